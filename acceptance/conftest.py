@@ -22,10 +22,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
-    """What lives by the computer's clock goes before other work; whether it got its time is part of its result.
+    """Put a test that lives by the computer's clock before other work.
+
+    Whether it got its time is part of its result.
 
     Raises:
-        MachineLateError: It failed, and did not.
+        MachineLateError: It failed, and did not get its time.
     """
     if item.get_closest_marker("real_time") is None:
         return (yield)

@@ -29,10 +29,10 @@ NEEDS_ROS = "deploy/demo/line_follower.py"
 
 
 class Reader:
-    """Plays chapters in order, each once; whoever asks for one gets those before it.
+    """Reader that plays chapters in order, each once; whoever asks for one gets those before it.
 
     Args:
-        shell: Where commands are typed.
+        shell: Shell in which commands are typed.
     """
 
     def __init__(self, shell: Shell) -> None:
@@ -56,7 +56,7 @@ class Reader:
 
 
 def needs_ros(step: object) -> bool:
-    """Whether a step starts ROS 2 nodes."""
+    """Return True if a step starts ROS 2 nodes."""
     return isinstance(step, Command) and NEEDS_ROS in step.text
 
 

@@ -21,7 +21,7 @@ EXTRAS = {
     "bridge": ("bridge", "view"),
 }
 BUILD = ("editables", "hatchling", "pip", "setuptools", "uv", "wheel")
-"""What installs the locks and builds wheels: ours, and of packages that have none."""
+"""Packages that install the locks and build wheels: ours, and those of packages that have none."""
 
 _HEADER = """\
 # What {what}: the lines of requirements.lock that it takes, written by deploy/lock_images.py (make lock).
@@ -65,7 +65,10 @@ def lock_of(entries: dict[str, str], needed: set[str], what: str) -> str:
 
 
 def closure(requirements: Iterable[str]) -> set[str]:
-    """What requirements name, and all that it needs in turn, as the installed packages say, on this kind of machine."""
+    """Return the packages that requirements name, and all that those need in turn.
+
+    The needs are as the installed packages say, on this kind of machine.
+    """
     found: set[str] = set()
     seen: set[tuple[str, tuple[str, ...]]] = set()
     waiting = [Requirement(text) for text in requirements]

@@ -36,6 +36,6 @@ def load_dd(name: str) -> ModuleType:
 
 
 def has_cudd() -> bool:
-    """Whether dd has its engine in C; nothing is loaded to find out."""
+    """Return True if dd has its engine in C; nothing is loaded to find out."""
     package = find_spec("dd")
     return package is not None and PathFinder.find_spec("dd.cudd", package.submodule_search_locations) is not None

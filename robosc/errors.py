@@ -19,7 +19,7 @@ from robosc.source import Bundle, Location, visible
 
 
 class Severity(StrEnum):
-    """How grave a finding is; only errors make a model unusable."""
+    """Severity of a finding; only errors make a model unusable."""
 
     ERROR = "error"
     WARNING = "warning"
@@ -41,9 +41,9 @@ class Diagnostic:
     Attributes:
         severity: Error, warning or note.
         code: Stable, documented code such as `unknown-name`.
-        message: What is wrong, one sentence without a full stop.
-        location: Where, or None where no text is at hand (a missing file).
-        mend: One sentence on how to mend it.
+        message: Description of what is wrong, one sentence without a full stop.
+        location: Place in the text, or None where no text is at hand (a missing file).
+        mend: One sentence on how to fix it.
         related: Other places that explain the finding.
     """
 

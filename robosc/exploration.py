@@ -46,7 +46,7 @@ class Graph:
     Attributes:
         name: The robot's name.
         initial: Number of the initial state.
-        columns: What a table calls the parts of a state: its components, variables and communications.
+        columns: Names of the parts of a state in a table: its components, variables and communications.
         states: States, breadth-first from the initial one; a state's number is its place.
         transitions: State, event, state: sorted by the first, then by event and by the values of the second.
     """
@@ -124,7 +124,7 @@ def _states(system: System, model: Model, graph: ControlledGraph) -> tuple[Graph
 
 
 def graph_columns(system: System, model: Model) -> tuple[str, ...]:
-    """What a table calls the parts of a state."""
+    """Return the names of the parts of a state in a table."""
     return tuple(_columns(system, model))
 
 
@@ -192,7 +192,7 @@ def graph_dot(graph: Graph) -> str:
 
 
 def _values(state: GraphState) -> list[str]:
-    """What a reader wants to see of a state: the value of each column."""
+    """Return what a reader wants to see of a state: the value of each column."""
     values = (*state.components, *state.variables, *state.communications)
     return [str(value).lower() if isinstance(value, bool) else str(value) for _, value in values]
 

@@ -9,11 +9,11 @@ _INDENT = 2
 
 
 def json_pieces(document: Mapping[str, object], *, is_ascii: bool = False) -> Iterator[str]:
-    """The text of a document in pieces, keys in the order given.
+    """Yield the text of a document in pieces, keys in the order given.
 
     Args:
         document: JSON values.
-        is_ascii: Whether other characters are escaped.
+        is_ascii: True if other characters are escaped.
     """
     yield from json.JSONEncoder(indent=_INDENT, ensure_ascii=is_ascii, allow_nan=False).iterencode(document)
     yield "\n"
@@ -25,7 +25,7 @@ def json_text(document: Mapping[str, object], *, is_ascii: bool = False) -> str:
 
 
 def counts(diagnostics: Sequence[Diagnostic]) -> dict[str, int]:
-    """How many errors, warnings and notes there are."""
+    """Return the numbers of errors, warnings and notes."""
     return {f"{severity}s": sum(diagnostic.severity is severity for diagnostic in diagnostics) for severity in Severity}
 
 

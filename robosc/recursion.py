@@ -1,4 +1,4 @@
-"""How deep Python may recurse: the limit belongs to the whole interpreter, so everyone who needs more asks here."""
+"""Limit of Python's recursion depth: it belongs to the whole interpreter, so everyone who needs more asks here."""
 
 import sys
 

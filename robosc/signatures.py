@@ -74,7 +74,7 @@ class PublicKey:
 
 
 def signature_file(supervisor: Path) -> Path:
-    """Where the signature of a supervisor file stands."""
+    """Return the path of the signature of a supervisor file."""
     return supervisor.with_name(supervisor.name + SIGNATURE_SUFFIX)
 
 
@@ -82,9 +82,9 @@ def make_key_pair(private: Path, public: Path, comment: str = "") -> PublicKey:
     """Make a new key pair and write it; no file is overwritten.
 
     Args:
-        private: Where the private key is to be; only its owner may read the file.
-        public: Where the public key is to be.
-        comment: Whose it is: one line.
+        private: Path of the new private key; only its owner may read the file.
+        public: Path of the new public key.
+        comment: Owner of the key: one line.
 
     Raises:
         OSError: A file is there already, or cannot be written; there is neither then.
@@ -137,11 +137,11 @@ def read_private_key(file: Path) -> "Ed25519PrivateKey":
 
 
 def read_public_keys(text: str, place: str) -> tuple[PublicKey, ...]:
-    """The public keys in a text: one on each line; empty lines and those that begin with # do not count.
+    """Return the public keys in a text: one on each line; empty lines and those that begin with # do not count.
 
     Args:
-        text: Such as the content of a file.
-        place: Where it stands, for messages.
+        text: Text such as the content of a file.
+        place: Place of the text, for messages.
 
     Raises:
         SignatureError: A line is no such key, or there is none.
@@ -165,12 +165,12 @@ def sign(data: bytes, key: "Ed25519PrivateKey") -> bytes:
 
 
 def signer(data: bytes, signature: bytes, trusted: Collection[PublicKey]) -> PublicKey:
-    """Which of the trusted keys has signed a supervisor file.
+    """Return the trusted key that has signed a supervisor file.
 
     Args:
         data: The bytes of the supervisor file.
         signature: Those of its signature file.
-        trusted: Whose signatures count.
+        trusted: Keys whose signatures count.
 
     Raises:
         UnknownSignerError: It is signed by another key.

@@ -69,7 +69,7 @@ class Bundle:
     Attributes:
         main: The file with the robot (or the library that is being checked).
         libraries: Other files, sorted by name.
-        searched: Where libraries were looked for, in words for an error message.
+        searched: Places where libraries were looked for, in words for an error message.
         interfaces: Definitions of middleware types that the files use, named like `std_msgs/msg/Bool.msg`, as far as
             they were found; they are checked against but are no part of the model.
     """

@@ -120,7 +120,7 @@ class Child:
     """A process that takes inputs.
 
     Attributes:
-        outcome: What became of the last input: `sound`, `refused`, `synthesized` or `failed`.
+        outcome: Outcome of the last input: `sound`, `refused`, `synthesized` or `failed`.
         memory: The most memory that the process had so far, in KiB.
     """
 
@@ -136,7 +136,7 @@ class Child:
         self._pipe.recv()
 
     def run(self, text: str) -> tuple[str, float]:
-        """Why an input failed (empty: it did not), and how many seconds it took."""
+        """Return the reason why an input failed (empty: it did not), and the seconds that it took."""
         begin = time.monotonic()
         self.outcome = "failed"
         try:

@@ -1,4 +1,4 @@
-"""What an environment may ask of random tests."""
+"""Effort and seed that an environment may ask of random tests."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What the README shows is true."""
+"""Checks that everything that the README shows is true."""
 
 import re
 import shlex

@@ -78,12 +78,12 @@ def free_port() -> str:
 
 @contextmanager
 def started(part: Part, scheduler: str, folder: Path) -> Iterator[None]:
-    """A scheduler or worker that is well, on loopback addresses.
+    """Run a healthy scheduler or worker on loopback addresses.
 
     Args:
-        part: Which one.
+        part: Part to start.
         scheduler: The port of the scheduler.
-        folder: For its log and temporary files.
+        folder: Folder for its log and temporary files.
     """
     folder.mkdir()
     dashboard, own = free_port(), free_port()

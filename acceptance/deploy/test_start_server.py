@@ -21,7 +21,7 @@ from support.units import read_unit
 UNIT = read_unit(TOP / "deploy" / "systemd" / "robosc-server.service")
 ADDRESS = "localhost:50051"
 DOCKER_GRACE_S = 10.0
-"""What `docker stop` waits for, unless it is told otherwise."""
+"""Time that `docker stop` waits, in seconds, unless it is given another."""
 
 CHECK = """
 import sys

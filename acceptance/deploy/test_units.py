@@ -15,7 +15,7 @@ needs_systemd = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reas
 
 
 def _verified(file: Path, folder: Path) -> str:
-    """What systemd says about a unit whose program is there; an instance stands for a template."""
+    """Return the findings of systemd about a unit whose program is there; an instance stands for a template."""
     program = folder / "program"
     program.write_text("#!/bin/sh\n")
     program.chmod(0o755)

@@ -28,7 +28,7 @@ def test_the_words_are_those_of_the_language() -> None:
 
 
 def batch(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    """What Emacs without a screen tells."""
+    """Run Emacs without a screen and return its output."""
     assert EMACS is not None
     command = [EMACS, "--batch", *arguments]
     return subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S, check=False)
@@ -57,7 +57,7 @@ def home(tmp_path: Path) -> Home:
 
 
 def is_attached(emacs: Emacs) -> bool:
-    """Whether a server answers for what is shown."""
+    """Return True if a server answers for the text that is shown."""
     return emacs.ask("(and (fboundp 'eglot-current-server) (eglot-current-server) t)") is True
 
 
@@ -70,7 +70,7 @@ def emacs(eglot: None, home: Home) -> Iterator[Emacs]:
 
 
 def finds(emacs: Emacs, told: str, words: str) -> bool:
-    """Whether something is found before long."""
+    """Return True if something is found before long."""
     return eventually(lambda: any(told in text and found == words for text, found in emacs.findings))
 
 

@@ -49,7 +49,7 @@ CLIENTS = """
 
 
 def is_attached(nvim: Neovim) -> bool:
-    """Whether a server answers for what is shown."""
+    """Return True if a server answers for the text that is shown."""
     return len(nvim.lua(CLIENTS)) == 1
 
 
@@ -62,7 +62,7 @@ def nvim(home: Home) -> Iterator[Neovim]:
 
 
 def finds(nvim: Neovim, code: str, words: str) -> bool:
-    """Whether something is found before long."""
+    """Return True if something is found before long."""
     return eventually(lambda: (code, words) in nvim.findings)
 
 

@@ -15,7 +15,7 @@ LIMIT_S = 180.0
 
 @pytest.fixture
 def output_folder(tmp_path: Path) -> Path:
-    """Where its results go; it makes it itself."""
+    """Folder for the results of the demonstration, which makes it itself."""
     return tmp_path / "out"
 
 

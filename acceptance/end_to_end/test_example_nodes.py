@@ -1,4 +1,4 @@
-"""What the example robots' nodes do when something goes wrong: each as a process over DDS."""
+"""Behaviour of the example robots' nodes when something goes wrong: each as a process over DDS."""
 
 import math
 import os
@@ -209,7 +209,7 @@ def test_a_blind_person_detector_takes_it_that_somebody_may_stand_there(at: Stag
 
 @pytest.fixture
 def panel(at: Stage) -> SimpleNamespace:
-    """What the panel's listeners have heard."""
+    """Messages that the panel's listeners have heard."""
     from std_msgs.msg import Empty
 
     topics = {"stop": "/emergency_stop/stop", "resume": "/emergency_stop/resume", "button": "/button"}

@@ -86,7 +86,7 @@ def require_that_a_careless_controller_is_supervised(porter: Porter) -> None:
 
 
 def told(output: str) -> list[Any]:
-    """What a careless controller was told."""
+    """Return everything that was reported to a careless controller."""
     return [json.loads(line) for line in output.splitlines() if line.startswith("[")]
 
 

@@ -128,7 +128,7 @@ class Robot:
 
 
 def entries(folder: Path) -> list[Any]:
-    """What stands in the one event log of a folder."""
+    """Return the entries of the one event log in a folder."""
     (log,) = folder.iterdir()
     return [json.loads(line) for line in log.read_text().splitlines()]
 

@@ -342,7 +342,7 @@ def test_the_supervisor_cancels_a_goal_that_is_no_longer_allowed(courier: Courie
 
 
 def test_a_goal_is_cancelled_before_its_server_accepts_it(courier: Courier) -> None:
-    """What actionlib calls recalled: the server has the goal, but has not begun."""
+    """Cancel a goal so that it is what actionlib calls recalled: the server has the goal, but has not begun."""
     host = start_counting(courier, accepts="later")
     courier.allow(False)
     courier.reaches("Counter", "cancelled")

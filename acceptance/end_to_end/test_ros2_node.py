@@ -222,7 +222,7 @@ def test_the_state_is_published_as_semantics_says(start: StartNode, peer: Peer) 
         return json.loads(states[-1].data)
 
     def heard() -> bool:
-        """Whether the node has heard both topics, of which either may reach it first."""
+        """Return True if the node has heard both topics, of which either may reach it first."""
         if not states:
             return False
         current = content()["current"]

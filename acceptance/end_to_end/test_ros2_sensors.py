@@ -1,4 +1,4 @@
-"""What a generated ROS 2 node makes of sensors, on real topics: scans in degrees, diagnostics, one subscription."""
+"""Handling of sensors by a generated ROS 2 node, on real topics: scans in degrees, diagnostics, one subscription."""
 
 import json
 import math
@@ -103,7 +103,7 @@ def scan(count: int, first_deg: float, step_deg: float, near: float = 0.5) -> An
 
 
 class Watched:
-    """What the node says of itself."""
+    """Reports of the node about itself."""
 
     def __init__(self, peer: Peer) -> None:
         from diagnostic_msgs.msg import DiagnosticArray

@@ -173,7 +173,10 @@ def start_counting(courier: Courier, server: HeldAction, *parameters: str) -> No
 
 
 def server_is_seen(courier: Courier, action: str) -> Callable[[], bool]:
-    """Whether the node's client of an action and its server here know of each other, as far as can be seen here."""
+    """Return the condition that the node's client of an action and its server here know of each other.
+
+    It holds as far as can be seen here.
+    """
     return lambda: courier.peer.node.count_subscribers(f"{action}/_action/feedback") > 0
 
 

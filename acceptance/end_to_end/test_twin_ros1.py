@@ -224,7 +224,7 @@ def test_the_maze_solver_gets_out_of_the_spiral(tmp_path: Path, record_property:
 
 
 def blocked(outcome: Outcome) -> int:
-    """How many velocities were held back."""
+    """Return the number of velocities that were held back."""
     return sum('"kind":"blocked"' in line for line in outcome.event_log.read_text().splitlines())
 
 

@@ -47,7 +47,7 @@ def launched(master: Master, folder: Path, *arguments: str) -> Process:
 
 
 def motion_of(path: Path) -> Motion | None:
-    """What was written until now; None: nothing."""
+    """Return the motion that was written until now; None: nothing."""
     try:
         return read_motion(path)
     except (MotionError, OSError):

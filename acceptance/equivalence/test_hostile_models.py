@@ -40,7 +40,7 @@ def hostile(seed: int, canary: Path, *, is_on_ros: bool = True) -> Supervisor:
 
 
 def check_files(files: GeneratedFiles, folder: Path) -> None:
-    """Whatever reads each kind of file takes it."""
+    """Check that every reader of each kind of file accepts it."""
     write_files(files, folder)
     for path, text in files.items():
         match Path(path).suffix:
@@ -59,7 +59,7 @@ def check_files(files: GeneratedFiles, folder: Path) -> None:
 
 
 def run_own_tests(files: GeneratedFiles, folder: Path) -> None:
-    """What a user would run of a Python package of ROS."""
+    """Run everything that a user would run of a Python package of ROS."""
     if "setup.py" in files:
         if "CMakeLists.txt" not in files:  # That of a catkin package needs catkin.
             subprocess.run([sys.executable, "setup.py", "--name"], cwd=folder, check=True, capture_output=True)

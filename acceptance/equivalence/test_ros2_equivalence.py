@@ -132,7 +132,7 @@ def test_what_a_request_leaves_out_has_its_default(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("robot", ["line_follower", "maze_solver"])
 def test_a_node_that_decides_by_its_own_timer(robot: str, tmp_path: Path) -> None:
-    """When it decided is known from its log afterwards: the reference, deciding then, must have done the same.
+    """Read from its log afterwards when it decided: the reference, deciding then, must have done the same.
 
     With every request in a list of priorities a decision that issues nothing leaves no trace in the controller.
     """

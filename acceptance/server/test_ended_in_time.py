@@ -71,7 +71,7 @@ def busy_worker_of(server: int) -> int:
 
 
 def gone_at(descriptor: int) -> float:
-    """When a process is no more: `poll` says so the moment it is."""
+    """Return the time when a process is no more: `poll` says so the moment it is."""
     poll = select.poll()
     poll.register(descriptor, select.POLLIN)
     assert poll.poll(PATIENCE_S * 1e3)

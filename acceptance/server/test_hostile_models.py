@@ -40,7 +40,7 @@ class Server:
         self._answered = 0
 
     def refusal(self, text: str) -> tuple[str, str]:
-        """How a synthesis for the stranger ends: the name of its code, and the reason."""
+        """Return the end of a synthesis for the stranger: the name of its code, and the reason."""
         request = small_request(TaskKind.SYNTHESIZE, text)
         with pytest.raises(grpc.RpcError) as refused:
             for _ in self.synthesis.Synthesize(request, timeout=PATIENCE_S, **self.stranger):

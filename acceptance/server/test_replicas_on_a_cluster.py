@@ -36,10 +36,10 @@ _LONG_BITS = 10
 
 @dataclass(frozen=True)
 class Site:
-    """What servers share.
+    """Resources that servers share.
 
     Attributes:
-        cluster: Who works for them.
+        cluster: Cluster that works for them.
         database: The URL of their database.
     """
 
@@ -99,7 +99,7 @@ def long_bundle(name: str) -> Bundle:
 
 
 def supervisor_of(model: Path, folder: Path) -> bytes:
-    """What `robosc synth` writes."""
+    """Return the content of the file that `robosc synth` writes."""
     file = folder / f"{model.stem}.rsup"
     assert main(["synth", str(model), "-o", str(file)]) == 0
     return file.read_bytes()

@@ -31,7 +31,7 @@ from support.small_disks import fill, small_disk
 from support.waiting import PATIENCE_S, until
 
 _REFUSED_WITHIN_S = 12.0
-"""What does not answer is given up after 8 seconds."""
+"""Time limit of a refusal, in seconds: anything that does not answer is given up after 8 seconds."""
 
 _GOES_ON_S = 4.0
 _AT_ONCE_S = 1.5
@@ -61,7 +61,7 @@ class Calls:
         (self.folder / name).touch()
 
     def begun(self, text: str) -> int:
-        """How often a task was begun."""
+        """Return the number of times that a task was begun."""
         path = self.folder / "begun"
         lines = Counter(path.read_text().splitlines() if path.exists() else ())
         return lines[hashlib.sha256(text.encode()).hexdigest()]

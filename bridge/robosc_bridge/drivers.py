@@ -20,7 +20,7 @@ ENTRY_POINT_GROUP = "robosc_bridge.devices"
 
 
 class Kind(StrEnum):
-    """What a driver is one of."""
+    """Kind of device that a driver is for."""
 
     DRIVE_BASE = "drive base"
     RANGE_SCANNER = "range scanner"
@@ -32,15 +32,16 @@ PANEL = ("button_1", "button_2", "bumper_1", "bumper_2")
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What a device has, beside what all of its kind have.
+    """Features of a device, beside those that all of its kind have.
 
     Attributes:
-        buttons: Names that its readings tell; those of bumpers are `bumper_1` (in front) and `bumper_2` (behind).
-        has_imu: Whether its readings tell accelerations and turn rates.
-        needs_turtlebot3: Whether its argument `robot` is a `devices.robots.Robot`, whose motors or board it drives;
+        buttons: Names in its readings; those of bumpers are `bumper_1` (in front) and `bumper_2` (behind).
+        has_imu: True if its readings report accelerations and turn rates.
+        needs_turtlebot3: True if its argument `robot` is a `devices.robots.Robot`, whose motors or board it drives;
             else it is a `devices.robots.Body`, and the robot may be any.
-        turn_s: How long a turn of a range scanner takes; None: that is not known.
-        torque_on_s: Within which motors that are told to hold do so and tell it; None: as the safety layer has it.
+        turn_s: Time that a turn of a range scanner takes, in seconds; None: that is not known.
+        torque_on_s: Time within which motors that are told to hold do so and report it, in seconds; None: as the
+            safety layer has it.
     """
 
     buttons: tuple[str, ...] = ()
@@ -51,21 +52,21 @@ class Facts:
 
     @property
     def has_bumpers(self) -> bool:
-        """Whether it tells of any."""
+        """True if it reports any bumpers."""
         return any(name.startswith("bumper_") for name in self.buttons)
 
 
 @dataclass(frozen=True, slots=True)
 class Driver:
-    """A driver: what it drives, and how one is made.
+    """A driver: the device that it drives, and the way to make one.
 
     Attributes:
-        kind: What it is one of; `make` returns a `DriveBase` or a `RangeScanner` accordingly.
-        name: What it is asked for by.
+        kind: Kind of device; `make` returns a `DriveBase` or a `RangeScanner` accordingly.
+        name: Name that it is asked for by.
         description: One line for a person.
-        make: Makes one, without opening anything. Its arguments are `path`, of a drive base `robot`, and the options of
-            the configuration, which are the driver's own.
-        facts: None: it does not say, and whatever a configuration ties is taken to be there.
+        make: Function that makes one, without opening anything. Its arguments are `path`, of a drive base `robot`,
+            and the options of the configuration, which are the driver's own.
+        facts: Features of the device; None: it does not say, and whatever a configuration ties is taken to be there.
     """
 
     kind: Kind
@@ -159,7 +160,10 @@ def available_drivers(kind: Kind) -> tuple[DriverInfo, ...]:
 
 
 def facts_of(name: str, kind: Kind = Kind.DRIVE_BASE) -> Facts | None:
-    """What a device has; None: its driver does not say, or there is none of that name, which is told elsewhere."""
+    """Return the features of a device; None: its driver does not say, or there is none of that name.
+
+    A missing driver is reported elsewhere.
+    """
     if (kind, name) not in _registered and name in _BUILT_IN[kind]:
         return _BUILT_IN[kind][name][2]
     try:

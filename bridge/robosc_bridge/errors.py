@@ -1,4 +1,4 @@
-"""What can go wrong between the bridge and the world.
+"""Errors between the bridge and the world.
 
     BridgeError
     |-- LineError               a serial line or a camera cannot be used
@@ -8,8 +8,8 @@
     |   `-- LineLostError       it was open and is gone: unplugged, hung up
     `-- DeviceError             something answers, and not as the device should
         |-- DeviceSilentError   it does not answer in time
-        |-- WrongDeviceError    another kind of device, another id, another firmware, another setting than can be driven
-        `-- DeviceFaultError    it tells a fault of its own, which a person must see to
+        |-- WrongDeviceError    another kind of device, another id, firmware or setting than can be driven
+        `-- DeviceFaultError    it reports a fault of its own, which a person must see to
 
 Whatever pyserial, termios, dynamixel-sdk or pymavlink raise is translated into one of these where it is first met.
 Malformed bytes from a wire are none: they are counted and dropped.
@@ -21,11 +21,11 @@ class BridgeError(Exception):
 
 
 class LineError(BridgeError):
-    """A serial line or a camera cannot be used.
+    """Error that a serial line or a camera cannot be used.
 
     Args:
-        path: Of the port.
-        problem: What is wrong, without the path.
+        path: Path of the port.
+        problem: Description of what is wrong, without the path.
     """
 
     def __init__(self, path: str, problem: str) -> None:

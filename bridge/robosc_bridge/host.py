@@ -50,7 +50,7 @@ class Thread(Protocol):
         """Wait for its end."""
 
     def is_alive(self) -> bool:
-        """Whether it has begun and not ended."""
+        """Return True if it has begun and not ended."""
 
 
 class Queue[Item](Protocol):
@@ -74,7 +74,7 @@ class Queue[Item](Protocol):
         """
 
     def qsize(self) -> int:
-        """How many items are there."""
+        """Return the number of items."""
 
 
 class Port(Protocol):
@@ -115,7 +115,7 @@ class NetworkPort(ABC):
 
     Attributes:
         path: The address.
-        is_datagram: Whether a read is one whole datagram.
+        is_datagram: True if a read is one whole datagram.
     """
 
     path: str

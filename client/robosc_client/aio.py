@@ -75,8 +75,8 @@ class AsyncClient:
         Args:
             address: `HOST:PORT`.
             credentials: Certificates and token; None: neither.
-            retries: How often and when calls are made again.
-            sleep: Waits for so many seconds without holding up others.
+            retries: Policy of how often and when calls are made again.
+            sleep: Function that waits for so many seconds without holding up others.
             channel_options: More options of gRPC's channels, such as `grpc.use_local_subchannel_pool`.
 
         Raises:

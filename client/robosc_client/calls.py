@@ -24,7 +24,7 @@ MAXIMUM_PAGE = 1000
 """Jobs that one answer lists."""
 
 LOST = Failure(grpc.StatusCode.UNAVAILABLE, "the watch ended before the job")
-"""How a watch has failed that ends well before its job does."""
+"""Failure of a watch that ends without an error before its job does."""
 
 _EMPTY_PAGES = 100
 
@@ -42,11 +42,11 @@ class Operation[Result]:
     Attributes:
         method: Name of the method.
         request: The request message.
-        assembly: Makes what puts an answer together; each attempt needs another.
-        is_stream: Whether the answer is a stream of messages.
-        is_about_jobs: Whether the method is of the service for jobs.
+        assembly: Function that makes the assembly of an answer; each attempt needs another.
+        is_stream: True if the answer is a stream of messages.
+        is_about_jobs: True if the method is of the service for jobs.
         deadline_s: Seconds for all attempts together; None: any number.
-        on_progress: Told where the work is.
+        on_progress: Callback that receives the progress.
     """
 
     method: str
@@ -62,12 +62,12 @@ class Course[Result]:
     """One operation on its way to its result."""
 
     def __init__(self, operation: Operation[Result], policy: RetryPolicy, address: str) -> None:
-        """Begin.
+        """Prepare the operation.
 
         Args:
-            operation: What is called.
-            policy: How often and when.
-            address: Whom it is called of, for messages.
+            operation: Operation that is called.
+            policy: Policy of how often and when.
+            address: Address of the server that is called, for messages.
         """
         self._operation = operation
         self._attempts = Attempts(policy, address, operation.deadline_s)
@@ -92,7 +92,10 @@ class Course[Result]:
             self._operation.on_progress(progress)
 
     def result(self) -> Result:
-        """What it was called for, once the attempt's messages have ended; raises ServiceError where it is not whole."""
+        """Return the operation's result, once the attempt's messages have ended.
+
+        Raises ServiceError where it is not whole.
+        """
         return self._assembly.result()
 
     def failed(self, error: grpc.RpcError) -> float:
@@ -174,7 +177,7 @@ class Watching:
     """One job's changes, over as many connections as it takes.
 
     Attributes:
-        is_over: Whether the job has ended.
+        is_over: True if the job has ended.
     """
 
     def __init__(self, job_id: str, after_revision: int = 0, deadline_s: float | None = None) -> None:
@@ -184,7 +187,7 @@ class Watching:
         self.is_over = False
 
     def attempts(self, policy: RetryPolicy, address: str) -> Attempts:
-        """How often and when it is asked for."""
+        """Return the attempts: how often and when the changes are asked for."""
         return Attempts(policy, address, self._deadline_s, is_watch=True)
 
     def operation(self) -> Operation[Job]:

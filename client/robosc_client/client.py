@@ -21,7 +21,7 @@ from robosc_client.methods import described
 from robosc_client.retry import DEFAULT_RETRIES, RetryPolicy
 
 _PARTING_S = 0.5
-"""How long an interrupted program waits for the end of its connection."""
+"""Time that an interrupted program waits for the end of its connection, in seconds."""
 
 
 def _answered[**P, Result](describe: Callable[P, Operation[Result]]) -> "Callable[Concatenate[Client, P], Result]":
@@ -75,8 +75,8 @@ class Client:
         Args:
             address: `HOST:PORT`.
             credentials: Certificates and token; None: neither.
-            retries: How often and when calls are made again.
-            sleep: Waits for so many seconds.
+            retries: Policy of how often and when calls are made again.
+            sleep: Function that waits for so many seconds.
             channel_options: More options of gRPC's channels, such as `grpc.use_local_subchannel_pool`.
 
         Raises:

@@ -1,4 +1,4 @@
-"""What both clients ask of their channels."""
+"""Options that both clients ask of their channels."""
 
 from robosc_client.convert.assembly import MAXIMUM_BYTES
 

@@ -1,4 +1,4 @@
-"""What can go wrong between client and server; callers never see a raw gRPC error.
+"""Errors between client and server; callers never see a raw gRPC error.
 
 ClientError
 |-- ServerUnavailableError   nobody answers at the address     (also a ConnectionError)
@@ -15,8 +15,8 @@ class ClientError(Exception):
     """Root of every error of the client; its text is one sentence for people.
 
     Attributes:
-        reason: Why, in the server's words: a word such as `SERVER_BUSY`, documented in the API; empty where the server
-            has told none.
+        reason: Reason in the server's words: a word such as `SERVER_BUSY`, documented in the API; empty where the
+            server has given none.
     """
 
     def __init__(self, message: str, reason: str = "") -> None:
@@ -44,7 +44,7 @@ class ServerBusyError(RequestRefusedError):
     """The server has too much to do, or this caller asks for too much; later may be better.
 
     Attributes:
-        retry_after_s: When the server would be asked again; None: it has not told.
+        retry_after_s: Seconds after which the server would be asked again; None: it has not said.
     """
 
     def __init__(self, message: str, reason: str = "", retry_after_s: float | None = None) -> None:

@@ -14,7 +14,7 @@ MAXIMUM_IDEMPOTENCY_KEY = 128
 
 
 class TaskKind(StrEnum):
-    """What a task is."""
+    """Kind of a task."""
 
     CHECK = "check"
     SYNTHESIZE = "synthesize"
@@ -25,7 +25,7 @@ class TaskKind(StrEnum):
 
 
 class JobState(StrEnum):
-    """Where a job is."""
+    """State of a job."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -36,13 +36,13 @@ class JobState(StrEnum):
 
     @property
     def has_ended(self) -> bool:
-        """Whether it stays so."""
+        """True if the state does not change any more."""
         return self not in (JobState.QUEUED, JobState.RUNNING)
 
 
 @dataclass(frozen=True, slots=True)
 class JobFailure:
-    """Why a job has failed.
+    """Reason why a job has failed.
 
     Attributes:
         reason: The word for it, such as `CPU_LIMIT`.
@@ -59,20 +59,20 @@ class Job:
 
     Attributes:
         id: Its id.
-        owner: Whose it is.
-        kind: What its task is.
-        state: Where it is.
-        revision: Grows with each change.
+        owner: Owner of the job.
+        kind: Kind of its task.
+        state: State of the job.
+        revision: Number that grows with each change.
         main_file: Name of the main file.
-        label: What its submitter calls it.
-        created: When it was accepted.
-        started: When a worker began, or None.
-        ended: When it ended, or None.
-        expires: When it and its result are forgotten, or None.
-        attempts: How often a worker has begun.
-        progress: Where the work is, or None.
-        failure: Why it has failed, or None.
-        from_store: Whether the result is an earlier one of the same request.
+        label: Submitter's name for the job.
+        created: Time of its acceptance.
+        started: Time at which a worker began, or None.
+        ended: Time of its end, or None.
+        expires: Time at which it and its result are forgotten, or None.
+        attempts: Number of times that a worker has begun.
+        progress: Progress of the work, or None.
+        failure: Reason why it has failed, or None.
+        from_store: True if the result is an earlier one of the same request.
         waiting_before: Jobs that wait before it.
     """
 
@@ -96,11 +96,11 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Submission:
-    """What became of a task that was submitted.
+    """Outcome of the submission of a task.
 
     Attributes:
         job: The job.
-        existed: Whether it was there before, by its idempotency key.
+        existed: True if it was there before, by its idempotency key.
     """
 
     job: Job

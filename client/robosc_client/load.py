@@ -26,11 +26,11 @@ _SETTLING_S = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What is asked.
+    """Calls that make up a load.
 
     Attributes:
         method: The method's whole name, such as `/robosc_api.v1.SynthesisService/Check`.
-        is_stream: Whether it answers with a stream.
+        is_stream: True if it answers with a stream.
         request: The serialized request of the call of a number.
         concurrency: Callers, each with one call at a time.
         count: Calls in all; None: as many as there is time for.
@@ -51,14 +51,14 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What came of it.
+    """Result of a load.
 
     Attributes:
-        seconds: From the first call's beginning to the last one's end.
-        times_s: Of each call that was answered well, sorted.
+        seconds: Time from the first call's beginning to the last one's end.
+        times_s: Time of each call that was answered well, sorted.
         answer_bytes: Bytes of all answers.
-        errors: How many calls failed, by the reason in the server's words, or by gRPC's status.
-        is_interrupted: Whether it was cancelled: calls under way then do not count.
+        errors: Number of failed calls, by the reason in the server's words, or by gRPC's status.
+        is_interrupted: True if it was cancelled: calls under way then do not count.
     """
 
     seconds: float

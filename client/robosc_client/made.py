@@ -1,4 +1,4 @@
-"""What a server answers, as the values that `robosc` itself would have made: so both print and write the same."""
+"""Answers of a server, as the values that `robosc` itself would have made: so both print and write the same."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
@@ -23,10 +23,10 @@ from robosc_client.results import Exploration, Generation, StateGraph, Synthesis
 
 
 def made_of(result: Synthesis | Generation | Exploration, content: bytes = b"") -> Made:
-    """What the server made.
+    """Return what the server made.
 
     Args:
-        result: How a synthesis ended.
+        result: Result of a synthesis.
         content: The supervisor's file; empty: there is none.
 
     Raises:
@@ -168,12 +168,12 @@ def verdicts_of(
     texts: Sequence[SourceFile],
     listings: Sequence[SourceFile],
 ) -> tuple[tuple[Verdict, ...], System, Model]:
-    """The server's verdicts about properties, and what they are about.
+    """Return the server's verdicts about properties, and what they are about.
 
     Args:
         report: Its report.
         bundle: The model and its libraries.
-        deployment: Where the supervisor stands.
+        deployment: Place where the supervisor stands.
         texts: Properties, one each.
         listings: Files of properties.
 

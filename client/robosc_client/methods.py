@@ -8,13 +8,13 @@ from typing import Any, get_args
 def described[Method: Callable[..., Any]](
     method: Method, description: Callable[..., Any], of: str, returns: Any = None
 ) -> Method:
-    """A method that is called and documented as what describes it.
+    """Return a method that is called and documented as the function that describes it.
 
     Args:
         method: The method.
         description: The function that describes it, but for `self`.
         of: Name of the client's class.
-        returns: What the method returns; None: what the operation that the function returns is one of.
+        returns: Type that the method returns; None: the result type of the operation that the function returns.
     """
     signature = inspect.signature(description)
     own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY)

@@ -1,4 +1,4 @@
-"""What each method of a client is: its arguments, what it calls, and how its answer is put together.
+"""Methods of a client: their arguments, what they call, and how their answers are put together.
 
 These functions are the one description of the methods of both clients, which take their names, arguments and
 documentation over: `robosc_client.client` has them done for threads, `robosc_client.aio` for asyncio.
@@ -83,8 +83,8 @@ def generate(
     Args:
         bundle: The model and its libraries.
         target: Name of the target, or `all`.
-        generation: What is chosen about the files.
-        options: How the supervisor is made.
+        generation: Choices about the files.
+        options: Options for making the supervisor.
         deadline_s: See the class.
         on_progress: See the class.
     """
@@ -131,13 +131,13 @@ def _work[Result](
 
 
 def list_targets(*, deadline_s: float | None = None) -> Operation[tuple[TargetInfo, ...]]:
-    """What can be generated, sorted by name."""
+    """Return the targets that can be generated, sorted by name."""
     request = pb.ListTargetsRequest()
     return Operation("ListTargets", request, lambda: Whole(answers.targets_of), deadline_s=deadline_s)
 
 
 def get_version(*, deadline_s: float | None = None) -> Operation[ServerInfo]:
-    """What the server is, and its limits."""
+    """Return information about the server, and its limits."""
     request = pb.GetVersionRequest()
     return Operation("GetVersion", request, lambda: Whole(answers.server_info_of), deadline_s=deadline_s)
 
@@ -156,10 +156,10 @@ def submit(
     """Have a task done without waiting for it; once this returns, the server keeps the job.
 
     Args:
-        task: What is to be done.
-        label: What it is called in lists.
+        task: Task to be done.
+        label: Name of the job in lists.
         idempotency_key: The same key again gives the same job; None: a new key.
-        retention_s: How long the job is kept after its end; None: as long as the server keeps jobs.
+        retention_s: Time for which the job is kept after its end; None: as long as the server keeps jobs.
         deadline_s: See the class; it is about the submission, not about the task.
     """
     # With a key, the call may be made again.
@@ -169,7 +169,7 @@ def submit(
 
 
 def get_job(job_id: str, *, deadline_s: float | None = None) -> Operation[Job]:
-    """Where a job is."""
+    """Return the current state of a job."""
     return _about_jobs("GetJob", jobs_pb2.GetJobRequest(id=job_id), about(job_id), deadline_s)
 
 
@@ -202,12 +202,12 @@ def list_jobs(
     page_size: int = 100,
     deadline_s: float | None = None,
 ) -> Listing:
-    """Jobs, the youngest first, asked for page by page.
+    """List jobs, the youngest first, asked for page by page.
 
     Args:
         states: Only jobs in these; empty: in any.
         kind: Only jobs of this kind; None: of any.
-        all_owners: Whether those of other callers are wanted, too; for a token with the scope `admin`.
+        all_owners: True if those of other callers are wanted, too; for a token with the scope `admin`.
         page_size: Jobs that are asked for at once.
         deadline_s: See the class; for each page.
     """
@@ -215,11 +215,12 @@ def list_jobs(
 
 
 def job_result(job_id: str, *, kind: TaskKind | None = None, deadline_s: float | None = None) -> Operation[TaskResult]:
-    """What a job that has succeeded has found: as the method for its task would have returned it.
+    """Return the result of a job that has succeeded, as the method for its task would have returned it.
 
     Args:
         job_id: Its id.
-        kind: What its task is, as `submit` or `get_job` have told: a result of another kind is refused; None: any.
+        kind: Kind of its task, as `submit` or `get_job` have reported: a result of another kind is refused; None:
+            any.
         deadline_s: See the class.
     """
     request = jobs_pb2.GetJobResultRequest(id=job_id)

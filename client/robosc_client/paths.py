@@ -18,11 +18,11 @@ _DEVICES = frozenset(
     ["con", "prn", "aux", "nul", "conin$", "conout$"]
     + [f"{name}{number}" for name in ("com", "lpt") for number in "0123456789¹²³"]
 )
-"""What Windows takes for a device, whatever its extension."""
+"""Names that Windows takes for a device, whatever their extension."""
 
 
 def path_problem(path: str) -> str:
-    """What is wrong with one path; empty: nothing."""
+    """Return the problem with one path; empty: none."""
     try:
         length = len(path.encode("utf-8"))
     except UnicodeEncodeError:
@@ -45,9 +45,10 @@ def path_problem(path: str) -> str:
 
 
 def paths_problem(paths: Iterable[str]) -> str:
-    """What is wrong with some paths, together; empty: nothing.
+    """Return the problem with some paths, together; empty: none.
 
-    Two names that differ in case, or in how their letters are composed, are one file on some systems; and a file cannot
+    Two names that differ in case, or in how their letters are composed, are one file on some systems; and a file
+    cannot
     be the folder of another.
     """
     files: set[str] = set()

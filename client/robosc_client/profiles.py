@@ -36,11 +36,11 @@ _PATHS = ("ca", "certificate", "key", "token_file")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Profile:
-    """How a server is reached.
+    """Way to reach a server.
 
     Attributes:
         server: HOST:PORT.
-        tls: With TLS, believing the usual certificate authorities; a CA or certificate implies TLS.
+        tls: True to use TLS, believing the usual certificate authorities; a CA or certificate implies TLS.
         ca: Certificates (PEM) that are believed instead.
         certificate: Own chain of certificates (PEM).
         key: Its private key.
@@ -74,7 +74,7 @@ class Profiles:
 
 
 def is_address(text: str) -> bool:
-    """Whether a text is HOST:PORT."""
+    """Return True if a text is HOST:PORT."""
     match = _ADDRESS.match(text)
     return match is not None and 0 < int(match[2]) <= 65535
 
@@ -89,7 +89,7 @@ def settings_folder() -> Path:
 
 
 def profiles_file() -> Path:
-    """Where the profiles stand."""
+    """Return the path of the file with the profiles."""
     return settings_folder() / "client.toml"
 
 
@@ -120,11 +120,11 @@ def add_profile(name: str, profile: Profile, *, token: str | None = None, is_def
     """Write a profile.
 
     Args:
-        name: What it is called.
-        profile: What it says.
+        name: Name of the profile.
+        profile: Content of the profile.
         token: A token that is kept in a file of its own, which the profile then names; None: there is none to keep.
-        is_default: Whether it is the one that is used where none is named; the first one always is.
-        replaces: Whether one of that name may be there.
+        is_default: True if it is the one that is used where none is named; the first one always is.
+        replaces: True if one of that name may be there.
 
     Raises:
         UsageError: The name is none, or taken; or a file cannot be written.

@@ -1,4 +1,4 @@
-"""What the service answers, as values."""
+"""Answers of the service, as values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from robosc.targets import GeneratedFiles
 
 
 class SynthesisStatus(StrEnum):
-    """How an attempt to make a supervisor ended."""
+    """Outcome of an attempt to make a supervisor."""
 
     SUPERVISOR = "supervisor"
     EMPTY = "empty"
@@ -25,7 +25,7 @@ class SynthesisStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where long work is.
+    """Progress of long work.
 
     Attributes:
         stage: `check`, `synthesis`, `verification` or `controller`.
@@ -76,19 +76,19 @@ class Statistics:
 
 @dataclass(frozen=True, slots=True)
 class Synthesis:
-    """How a synthesis ended.
+    """Result of a synthesis.
 
     Attributes:
-        status: How it ended.
+        status: Outcome of the synthesis.
         diagnostics: Every finding about the model, sorted by place.
-        reason: Why there is no supervisor, in one sentence; empty where there is one.
+        reason: Reason why there is no supervisor, in one sentence; empty where there is one.
         supervisor: The supervisor's file (`.rsup`), as the server meant it: its digest was checked; empty where there
             is none. Untrusted: decode it with `robosc.supervisor.decode`, which validates it.
         summary: The supervisor in figures and words, or None where there is none.
         statistics: Figures of the work, or None where there was no synthesis.
-        explanation: What is to blame that no supervisor exists, or None where there is nothing to explain.
+        explanation: Explanation of why no supervisor exists, or None where there is nothing to explain.
         signature: Content of the file's signature (`.rsup.sig`), as the server made it; empty where it signs nothing.
-            Untrusted: `robosc.signatures.signer` tells whose it is.
+            Untrusted: `robosc.signatures.signer` returns whose it is.
     """
 
     status: SynthesisStatus
@@ -103,15 +103,15 @@ class Synthesis:
 
 @dataclass(frozen=True, slots=True)
 class Generation:
-    """What was generated.
+    """Result of a generation.
 
     Attributes:
-        status: How the synthesis ended.
+        status: Outcome of the synthesis.
         diagnostics: Every finding about the model, sorted by place.
-        reason: Why there are no files, in one sentence; empty where there are.
+        reason: Reason why there are no files, in one sentence; empty where there are.
         files: The files, or None where there are none; `robosc.targets.write_files` writes them. Their digests and
             names were checked.
-        explanation: What is to blame that no supervisor exists, or None where there is nothing to explain.
+        explanation: Explanation of why no supervisor exists, or None where there is nothing to explain.
     """
 
     status: SynthesisStatus
@@ -127,7 +127,7 @@ class StateValues(msgspec.Struct, frozen=True, gc=False):
     Attributes:
         components: State of every component with a behaviour, by its name.
         variables: Value of every synthesis variable, by `Component.variable`.
-        communications: Where every service and action is, by its name.
+        communications: Location of every service and action, by its name.
         enabled: Events that can happen here, sorted by name.
     """
 
@@ -153,14 +153,14 @@ class StateGraph(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Exploration:
-    """How an exploration ended.
+    """Result of an exploration.
 
     Attributes:
-        status: How the synthesis ended.
+        status: Outcome of the synthesis.
         diagnostics: Every finding about the model, sorted by place.
-        reason: Why there is no graph, in one sentence; empty where there is one.
+        reason: Reason why there is no graph, in one sentence; empty where there is one.
         graph: The graph, or None.
-        explanation: What is to blame that no supervisor exists, or None where there is nothing to explain.
+        explanation: Explanation of why no supervisor exists, or None where there is nothing to explain.
     """
 
     status: SynthesisStatus
@@ -171,7 +171,7 @@ class Exploration:
 
 
 class VerificationStatus(StrEnum):
-    """What a verification found."""
+    """Outcome of a verification."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -186,13 +186,13 @@ class VerificationStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """How a verification ended.
+    """Result of a verification.
 
     Attributes:
-        status: What was found.
+        status: Outcome of the verification.
         diagnostics: Every finding about the model or the properties, sorted by place.
-        reason: Why there is no verdict, in one sentence; empty where there is one.
-        report: What `robosc verify --json` prints, as values.
+        reason: Reason why there is no verdict, in one sentence; empty where there is one.
+        report: Output of `robosc verify --json`, as values.
     """
 
     status: VerificationStatus
@@ -216,19 +216,19 @@ class Formatted:
 
 @dataclass(frozen=True, slots=True)
 class ServerLimits:
-    """What a server takes and gives.
+    """Limits of what a server takes and gives.
 
     Attributes:
-        bundle_bytes: Of all names and texts of a bundle.
+        bundle_bytes: Bytes of all names and texts of a bundle.
         bundle_files: Files of a bundle.
-        task_seconds: By the clock, of one task.
-        task_cpu_seconds: Of a processor's time, of one task.
-        task_memory_bytes: Of memory, of one task.
-        task_nodes: Of decision diagrams, of one task.
-        result_bytes: Of one result.
-        waiting_tasks: That may wait, of all callers together.
-        waiting_tasks_per_caller: That may wait, of one caller.
-        retention_seconds: That a job and its result are kept after its end.
+        task_seconds: Seconds by the clock, of one task.
+        task_cpu_seconds: Seconds of a processor's time, of one task.
+        task_memory_bytes: Bytes of memory, of one task.
+        task_nodes: Nodes of decision diagrams, of one task.
+        result_bytes: Bytes of one result.
+        waiting_tasks: Tasks that may wait, of all callers together.
+        waiting_tasks_per_caller: Tasks that may wait, of one caller.
+        retention_seconds: Seconds that a job and its result are kept after its end.
     """
 
     bundle_bytes: int
@@ -245,12 +245,12 @@ class ServerLimits:
 
 @dataclass(frozen=True, slots=True)
 class ServerInfo:
-    """What a server is.
+    """Information about a server.
 
     Attributes:
-        version: Of RoboSC.
-        engines: For decision diagrams, the fastest first.
-        limits: What it takes and gives.
+        version: Version of RoboSC.
+        engines: Engines for decision diagrams, the fastest first.
+        limits: Limits of what it takes and gives.
     """
 
     version: str

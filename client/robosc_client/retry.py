@@ -1,9 +1,9 @@
-"""When a call that failed is made again: decided here, without making or waiting for anything.
+"""Decisions on when a failed call is made again, taken here without making or waiting for anything.
 
-Tried again is what cannot have any effect twice: every task gives the same result for the same request, and a job is
-submitted with a key by which the server knows it. The delays grow exponentially and are scattered at random, so that
-clients that lost one server together do not come back together (Marc Brooker, "Exponential Backoff And Jitter", AWS
-Architecture Blog, 2015).
+Only calls that cannot have any effect twice are tried again: every task gives the same result for the same request,
+and a job is submitted with a key by which the server knows it. The delays grow exponentially and are scattered at
+random, so that clients that lost one server together do not come back together (Marc Brooker, "Exponential Backoff
+And Jitter", AWS Architecture Blog, 2015).
 """
 
 import random
@@ -42,13 +42,13 @@ _JOB_CODES = frozenset({grpc.StatusCode.NOT_FOUND, grpc.StatusCode.FAILED_PRECON
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RetryPolicy:
-    """How often and when calls are made again.
+    """Policy on how often and when calls are made again.
 
     Attributes:
         attempts: Calls in all, the first included; 1: none is made again.
         watch_attempts: The same for a watch, after each message anew.
         first_s: The first delay, before it is scattered between a half and the whole of it.
-        factor: Each delay by the one before: from 1 to 10.
+        factor: Ratio of each delay to the one before: from 1 to 10.
         longest_s: The longest delay.
         longest_asked_s: The longest delay that a server may ask for; if it asks for more, its error is raised.
         scatter: Random numbers from 0 to 1.
@@ -83,10 +83,10 @@ class Attempts:
         """Begin.
 
         Args:
-            policy: How often and when.
-            address: Whom it is made to, for messages.
+            policy: Policy on how often and when.
+            address: Address that the call is made to, for messages.
             deadline_s: Seconds from now that all attempts and delays may take together; None: any number.
-            is_watch: Whether what was received counts for the next attempt, too.
+            is_watch: True if what was received counts for the next attempt, too.
         """
         self._policy = policy
         self._address = address
@@ -112,11 +112,11 @@ class Attempts:
         self._failed = 0
 
     def delay_after(self, failure: Failure, *, has_answered: bool) -> float:
-        """Seconds until the next attempt.
+        """Return the seconds until the next attempt.
 
         Args:
-            failure: How the last one failed.
-            has_answered: Whether it had received anything.
+            failure: Failure of the last one.
+            has_answered: True if it had received anything.
 
         Raises:
             ClientError: There is no next one.

@@ -1,4 +1,4 @@
-"""What a server can be asked to do, as values: done at once, or submitted as a job."""
+"""Tasks that a server can be asked to do, as values: done at once, or submitted as a job."""
 
 from dataclasses import dataclass
 
@@ -9,13 +9,13 @@ from robosc.targets import GenerateOptions
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SynthesisOptions:
-    """How a supervisor is made.
+    """Options for making a supervisor.
 
     Attributes:
-        deployment: Where the supervisor will stand.
+        deployment: Place where the supervisor will stand.
         engine: Name of the server's engine for decision diagrams, or `auto`.
-        allow_livelock: Whether a supervisor is made even if silent steps of its controller never end.
-        allow_reordering: Whether the engine may change the order of its variables while it works.
+        allow_livelock: True if a supervisor is made even if silent steps of its controller never end.
+        allow_reordering: True if the engine may change the order of its variables while it works.
         maximum_nodes: Nodes of decision diagrams beyond which the work is given up; None: the server's limit.
         verified_states: States up to which the supervisor is verified one by one; None: 200,000.
     """
@@ -72,19 +72,19 @@ class Explore:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verify:
-    """Check a supervisor against its model, or verify properties of the robot under its supervisor.
+    """Check of a supervisor against its model, or verification of properties of the robot under its supervisor.
 
     Attributes:
         bundle: The model and its libraries.
         supervisor: A supervisor's file (`.rsup`), of which nothing is believed; empty: one is made of the model.
-        deployment: Where the supervisor is to stand; None: as its file says, and a controller without one.
+        deployment: Place where the supervisor is to stand; None: as its file says, and a controller without one.
         properties: Properties in the property language.
         property_files: Texts with a property on each line.
         engine: As in SynthesisOptions.
         allow_reordering: As in SynthesisOptions.
         maximum_nodes: As in SynthesisOptions.
         maximum_states: States up to which a given supervisor is searched one by one; None: 1,000,000.
-        is_strict: Whether a given supervisor passes only if permissiveness was checked, too.
+        is_strict: True if a given supervisor passes only if permissiveness was checked, too.
     """
 
     bundle: Bundle

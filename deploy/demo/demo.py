@@ -24,7 +24,7 @@ from robosc_bridge.simulated.values import option, seed
 ROOT = Path(__file__).resolve().parents[2]
 SPEED = 10.0
 SHOWN_S = 3.0
-"""How much of the log the picture of events begins with: all of it would be a wall of strokes."""
+"""Length of the log that the picture of events begins with, in seconds: all of it would be a wall of strokes."""
 
 
 class Progress:
@@ -36,7 +36,7 @@ class Progress:
         self._said = 0
 
     def say(self, text: str) -> None:
-        """What is going on."""
+        """Show what is going on."""
         if self._is_terminal:
             sys.stdout.write(f"\r\x1b[K{text}")
             self._is_shown = True

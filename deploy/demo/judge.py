@@ -19,7 +19,7 @@ def read_lines(path: Path) -> list[Entry]:
 
 
 def judge_log(entries: Sequence[Entry]) -> list[str]:
-    """What is wrong with the event log: every `move` must have been requested in an allowed state."""
+    """Return the faults in the event log: every `move` must have been requested in an allowed state."""
     faults = []
     state: Mapping[str, Any] = {}
     moves = 0
@@ -40,7 +40,7 @@ def _state(state: Mapping[str, Any], component: str) -> str:
 
 
 def judge_motion(record: Sequence[Entry], happenings: Iterable[Happening] = HAPPENINGS) -> tuple[list[str], list[str]]:
-    """What is wrong with the robot's motion, and how fast it came to rest: (faults, remarks).
+    """Return the faults of the robot's motion, and how fast it came to rest: (faults, remarks).
 
     For each happening that forbids moving: the robot moved before it, its speed and every command are zero
     from the reaction limit on until the happening that ends it, and afterwards it moves again.

@@ -1,4 +1,4 @@
-"""What happens to the simulated robot, and when: shared by the robot, which plays it, and the checks."""
+"""Scenario of the simulated robot: what happens, and when; shared by the robot, which plays it, and the checks."""
 
 from dataclasses import dataclass
 
@@ -12,8 +12,8 @@ class Happening:
 
     Attributes:
         at_s: Seconds after the controller is connected.
-        name: What happens, in words for the log.
-        forbids_moving: Whether the robot must stand still from here on until `ended_by`.
+        name: Name of what happens, in words for the log.
+        forbids_moving: True if the robot must stand still from here on until `ended_by`.
         ended_by: Name of the happening that lets it move again.
     """
 

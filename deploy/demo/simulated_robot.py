@@ -38,7 +38,7 @@ class SimulatedRobot(Node):  # type: ignore[misc]  # rclpy has no types
     """Wheels, sensors and the scenario, advanced by one timer.
 
     Args:
-        record: Where the JSON Lines go.
+        record: Stream for the JSON Lines.
     """
 
     def __init__(self, record: IO[str]) -> None:

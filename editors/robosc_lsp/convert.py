@@ -1,4 +1,4 @@
-"""What RoboSC tells, in the words of the protocol."""
+"""Reports of RoboSC, in the words of the protocol."""
 
 from collections.abc import Iterable
 

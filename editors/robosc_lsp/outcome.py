@@ -1,4 +1,4 @@
-"""What the language server and the process that synthesizes for it tell each other."""
+"""Messages between the language server and the process that synthesizes for it."""
 
 import msgspec
 
@@ -17,14 +17,14 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 class Outcome(msgspec.Struct, frozen=True):
-    """What synthesis tells of a robot.
+    """Result of synthesis for a robot.
 
     Attributes:
-        unknown: Why nothing is known; empty where something is.
+        unknown: Reason why nothing is known; empty where something is.
         states: States of the controlled robot; None where there is no supervisor.
-        reason: Why there is none; empty where there is one.
-        added: For each controllable event what the supervisor adds, in words.
-        findings: What only synthesis can find.
+        reason: Reason why there is no supervisor; empty where there is one.
+        added: Additions of the supervisor to each controllable event, in words.
+        findings: Findings that only synthesis can make.
     """
 
     unknown: str = ""

@@ -28,14 +28,14 @@ _MOST_FILES = 1_000
 
 @dataclass(frozen=True, slots=True)
 class Analysis:
-    """What is known of a robot or library as it is in the editor.
+    """Analysis of a robot or library as it is in the editor.
 
     Attributes:
-        uri: Of its file.
-        text: Of its file.
+        uri: URI of its file.
+        text: Text of its file.
         bundle: All its texts; None where they cannot be read together.
-        inspected: What they mean.
-        names: What their names mean.
+        inspected: Meaning of the texts.
+        names: Meaning of their names.
         whole: The parts of the file; None where nothing is sound.
         uris: The URI of each file by its name in the bundle.
     """
@@ -55,7 +55,7 @@ class Analysis:
 
     @property
     def errors(self) -> int:
-        """How many errors it has."""
+        """Number of its errors."""
         return sum(item.severity is Severity.ERROR for item in self.inspected.checked.diagnostics)
 
 
@@ -63,7 +63,7 @@ class Project:
     """Open texts over saved ones.
 
     Args:
-        encoding: What the editor counts columns in.
+        encoding: Encoding in which the editor counts columns.
         folders: The folders that it works on.
     """
 
@@ -79,7 +79,7 @@ class Project:
 
     @property
     def open_uris(self) -> tuple[str, ...]:
-        """What is open."""
+        """URIs of the open files."""
         return tuple(self._open)
 
     def open(self, uri: str, text: str) -> None:
@@ -110,7 +110,7 @@ class Project:
         self._by_path = {os.path.realpath(path): uri for path, uri in paths}
 
     def with_edits(self, changes: Mapping[str, Iterable[lsp.TextEdit]]) -> "Project":
-        """What it would be like after some edits, of files that are there and that do not overlap."""
+        """Return the project as it would be after some edits, of files that are there and that do not overlap."""
         changed = Project(self.encoding, self.folders)
         changed.library_paths, changed.interface_paths = self.library_paths, self.interface_paths
         changed._open = dict(self._open)
@@ -145,7 +145,7 @@ class Project:
             return None
 
     def analysis(self, uri: str) -> Analysis | None:
-        """What is known of a file; None where there is none."""
+        """Return the analysis of a file; None where there is none."""
         if uri not in self._known:
             text = self.text(uri)
             if text is None:
@@ -154,7 +154,7 @@ class Project:
         return self._known[uri]
 
     def analyses(self) -> Iterator[Analysis]:
-        """What is known of every file: the open ones, and those in the folders."""
+        """Yield the analysis of every file: the open ones, and those in the folders."""
         seen = set[str]()
         for uri in (*self._open, *self._saved()):
             if uri not in seen:
@@ -164,7 +164,7 @@ class Project:
                     yield found
 
     def surroundings(self, uri: str) -> Surroundings:
-        """What can be imported, and which ROS types there are."""
+        """Return what can be imported, and which ROS types there are."""
         path = _path(uri)
         libraries: dict[str, tuple[str, ...]] = {}
         folders = () if path is None else (path.parent, path.parent.parent / "shared", *self.library_paths)
@@ -265,7 +265,7 @@ def _path(uri: str) -> Path | None:
 
 
 def place_of(analysis: Analysis, project: Project, location: Location) -> lsp.Location | None:
-    """Where a location is for the editor; None where its file is not to be had."""
+    """Return the place of a location for the editor; None where its file is not to be had."""
     uri = analysis.uris.get(location.file)
     text = None if uri is None else project.text(uri)
     return None if uri is None or text is None else lsp.Location(uri, text.range_of(location))

@@ -183,7 +183,7 @@ class Server(LanguageServer):
     # Synthesis
 
     def outcome(self, analysis: Analysis) -> Outcome | None:
-        """What synthesis has told of this very text; None: nothing yet."""
+        """Return the result of synthesis for this very text; None: there is none yet."""
         known = self._outcomes.get(analysis.uri)
         if known is None or analysis.bundle is None or known[0] != analysis.bundle.digest:
             return None
@@ -345,7 +345,7 @@ class Server(LanguageServer):
                 raise JsonRpcInvalidParams(f"'{definition.name}' stands in {path.name}, which is not UTF-8")
 
     def hover(self, uri: str, position: lsp.Position) -> lsp.Hover | None:
-        """What is told of the name at a position."""
+        """Return the hover text for the name at a position."""
         found = self.named(uri, position)
         if found is None:
             return None
@@ -371,7 +371,7 @@ class Server(LanguageServer):
         return "" if file is None else file.line(definition.location.line).strip()
 
     def _holders(self, analysis: Analysis, definition: Definition) -> list[str]:
-        """What each use of a definition stands in: a part of this file, or another file."""
+        """Return the holder of each use of a definition: a part of this file, or another file."""
         found = []
         for use in analysis.names.uses(definition):
             holder = (
@@ -385,7 +385,7 @@ class Server(LanguageServer):
         return found
 
     def completions(self, uri: str, position: lsp.Position) -> lsp.CompletionList:
-        """What can be written at a position."""
+        """Return the completions that can be written at a position."""
         analysis = self.project.analysis(uri)
         if analysis is None:
             return lsp.CompletionList(is_incomplete=False, items=[])
@@ -434,7 +434,7 @@ class Server(LanguageServer):
         return actions
 
     def _is_mended(self, analysis: Analysis, found: Diagnostic, edit: lsp.TextEdit) -> bool:
-        """Whether an edit takes a finding away, and brings no more than one for it."""
+        """Return True if an edit removes a finding, and brings no more than one for it."""
         after = self.project.with_edits({analysis.uri: [edit]}).analysis(analysis.uri)
         if after is None:
             return False
@@ -650,7 +650,7 @@ def make_server(
 
 
 def _is_in_order(wanted: str, name: str) -> bool:
-    """Whether a name has the characters that are wanted, in their order."""
+    """Return True if a name has the characters that are wanted, in their order."""
     rest = iter(name)
     return all(character in rest for character in wanted)
 

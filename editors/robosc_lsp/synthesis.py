@@ -63,11 +63,11 @@ class Turns:
 
 
 async def synthesized(bundle: Bundle, known: frozenset[str], limit_s: float) -> Outcome:
-    """What synthesis tells of a robot without errors; cancelling this ends its process.
+    """Return the result of synthesis for a robot without errors; cancelling this ends its process.
 
     Args:
         bundle: The robot.
-        known: Codes of findings that the checks have told already.
+        known: Codes of findings that the checks have reported already.
         limit_s: Longest time; after it, nothing is known.
     """
     asked = Asked(
@@ -101,7 +101,7 @@ async def synthesized(bundle: Bundle, known: frozenset[str], limit_s: float) -> 
 
 
 async def _answer(process: asyncio.subprocess.Process, request: bytes) -> bytes:
-    """What a process answers, whose input stays open until it has."""
+    """Return the answer of a process, whose input stays open until it has answered."""
     if process.stdin is None or process.stdout is None:
         raise OSError("no pipes to the process of a synthesis")
     process.stdin.write(request)

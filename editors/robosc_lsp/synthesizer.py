@@ -25,7 +25,7 @@ _MOST_NODES = 4_000_000
 
 
 def outcome(asked: Asked) -> Outcome:
-    """What synthesis tells of a robot."""
+    """Return the result of synthesis for a robot."""
     bundle = Bundle(SourceFile(*asked.main), tuple(SourceFile(*file) for file in asked.libraries))
     try:
         made = make_supervisor(

@@ -27,7 +27,7 @@ class Text:
 
     Args:
         text: All of it.
-        encoding: What the editor counts in: `utf-8`, `utf-16` or `utf-32`.
+        encoding: Encoding in which the editor counts: `utf-8`, `utf-16` or `utf-32`.
     """
 
     def __init__(self, text: str, encoding: str = lsp.PositionEncodingKind.Utf16) -> None:
@@ -109,7 +109,7 @@ class Text:
         return line.removesuffix("\n").removesuffix("\r") if number + 1 < len(self._starts) else line
 
     def _taken(self, offset: int) -> int:
-        """How many units the characters before an offset take beyond one each."""
+        """Return the number of units that the characters before an offset take beyond one each."""
         return self._more[bisect_left(self._wide, offset)]
 
     def _units(self, character: str) -> int:

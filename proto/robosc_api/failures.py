@@ -1,4 +1,4 @@
-"""How failures are told over gRPC, besides the status code: details in the form of google.rpc (AIP-193)."""
+"""Failures over gRPC, besides the status code: details in the form of google.rpc (AIP-193)."""
 
 from typing import Any
 

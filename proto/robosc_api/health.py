@@ -26,14 +26,14 @@ _STATUSES = ("UNKNOWN", "SERVING", "NOT_SERVING", "SERVICE_UNKNOWN")
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """How a service is.
+    """Condition of a service.
 
     Attributes:
-        is_there: Whether the program is at work: it answered, if with no, or ended a connection that it had taken, as
+        is_there: True if the program is at work: it answered, if with no, or ended a connection that it had taken, as
             where a certificate does not suit. One that takes connections and says nothing hangs, and is not there.
-        is_serving: Whether it said that it is well.
+        is_serving: True if it said that it is well.
         words: Its answer, or why there is none.
-        has_answered: Whether there is an answer, well or not.
+        has_answered: True if there is an answer, well or not.
     """
 
     is_there: bool
@@ -43,7 +43,7 @@ class Condition:
 
 
 def local_address(address: str) -> str:
-    """Where somebody on this machine reaches what listens on `HOST:PORT`, also where HOST is every interface.
+    """Return the address on this machine of what listens on `HOST:PORT`, also where HOST is every interface.
 
     Raises:
         ValueError: It is no address.
@@ -94,9 +94,9 @@ def ask_service(
     Args:
         address: `HOST:PORT`.
         service: Full name of one; empty: the program as a whole.
-        credentials: How it is reached.
+        credentials: Credentials for reaching it.
         timeout_s: Longest time for connection and answer, in seconds.
-        options: Of the channel.
+        options: Options of the channel.
 
     Raises:
         SecurityError: A file cannot be used.
@@ -137,7 +137,7 @@ def ask_alive(
 
 
 def _takes_connections(address: str, timeout_s: float) -> bool:
-    """Whether somebody listens there."""
+    """Return True if somebody listens there."""
     host, port = split(address)
     try:
         with socket.create_connection((host, port), timeout_s):

@@ -1,4 +1,4 @@
-"""What stands around the handlers of a server, one thing around the other, for the price of one interceptor.
+"""Layers around the handlers of a server, one around the other, for the price of one interceptor.
 
 An interceptor of grpc.aio costs every call a coroutine of its own, whatever it does.
 """
@@ -66,7 +66,7 @@ class Layers(grpc.aio.ServerInterceptor):
 
 
 def behaviour_of(handler: Any) -> Callable[[Any, Any], Any]:
-    """What a handler of any kind does with a request, or a stream of them, and a context."""
+    """Return the function that a handler of any kind calls with a request, or a stream of them, and a context."""
     behaviour: Callable[[Any, Any], Any] = (
         handler.unary_unary or handler.unary_stream or handler.stream_unary or handler.stream_stream
     )

@@ -14,7 +14,7 @@ _MALFORMED = object()
 
 
 class MalformedError(Exception):
-    """What a stream of requests raises for one that is no message; whoever reads them lets it pass."""
+    """Error that a stream of requests raises for one that is no message; whoever reads them lets it pass."""
 
 
 _CODE, _MESSAGE = grpc.StatusCode.INVALID_ARGUMENT, "the request is no message of this service"

@@ -97,7 +97,7 @@ class _Patience:
     A timer for each (`asyncio.timeout`) costs a call ten times as much.
 
     Attributes:
-        limit_s: How long, in seconds.
+        limit_s: Length of a wait, in seconds.
     """
 
     def __init__(self, limit_s: float) -> None:
@@ -108,7 +108,7 @@ class _Patience:
         self._is_looking = False
 
     async def wait(self, answer: Awaitable[Any]) -> Any:
-        """What is waited for.
+        """Wait for an answer and return it.
 
         Raises:
             _SilentError: It does not come in time.

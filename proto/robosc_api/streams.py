@@ -9,8 +9,9 @@ async def write_responses(made: Awaitable[Any] | AsyncIterator[Any], context: An
     """Send what a handler makes: handlers of streams are generators, or coroutines that write by themselves.
 
     Args:
-        made: What the handler gave when it was called. A generator is closed at once when the call ends before it.
-        context: Of the call.
+        made: Value that the handler gave when it was called. A generator is closed at once when the call ends before
+            it.
+        context: Context of the call.
     """
     if not hasattr(made, "__aiter__"):
         await made

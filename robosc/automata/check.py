@@ -1,7 +1,7 @@
-"""Whether the parts of a system fit together: what a front end may ask before it hands one on.
+"""Check whether the parts of a system fit together, which a front end may run before it hands a system on.
 
-What only values can tell, such as two edges of a controllable event that can be taken at once, is found where the
-values are: by `Semantics` and by synthesis.
+Faults that only values can show, such as two edges of a controllable event that can be taken at once, are found where
+the values are: by `Semantics` and by synthesis.
 """
 
 from collections.abc import Iterable, Iterator
@@ -102,7 +102,7 @@ class _Checker:
 
 
 def _shape(automaton: Automaton, events: set[str]) -> Iterator[str]:
-    """What is wrong with locations and alphabet."""
+    """Yield the faults in locations and alphabet."""
     yield from _doubles("location", automaton.locations)
     locations = set(automaton.locations)
     if not automaton.initial:

@@ -64,11 +64,11 @@ def paths_read(expression: Expression) -> tuple[Path, ...]:
 
 
 def compile_expression(expression: Expression, places: Mapping[Subject, int]) -> Function:
-    """The expression as a function of state and received data.
+    """Return the expression as a function of state and received data.
 
     Args:
         expression: A resolved expression.
-        places: Where in a state tuple each subject stands.
+        places: Place of each subject in a state tuple.
     """
     # A chain such as `a and b and c ...` is a tree as deep as it is long, leaning left: a loop takes it.
     spine: list[Binary] = []

@@ -8,7 +8,7 @@ from robosc.automata.semantics import Semantics, TooManyChoicesError
 from robosc.errors import SynthesisCancelled
 
 Added = Mapping[str, Callable[[State], bool]]
-"""What a supervisor adds to events; nothing for events that are not in it."""
+"""Conditions that a supervisor adds to events; nothing for events that are not in it."""
 
 TRANSITIONS_PER_STATE = 20
 """Transitions for each allowed state beyond which a search is given up too: one wide integer has millions of them."""

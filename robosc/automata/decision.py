@@ -9,7 +9,10 @@ from robosc.expressions import Value
 
 
 def index_in(values: Sequence[Value]) -> Callable[[Value], int]:
-    """What tells the index of a value in a domain, at once; a range of integers may be wide and is not listed."""
+    """Return a function that gives the index of a value in a domain, at once.
+
+    A range of integers may be wide and is not listed.
+    """
     if isinstance(values, range):
         return lambda value: values.index(value)  # type: ignore[arg-type]  # a whole number, by its type
     return {value: index for index, value in enumerate(values)}.__getitem__
@@ -17,12 +20,12 @@ def index_in(values: Sequence[Value]) -> Callable[[Value], int]:
 
 @dataclass(frozen=True, slots=True)
 class Test:
-    """A node: which branch a value takes.
+    """Node: the branch that each value takes.
 
     Attributes:
         place: The place of a state tuple that is tested.
-        starts: Ascending indices into the place's domain, the first 0: where each branch begins.
-        children: Where each branch leads: 0 false, 1 true, n + 2 the node of that number.
+        starts: Ascending indices into the place's domain, the first 0: the beginning of each branch.
+        children: Target of each branch: 0 false, 1 true, n + 2 the node of that number.
     """
 
     place: int
@@ -30,7 +33,7 @@ class Test:
     children: tuple[int, ...]
 
     def child(self, index: int) -> int:
-        """Where the value of an index leads."""
+        """Return the target of the branch that the value of an index takes."""
         return self.children[bisect_right(self.starts, index) - 1]
 
 
@@ -49,7 +52,7 @@ class Decision:
     indices: tuple[Callable[[Value], int], ...] = field(repr=False)
 
     def __call__(self, state: State) -> bool:
-        """Whether it is true in a state."""
+        """Return True if the decision is true in a state."""
         number = self.root
         while number > 1:
             node = self.nodes[number - 2]

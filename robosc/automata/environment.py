@@ -13,10 +13,10 @@ class EnvironmentVariable:
     """An input variable, as parts of a system: one uncontrollable event gives it any value, at any time.
 
     Attributes:
-        automaton: It holds the value, is marked whatever that is, and may begin with any.
-        event: The environment changes the value.
+        automaton: Automaton that holds the value, is marked whatever the value is, and may begin with any.
+        event: Event by which the environment changes the value.
         received: The new value.
-        read: What reads it in guards, updates and conditions.
+        read: Expression that reads the value in guards, updates and conditions.
     """
 
     automaton: Automaton

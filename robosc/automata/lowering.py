@@ -37,15 +37,15 @@ from robosc.model.structure import (
 )
 
 _recent: deque[tuple[Model, Deployment, System]] = deque(maxlen=2)
-"""What was made last: of a robot that is worked on, several stages ask for the same system, or its executed form."""
+"""Systems made last: several stages ask for the same system of a robot in progress, or for its executed form."""
 
 
 def to_automata(model: Model, deployment: Deployment) -> System:
-    """The plants and event conditions of a model.
+    """Return the plants and event conditions of a model.
 
     Args:
         model: A checked robot.
-        deployment: Where its supervisor will stand: in a layer, cancel is the caller's own.
+        deployment: Deployment of its supervisor: in a layer, cancel is the caller's own.
 
     Raises:
         UnsupportedModelError: A synthesis variable takes received data with infinitely many values.

@@ -56,7 +56,7 @@ def _protocol(kind: CommunicationKind) -> tuple[tuple[str, ...], tuple[tuple[str
 
 
 def _call(busy: str) -> tuple[tuple[str, EventKind, str], ...]:
-    """What services and actions have in common."""
+    """Return the edges that services and actions have in common."""
     return (
         (_IDLE, EventKind.REQUEST, busy),
         (busy, EventKind.RESPONSE, _READY),
@@ -118,5 +118,5 @@ def _self_loops(states: tuple[str, ...], alphabet: Iterable[str], written: tuple
 
 
 def is_blocking(event: str) -> bool:
-    """Whether a behaviour that mentions an event blocks it in the states where it writes none."""
+    """Return True if a behaviour that mentions an event blocks it in the states where it writes no transition."""
     return is_tau(event) or event.rpartition(".")[2] == EventKind.REQUEST

@@ -43,7 +43,7 @@ class TooManyChoicesError(RoboscError):
 
 
 _Writes = tuple[tuple[int, Value], ...]
-"""What a step puts where in a state tuple."""
+"""Values that a step writes, each with its place in a state tuple."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,13 +73,13 @@ class _Arc:
 
 @dataclass(frozen=True, slots=True)
 class _Outcome:
-    """What one event does in a state.
+    """Effect of one event in a state.
 
     Attributes:
-        is_possible: Whether every plant has an edge for it whose guard is true.
-        may_leave_range: Whether some data or edge would take a variable out of its range.
-        meets_condition: Whether every event condition is true and every requirement automaton has such an edge, too.
-        writes: What each choice of data and edges that stays in range changes.
+        is_possible: True if every plant has an edge for it whose guard is true.
+        may_leave_range: True if some data or edge would take a variable out of its range.
+        meets_condition: True if every event condition is true and every requirement automaton has such an edge, too.
+        writes: Changes by each choice of data and edges that stays in range.
     """
 
     is_possible: bool
@@ -98,11 +98,11 @@ class _Rule:
 
     Attributes:
         event: The event.
-        reads: The part of a state that tells what it does.
-        participants: For each plant that takes part: place of its location, arcs by location.
+        reads: The part of a state that determines the outcome.
+        participants: Place of the location and arcs by location, for each plant that takes part.
         observers: The same for each requirement automaton.
         conditions: Its event conditions.
-        outcomes: What was worked out already, by the values of `reads`.
+        outcomes: Outcomes worked out already, by the values of `reads`.
         carried: The same for certain data.
     """
 
@@ -140,7 +140,7 @@ class _Rule:
         return _Outcome(True, leaves_range, meets_condition, tuple(writes))
 
     def writes_with(self, state: State, data: Carried) -> _Writes | None:
-        """What the first arcs change with some data; None where there are none, or where that leaves a range."""
+        """Return what the first arcs change with some data; None if there are no arcs, or if that leaves a range."""
         key = (self.reads(state), data)
         if key not in self.carried:
             self.carried[key] = self._work_out_with(state, dict(data))
@@ -173,7 +173,7 @@ class _Rule:
 
 
 def _joint_step(arcs: tuple[_Arc, ...], state: State) -> tuple[bool, list[_Writes]]:
-    """Whether the arcs, taken together, may leave a range, and what they write for each choice of data."""
+    """Return whether the arcs, taken together, may leave a range, and what they write for each choice of data."""
     leaves_range = False
     moves = tuple((arc.place, arc.target) for arc in arcs)
     all_updates = [update for arc in arcs for update in arc.updates]
@@ -200,7 +200,7 @@ def _require_few(counts: Iterable[int]) -> None:
 
 
 def _updates_together(updates: list[_Update], state: State) -> tuple[bool, list[_Writes]]:
-    """Whether updates that share data may leave a range, and what they write for each choice of data."""
+    """Return whether updates that share data may leave a range, and what they write for each choice of data."""
     leaves_range = False
     results: dict[_Writes, None] = {}
     inputs = dict.fromkeys(item for update in updates for item in update.inputs)
@@ -282,13 +282,13 @@ class Semantics:
         return self.initial_states[0]
 
     def enabled(self, state: State, event: str) -> bool:
-        """Whether the plant enables an event; a controllable one must also stay in every range."""
+        """Return True if the plant enables an event; a controllable one must also stay in every range."""
         rule = self._rules[event]
         outcome = rule.outcome(state)
         return outcome.is_possible and not (rule.event.is_controllable and outcome.may_leave_range)
 
     def condition(self, state: State, event: str) -> bool:
-        """Whether every event condition on an event is true."""
+        """Return True if every event condition on an event is true."""
         rule = self._rules[event]
         return not (rule.conditions or rule.observers) or rule.outcome(state).meets_condition
 
@@ -329,11 +329,11 @@ class Semantics:
         return tuple(target)
 
     def bad(self, state: State) -> bool:
-        """Whether a state is against an invariant, or an uncontrollable event of it against a condition or range."""
+        """Return True if a state violates an invariant, or an uncontrollable event of it a condition or range."""
         return bool(self.trouble(state))
 
     def trouble(self, state: State) -> str | None:
-        """Why a state is bad, in words, or None if it is not."""
+        """Return the reason why a state is bad, in words, or None if it is not."""
         for number, invariant in enumerate(self._invariants):
             if invariant(state, NO_DATA) is not True:
                 return f"'{expression_text(self.system.invariants[number])}' is not true"
@@ -346,7 +346,7 @@ class Semantics:
         return None
 
     def is_marked(self, state: State) -> bool:
-        """Whether every automaton is in a marked location, and the marker condition is true."""
+        """Return True if every automaton is in a marked location, and the marker condition is true."""
         return all(state[place] in marked for place, marked in self._marked) and self._marker(state, NO_DATA) is True
 
     def _rule(self, event: Event) -> _Rule:

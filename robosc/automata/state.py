@@ -8,7 +8,7 @@ from robosc.expressions import Type, Value, domain
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """What one place of a state tuple holds: an automaton's location, or one of its variables.
+    """Content of one place of a state tuple: an automaton's location, or one of its variables.
 
     Attributes:
         automaton: Name of the automaton.

@@ -46,7 +46,7 @@ class InputVariable:
         event: The event that carries it.
         path: The `Received` path that reads it.
         type: A finite type.
-        may_be_unknown: Whether the environment may also leave it out (an element of an array). Elements
+        may_be_unknown: True if the environment may also leave it out (an element of an array). Elements
             of one array that differ only in the last index: a later one is known only if every
             earlier one is. In general the environment chooses the length of every array on the path, and
             a datum is known exactly if each index on its path is below its array's length.
@@ -82,12 +82,12 @@ class Edge:
 
 
 class Role(StrEnum):
-    """What an automaton is in a synthesis problem."""
+    """Role of an automaton in a synthesis problem."""
 
     PLANT = "plant"
-    """What can happen."""
+    """Automaton that says what can happen."""
     REQUIREMENT = "requirement"
-    """What may happen: it watches the plants, and an event that it has no edge for is against it."""
+    """Automaton that says what may happen: it watches the plants, and an event without an edge in it violates it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ class Automaton:
             forbids it.
         variables: Its variables.
         edges: Its arcs. Two edges of one location may both take part only for an uncontrollable event.
-        role: What it is.
+        role: Its role, plant or requirement.
     """
 
     name: str
@@ -134,7 +134,7 @@ class System:
     """Plants and requirements of one synthesis problem, in source order.
 
     Attributes:
-        name: What it is called.
+        name: Name of the system.
         events: All events.
         automata: Plants and requirement automata; the synchronous composition of the plants is the uncontrolled
             system.

@@ -55,7 +55,7 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_deployment_argument(parser: argparse.ArgumentParser) -> None:
-    """Where the supervisor will stand."""
+    """Add the option for the deployment of the supervisor."""
     parser.add_argument(
         "--deployment",
         choices=[str(deployment) for deployment in Deployment],
@@ -65,11 +65,11 @@ def add_deployment_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def add_given_supervisor_options(parser: argparse.ArgumentParser, stands: str) -> None:
-    """For what takes a model or its supervisor as `--model`: how a model is synthesized.
+    """Add options for commands that take a model or its supervisor as `--model`: how a model is synthesized.
 
     Args:
-        parser: Of the command.
-        stands: That the supervisor `stands` or `stood` somewhere.
+        parser: Parser of the command.
+        stands: Verb of the help text: the supervisor `stands` or `stood` somewhere.
     """
     parser.add_argument(
         "--deployment",
@@ -127,14 +127,14 @@ def _positive(text: str) -> int:
 
 
 def engine_options(arguments: argparse.Namespace) -> "EngineOptions":
-    """What `add_engine_options` has read."""
+    """Return the engine options that `add_engine_options` has read."""
     from robosc.synthesis import EngineOptions
 
     return EngineOptions(arguments.engine or "auto", arguments.reorder, arguments.max_nodes)
 
 
 def add_verify_limit_argument(parser: argparse.ArgumentParser, name: str, default: int) -> None:
-    """How far the independent verifier goes."""
+    """Add the option for the limit of the independent verifier."""
     parser.add_argument(
         name,
         type=_natural,
@@ -157,7 +157,7 @@ _natural.__name__ = "number"
 
 
 def add_livelock_argument(parser: argparse.ArgumentParser) -> None:
-    """What is thought of silent steps that never end."""
+    """Add the option that allows silent steps that never end."""
     parser.add_argument(
         "--allow-livelock",
         action="store_true",

@@ -88,14 +88,14 @@ def _checked(bundle: Bundle) -> tuple[Diagnostic, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _Synthesized:
-    """What checking and synthesis found.
+    """Result of checking and synthesis.
 
     Attributes:
         diagnostics: Every finding.
-        status: What became of the synthesis.
-        reason: Why there is no supervisor; empty where there is one.
-        has_failed: Whether a robot without errors has no supervisor.
-        explanation: What is to blame where no supervisor exists.
+        status: Outcome of the synthesis.
+        reason: Reason why there is no supervisor; empty if there is one.
+        has_failed: True if a robot without errors has no supervisor.
+        explanation: Explanation of what is to blame if no supervisor exists.
     """
 
     diagnostics: tuple[Diagnostic, ...]

@@ -46,7 +46,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 
 class _Status(StrEnum):
-    """What became of a file."""
+    """Kind of outcome for a file."""
 
     UNCHANGED = "unchanged"
     CHANGED = "changed"
@@ -59,16 +59,16 @@ class _Status(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class _Outcome:
-    """What became of a file.
+    """Outcome for a file.
 
     Attributes:
-        name: What the user calls it.
-        status: What became of it.
+        name: Name of the file as the user wrote it.
+        status: Kind of outcome.
         before: Its content, as far as it was read.
         after: Its canonical content, the same where there is none.
         diagnostics: Its errors.
         source: Its text, for showing the errors.
-        fault: Why it cannot be read or written.
+        fault: Reason why it cannot be read or written.
     """
 
     name: str

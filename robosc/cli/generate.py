@@ -26,7 +26,7 @@ WRITTEN = "the files are written"
 NOT_WRITTEN = """\
 nothing is written: the model has errors, no supervisor exists, the target cannot do the model, or files were
      changed since they were generated, or are not of RoboSC, and would be overwritten (see --force)"""
-"""What the exit statuses 0 and 1 tell."""
+"""Meaning of the exit statuses 0 and 1."""
 
 _EPILOG = f"exit status:\n  0  {WRITTEN}\n  1  {NOT_WRITTEN}\n  2  wrong use\n"
 
@@ -82,7 +82,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 
 def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to generate, and where to."""
+    """Add the arguments for what to generate, and where to."""
     parser.add_argument(
         "--target",
         action=_OneTarget,
@@ -120,11 +120,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
-    """What is asked of the target; the folder to write to is set where it is not given.
+    """Return the options for the target; the folder to write to is set where it is not given.
 
     Raises:
-        UsageError: The package cannot be called so, the file beside the model cannot be used, or there is no folder to
-            write to.
+        UsageError: The package cannot be called so, the file beside the model cannot be used, or there is no folder
+            to write to.
     """
     from robosc.targets import CONFIG_FILE, ControllerConfigError, read_controller_config
     from robosc.targets.python.package import require_package_name

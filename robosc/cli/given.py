@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 
 def given_supervisor(arguments: argparse.Namespace, *, is_json: bool = False) -> "Supervisor | None":
-    """Read or synthesize it; None where there is none, which has been told.
+    """Read or synthesize the supervisor; None if there is none, which has been reported.
 
     Args:
-        arguments: With `model`, and with what `arguments.add_given_supervisor_options` has read.
-        is_json: Whether why there is none is told to machines, on standard output.
+        arguments: Arguments with `model`, and with those that `arguments.add_given_supervisor_options` has read.
+        is_json: True if the reason why there is none is reported to machines, on standard output.
 
     Raises:
         UsageError: A file cannot be read.

@@ -38,7 +38,7 @@ _NAMES = (
     "new", "check", "format", "synth", "verify", "key", "sign", "explore", "generate", "explain-synthesis", "explain",
     "doc", "plot", "check-log",
 )  # fmt: skip
-"""What they are called: nobody who calls one of them pays for a look at what other packages bring."""
+"""Names of the commands: a call of one of them needs no search for commands of other packages."""
 
 _EPILOG = """\
 exit status:

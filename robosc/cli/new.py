@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _next_commands(model: Path, folder: Path) -> list[str]:
-    """What to do with the model, as lines for a shell."""
+    """Return the next commands for the model, as lines for a shell."""
     quoted = shlex.quote(_argument(model))
     output = shlex.quote(_argument(folder / "out"))
     return [

@@ -1,4 +1,4 @@
-"""What the commands print, and the exit codes: shared by `robosc` and `robosc-client`.
+"""Output of the commands, and the exit codes: shared by `robosc` and `robosc-client`.
 
 Results go to standard output, findings and progress to standard error; with `--json` one JSON document
 goes to standard output and holds the findings too. Where a command cannot do what it was asked, that document is
@@ -22,7 +22,7 @@ from robosc.source import Bundle
 
 
 class ExitCode(IntEnum):
-    """What a command's exit status tells."""
+    """Meaning of a command's exit status."""
 
     OK = 0
     FAILED = 1
@@ -35,10 +35,10 @@ class ExitCode(IntEnum):
 
 
 class CommandError(Exception):
-    """What ends a command with a message.
+    """Error that ends a command with a message.
 
     Attributes:
-        status: Its exit status.
+        status: Exit status of the command.
     """
 
     def __init__(self, message: str, status: ExitCode) -> None:
@@ -64,7 +64,7 @@ def prepare_streams() -> None:
 
 
 _ESCAPED = {code: f"\\u{code:04x}" for code in (*range(0x7F, 0xA0), 0x200E, 0x200F, *range(0x202A, 0x202F))}
-"""What JSON lets stand in its strings, and what would move a terminal's cursor or turn its text round."""
+"""Characters that JSON allows in its strings, but that would move a terminal's cursor or turn its text round."""
 
 
 def print_json(document: Mapping[str, object]) -> None:
@@ -93,7 +93,7 @@ def counts_text(diagnostics: Sequence[Diagnostic]) -> str:
 
 
 def has_errors(diagnostics: Sequence[Diagnostic], *, strict: bool = False) -> bool:
-    """Whether any finding is an error; with `strict`, whether any is an error or a warning."""
+    """Return True if any finding is an error; with `strict`, if any is an error or a warning."""
     grave = {Severity.ERROR, Severity.WARNING} if strict else {Severity.ERROR}
     return any(diagnostic.severity in grave for diagnostic in diagnostics)
 

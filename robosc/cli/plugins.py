@@ -24,9 +24,9 @@ class Plugin:
     """A command of another package.
 
     Attributes:
-        name: What it is called by.
+        name: Name by which it is called.
         module: Its module, or None where that cannot be loaded.
-        problem: Why not, in one sentence.
+        problem: Reason why not, in one sentence.
     """
 
     name: str

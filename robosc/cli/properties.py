@@ -42,7 +42,7 @@ exit status:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to verify."""
+    """Add the arguments for the properties to verify."""
     parser.add_argument(
         "--property",
         action="append",

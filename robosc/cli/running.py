@@ -1,4 +1,4 @@
-"""How a command runs: its arguments are read, what it prints arrives or that is told, errors become a message.
+"""Running of a command: arguments are read, output arrives or its loss is reported, errors become a message.
 
 It loads no command, so that programs beside `robosc` run theirs in the same way.
 """
@@ -15,10 +15,10 @@ from robosc.source import visible
 
 
 class WrongArguments(SystemExit):
-    """Arguments that are wrong, which has been told on standard error.
+    """Arguments that are wrong, which has been reported on standard error.
 
     Attributes:
-        message: What is wrong.
+        message: Description of what is wrong.
     """
 
     def __init__(self, message: str) -> None:
@@ -79,9 +79,9 @@ def guarded(program: str, run: Callable[[], int], *, as_json: bool = False) -> i
     """Run a command and turn every error into one clear message and an exit status.
 
     Args:
-        program: What the message begins with.
+        program: Beginning of the message.
         run: The command.
-        as_json: Whether standard output gets a JSON document, which then tells the error.
+        as_json: True if standard output gets a JSON document, which then reports the error.
     """
     prepare_streams()
     diagnostics: Sequence[Diagnostic] = ()

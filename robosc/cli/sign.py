@@ -102,16 +102,16 @@ def read_supervisor(file: Path) -> bytes:
 
 
 def signer_of(file: Path, content: bytes, trusted: Sequence[Path]) -> "PublicKey":
-    """Which key of some files has signed a supervisor file.
+    """Return the key, out of those in some files, that has signed a supervisor file.
 
     Args:
-        file: The supervisor's.
+        file: File of the supervisor.
         content: Its bytes.
         trusted: Files with public keys.
 
     Raises:
         UsageError: A file cannot be read.
-        SignatureError: None of them has, or a file holds no key.
+        SignatureError: None of the keys has, or a file holds no key.
         SigningUnavailableError: The package for it is not installed.
     """
     from robosc.signatures import (

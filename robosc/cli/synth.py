@@ -26,15 +26,15 @@ if TYPE_CHECKING:
 
 
 class Reasons(Protocol):
-    """Whatever knows why there is no supervisor."""
+    """Object that knows why there is no supervisor."""
 
     @property
     def reason(self) -> str:
-        """Why, in one sentence; empty where there is one."""
+        """Reason why there is no supervisor, in one sentence; empty if there is one."""
 
     @property
     def explanation(self) -> "EmptyExplanation | None":
-        """What is to blame where none exists."""
+        """Explanation of what is to blame if no supervisor exists."""
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -128,7 +128,7 @@ def report_problems(made: "Made", bundle: Bundle) -> None:
 
 
 def report_reasons(made: Reasons, bundle: Bundle) -> None:
-    """Where there is no supervisor, why, on standard error."""
+    """Write the reason why there is no supervisor to standard error, if there is none."""
     from robosc.explanation import empty_text
 
     if made.reason:
@@ -138,7 +138,7 @@ def report_reasons(made: Reasons, bundle: Bundle) -> None:
 
 
 def reasons_json(made: Reasons) -> dict[str, object]:
-    """Why there is no supervisor, as JSON values."""
+    """Return the reason why there is no supervisor, as JSON values."""
     from robosc.explanation import document
 
     return {"reason": made.reason, "explanation": document(made.explanation) if made.explanation else None}

@@ -165,9 +165,9 @@ def report_recheck(
     """Print what was found about a supervisor as asked, and return the exit status.
 
     Args:
-        arguments: Of the command.
-        document: As `recheck_json` makes it.
-        diagnostics: Why the texts hold no model that the supervisor could be for.
+        arguments: Arguments of the command.
+        document: Document as `recheck_json` makes it.
+        diagnostics: Reasons why the texts hold no model that the supervisor could be for.
         bundle: The texts.
     """
     if arguments.json:
@@ -182,7 +182,7 @@ def report_recheck(
 
 
 def _verify_signature(arguments: argparse.Namespace) -> int:
-    """Whether a file alone is signed; its model is not looked at."""
+    """Verify the signature of a file alone; its model is not looked at."""
     from robosc.supervisor.codec import decode
 
     arguments.supervisor = arguments.model

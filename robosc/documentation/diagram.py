@@ -19,7 +19,7 @@ MAXIMUM_LABEL = 100
 """Characters of a transition's label."""
 
 _SPECIAL = re.compile(r"[^A-Za-z0-9_ .,()\[\]=!/+-]|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])")
-"""What could mean something to Mermaid, or, as an underscore at the edge of a word, to the Markdown in its labels."""
+"""Characters that could mean something to Mermaid or, as underscores at a word's edge, to Markdown in its labels."""
 _ANY = "any"
 
 
@@ -29,8 +29,8 @@ class Diagram:
 
     Attributes:
         text: Its Mermaid text, or empty if it would be too large.
-        has_any: Whether it shows transitions that stand in every state.
-        is_complete: Whether it tells everything: nothing is left out or cut.
+        has_any: True if it shows transitions that stand in every state.
+        is_complete: True if it shows everything: nothing is left out or cut.
     """
 
     text: str
@@ -52,7 +52,7 @@ def diagram(behaviour: Behaviour) -> Diagram:
 
 
 def label(transition: Transition) -> str:
-    """What a transition says: `event [guard] / updates`, as plain text on one line."""
+    """Return the label of a transition: `event [guard] / updates`, as plain text on one line."""
     guard = f" [{visible(expression_text(transition.guard))}]" if transition.guard is not None else ""
     return transition.event + guard + (f" / {updates_text(transition)}" if transition.updates else "")
 

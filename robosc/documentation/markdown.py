@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from robosc.source import visible
 
 _PLAIN_CODE = re.compile(r"[^`|\\ ](?:[^`|\\]*[^`|\\ ])?")
-"""What stands in a code span just as it is, also in a cell of a table."""
+"""Text that stands in a code span just as it is, also in a cell of a table."""
 
 _PLAIN_TEXT = re.compile(r"[A-Za-z0-9 ,;()'/-]")
 """Characters that mean nothing to Markdown wherever they stand inside a line."""

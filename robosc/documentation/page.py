@@ -39,11 +39,11 @@ _DIRECTIONS = {
 
 
 def page(model: Model, findings: Sequence[Diagnostic] = ()) -> str:
-    """The Markdown page of a robot; it ends with a line end.
+    """Return the Markdown page of a robot; it ends with a line end.
 
     Args:
         model: The checked robot.
-        findings: What else the check found, told in a section of its own.
+        findings: Other findings of the check, reported in a section of their own.
     """
     sections = blocks(
         heading(1, code(model.name)),

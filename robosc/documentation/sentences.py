@@ -17,7 +17,7 @@ from robosc.model.structure import (
 
 
 def requirement_sentence(requirement: Requirement) -> str:
-    """What a requirement says, with a list below where several conditions play together."""
+    """Describe a requirement in a sentence, with a list below where several conditions play together."""
     subject = f"{codes(requirement.communications)} {'is' if len(requirement.communications) == 1 else 'are'}"
     if requirement.form is RequirementForm.NEEDS:
         start, joint = f"{subject} requested only while", _joined(requirement.expression, "and")
@@ -27,7 +27,7 @@ def requirement_sentence(requirement: Requirement) -> str:
 
 
 def invariant_sentence(invariant: Invariant) -> str:
-    """What a state invariant says, with a list below where it has several parts."""
+    """Describe a state invariant in a sentence, with a list below where it has several parts."""
     if invariant.is_never:
         return _listed("There is never a state with", "any of these", _joined(invariant.expression, "or"))
     return _listed("There are only states with", "all of these", _joined(invariant.expression, "and"))
@@ -51,7 +51,7 @@ def _listed(start: str, meaning: str, conditions: Sequence[Expression]) -> str:
 
 
 def provide_sentences(communication: str, provides: Sequence[Provide]) -> str:
-    """What a request carries: one sentence, or a list of the cases in their order."""
+    """Describe the data that a request carries: one sentence, or a list of the cases in their order."""
     statements = list(provides)
     # What stands behind a statement without condition never gives the data.
     final = next((number for number, item in enumerate(statements) if item.condition is None), None)
@@ -82,7 +82,7 @@ def value_text(value: ProvidedValue) -> str:
 
 
 def enum_sentences(enum: EnumDefinition) -> str:
-    """How received data becomes a value of the enum."""
+    """Describe how received data becomes a value of the enum."""
     start = f"Made from a received {code(type_text(enum.source))}"
     otherwise = f"otherwise {code(enum.default)}"
     if not enum.rules:

@@ -1,1 +1,1 @@
-"""What editors ask about a text, also while it is being typed; knows no protocol."""
+"""Information about a text for editors, also while it is being typed; knows no protocol."""

@@ -1,4 +1,4 @@
-"""What can be written at a place of a text, also of one that is broken elsewhere."""
+"""Candidates that can be written at a place of a text, also of one that is broken elsewhere."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -41,10 +41,10 @@ class Candidate:
     """Something that can be written.
 
     Attributes:
-        text: What is written.
-        kind: What it is; None: a word of the language.
+        text: Text to write.
+        kind: Kind of the thing; None: a word of the language.
         detail: Its type or the like; may be empty.
-        is_wanted: Whether it has the very type that is needed there.
+        is_wanted: True if it has the very type that is needed there.
     """
 
     text: str
@@ -55,7 +55,7 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What there is around a text.
+    """Surroundings of a text.
 
     Attributes:
         libraries: The components of each library that can be imported from, by its name.
@@ -72,16 +72,17 @@ def complete(
     inspected: Inspected,
     surroundings: Callable[[], Surroundings] = Surroundings,
 ) -> tuple[int, tuple[Candidate, ...]]:
-    """What can be written at a place, in the order of the kinds of things.
+    """Return what can be written at a place, in the order of the kinds of things.
 
     Args:
         text: The text of the main file.
-        offset: Of the cursor.
-        inspected: What is known of the text, or of an earlier state of it.
-        surroundings: Tells what there is around it; asked only where that matters, since it may have to look.
+        offset: Offset of the cursor.
+        inspected: Knowledge of the text, or of an earlier state of it.
+        surroundings: Function that returns what there is around it; called only where that matters, since it may have
+            to look.
 
     Returns:
-        The offset where the word begins that is being typed, and what it can become.
+        The offset where the word begins that is being typed, and the candidates for it.
     """
     place = place_at(text, offset)
     if place is None:
@@ -255,7 +256,7 @@ class _Names:
                 yield Candidate(spelled(name), DefinitionKind.INTERFACE, ", ".join(sorted(homes[name])))
 
     def _values(self, wanted: Type | None) -> Iterator[Candidate]:
-        """What an expression can begin with."""
+        """Yield the candidates that an expression can begin with."""
         scope = self._scope
         if scope is None:
             return
@@ -279,7 +280,7 @@ class _Names:
                 yield Candidate(spelled(name), DefinitionKind.ENUM_VALUE, enum.name)
 
     def _members(self) -> Iterator[Candidate]:
-        """What can stand behind a point."""
+        """Yield the candidates that can stand behind a point."""
         chain = _chain(self._place.before[:-1])
         scope = self._scope
         if not chain or scope is None:
@@ -481,7 +482,7 @@ def _chain(tokens: Sequence[str]) -> list[str]:
 
 
 def _elements(tokens: Sequence[str]) -> _Elements:
-    """What `all` and `any` that are open name the elements, the innermost first; with what names the array."""
+    """Return the names that open `all` and `any` give the elements, innermost first, with what names the array."""
     opened: list[int] = []
     for index, token in enumerate(tokens):
         if token == "(":

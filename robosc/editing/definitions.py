@@ -11,7 +11,7 @@ from robosc.source import Location
 
 
 class DefinitionKind(StrEnum):
-    """What a name can stand for."""
+    """Kind of thing that a name can stand for."""
 
     ROBOT = "robot"
     LIBRARY = "library"
@@ -41,10 +41,10 @@ class Definition:
     """A name where it is given.
 
     Attributes:
-        kind: What it stands for.
+        kind: Kind of thing that it stands for.
         name: The name, without a `^`.
         location: The name's place.
-        tree: What is defined.
+        tree: Tree of the thing that is defined.
         owner: The name of what it is part of; empty at the top.
     """
 

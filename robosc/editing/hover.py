@@ -1,4 +1,4 @@
-"""What can be told of a name: its declaration, who uses it, the plant that it becomes, what the supervisor adds."""
+"""Information about a name: its declaration, its users, the plant that it becomes, what the supervisor adds."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,14 +22,14 @@ def hover_text(
     holders: Sequence[str],
     added: Mapping[str, str],
 ) -> str:
-    """What is told of a definition, in Markdown.
+    """Return the description of a definition, in Markdown.
 
     Args:
-        definition: Of the name.
-        inspected: What is known of it.
+        definition: Definition of the name.
+        inspected: Knowledge of it.
         declaration: The text of the definition.
-        holders: What each use stands in.
-        added: For each controllable event what the supervisor adds, in words; empty while it is not known.
+        holders: Component, requirement or the like in which each use stands.
+        added: Addition of the supervisor to each controllable event, in words; empty while it is not known.
     """
     lines = declaration.splitlines()
     shown = lines if len(lines) <= _LONGEST else [*lines[: _LONGEST - 1], "..."]

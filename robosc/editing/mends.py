@@ -18,9 +18,9 @@ class Mend:
     """One change of a text.
 
     Attributes:
-        title: What it does, as an instruction.
-        location: What is replaced.
-        text: What stands there then.
+        title: Effect of the change, as an instruction.
+        location: Place of the text that is replaced.
+        text: Replacement that stands there then.
     """
 
     title: str
@@ -29,10 +29,10 @@ class Mend:
 
 
 def mends(found: Diagnostic, line: str) -> tuple[Mend, ...]:
-    """The changes that would mend a finding, the likeliest first; empty where a person has to think.
+    """Return the changes that would fix a finding, the likeliest first; empty where a person has to think.
 
     Args:
-        found: What was found.
+        found: The finding.
         line: The line of the text that it is in.
     """
     return () if found.location is None else tuple(_Line(found.location, line).mends(found))

@@ -15,7 +15,7 @@ class Names:
     """The names of a robot or library and of the libraries that it imports from.
 
     Args:
-        inspected: What is known of the bundle.
+        inspected: Knowledge of the bundle.
     """
 
     def __init__(self, inspected: Inspected) -> None:
@@ -74,20 +74,21 @@ class Names:
                 yield place, found
 
     def pattern(self) -> list[int]:
-        """Which names of the bundle mean the same: the place of what each means among all places, in their order.
+        """Return which names of the bundle mean the same.
 
-        What only gives a name another spelling leaves it as it is.
+        The result holds the place of what each name means among all places, in their order. A change that only gives
+        a name another spelling leaves it as it is.
         """
         places = sorted({*self.definitions, *self._uses})
         number = {place: index for index, place in enumerate(places)}
         return [number.get(self._uses.get(place, place), -1) for place in places]
 
     def not_understood(self, file: SourceFile, name: str) -> list[Location]:
-        """Where a name stands in a file of the bundle without meaning anything there, because of errors.
+        """Return the places in a file of the bundle where a name has no meaning, because of errors.
 
         Args:
             file: The file.
-            name: The name, without what keeps it from being a word of the language.
+            name: The name, without the mark that keeps it from being a word of the language.
         """
         known = {(place.line, place.column) for places in self._lines_of(file.name) for place in places}
         line_begins = [0, *(match.end() for match in re.finditer("\n", file.text))]

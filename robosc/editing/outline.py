@@ -8,18 +8,18 @@ from robosc.language import Parsed, syntax
 from robosc.language.tokens import Kind, tokenize_broken
 
 _INSIDE = frozenset({DefinitionKind.ELEMENT})
-"""What is no part of a text that anybody looks for."""
+"""Kinds of definitions that are no part of a text that anybody looks for."""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A definition with what stands in it.
+    """A definition with its contents.
 
     Attributes:
-        definition: What is defined.
+        definition: The definition.
         begin: Offset of the first character of the definition.
         end: Offset behind its last one.
-        parts: What is defined in it.
+        parts: Definitions inside it.
     """
 
     definition: Definition
@@ -63,7 +63,7 @@ def parts(part: Part) -> Iterator[Part]:
 
 
 def folds(text: str) -> Iterator[tuple[int, int, bool]]:
-    """What can be folded: offsets of the first and the last character, and whether it is a comment."""
+    """Yield the ranges that can be folded: offsets of the first and the last character, and True for a comment."""
     texts, kinds, starts = tokenize_broken(text)
     opened: list[int] = []
     for token, start in zip(texts, starts, strict=True):

@@ -1,4 +1,4 @@
-"""Where in a text somebody types: what is open there, and what came before."""
+"""Place in a text where somebody types: what is open there, and what came before."""
 
 import re
 from collections.abc import Sequence

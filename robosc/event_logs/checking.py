@@ -1,10 +1,10 @@
-"""Whether what a log tells could have happened under a supervisor.
+"""Check whether the events that a log reports could have happened under a supervisor.
 
 The events are replayed from the initial state on the automata: each request must have been allowed by plants, ranges,
 requirements and what synthesis has added in the state that the events before it led to, each other event must have
 been possible, and each logged state must be the one that they lead to. Resets, cancels and tau transitions stand in a
 log as events like any other; a request is wrong while one of the resets or taus was still to be taken, since the
-executor takes them first. Where something is wrong the replay goes on from what the log tells.
+executor takes them first. Where something is wrong the replay goes on from what the log reports.
 """
 
 import json
@@ -43,8 +43,8 @@ class Violation:
 
     Attributes:
         line: The line of the log.
-        time_s: When, in seconds since 1970-01-01 UTC.
-        sentence: What is wrong.
+        time_s: Time, in seconds since 1970-01-01 UTC.
+        sentence: Description of what is wrong.
     """
 
     line: int
@@ -54,19 +54,19 @@ class Violation:
 
 @dataclass(frozen=True, slots=True)
 class LogCheck:
-    """What was found out about a log.
+    """Result of the check of a log.
 
     Attributes:
-        violations: In the order of the log; at most `MAXIMUM_VIOLATIONS`.
-        violation_count: How many there are in all.
-        events: How many events were replayed.
-        requests: How many of them were requests.
-        blocked: How many requests a supervision layer held back.
-        unjudged: How many of those were held back for a reason that no state tells: a NaN in the message, a sensor
+        violations: Violations in the order of the log; at most `MAXIMUM_VIOLATIONS`.
+        violation_count: Number of violations in all.
+        events: Number of events that were replayed.
+        requests: Number of requests among them.
+        blocked: Number of requests that a supervision layer held back.
+        unjudged: Number of those that were held back for a reason that no state shows: a NaN in the message, a sensor
             that was awaited.
-        restarts: How often the model began again.
-        notes: What a reader should know of how whole the log is: after entries that were lost, much that looks wrong
-            may have been right.
+        restarts: Number of times that the model began again.
+        notes: Remarks on how whole the log is: after entries that were lost, much that looks wrong may have been
+            right.
     """
 
     violations: tuple[Violation, ...]
@@ -80,7 +80,7 @@ class LogCheck:
 
     @property
     def has_passed(self) -> bool:
-        """Whether something was checked, and nothing is wrong."""
+        """True if something was checked, and nothing is wrong."""
         return self.violation_count == 0 and self.events > 0
 
 
@@ -90,7 +90,7 @@ def check_log(run: LoggedRun, supervisor: Supervisor, deployment: Deployment | N
     Args:
         run: The log.
         supervisor: The supervisor; believed.
-        deployment: Where it stood; None: where it was made for.
+        deployment: Deployment in which it stood; None: the one that it was made for.
 
     Raises:
         WrongDeploymentError: It was made for another deployment, and its model has actions.
@@ -222,7 +222,7 @@ class _Checking:
             self._awaited.discard(self._identifiers[event])
 
     def _provided_otherwise(self, event: str, data: object) -> Iterator[str]:
-        """What is wrong with the data of a controller's request. A layer passes on what it was given."""
+        """Yield the faults in the data of a controller's request. A layer passes on what it was given."""
         is_known, provided = self._replay.provided(event)
         if not is_known:
             yield f"{event} happened although the data that the model provides for it was not known"
@@ -234,7 +234,7 @@ class _Checking:
             self._wrong(entry, f"{entry.event} is logged as unexpected, but could happen")
 
     def _held_back(self, entry: LogEntry) -> None:
-        """Whether a layer held a request back with reason."""
+        """Check whether a layer held a request back with reason."""
         self._blocked += 1
         identifier, why = entry.text("identifier"), entry.text("why")
         if self._deployment is Deployment.CONTROLLER:

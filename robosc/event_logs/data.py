@@ -1,4 +1,4 @@
-"""What entries tell in JSON, as values of the model's types."""
+"""Data that log entries hold in JSON, as values of the model's types."""
 
 import math
 from typing import Any, Final
@@ -20,21 +20,21 @@ from robosc.model.structure import EventKind, Model, is_tau
 Path = tuple[PathStep, ...]
 
 _NOT_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
-"""How logs write numbers that JSON has not."""
+"""Notation of logs for numbers that JSON lacks."""
 
 _CLOSE = 1e-9
 """Relative difference up to which two doubles are the same: C and Python round differently in the last place."""
 
 
 class Misfit:
-    """What stands in the log is no value of the type."""
+    """Mark for data in the log that is no value of the type."""
 
 
 MISFIT: Final = Misfit()
 
 
 def path_text(path: Path) -> str:
-    """How a log names a part of received data: `value.ranges[0]`."""
+    """Return the name by which a log calls a part of received data: `value.ranges[0]`."""
     return "value" + "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
 
 
@@ -60,7 +60,7 @@ def value_of(logged: object, type_: Type | None) -> Value | Misfit | None:
 
 
 def is_same(logged: object, value: Value | None, type_: Type | None) -> bool:
-    """Whether a log tells just this value."""
+    """Return True if a log reports exactly this value."""
     found = value_of(logged, type_)
     if isinstance(found, float) and isinstance(value, float):
         return found == value or math.isclose(found, value, rel_tol=_CLOSE, abs_tol=1e-300)
@@ -68,11 +68,11 @@ def is_same(logged: object, value: Value | None, type_: Type | None) -> bool:
 
 
 def is_provided(logged: object, data: object) -> bool:
-    """Whether a log tells just this data of a request, property by property.
+    """Return True if a log reports exactly this data of a request, property by property.
 
     Args:
-        logged: What stands in the log.
-        data: What the model provides: a value, properties by name, or None.
+        logged: Data in the log.
+        data: Data that the model provides: a value, properties by name, or None.
     """
     if isinstance(data, dict):
         return (
@@ -97,7 +97,7 @@ NOT_TOLD: Final = NotTold()
 
 
 class Received:
-    """What events of a model carry, by the entries of a log.
+    """Data that events of a model carry, by the entries of a log.
 
     Executors in Python log the parts that the model reads, converted; nodes in C++ log the message as it came.
 
@@ -112,16 +112,16 @@ class Received:
         self._texts: dict[str, frozenset[str]] = {}
 
     def value(self, event: str, data: Any, path: Path) -> Any:
-        """A part of what an event carries.
+        """Return a part of the data that an event carries.
 
         Args:
             event: An event of the model.
-            data: What its entry tells.
-            path: Which part; one that the model reads.
+            data: Data in its entry.
+            path: Path of the part; one that the model reads.
 
         Returns:
-            The value as the model has it, None if it is unknown, MISFIT if it is none of its type, NOT_TOLD if the log
-            leaves it out.
+            The value as the model has it, None if it is unknown, MISFIT if it is none of its type, NOT_TOLD if the
+            log leaves it out.
         """
         if event not in self._paths:
             self._paths[event] = converted_paths(self._model, event)

@@ -19,7 +19,7 @@ CONTROLLABLE = "#D55E00"
 UNCONTROLLABLE = "#0072B2"
 
 SUFFIXES = (".png", ".svg", ".html")
-"""What can be drawn, by the file's name."""
+"""Kinds of plots that can be drawn, by the suffix of the file's name."""
 
 
 class PlottingUnavailableError(RoboscError, LookupError):
@@ -28,16 +28,16 @@ class PlottingUnavailableError(RoboscError, LookupError):
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """What stands in a plot.
+    """Content of a plot.
 
     Attributes:
         path: Its file.
-        events: How many events there are in the time window.
-        marks: How many marks were drawn for them.
+        events: Number of events in the time window.
+        marks: Number of marks that were drawn for them.
         rows: Names of the events that have a row, from top to bottom.
-        begin_s: Where the time axis begins, in seconds since the begin of the log.
-        end_s: Where it ends.
-        notes: What is not shown, in sentences.
+        begin_s: Begin of the time axis, in seconds since the begin of the log.
+        end_s: End of the time axis.
+        notes: Remarks on what is not shown, in sentences.
     """
 
     path: Path
@@ -63,12 +63,12 @@ def draw_sequence(
 
     Args:
         run: The log.
-        path: Where to: `.png` and `.svg` are pictures, `.html` a page that can be zoomed and needs no network.
+        path: Output file: `.png` and `.svg` are pictures, `.html` a page that can be zoomed and needs no network.
         begin_s: Begin of the time window, in seconds since the begin of the log; None: the first event.
         end_s: Its end; None: the last event.
         events: Names, or patterns such as `*.request`, of the events to show; empty: all.
-        only_changes: Whether events are left out that carry what they carried before and leave the state as it was.
-        title: What stands above it.
+        only_changes: True if events are left out that carry what they carried before and leave the state as it was.
+        title: Text above it.
 
     Raises:
         PlotError: There is nothing to show, or no such kind of file.
@@ -97,10 +97,10 @@ def draw_sequence(
 
 
 def _drawer(module: str, package: str) -> Any:
-    """A module of this package that draws with another package, loaded on use.
+    """Return a module of this package that draws with another package, loaded on use.
 
     Raises:
-        PlottingUnavailableError: That is not installed.
+        PlottingUnavailableError: The other package is not installed.
     """
     try:
         return importlib.import_module(f"robosc.event_logs.{module}")

@@ -23,11 +23,11 @@ def _escaped(text: str) -> str:
 
 
 def page(sequence: EventSequence, title: str) -> tuple[bytes, EventSequence]:
-    """A page, and what of the sequence it shows.
+    """Return a page, and the part of the sequence that it shows.
 
     Args:
-        sequence: What to draw.
-        title: What stands above it.
+        sequence: Sequence to draw.
+        title: Text above it.
     """
     shown = sequence.thinned(_PLACES)
     figure = go.Figure()

@@ -18,11 +18,11 @@ _PLACES = 600
 
 
 def picture(sequence: EventSequence, title: str, format_: str) -> tuple[bytes, EventSequence]:
-    """A picture, and what of the sequence it shows.
+    """Return a picture, and the part of the sequence that it shows.
 
     Args:
-        sequence: What to draw.
-        title: What stands above it.
+        sequence: Sequence to draw.
+        title: Text above it.
         format_: `png` or `svg`.
     """
     shown = sequence.thinned(_PLACES)

@@ -154,7 +154,7 @@ def _is_name(value: object) -> "TypeIs[str]":
 
 
 def _is_text(value: str) -> bool:
-    """Whether it can be drawn: no half of a character of UTF-16, no control character but white space."""
+    """Return True if a text can be drawn: no half of a UTF-16 character, no control character but white space."""
     return all(char.isprintable() or char.isspace() for char in value)
 
 

@@ -52,7 +52,7 @@ class _Stored:
     variable: Variable
 
     def assigned(self, value: Any) -> Value | None:
-        """What it takes, or None if it keeps what it has."""
+        """Return the value that the variable takes, or None if it keeps what it has."""
         found: Value | None
         match self.variable.type:
             case IntegerType(low=int(low), high=int(high)):
@@ -68,13 +68,13 @@ class Replay:
     """The state that the events so far lead to.
 
     Args:
-        supervisor: Its automata, requirements and added conditions.
-        deployment: Where it stood.
+        supervisor: Supervisor with its automata, requirements and added conditions.
+        deployment: Deployment in which it stood.
 
     Attributes:
         model: The model.
         requests: The communications that are requested, by identifier.
-        state: Of the automata.
+        state: State of the automata.
         stored: Values of the variables that synthesis leaves out, by component and name.
 
     Raises:
@@ -123,15 +123,15 @@ class Replay:
     # What the state allows.
 
     def has(self, event: str) -> bool:
-        """Whether the model has an event of that name."""
+        """Return True if the model has an event of that name."""
         return event in self._events
 
     def is_controllable(self, event: str) -> bool:
-        """Whether the supervisor may disable it."""
+        """Return True if the supervisor may disable an event."""
         return self._events[event]
 
     def is_possible(self, event: str) -> bool:
-        """Whether the plants can do it."""
+        """Return True if the plants can do an event."""
         if self._events[event]:
             return self._semantics.enabled(self.state, event)
         # Data never blocks what the environment does, and there may be too many choices of it to try them all.
@@ -139,7 +139,7 @@ class Replay:
         return self._semantics.target_with(self.state, event, unknown) is not None
 
     def refusal(self, event: str) -> str:
-        """Why a controllable event is not allowed now, in words; empty: it is."""
+        """Return the reason why a controllable event is not allowed now, in words; empty if it is allowed."""
         if not self._semantics.enabled(self.state, event):
             return self._blocked_by(event)
         if not self._semantics.condition(self.state, event):
@@ -197,12 +197,13 @@ class Replay:
 
         Args:
             event: An event of the model.
-            data: What the log tells of its data.
+            data: Data of the event in the log.
             logged: The state after it by the log: what the log leaves out is taken from there.
 
         Returns:
-            What is wrong, in sentences: the event is not possible, its data is no such data, or the state after it is
-            another one than the logged. The replay goes on from what the log tells, so that nothing is told twice.
+            Faults, in sentences: the event is not possible, its data is no such data, or the state after it is
+            another one than the logged. The replay goes on from what the log reports, so that nothing is reported
+            twice.
         """
         problems: list[str] = []
         target = self._target(event, data, problems)

@@ -1,4 +1,4 @@
-"""What a plot of a sequence of events shows: rows, marks along time, and fewer of those that cover others."""
+"""Content of a plot of a sequence of events: rows, marks along time, and fewer of those that cover others."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -27,8 +27,8 @@ class Row:
 
     Attributes:
         event: Its name.
-        is_controllable: Whether the controller took it by itself.
-        times_s: When it happened, in seconds since the begin of the log.
+        is_controllable: True if the controller took it by itself.
+        times_s: Times at which it happened, in seconds since the begin of the log.
         lines: Its lines in the log.
     """
 
@@ -65,15 +65,15 @@ class Interruption:
 
 @dataclass(frozen=True, slots=True)
 class EventSequence:
-    """What is drawn.
+    """Content of a drawing.
 
     Attributes:
-        rows: From top to bottom, by their first occurrence in the log.
+        rows: Rows from top to bottom, by their first occurrence in the log.
         interruptions: Faults, stops, their ends and restarts.
-        begin_s: Where the time axis begins, in seconds since the begin of the log.
-        end_s: Where it ends.
-        count: How many events there are in it.
-        notes: What is not shown of what was asked for, in sentences.
+        begin_s: Begin of the time axis, in seconds since the begin of the log.
+        end_s: End of the time axis.
+        count: Number of events in it.
+        notes: Remarks on what is not shown of what was asked for, in sentences.
     """
 
     rows: tuple[Row, ...]
@@ -85,7 +85,7 @@ class EventSequence:
 
     @property
     def drawn(self) -> int:
-        """How many marks there are."""
+        """Number of marks."""
         return sum(len(row.times_s) for row in self.rows)
 
     def thinned(self, places: int) -> "EventSequence":
@@ -106,14 +106,14 @@ def sequence_of(
     *,
     only_changes: bool = False,
 ) -> EventSequence:
-    """The events of a log in a time window.
+    """Return the events of a log in a time window.
 
     Args:
         run: The log.
         begin_s: The window's begin, in seconds since the begin of the log; None: the first event or interruption.
         end_s: Its end; None: the last event or interruption.
         events: Names, or patterns such as `*.request`, of the events to show; empty: all.
-        only_changes: Whether events are left out that say nothing new.
+        only_changes: True if events are left out that say nothing new.
 
     Raises:
         PlotError: There is nothing to show.

@@ -1,4 +1,4 @@
-"""What was read from an event log."""
+"""Content that was read from an event log."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,10 +14,10 @@ class LogEntry:
 
     Attributes:
         line: Its number in the file, from 1.
-        time_s: When, in seconds since 1970-01-01 UTC.
+        time_s: Time, in seconds since 1970-01-01 UTC.
         kind: `event`, `blocked`, `fault` and so on: see `robosc.execution.event_log`.
         event: The event that it is about; empty if it is about none.
-        is_controllable: Whether the controller took the event by itself.
+        is_controllable: True if the controller took the event by itself.
         document: All of it, as it stands in the log. Entries share what is equal: nobody may change it.
     """
 
@@ -30,7 +30,7 @@ class LogEntry:
 
     @property
     def data(self) -> Any:
-        """What came or went with the event, or None."""
+        """Data that came or went with the event, or None."""
         return self.document.get("data")
 
     @property
@@ -51,9 +51,9 @@ class LoggedRun:
 
     Attributes:
         entries: Its entries in their order.
-        dropped: How many entries its writer lost, by its own word.
-        torn_line: Number of the last line, if it was cut off (the writer ended while it wrote, or writes still); it is
-            left out. None: the last line is whole.
+        dropped: Number of entries that its writer lost, by its own word.
+        torn_line: Number of the last line, if it was cut off (the writer ended while it wrote, or writes still); it
+            is left out. None: the last line is whole.
     """
 
     entries: tuple[LogEntry, ...]
@@ -71,7 +71,7 @@ class LoggedRun:
         return self.entries[0].time_s if self.entries else 0.0
 
     def notes(self) -> tuple[str, ...]:
-        """What a reader should know of how whole the log is, in sentences."""
+        """Return remarks on how whole the log is, in sentences."""
         found = []
         if self.dropped:
             found.append(f"the log lacks {self.dropped} entries that its writer lost")

@@ -19,7 +19,7 @@ from robosc.execution.runner import Status
 from robosc.execution.settings import Settings
 
 WATCH_S = 0.05
-"""How often, at least, it is noticed that time has passed."""
+"""Longest time until it is noticed that time has passed, in seconds."""
 
 EARLY_MESSAGES = 1000
 """Messages that are kept until the controller runs."""
@@ -73,13 +73,13 @@ class AsyncController:
     Args:
         system: Plants, requirements and supervisor with their state.
         robot: The robot.
-        settings: What the deployment chose; the defaults if None.
+        settings: Settings that the deployment chose; the defaults if None.
         clock: The only source of time; the computer's if None.
         log: The event log; none if None.
-        sleep: How to wait for some seconds of that clock.
+        sleep: Function that waits for some seconds of that clock.
 
     Attributes:
-        executor: What decides; its `status`, `reasons`, `counters` and `is_faulty` tell how it is.
+        executor: Executor that decides; its `status`, `reasons`, `counters` and `is_faulty` report its condition.
 
     Raises:
         DeploymentError: The model has actions and the supervisor was made for a supervision layer.
@@ -222,7 +222,7 @@ class _Work:
         return data
 
     def is_default(self, communication: str, message: Any) -> bool:
-        """Whether nothing in it differs from zero, false and the empty text."""
+        """Return True if nothing in a message differs from zero, false and the empty text."""
         return _is_default(message)
 
     def publish(self, communication: str, message: Any) -> None:
@@ -290,7 +290,7 @@ class _Work:
 
 
 def _is_default(data: Any) -> bool:
-    """Whether data of the model is all-default: nothing given, or nothing but zero, false and the empty text."""
+    """Return True if data of the model is all-default: none given, or only zero, false and the empty text."""
     if isinstance(data, dict):
         return all(_is_default(part) for part in data.values())
     if isinstance(data, (list, tuple)):

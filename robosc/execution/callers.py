@@ -12,7 +12,7 @@ class CallerCall(NamedTuple):
 
     Attributes:
         service: Its service.
-        call_id: How the caller's side knows it.
+        call_id: Id of the call on the caller's side.
     """
 
     service: str
@@ -23,10 +23,10 @@ class CallerGoal:
     """A goal that has not ended for its caller.
 
     Attributes:
-        number: How the robot's side knows it.
+        number: Number of the goal on the robot's side.
         action: Its action.
-        goal_id: How the caller's side knows it.
-        is_cancelled: Whether its caller asked to cancel it: it then ends as its server ends it.
+        goal_id: Id of the goal on the caller's side.
+        is_cancelled: True if its caller asked to cancel it: it then ends as its server ends it.
     """
 
     __slots__ = ("action", "goal_id", "is_cancelled", "number")
@@ -38,10 +38,10 @@ class CallerGoal:
         self.is_cancelled = False
 
     def outcome(self, outcome: str) -> str:
-        """How it ends for its caller.
+        """Return the outcome of the goal for its caller.
 
         Args:
-            outcome: How its server ended it, or `rejected` or `lost`.
+            outcome: Outcome from its server, or `rejected` or `lost`.
         """
         if outcome == "succeeded" or (self.is_cancelled and outcome == "cancelled"):
             return outcome
@@ -49,7 +49,9 @@ class CallerGoal:
 
 
 class Callers:
-    """What the existing controller waits for. An id of the robot's side never meets one of the caller's side.
+    """Calls and goals that the existing controller waits for.
+
+    An id of the robot's side never meets one of the caller's side.
 
     Args:
         calls: Service calls under way on the robot's side.

@@ -10,7 +10,7 @@ from robosc.execution.protocol import ControlledSystem, RobotSide
 FOREVER = float("inf")
 
 OUTCOMES = ("succeeded", "rejected", "aborted", "cancelled", "lost")
-"""How a goal can end: with a result, refused by its server, given up by it, cancelled, or its server is gone."""
+"""Outcomes of a goal: with a result, refused by its server, given up by it, cancelled, or its server is gone."""
 
 
 class Call(NamedTuple):
@@ -53,7 +53,7 @@ class Calls:
         return None if call is None else call.service
 
     def is_open(self, number: int) -> bool:
-        """Whether a call is under way."""
+        """Return True if a call is under way."""
         return number in self._calls
 
     def expired(self, now_s: float) -> List[int]:
@@ -61,7 +61,7 @@ class Calls:
         return [number for number, call in self._calls.items() if now_s >= call.deadline_s]
 
     def deadline_s(self) -> float:
-        """When the next one is over."""
+        """Return the reading of the clock, in seconds, at which the time of the next call is over."""
         return min((call.deadline_s for call in self._calls.values()), default=FOREVER)
 
     def clear(self) -> None:
@@ -75,12 +75,12 @@ class Goal:
     Attributes:
         number: Its id.
         action: Name of the action.
-        is_running: Whether the model's action executes it; no longer after its cancel or error.
-        is_accepted: Whether its server accepted it.
-        is_cancel_wanted: Whether it is to be cancelled.
-        is_cancel_sent: Whether its server was asked to cancel it.
+        is_running: True if the model's action executes it; no longer after its cancel or error.
+        is_accepted: True if its server accepted it.
+        is_cancel_wanted: True if it is to be cancelled.
+        is_cancel_sent: True if its server was asked to cancel it.
         deadline_s: Reading of the clock at which it counts as failed.
-        held: For each requirement of the action: whether it held in a stable state since the request.
+        held: Values for the requirements of the action: True if one held in a stable state since the request.
     """
 
     __slots__ = (
@@ -151,7 +151,7 @@ class Goals:
         return self._goals.pop(number, None)
 
     def is_open(self, action: str) -> bool:
-        """Whether a goal of an action may still be under way."""
+        """Return True if a goal of an action may still be under way."""
         return any(goal.action == action for goal in self._goals.values())
 
     def all(self) -> List[Goal]:
@@ -163,7 +163,7 @@ class Goals:
         return [goal for goal in self._goals.values() if goal.is_running and now_s >= goal.deadline_s]
 
     def deadline_s(self) -> float:
-        """When the next running one is over."""
+        """Return the reading of the clock, in seconds, at which the time of the next running goal is over."""
         return min((goal.deadline_s for goal in self._goals.values() if goal.is_running), default=FOREVER)
 
     def to_cancel(self) -> Optional[Goal]:

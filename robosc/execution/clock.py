@@ -28,7 +28,7 @@ class ManualClock:
 
     Args:
         now_s: Its first reading.
-        epoch_s: What is added to a reading for the wall clock.
+        epoch_s: Number of seconds added to a reading for the wall clock.
     """
 
     __slots__ = ("epoch_s", "now_s")

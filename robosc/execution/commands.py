@@ -1,4 +1,4 @@
-"""When something came last from the existing controller of a supervision layer (semantics 3.7)."""
+"""Time of the last input from the existing controller of a supervision layer (semantics 3.7)."""
 
 from __future__ import annotations
 
@@ -32,5 +32,5 @@ class Commands:
         return [item for item in self._releases.acting() if now_s >= self._arrived_s[item] + self._timeout_s]
 
     def deadline_s(self) -> float:
-        """When the next of them is over its time."""
+        """Return the reading of the clock, in seconds, at which the next of the identifiers is over its time."""
         return min((self._arrived_s[item] + self._timeout_s for item in self._releases.acting()), default=FOREVER)

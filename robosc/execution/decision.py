@@ -1,4 +1,4 @@
-"""Which of the enabled requests is issued: the policies of semantics 3.5.
+"""Choice of the enabled request that is issued: the policies of semantics 3.5.
 
 Requests are known by number, 0 up to N - 1 in source order. A decision is: `choose` among candidates,
 again without those that could not be issued, `issued` for the one that was, then `close`.
@@ -109,10 +109,10 @@ class PriorityPolicy:
 
 
 class RandomPolicy:
-    """Any candidate with equal probability, the same sequence for the same seed.
+    """Policy that takes any candidate with equal probability, the same sequence for the same seed.
 
     Args:
-        seed: Where the sequence starts.
+        seed: Start of the sequence.
     """
 
     __slots__ = ("_random",)

@@ -35,11 +35,11 @@ _MAXIMUM_DEPTH = 20
 
 
 class EventLog(Protocol):
-    """Where entries go. None of its methods raises or waits, but for `close`."""
+    """Destination of log entries. None of its methods raises or waits, but for `close`."""
 
     @property
     def is_active(self) -> bool:
-        """Whether entries are kept at all now; if not, nobody needs to make them."""
+        """True if entries are kept at all now; if not, nobody needs to make them."""
 
     @property
     def dropped(self) -> int:
@@ -83,10 +83,12 @@ class MemoryLog:
 
 
 class JsonLinesLog:
-    """Writes entries as JSON Lines in a thread of its own; drops and counts them when the disk is too slow or full.
+    """Log that writes entries as JSON Lines in a thread of its own.
+
+    It drops and counts them when the disk is too slow or full.
 
     Args:
-        stream: Where to write; closed at the end.
+        stream: Stream to write to; closed at the end.
         limit: Entries that may wait.
     """
 
@@ -159,10 +161,10 @@ class JsonLinesLog:
 
 
 def open_event_log(folder: str, name: str, wall_s: float) -> JsonLinesLog:
-    """A log in a new file `<name>-<date>-<time>.jsonl` (UTC) of a folder, which is made if it is not there.
+    """Return a log in a new file `<name>-<date>-<time>.jsonl` (UTC) of a folder, which is made if it is not there.
 
     Args:
-        folder: Where to put the file.
+        folder: Folder for the file.
         name: First part of the file's name.
         wall_s: The time for its name, in seconds since 1970-01-01 UTC.
 

@@ -15,12 +15,12 @@ from robosc.execution.settings import Settings
 
 
 class Executor(Runner):
-    """Makes a controlled system run as the robot's controller.
+    """Executor that runs a controlled system as the robot's controller.
 
     Args:
         system: Plants, requirements and supervisor with their state.
-        middleware: The world.
-        settings: What the deployment chose; the defaults if None.
+        middleware: Middleware of the robot.
+        settings: Settings that the deployment chose; the defaults if None.
         clock: The only source of time; the computer's if None.
         log: The event log; none if None.
 

@@ -25,9 +25,9 @@ def fields_of(message: Any) -> Dict[str, Any]:
 
 
 def is_finite(message: Any) -> bool:
-    """Whether there is neither a NaN nor an infinity anywhere in a message.
+    """Return True if there is neither a NaN nor an infinity anywhere in a message.
 
-    What cannot be looked through is not known to be finite, so the answer is no.
+    A message that cannot be looked through is not known to be finite, so the answer is no.
     """
     try:
         return _is_finite(message)
@@ -58,7 +58,7 @@ def _is_finite(message: Any) -> bool:
 
 
 def _parts(value: Any) -> Iterable[Any]:
-    """What a value is made of."""
+    """Return the parts of a value."""
     if isinstance(value, Mapping):
         return value.values()
     if isinstance(value, (list, tuple, set, frozenset)):

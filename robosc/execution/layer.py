@@ -37,13 +37,13 @@ _AT_REST = {
 
 
 class Layer(Runner):
-    """Makes a controlled system run as a supervision layer.
+    """Executor that runs a controlled system as a supervision layer.
 
     Args:
         system: Plants, requirements and supervisor with their state.
         robot: The robot's side of the middleware.
         caller: The existing controller's side.
-        settings: What the deployment chose; the defaults if None.
+        settings: Settings that the deployment chose; the defaults if None.
         clock: The only source of time; the computer's if None.
         log: The event log; none if None.
 
@@ -73,10 +73,10 @@ class Layer(Runner):
 
     @guarded
     def on_request(self, identifier: str, message: Any) -> None:
-        """The existing controller sent a message: it goes through unchanged if it is allowed now, else it is held back.
+        """Let a message of the existing controller through unchanged if it is allowed now, else hold it back.
 
         Args:
-            identifier: Where it is meant to go.
+            identifier: Identifier that it is meant for.
             message: Mapping or object with the properties, or the plain value of a basic type; None for no data.
         """
         names = self._messages.get(identifier)
@@ -94,11 +94,11 @@ class Layer(Runner):
 
     @guarded
     def on_call(self, service: str, call_id: Any, message: Any) -> None:
-        """The existing controller called a service: held back, it is answered at once with a default response.
+        """Take a service call of the existing controller: held back, it gets a default response at once.
 
         Args:
             service: Name of the service in the model.
-            call_id: How its answer is to be addressed; the executor only hands it back.
+            call_id: Id by which its answer is to be addressed; the executor only hands it back.
             message: The request.
         """
         request = self._request_of(service, "service")
@@ -115,11 +115,11 @@ class Layer(Runner):
 
     @guarded
     def on_goal(self, action: str, goal_id: Any, message: Any) -> None:
-        """The existing controller sent a goal: held back, it is rejected, else accepted.
+        """Take a goal of the existing controller: held back, it is rejected, else accepted.
 
         Args:
             action: Name of the action in the model.
-            goal_id: How the caller's side knows the goal.
+            goal_id: Id of the goal on the caller's side.
             message: The goal.
         """
         request = self._request_of(action, "action")
@@ -136,11 +136,11 @@ class Layer(Runner):
 
     @guarded
     def on_cancel(self, action: str, goal_id: Any) -> None:
-        """The existing controller wants to cancel a goal: that is always forwarded, also while the robot is stopped.
+        """Cancel a goal for the existing controller: that is always forwarded, also while the robot is stopped.
 
         Args:
             action: Name of the action in the model.
-            goal_id: How the caller's side knows the goal.
+            goal_id: Id of the goal on the caller's side.
         """
         self._look_at_clock()
         waiting = self._callers.find_goal(action, goal_id)
@@ -160,10 +160,10 @@ class Layer(Runner):
 
     @guarded
     def on_silent(self, identifier: str) -> None:
-        """The existing controller is known to be gone from an identifier: its last message there is released now.
+        """Release the last message on an identifier now: the existing controller is known to be gone from it.
 
         Args:
-            identifier: Where it sent messages; where none of them acts, nothing happens.
+            identifier: Identifier on which it sent messages; where none of them acts, nothing happens.
         """
         self._look_at_clock()
         if self._releases.is_acting(identifier):
@@ -274,7 +274,7 @@ class Layer(Runner):
         return None
 
     def _refusal(self, message: Any) -> Optional[str]:
-        """Why no request at all, or none with this message, is let through now."""
+        """Return the reason why no request at all, or none with this message, is let through now."""
         if not self._may_request:
             return _AT_REST[self.status]
         return None if is_finite(message) else _NOT_FINITE

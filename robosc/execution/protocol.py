@@ -19,7 +19,7 @@ OUTGOING = "outgoing message"
 
 
 class CommunicationInfo(NamedTuple):
-    """What the executor must know of a message, service or action.
+    """Facts about a message, service or action that the executor must know.
 
     Attributes:
         name: Its name in the model.
@@ -31,7 +31,7 @@ class CommunicationInfo(NamedTuple):
         requirement_count: Number of requirements on its request.
         conjunct_count: Number of top-level conjuncts of those requirements, all counted on.
         max_age_s: Seconds after which an outgoing message is stale, if the model says so.
-        has_condition: Whether an incoming message says with `when` which messages it is, in a supervision layer.
+        has_condition: True if an incoming message says with `when` which messages it is, in a supervision layer.
     """
 
     name: str
@@ -88,9 +88,9 @@ class Reading(NamedTuple):
     Attributes:
         values: One value (None: unknown) for each datum that updates on the event read, as the system wants them.
         data: The same by name (`value.front`), for the log.
-        unknown: What was unknown, in words: an enum that fell to its default past an unknown rule, an
+        unknown: Descriptions of what was unknown: an enum that fell to its default past an unknown rule, an
             integer that was clamped. Empty: nothing was.
-        enum_unknown: Whether an enum fell to its default although an earlier rule was unknown.
+        enum_unknown: True if an enum fell to its default although an earlier rule was unknown.
     """
 
     values: Any
@@ -100,12 +100,12 @@ class Reading(NamedTuple):
 
 
 class Match(NamedTuple):
-    """Whether a message that an existing controller sent is a certain incoming message of the model.
+    """Result of matching a message of an existing controller with a certain incoming message of the model.
 
     Attributes:
-        holds: Whether the condition `when` is true of it; yes if there is none.
-        unknown: What was unknown, as in a `Reading`.
-        enum_unknown: As in a `Reading`.
+        holds: True if the condition `when` is true of it, or if there is none.
+        unknown: Descriptions of what was unknown, as in a `Reading`.
+        enum_unknown: The same as in a `Reading`.
     """
 
     holds: bool
@@ -132,13 +132,13 @@ class ControlledSystem(Protocol):
         """Back to the initial state."""
 
     def enabled(self, event: str) -> bool:
-        """Whether a controllable event is allowed now: by plants, ranges, requirements and supervisor.
+        """Return True if a controllable event is allowed now: by plants, ranges, requirements and supervisor.
 
         A tau that would change nothing in the current state is not enabled.
         """
 
     def enabled_requests(self) -> Tuple[int, ...]:
-        """Which requests are allowed now: their numbers, from 0, among all requests in source order."""
+        """Return the requests that are allowed now: their numbers, from 0, among all requests in source order."""
 
     def enabled_silent(self) -> Optional[str]:
         """The first of the description's resets, then its taus, that is allowed now; None if none is."""
@@ -171,7 +171,7 @@ class ControlledSystem(Protocol):
         """
 
     def matches(self, communication: str, data: Any) -> Match:
-        """Whether a message is an incoming message, by its condition `when`; never raises for any data."""
+        """Tell whether a message is an incoming message, by its condition `when`; never raises for any data."""
 
     def requirements(self, communication: str) -> Tuple[bool, ...]:
         """For each requirement on a communication's request, in source order: whether it holds now."""
@@ -190,10 +190,10 @@ class ControlledSystem(Protocol):
 
 
 class RobotSide(Protocol):
-    """What an executor of either deployment asks of the robot; replies come back through its methods, later."""
+    """Robot's side for an executor of either deployment; replies come back through the executor's methods, later."""
 
     def is_default(self, communication: str, message: Any) -> bool:
-        """Whether a message of a request is the all-default one (its header apart)."""
+        """Return True if a message of a request is the all-default one (its header apart)."""
 
     def publish(self, communication: str, message: Any) -> None:
         """Send an incoming message's message."""
@@ -212,7 +212,7 @@ class RobotSide(Protocol):
 
 
 class Middleware(RobotSide, Protocol):
-    """What the executor of a controller asks of the world: the robot, and messages made of the model's data."""
+    """Middleware for the executor of a controller: the robot, and messages made of the model's data."""
 
     def prepare(self, communication: str, data: Any) -> Any:
         """The middleware's message for a request, from the model's data (None: the default message).
@@ -225,7 +225,7 @@ class Middleware(RobotSide, Protocol):
 
 
 class LayerMiddleware(Protocol):
-    """What a supervision layer tells the existing controller, the caller.
+    """Reports of a supervision layer to the existing controller, the caller.
 
     The ids of calls and goals here are the caller's own; the robot's side never sees them.
     """
@@ -252,11 +252,11 @@ class LayerMiddleware(Protocol):
         """Feedback of a goal, unchanged."""
 
     def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any) -> None:
-        """An accepted goal has ended for its caller.
+        """End an accepted goal for its caller.
 
         Args:
             communication: The action.
-            goal_id: Which goal.
+            goal_id: Id of the goal.
             outcome: `succeeded`, `aborted` or `cancelled`.
             data: The server's result, unchanged; None for the default one.
         """

@@ -1,4 +1,4 @@
-"""What an executor tells about itself: entries of the event log, and counters for diagnostics."""
+"""Reports of an executor about itself: entries of the event log, and counters for diagnostics."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from robosc.execution.protocol import ControlledSystem
 
 
 class Counters(NamedTuple):
-    """What went wrong so far.
+    """Counts of what went wrong so far.
 
     Attributes:
         unknown: Enums that fell to their default past an unknown rule, received integers that were moved into
@@ -27,12 +27,12 @@ class Counters(NamedTuple):
 
 
 class Recorder:
-    """Counts, and writes entries; nothing in it raises.
+    """Recorder that counts, and writes entries; nothing in it raises.
 
     Args:
-        system: Its state stands in the entries of events.
-        clock: Tells the time of an entry.
-        log: Where entries go.
+        system: System whose state stands in the entries of events.
+        clock: Clock that gives the time of an entry.
+        log: Log for the entries.
 
     Attributes:
         began_s: Reading of the clock when the handling of what came last began: decision times count from here.
@@ -61,7 +61,7 @@ class Recorder:
 
     @property
     def is_active(self) -> bool:
-        """Whether the log keeps anything now."""
+        """True if the log keeps anything now."""
         return self._log.is_active
 
     def counters(self) -> Counters:

@@ -13,10 +13,10 @@ class _Acting:
 
     Attributes:
         request: Name of the communication whose request sent it.
-        event: That request.
-        was_enabled: Whether the request was enabled in the last stable state since.
-        held: For each conjunct of its requirements: whether it held in that state.
-        is_due: Whether it is to be released: something was so and is no longer. Once due it stays so until
+        event: Event of that request.
+        was_enabled: True if the request was enabled in the last stable state since.
+        held: Values for the conjuncts of its requirements: True if one held in that state.
+        is_due: True if it is to be released: something was so and is no longer. Once due it stays so until
             something is sent there; that is why the last stable state is enough to remember.
     """
 
@@ -31,13 +31,13 @@ class _Acting:
 
 
 class Releases:
-    """Follows the last message of each release identifier.
+    """Tracker of the last message of each release identifier.
 
     Args:
-        system: Tells what is enabled and what holds.
+        system: System that shows what is enabled and what holds.
         identifiers: The release identifiers.
-        requests: For each of them its communications, in source order.
-        may_wait: Whether a due release waits while another request there is enabled: only a controller's does.
+        requests: Communications of each of them, in source order.
+        may_wait: True if a due release waits while another request there is enabled: only a controller's does.
     """
 
     __slots__ = ("_acting", "_events", "_may_wait", "_system", "identifiers", "waiting")
@@ -116,7 +116,7 @@ class Releases:
             self.sent(request, identifier, is_default)
 
     def is_acting(self, identifier: str) -> bool:
-        """Whether the last message sent on a release identifier still acts."""
+        """Return True if the last message sent on a release identifier still acts."""
         return identifier in self._acting
 
     def acting(self) -> Tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""What comes back to service calls and goals, or does not come in time (semantics 3.2)."""
+"""Replies to service calls and goals, also those that do not come in time (semantics 3.2)."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class Replies:
         self._goals.leave_model()
 
     def deadline_s(self) -> float:
-        """When the next call or goal is over its time."""
+        """Return the reading of the clock, in seconds, at which the next call or goal is over its time."""
         return min(self._calls.deadline_s(), self._goals.deadline_s())
 
     def expire(self, now_s: float) -> None:
-        """What is over its time has failed; such a goal is also cancelled."""
+        """Fail the calls and goals that are over their time; also cancel such goals."""
         for number in self._calls.expired(now_s):
             service = self._calls.close(number)
             self._steps.happen("{}.error".format(service), None, "timeout")

@@ -20,9 +20,9 @@ class Request(NamedTuple):
     Attributes:
         name: Its communication.
         event: Its event.
-        identifier: Where its message goes.
+        identifier: Identifier that its message goes to.
         kind: `incoming message`, `service` or `action`.
-        keeps_acting: Whether that is a release identifier.
+        keeps_acting: True if that is a release identifier.
     """
 
     name: str
@@ -61,18 +61,18 @@ def by_identifier(requests: Sequence[Request]) -> Dict[str, Tuple[str, ...]]:
 
 
 class Decisions:
-    """Issues requests, at most one in a decision.
+    """Part of an executor that issues requests, at most one in a decision.
 
     Args:
         system: The controlled system.
-        middleware: Where requests go.
+        middleware: Middleware that requests go to.
         requests: All of them, in source order.
-        steps: Takes their events.
-        recorder: Is told about requests that cannot be issued.
+        steps: Steps that take their events.
+        recorder: Recorder of requests that cannot be issued.
         releases: Messages that keep acting.
         calls: Service calls under way.
         goals: Goals under way.
-        policy: Decides between enabled requests, by number; may be replaced.
+        policy: Policy that decides between enabled requests, by number; may be replaced.
     """
 
     __slots__ = (

@@ -32,13 +32,13 @@ class Rest:
     """The reasons why an executor rests, and what it does to come to rest.
 
     Args:
-        middleware: Sends default messages and cancels.
+        middleware: Middleware that sends default messages and cancels.
         releases: The release identifiers.
         goals: Goals under way.
 
     Attributes:
-        reasons: Why, in words, by a key; nothing may be requested while there is one.
-        awaited_until_s: Until when the goals' ends are awaited.
+        reasons: Reasons in words, by a key; nothing may be requested while there is one.
+        awaited_until_s: Time until which the goals' ends are awaited, in seconds.
         restless: Release identifiers whose default message could not be sent so far.
     """
 
@@ -82,5 +82,5 @@ class Rest:
         return failures
 
     def is_awaiting(self, now_s: float) -> bool:
-        """Whether goals may still end within the time that they are given."""
+        """Return True if goals may still end within the time that they are given."""
         return bool(self._goals) and now_s < self.awaited_until_s

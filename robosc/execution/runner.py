@@ -1,4 +1,6 @@
-"""What the executors of both deployments share: semantics part 3, points 1 to 4 and 8, around any `ControlledSystem`.
+"""Common part of the executors of both deployments, around any `ControlledSystem`.
+
+It covers semantics part 3, points 1 to 4 and 8.
 
 An adapter drives an executor from one thread: `tick` once a period, the other methods when something comes. Its
 middleware must not call it back from within. No method raises: an exception of the system or of the
@@ -32,7 +34,7 @@ _STOPPED_BY_HAND = "stop"
 
 
 class Status(str, Enum):
-    """What an executor is doing."""
+    """Status of an executor."""
 
     NEW = "new"
     """Not started."""
@@ -66,13 +68,13 @@ def guarded(method: _Method) -> _Method:
 
 
 class Runner:
-    """Takes what comes from the robot, and brings it to rest.
+    """Runner that takes what comes from the robot, and brings the robot to rest.
 
     Args:
         system: Plants, requirements and supervisor with their state.
         robot: The robot's side of the middleware.
         deployment: `controller` or `layer`.
-        settings: What the deployment chose; the defaults if None.
+        settings: Settings that the deployment chose; the defaults if None.
         clock: The only source of time; the computer's if None.
         log: The event log; none if None.
 
@@ -126,7 +128,7 @@ class Runner:
 
     @property
     def status(self) -> Status:
-        """What the executor is doing now."""
+        """Current status of the executor."""
         if self._rest.reasons:
             return Status.STOPPING if self._rest.is_awaiting(self._clock.monotonic()) else Status.STOPPED
         if not self._is_started:
@@ -135,17 +137,17 @@ class Runner:
 
     @property
     def reasons(self) -> Tuple[str, ...]:
-        """Why it is stopped, in words; empty if it is not."""
+        """Reasons why it is stopped, in words; empty if it is not."""
         return tuple(self._rest.reasons.values())
 
     @property
     def is_faulty(self) -> bool:
-        """Whether a fault stopped it; only `restart` ends that."""
+        """True if a fault stopped it; only `restart` ends that."""
         return _FAULT in self._rest.reasons
 
     @property
     def counters(self) -> Counters:
-        """What went wrong so far."""
+        """Counts of what went wrong so far."""
         return self._recorder.counters()
 
     # What an adapter tells.
@@ -171,10 +173,10 @@ class Runner:
             self._fail(describe_error(error))
 
     def receive(self, identifier: str, data: Any) -> None:
-        """A message of the robot came: one batch, the events of all messages of the model that it stands for.
+        """Take a message of the robot: one batch, the events of all messages of the model that it stands for.
 
         Args:
-            identifier: Where it came.
+            identifier: Identifier on which it came.
             data: Mapping or object with the properties, or the plain value of a basic type; None for no data.
         """
         # This is written out for speed: the cycle time of the controller.
@@ -227,10 +229,10 @@ class Runner:
 
     @guarded
     def on_goal_ended(self, goal_id: int, outcome: str, data: Any = None) -> None:
-        """A goal's end is known, or its server is lost.
+        """Take the end of a goal, or the loss of its server.
 
         Args:
-            goal_id: Which goal.
+            goal_id: Id of the goal.
             outcome: `succeeded`, `rejected`, `aborted`, `cancelled` or `lost`.
             data: Its result, if it succeeded.
         """
@@ -239,11 +241,11 @@ class Runner:
 
     @guarded
     def on_cancel_refused(self, goal_id: int, ended: bool) -> None:
-        """A cancel was refused.
+        """Take the refusal of a cancel.
 
         Args:
-            goal_id: Which goal.
-            ended: Whether because the goal had ended already; its result follows or came already.
+            goal_id: Id of the goal.
+            ended: True if the reason is that the goal had ended already; its result follows or came already.
         """
         self._look_at_clock()
         self._replies.cancel_refused(goal_id, ended)
@@ -294,7 +296,7 @@ class Runner:
         return min(self._replies.deadline_s(), self._sensors.deadline_s(now))
 
     def _check_time(self, now: float) -> None:
-        """What is over by now has its effect.
+        """Handle what is over by now.
 
         Never raises: after a fault, too, what comes is handled; a goal whose end were lost would never have ended.
         """

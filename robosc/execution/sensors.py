@@ -11,10 +11,10 @@ class _Sensor:
     """An outgoing message with a maximum age.
 
     Attributes:
-        identifier: Where it comes.
+        identifier: Identifier on which it comes.
         max_age_s: Seconds after which it is stale.
-        seen_s: When it came last; before the first time, when the executor started.
-        was_seen: Whether it came since the start.
+        seen_s: Time when it came last, in seconds; before the first time, when the executor started.
+        was_seen: True if it came since the start.
     """
 
     __slots__ = ("identifier", "max_age_s", "name", "seen_s", "was_seen")
@@ -63,7 +63,7 @@ class Sensors:
         return True
 
     def are_all_seen(self) -> bool:
-        """Whether every one of them came at least once."""
+        """Return True if every one of the sensors came at least once."""
         return all(sensor.was_seen for sensor in self._sensors.values())
 
     def stale(self, now_s: float) -> List[Tuple[str, str]]:
@@ -75,6 +75,6 @@ class Sensors:
         ]
 
     def deadline_s(self, now_s: float) -> float:
-        """When the next of those that are not stale will be."""
+        """Return the time, in seconds, at which the next sensor that is not stale becomes stale."""
         ages = (sensor.seen_s + sensor.max_age_s for sensor in self._sensors.values())
         return min((age for age in ages if age > now_s), default=FOREVER)

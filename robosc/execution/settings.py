@@ -22,22 +22,22 @@ class SettingsError(ValueError):
 
 
 class Settings(NamedTuple):
-    """What a deployment may choose; `validated` makes one out of plain values.
+    """Settings that a deployment may choose; `validated` makes them out of plain values.
 
     Attributes:
         period_s: Time between decisions, in seconds.
-        policy: Which enabled request is issued: `fair`, `priority` or `random`.
+        policy: Policy that chooses the enabled request to issue: `fair`, `priority` or `random`.
         priority: Names of communications, most urgent first, for the policy `priority`.
         seed: Seed of the policy `random`.
-        every: When to decide: each `period`, or after each batch as well (`event`).
+        every: Times of decisions: each `period`, or after each batch as well (`event`).
         release_identifiers: Identifiers whose last message keeps acting; None: every incoming message
             that is linked to geometry_msgs Twist or TwistStamped.
-        max_age_s: By identifier of an outgoing message, the seconds without a message after which it is stale.
+        max_age_s: Seconds without a message after which an outgoing message is stale, by its identifier.
         service_timeout_s: Seconds until a service call without a reply counts as failed; None: never.
         action_timeout_s: Seconds until a goal without a result counts as failed; None: never.
-        on_unknown: What happens when an enum falls to its default past an unknown rule: `default`, `keep`, `fault`.
-        command_timeout_s: In a supervision layer, the seconds without a message from the existing controller on a
-            release identifier after which its last one is released; 0: never.
+        on_unknown: Reaction when an enum falls to its default past an unknown rule: `default`, `keep`, `fault`.
+        command_timeout_s: Seconds without a message from the existing controller on a release identifier after
+            which its last one is released, in a supervision layer; 0: never.
     """
 
     period_s: float = 0.1

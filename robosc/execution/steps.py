@@ -22,18 +22,18 @@ class ExecutionError(Exception):
 
 
 class Steps:
-    """Takes events of a controlled system.
+    """Part of an executor that takes events of a controlled system.
 
     Args:
         system: The controlled system.
-        middleware: Where default messages and cancels go.
-        recorder: Is told everything that happens.
+        middleware: Middleware that default messages and cancels go to.
+        recorder: Recorder of everything that happens.
         releases: Messages that keep acting.
         goals: Goals under way.
-        on_unknown: What an unknown enum means: `default`, `keep` or `fault`.
+        on_unknown: Meaning of an unknown enum: `default`, `keep` or `fault`.
 
     Attributes:
-        enabled: Which requests the stable state enables, by number, once somebody worked it out, else None.
+        enabled: Requests that the stable state enables, by number, once somebody worked it out, else None.
         unchanging: Messages whose request was issued in this stable state and changed nothing: their data, and
             whether that is the default. A request's data and its step depend on nothing but the state.
     """
@@ -86,11 +86,11 @@ class Steps:
 
         Args:
             event: An uncontrollable event.
-            data: What came.
-            may_keep: Whether the setting `keep` applies: it does to messages.
+            data: Data that came.
+            may_keep: True if the setting `keep` applies: it does to messages.
 
         Returns:
-            Whether anything counts as having come; not if the data is unknown and `keep` applies.
+            True if anything counts as having come; False if the data is unknown and `keep` applies.
         """
         reading = self._system.read(event, data)
         if reading.unknown:
@@ -123,7 +123,7 @@ class Steps:
         Args:
             event: The event.
             reading: Its converted data, if it carries any.
-            data: What the log tells about it.
+            data: Data that the log reports for it.
         """
         skipped = self._system.step(event, reading)
         if skipped is None:

@@ -1,4 +1,4 @@
-"""What every diagnostic code means, with an example of it and how to mend it."""
+"""Meaning of every diagnostic code, with an example of it and how to fix it."""
 
 from robosc.explain.pages import MARK, Block, Page, Stage, codes, document, page, pages, parse_page
 

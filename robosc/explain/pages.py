@@ -39,7 +39,7 @@ _HEAD = re.compile(
 
 
 class Stage(StrEnum):
-    """Who reports a code."""
+    """Stage that reports a code."""
 
     TEXT = "text"
     """Reading the text: spelling, brackets, sizes."""
@@ -58,7 +58,7 @@ class Block:
     Attributes:
         kind: `robosc` or `console`.
         library: Name of the library that it holds, or None where it holds the robot or a session.
-        text: What stands between the fences.
+        text: Text between the fences.
     """
 
     kind: str
@@ -77,13 +77,13 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """What there is to say about one code.
+    """Explanation of one code.
 
     Attributes:
         code: The code.
-        severity: How grave its findings are.
-        stage: Who reports it.
-        summary: What is wrong, in one sentence.
+        severity: Severity of its findings.
+        stage: Stage that reports it.
+        summary: Description of what is wrong, in one sentence.
         markdown: The whole page.
         example: Texts that are reported with this code.
         mended: Texts that are not.
@@ -170,7 +170,7 @@ def parse_page(code: str, markdown: str) -> Page:
 
 
 def _sections(code: str, text: str) -> tuple[str, dict[str, str]]:
-    """What stands before the first heading, and what stands below each."""
+    """Return the text before the first heading, and the text below each heading."""
     parts = re.split(r"^## (.*)\n", text, flags=re.MULTILINE)
     names = tuple(parts[1::2])
     if names not in (_SECTIONS, _SECTIONS[:-1]):

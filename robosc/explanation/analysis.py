@@ -1,4 +1,4 @@
-"""Why events cannot happen in states, and how states run into trouble: answers in terms of automata.
+"""Analysis of why events cannot happen in states, and how states run into trouble, in terms of automata.
 
 *Trouble* is a state that is bad, or from which no marked state can be reached under the requirements without going
 through a bad one. Of a state that a supervisor has to avoid, a run into trouble is shown: where uncontrollable events
@@ -27,7 +27,7 @@ from robosc.synthesis.watch import Watch
 
 
 class HindranceKind(StrEnum):
-    """What keeps an event from happening."""
+    """Kind of cause that keeps an event from happening."""
 
     BEHAVIOUR = "behaviour"
     """An automaton has no edge for it there whose guard is true."""
@@ -44,7 +44,7 @@ class Hindrance:
     """Something that keeps an event from happening in some states.
 
     Attributes:
-        kind: What it is.
+        kind: Kind of cause.
         event: The event.
         where: Those of the states in which it does.
         automaton: The one without an edge.
@@ -66,13 +66,13 @@ class Trouble:
 
     Attributes:
         run: The run.
-        is_forced: Whether all of its events are uncontrollable.
+        is_forced: True if all of its events are uncontrollable.
         invariants: Places of the invariants that are not true there.
         leaving: Uncontrollable events that can leave a range there.
         forbidden: Uncontrollable events that can happen there against a condition (its place).
-        detour: Where the state is not bad, but blocks: the way that the plants by themselves would have to a marked
-            state; None where the plants have none either.
-        unmarked: Where it blocks: automata that are in no marked location.
+        detour: Way that the plants by themselves would have to a marked state, where the state is not bad, but
+            blocks; None where the plants have none either.
+        unmarked: Automata that are in no marked location, where the state blocks.
     """
 
     run: Run
@@ -85,7 +85,7 @@ class Trouble:
 
     @property
     def is_blocking(self) -> bool:
-        """Whether the state is not bad, but has no way on to a marked state."""
+        """True if the state is not bad, but has no way on to a marked state."""
         return not (self.invariants or self.leaving or self.forbidden)
 
 
@@ -97,7 +97,8 @@ class Detour:
         events: The events of the whole run.
         stopped_at: Place of the first event that is not allowed, or that leads to a state to be avoided.
         state: The state before it.
-        hindrances: What keeps it from happening there; none where it is uncontrollable and leads to trouble.
+        hindrances: Hindrances that keep it from happening there; none where it is uncontrollable and leads to
+            trouble.
     """
 
     events: tuple[str, ...]
@@ -107,11 +108,11 @@ class Detour:
 
 
 class Analysis:
-    """Questions about one problem.
+    """Answers to questions about one problem.
 
     Args:
         encoding: The variables.
-        watch: Who waits.
+        watch: Watch of the waiting caller.
         problems: The problem and what is left of it without obstacles.
         obstacles: All of them.
         good: The states that a supervisor may be in.
@@ -173,26 +174,32 @@ class Analysis:
         return self._participants[event]
 
     def wanted(self, event: str) -> Any:
-        """Where the plants would let an event happen if variables had no ranges."""
+        """Return the states where the plants would let an event happen if variables had no ranges."""
         return self._problems.steps(event, self._ranges).plant
 
     def possible(self, event: str, good: Any | None = None) -> Any:
-        """Where an event may happen and stays in good states: those that a supervisor may be in, or others."""
+        """Return the states where an event may happen and stays in good states.
+
+        Good states are those that a supervisor may be in, or others.
+        """
         good = self.good if good is None else good
         steps = self._steps[event]
         return good & steps.plant & allowed(steps, good)
 
     def moving(self, event: str) -> Any:
-        """Where an event is more than a silent step that changes nothing, which is never taken."""
+        """Return the states where an event is more than a silent step that changes nothing.
+
+        Such a step is never taken.
+        """
         return self._steps[event].moving() if is_tau(event) else self._manager.true
 
     def hindrances(self, event: str, states: Any, good: Any | None = None) -> tuple[Hindrance, ...]:
-        """What keeps an event from happening in some of the states, whatever else does.
+        """Return the hindrances that keep an event from happening in some of the states, whatever else does.
 
         Args:
             event: The event.
             states: The states.
-            good: What a supervisor must not leave, if other than the states that it may be in.
+            good: States that a supervisor must not leave, if other than the states that it may be in.
         """
         good = self.good if good is None else good
         steps = self._steps[event]
@@ -215,7 +222,7 @@ class Analysis:
         return tuple(item for item in found if item.where != self._manager.false)
 
     def _leaving(self, event: str) -> Iterable[tuple[Obstacle, Any]]:
-        """Where an event leaves each of the ranges that it can leave."""
+        """Yield each of the ranges that an event can leave, with the states where it leaves it."""
         mine = self._problems.written_by(event, self._ranges)
         for item in mine:
             if item in self._dropped_ranges:
@@ -240,7 +247,7 @@ class Analysis:
         return ShortestRuns(self._encoding, self._watch, chosen, possible, start)
 
     def trouble_after(self, start: Any) -> Trouble:
-        """How one of some states that must be avoided runs into trouble."""
+        """Return a run into trouble from one of some states that must be avoided."""
         for steps, is_forced in self._ways_on():
             possible = {
                 name: item.plant & self._restricted(item)
@@ -309,16 +316,16 @@ class Analysis:
         )
 
     def detour(self, start: Any, goal: Any, good: Any, inside: Any | None = None) -> Detour | None:
-        """A way to a goal that the plants alone would have, and where it is stopped; None without any.
+        """Return a way to a goal that the plants alone would have, and where it is stopped; None without any.
 
-        What is allowed leads on as far as it can, and only from there the plants alone: the event that is told is one
-        that no other way avoids.
+        Allowed events lead on as far as they can, and only from there the plants alone: the event that is reported is
+        one that no other way avoids.
 
         Args:
-            start: Where the way begins.
-            goal: Where it leads to; what is allowed does not.
+            start: States where the way begins.
+            goal: States that it leads to; allowed events do not.
             good: The states that must not be left.
-            inside: What can be reached by what is allowed, if that is known.
+            inside: States that can be reached by allowed events, if that is known.
         """
         if inside is None:
             inside = self._fixed_point.states_from(self._problem, start, good)
@@ -350,7 +357,7 @@ class Analysis:
         return ShortestRuns(self._encoding, self._watch, tuple(steps.values()), possible, start).run_to(goal)
 
     def predicate(self, state: State) -> Any:
-        """Where the state is this one."""
+        """Return the predicate that is true where the state is this one."""
         values = zip(subjects(self._encoding.system), state, strict=True)
         return self._encoding.all_of(
             self._encoding.equals(self._encoding.subjects[subject], value) for subject, value in values

@@ -1,4 +1,4 @@
-"""Why a problem has no supervisor: a run into trouble, what is to blame, and what would have to go."""
+"""Reasons why a problem has no supervisor: a run into trouble, what is to blame, and what would have to go."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -29,16 +29,16 @@ MAXIMUM_PARTS = 200
 """Parts of the model that an explanation lists: a search that was given up early may leave thousands."""
 
 _ASKED = (ObstacleKind.REQUIREMENT, ObstacleKind.INVARIANT)
-"""What is asked of the robot; the others are what it is."""
+"""Kinds of obstacles that are asked of the robot; the others are what it is."""
 
 
 @dataclass(frozen=True, slots=True)
 class Blame:
-    """What is to blame that there is no supervisor: places in a list of obstacles, in its order.
+    """Obstacles to blame for the lack of a supervisor: places in a list of obstacles, in its order.
 
     Attributes:
-        conflict: Those that, without any other, leave none.
-        is_minimal: Whether it is known that none of them can be missing.
+        conflict: Obstacles that, without any other, leave no supervisor.
+        is_minimal: True if it is known that none of them can be missing.
         sufficing: Those of the conflict without which alone there is a supervisor, beside all others; None where
             that was not found out.
         removal: Those without which there is a supervisor, none of which can stay; None where that was not found out.
@@ -51,13 +51,13 @@ class Blame:
 
 
 def find_blame(problems: Problems, obstacles: Sequence[Obstacle], false: Any, watch: BoundedWatch) -> Blame:
-    """What is to blame for a problem without a supervisor.
+    """Find what is to blame for a problem without a supervisor.
 
     Args:
         problems: The problem.
-        obstacles: What it could be without; those to be blamed rather than others first.
+        obstacles: Obstacles that it could be without; those to be blamed rather than others first.
         false: The predicate that is true nowhere.
-        watch: Bounds the work; beyond its limit what has been found so far is told.
+        watch: Watch that bounds the work; beyond its limit what has been found so far is reported.
 
     Raises:
         SynthesisCancelled: The work is to end.
@@ -79,7 +79,10 @@ def find_blame(problems: Problems, obstacles: Sequence[Obstacle], false: Any, wa
 
 
 def _to_keep(obstacles: Sequence[Obstacle], conflict: Sequence[int]) -> tuple[int, ...]:
-    """What the robot is stays, before what is asked of it; of this, what is not blamed first."""
+    """Return the order in which obstacles stay.
+
+    What the robot is comes before what is asked of it; of this, what is not blamed comes first.
+    """
     blamed = set(conflict)
     return tuple(sorted(range(len(obstacles)), key=lambda item: (obstacles[item].kind in _ASKED, item in blamed)))
 
@@ -97,7 +100,7 @@ class _Search:
         self._known: dict[frozenset[int], bool] = {}
 
     def is_empty(self, kept: frozenset[int]) -> bool:
-        """Whether there is no supervisor with these obstacles alone."""
+        """Return True if there is no supervisor with these obstacles alone."""
         found = self._known.get(kept)
         if found is None:
             found = self._known[kept] = self._solve(kept)
@@ -121,16 +124,16 @@ def explain_empty(
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> EmptyExplanation:
-    """Why a model has no supervisor.
+    """Explain why a model has no supervisor.
 
     Args:
         model: The model.
-        places: Where its parts stand.
+        places: Places of its parts.
         system: Its automata, for which synthesis has found no supervisor.
-        deployment: Where the supervisor was to stand.
+        deployment: Deployment of the supervisor that was to be made.
         engine: Name of the engine for decision diagrams, or more about it.
-        should_stop: Asked before each step; once true, the work ends.
-        on_progress: Told where the work is.
+        should_stop: Function called before each step; once true, the work ends.
+        on_progress: Function called with the progress of the work.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
@@ -149,7 +152,7 @@ def explain_lost(
     obstacles: Sequence[Obstacle],
     terms: Terms,
 ) -> EmptyExplanation:
-    """Why a problem has no supervisor, in the words of its model."""
+    """Explain why a problem has no supervisor, in the words of its model."""
     encoding, false = place.encoding, place.encoding.manager.false
     fixed_point, problem = problems.without(())
     fixed_point.good_states(problem, false)

@@ -1,12 +1,13 @@
-"""Which requests a supervisor lets through in the state that a robot is in, and why not the others.
+"""Requests that a supervisor lets through in the state that a robot is in, and the reasons why not the others.
 
 A request is not enabled where its service or action is not idle, where a behaviour that mentions it has no transition
 on it, where an update would take a variable out of its range, where a requirement does not hold, and where synthesis
 forbids it (semantics part 1). Each of these is a sentence here, so that a request has one if and only if it is not
-enabled. What synthesis adds means nothing where the rest blocks a request already, and is told only where it does not.
+enabled. What synthesis adds means nothing where the rest blocks a request already, and is reported only where it does
+not.
 
-The state comes from elsewhere - a bridge, a topic, a log file - and is untrusted: numbers and texts are taken for what
-the model's types say, and all that fits none is an error. Locations of services and actions may be unknown.
+The state comes from elsewhere - a bridge, a topic, a log file - and is untrusted: numbers and texts are taken for
+what the model's types say, and all that fits none is an error. Locations of services and actions may be unknown.
 """
 
 import re
@@ -87,9 +88,9 @@ class Judged:
     """The requests of a model in one state, each in one of these, in the model's order.
 
     Attributes:
-        enabled: What may be requested.
-        blocked: What may not.
-        unknown: What cannot be told, since the location of a service or action is not known.
+        enabled: Requests that may be made.
+        blocked: Requests that may not be made.
+        unknown: Requests that cannot be judged, since the location of a service or action is not known.
     """
 
     enabled: tuple[str, ...]
@@ -167,11 +168,11 @@ class _Rule:
 
 
 class Requests:
-    """Judges the requests of one supervisor.
+    """Judge of the requests of one supervisor.
 
     Args:
         model: The checked model.
-        added: What synthesis adds to it.
+        added: Conditions that synthesis adds to it.
     """
 
     def __init__(self, model: Model, added: Iterable[AddedCondition]) -> None:
@@ -198,7 +199,7 @@ class Requests:
         return tuple(rule.event for rule in self._rules)
 
     def judge(self, components: Mapping[str, Any], communications: Mapping[str, str]) -> Judged:
-        """What may be requested in a state, and why the rest may not.
+        """Return the requests that may be made in a state, and the reasons why the rest may not.
 
         Args:
             components: State and variables of every component with a behaviour, `{name: {"state": s, "variables": {v:
@@ -386,7 +387,7 @@ class Requests:
         return f"{name} is {_cut(value_text(value))}"
 
     def _decided(self, decision: Decision, state: State) -> tuple[bool | None, list[str]]:
-        """Whether a diagram is true, None where it looks at what is not known, and what it looked at."""
+        """Return whether a diagram is true, None where it looks at what is not known, and what it looked at."""
         order = tuple(self._places)
         number, told = decision.root, list[str]()
         while number > 1:

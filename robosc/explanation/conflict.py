@@ -10,7 +10,7 @@ What is asked must be monotone: with more things an empty problem stays empty.
 from collections.abc import Callable, Sequence
 
 IsEmpty = Callable[[frozenset[int]], bool]
-"""Whether the problem with these things alone is empty."""
+"""Function that returns True if the problem with these things alone is empty."""
 
 
 def minimal_conflict(things: Sequence[int], is_empty: IsEmpty) -> tuple[int, ...]:
@@ -28,7 +28,10 @@ def minimal_conflict(things: Sequence[int], is_empty: IsEmpty) -> tuple[int, ...
 def _conflict(
     is_empty: IsEmpty, background: frozenset[int], added: Sequence[int], candidates: tuple[int, ...]
 ) -> tuple[int, ...]:
-    """What of `candidates`, beside the background to which `added` came last, makes the problem empty."""
+    """Return those of `candidates` that make the problem empty.
+
+    They do so beside the background to which `added` came last.
+    """
     if added and is_empty(background):
         return ()
     if len(candidates) == 1:
@@ -52,7 +55,7 @@ def minimal_removal(things: Sequence[int], is_empty: IsEmpty) -> tuple[int, ...]
 
 
 def _grown(is_empty: IsEmpty, kept: frozenset[int], more: tuple[int, ...]) -> frozenset[int]:
-    """What can stay: what is kept already, and of `more` what can stay beside it."""
+    """Return the things that can stay: those kept already, and those of `more` that can stay beside them."""
     together = kept.union(more)
     if not more or not is_empty(together):
         return together

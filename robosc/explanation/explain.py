@@ -1,4 +1,4 @@
-"""What synthesis did to a model: what restricts each event, why one cannot happen in a state, and warnings.
+"""Effect of synthesis on a model: what restricts each event, why one cannot happen in a state, and warnings.
 
 Everything is found on predicates over the states of the controlled system; each answer comes with a shortest run.
 """
@@ -53,22 +53,22 @@ def explain_synthesis(
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> Explanation:
-    """What synthesis did to a model.
+    """Explain what synthesis did to a model.
 
     Args:
         model: The checked model.
-        places: Where its parts stand.
+        places: Places of its parts.
         system: Its automata.
-        deployment: Where the supervisor will stand.
+        deployment: Deployment of the supervisor.
         engine: Name of the engine for decision diagrams, or more about it.
         event: The event to explain; none: all of them, and warnings.
-        state: Explain what can happen in a state that fits this, such as `Door.closed, Lift.n = 2`.
-        after: Explain what can happen after this run, such as `open, jam.response`.
-        should_stop: Asked before each step; once true, the work ends.
-        on_progress: Told where the work is.
+        state: Description of a state in which to explain what can happen, such as `Door.closed, Lift.n = 2`.
+        after: Run after which to explain what can happen, such as `open, jam.response`.
+        should_stop: Function called before each step; once true, the work ends.
+        on_progress: Function called with the progress of the work.
 
     Raises:
-        RequestError: What is asked about is not there: an event, a part of the model, a state, a run.
+        RequestError: Something that is asked about is not there: an event, a part of the model, a state, a run.
         SynthesisCancelled: `should_stop` became true.
         NodeLimitError: Diagrams became larger than the engine's options allow.
         UnknownEngineError: There is no such engine.
@@ -155,7 +155,7 @@ class _Explainer:
     # Events
 
     def event(self, event: str, *, has_behaviours: bool = False) -> EventReport:
-        """What restricts an event, with behaviours or only what restricts it beside them."""
+        """Report what restricts an event, with behaviours or only what restricts it beside them."""
         possible, wanted = self._possible[event], self._reachable & self._analysis.wanted(event)
         found = [
             item
@@ -240,12 +240,12 @@ class _Explainer:
         raise RequestError(problem)
 
     def state(self, states: Any, event: str | None, after: tuple[str, ...] | None = None) -> StateReport:
-        """What can happen in one of some states; where an event is asked for, rather where it cannot.
+        """Report what can happen in one of some states; where an event is asked for, rather where it cannot.
 
         Args:
             states: The states.
             event: The event, or None for all.
-            after: The run that led there, if one was asked for; else a shortest one is told.
+            after: The run that led there, if one was asked for; else a shortest one is reported.
         """
         chosen = states
         if event is not None and states & ~self._possible[event] != self._false:

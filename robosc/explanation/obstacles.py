@@ -1,4 +1,4 @@
-"""What a synthesis problem could be without: requirements, ranges and markings, and the problem that is left.
+"""Obstacles that a synthesis problem could be without (requirements, ranges, markings), and the problem left.
 
 Leaving an obstacle out never takes anything from a supervisor: where one keeps the system safe and nonblocking, it
 still does. A condition or an invariant less forbids less, and a location more that is marked is one more to get to.
@@ -18,18 +18,18 @@ from robosc.synthesis.questions import Restriction
 
 
 class ObstacleKind(StrEnum):
-    """What an obstacle is; in this order the earlier are blamed rather than the later."""
+    """Kind of obstacle; in this order the earlier are blamed rather than the later."""
 
     REQUIREMENT = "requirement"
     """On events."""
     INVARIANT = "invariant"
-    """What must be true in every state."""
+    """Condition that must be true in every state."""
     CONDITION = "condition"
     """An event condition that no single requirement brings, such as the one on cancel."""
     RANGE = "range"
     """Of a variable."""
     MARKING = "marking"
-    """That an automaton has to get back to its marked locations."""
+    """Need of an automaton to get back to its marked locations."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class Obstacle:
     """Something that a problem could be without.
 
     Attributes:
-        kind: What it is.
+        kind: Kind of obstacle.
         conditions: Places in `System.conditions`.
         invariants: Places in `System.invariants`.
         range: The variable whose range it is.

@@ -26,7 +26,7 @@ class BoundedWatch(Watch):
     """A watch that counts steps, and ends the work at a limit once one is set.
 
     Args:
-        watch: Who waits.
+        watch: Watch of the waiting caller.
     """
 
     def __init__(self, watch: Watch) -> None:
@@ -55,11 +55,11 @@ class BoundedWatch(Watch):
 
 
 class Problems:
-    """What is left of a problem without some of its obstacles.
+    """Variants of a problem without some of its obstacles.
 
     Args:
         encoding: The variables.
-        watch: Who waits.
+        watch: Watch of the waiting caller.
     """
 
     def __init__(self, encoding: Encoding, watch: Watch) -> None:
@@ -102,7 +102,7 @@ class Problems:
         return FixedPoint(marked, self._watch), Problem(steps, safe)
 
     def steps(self, event: str, ranges: Iterable[Obstacle] = ()) -> Steps:
-        """What an event does without some ranges, under its event conditions."""
+        """Return the steps of an event without some ranges, under its event conditions."""
         mine = frozenset(item for item in ranges if item.range in self._written.get(event, ()))
         found = self._base.get((event, mine))
         if found is None:
@@ -117,14 +117,14 @@ class Problems:
         return tuple(self._on_event.get(event, ()))
 
     def condition(self, place: int) -> Any:
-        """Where an event condition is true."""
+        """Return the states where an event condition is true."""
         if place not in self._conditions:
             self._watch.check_stop()
             self._conditions[place] = self._symbols.holds(self._encoding.system.conditions[place].condition)
         return self._conditions[place]
 
     def invariant(self, place: int) -> Any:
-        """Where an invariant is true."""
+        """Return the states where an invariant is true."""
         if place not in self._invariants:
             self._watch.check_stop()
             self._invariants[place] = self._symbols.holds(self._encoding.system.invariants[place])

@@ -30,7 +30,7 @@ class Reporter:
         return Way(run.events, run.is_shortest, self._terms.state(run.states[-1]))
 
     def reason(self, item: Hindrance, state: State, good: Any, run: Run | None = None) -> Reason:
-        """Why an event cannot happen in a state, to which a run leads."""
+        """Return the reason why an event cannot happen in a state, to which a run leads."""
         message, part = self._terms.hindered(item, state)
         trouble = None
         if item.kind is HindranceKind.SUPERVISOR:

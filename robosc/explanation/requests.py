@@ -1,4 +1,4 @@
-"""What a user asks about, by the model's names: an event, a state, a run."""
+"""Subjects that a user asks about, by the model's names: an event, a state, a run."""
 
 import re
 
@@ -40,7 +40,7 @@ _OPERATORS: dict[str, BinaryOperator] = {"=": "=", "!=": "!=", "<": "<", "<=": "
 
 
 class RequestError(RoboscError, LookupError):
-    """What is asked about is not there."""
+    """Error for a request about something that is not there."""
 
 
 def asked_event(system: System, model: Model, text: str) -> str:
@@ -143,7 +143,7 @@ def _unknown(what: str, name: str, known: list[str]) -> RequestError:
 
 
 def _hint(name: str, known: list[str]) -> str:
-    """What may have been meant."""
+    """Return a hint at what may have been meant."""
     near = did_you_mean(name, known)
     if near is not None:
         return f"; did you mean '{near}'?"

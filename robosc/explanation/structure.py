@@ -18,8 +18,8 @@ class Part:
 
     Attributes:
         kind: `requirement`, `invariant`, `condition`, `range`, `marking`; `component`, `communication`, `state`.
-        text: What it is, in the model's words.
-        location: Where it stands.
+        text: Description of the part, in the model's words.
+        location: Place of the part.
     """
 
     kind: str
@@ -49,7 +49,7 @@ class Way:
 
     Attributes:
         events: Its events.
-        is_shortest: Whether it is known that no run is shorter.
+        is_shortest: True if it is known that no run is shorter.
         state: Its last state.
     """
 
@@ -60,14 +60,14 @@ class Way:
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """Why an event cannot happen in some state.
+    """Reason why an event cannot happen in some state.
 
     Attributes:
         kind: `behaviour`, `range`, `requirement` or `supervisor`.
-        message: Why, in one sentence.
+        message: Reason in one sentence.
         part: The part of the model, or None where it is the supervisor.
         way: A shortest run to a state where it is so, or None where the state is given.
-        trouble: What would follow, where the supervisor forbids it.
+        trouble: Trouble that would follow, where the supervisor forbids it.
     """
 
     kind: str
@@ -85,7 +85,7 @@ class Stopped:
         events: Events of the whole way.
         stopped_at: Place of the event, from 0, that must not happen.
         state: The state before that event.
-        reasons: Why it must not happen; none where it is uncontrollable and leads into trouble.
+        reasons: Reasons why it must not happen; none where it is uncontrollable and leads into trouble.
     """
 
     events: tuple[str, ...]
@@ -102,10 +102,10 @@ class TroubleReport:
         kind: `bad`, where an invariant, a range or a condition is broken at the end, or `blocking`, where no marked
             state can be reached from there.
         way: The run.
-        is_forced: Whether nothing can prevent it: all of its events are uncontrollable.
-        messages: What the trouble is, in sentences.
+        is_forced: True if nothing can prevent it: all of its events are uncontrollable.
+        messages: Sentences that say what the trouble is.
         parts: Parts of the model that are broken.
-        stopped: Of a state that blocks: the way that the behaviours would have to a marked state; None where they have
+        stopped: Way that the behaviours would have to a marked state, for a state that blocks; None where they have
             none.
     """
 
@@ -123,7 +123,7 @@ class Blamed:
 
     Attributes:
         part: The part.
-        suffices: Whether there is a supervisor without this part alone; None where that was not found out.
+        suffices: True if there is a supervisor without this part alone; None where that was not found out.
     """
 
     part: Part
@@ -132,15 +132,15 @@ class Blamed:
 
 @dataclass(frozen=True, slots=True)
 class EmptyExplanation:
-    """Why there is no supervisor.
+    """Explanation why there is no supervisor.
 
     Attributes:
         trouble: A run into trouble.
         blamed: Parts of the model that, without any other requirement, range or marking, leave no supervisor.
-        is_minimal: Whether it is known that each of them is needed for that.
+        is_minimal: True if it is known that each of them is needed for that.
         removal: The fewest parts, in the sense that none of them can stay, without which there is a supervisor; empty
             where that was not found out, or there are very many.
-        left_out: How many more parts are blamed than are listed.
+        left_out: Number of blamed parts that are not listed.
     """
 
     trouble: TroubleReport
@@ -152,15 +152,16 @@ class EmptyExplanation:
 
 @dataclass(frozen=True, slots=True)
 class EventReport:
-    """What restricts an event.
+    """Report on what restricts an event.
 
     Attributes:
         event: The event.
-        is_controllable: Whether the supervisor may disable it.
+        is_controllable: True if the supervisor may disable it.
         status: `free`, where it can happen wherever the behaviours let it; `restricted`; `never`, where it can happen
             nowhere.
-        reasons: What keeps it from happening, each with a shortest run to a state where it does.
-        stopped: Of an event that the behaviours never let happen: a way to where they would, and why that is stopped.
+        reasons: Reasons that keep it from happening, each with a shortest run to a state where it does.
+        stopped: Way to where the behaviours would let it happen, for an event that they never let happen, and why
+            that is stopped.
     """
 
     event: str
@@ -172,7 +173,7 @@ class EventReport:
 
 @dataclass(frozen=True, slots=True)
 class EventHere:
-    """Whether an event can happen in one state, and why not."""
+    """Report on whether an event can happen in one state, and why not."""
 
     event: str
     is_controllable: bool
@@ -182,11 +183,11 @@ class EventHere:
 
 @dataclass(frozen=True, slots=True)
 class StateReport:
-    """What can happen in one state.
+    """Report on what can happen in one state.
 
     Attributes:
         way: A run to it.
-        fitting: How many states of the controlled system fit what was asked, as a decimal number.
+        fitting: Number of states of the controlled system that fit what was asked, as a decimal number.
         events: The events asked for.
     """
 
@@ -202,9 +203,9 @@ class Remark:
     Attributes:
         kind: `never-enabled`, `unused-requirement`, `unreachable-state`, `only-uncontrollable` or `deadlock`.
         message: One sentence.
-        location: Where, or None where it is about no single part.
+        location: Place in the text, or None where it is about no single part.
         way: A shortest run to such a state, where there is one.
-        stopped: Of a state that is not reachable: a way that the behaviours would have, and where it is stopped.
+        stopped: Way that the behaviours would have to a state that is not reachable, and where it is stopped.
     """
 
     kind: str
@@ -216,12 +217,12 @@ class Remark:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """What synthesis did to a model.
+    """Explanation of what synthesis did to a model.
 
     Attributes:
-        empty: Why there is no supervisor, or None where there is one.
+        empty: Explanation why there is no supervisor, or None where there is one.
         events: The events asked for; where none was, every controllable event. Empty where a state was asked for.
-        state: What can happen in the state asked for.
+        state: Report on what can happen in the state asked for.
         remarks: Warnings, where neither an event nor a state was asked for.
     """
 

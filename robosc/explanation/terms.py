@@ -28,9 +28,9 @@ class Terms:
 
     Args:
         model: The model.
-        places: Where its parts stand.
+        places: Places of its parts.
         system: Its automata.
-        obstacles: What its problem could be without; requirements and invariants in the model's order.
+        obstacles: Obstacles that its problem could be without; requirements and invariants in the model's order.
     """
 
     def __init__(self, model: Model, places: Places, system: System, obstacles: Sequence[Obstacle]) -> None:
@@ -64,7 +64,7 @@ class Terms:
         )
 
     def values_read(self, expression: Expression, state: State) -> str:
-        """What a condition reads, with its values in a state; empty if it reads nothing."""
+        """Return what a condition reads, with its values in a state; empty if it reads nothing."""
         read = sorted(subjects_read(expression), key=self._subjects.__getitem__)
         found = [self._value(subject, state[self._subjects[subject]]) for subject in read[:MAXIMUM_NAMES]]
         return ", ".join(found) + (", ..." if len(read) > MAXIMUM_NAMES else "")
@@ -75,7 +75,7 @@ class Terms:
         return f"{subject} is {value_text(value)}"
 
     def automaton(self, name: str) -> str:
-        """What an automaton is called in the model."""
+        """Return the name of an automaton in the model."""
         return automaton_text(name, self._components)
 
     def _text(self, expression: Expression) -> str:
@@ -84,7 +84,7 @@ class Terms:
     # Parts
 
     def part(self, obstacle: Obstacle) -> Part:
-        """What an obstacle is in the model."""
+        """Return the part of the model that an obstacle is."""
         text, location = self._described(obstacle)
         return Part(str(obstacle.kind), _cut(text), location)
 
@@ -136,7 +136,7 @@ class Terms:
     # Sentences
 
     def hindered(self, item: Hindrance, state: State) -> tuple[str, Part | None]:
-        """Why an event cannot happen in a state, and the part of the model that is the cause."""
+        """Return the reason why an event cannot happen in a state, and the part of the model that is the cause."""
         match item.kind:
             case HindranceKind.BEHAVIOUR:
                 name = str(item.automaton)

@@ -24,12 +24,12 @@ MAXIMUM_VALUES = 30
 
 
 def explanation_text(explanation: Explanation) -> str:
-    """What synthesis did to a model."""
+    """Return the text on what synthesis did to a model."""
     return _joined(_explained(explanation))
 
 
 def empty_text(explanation: EmptyExplanation) -> str:
-    """Why there is no supervisor."""
+    """Return the text on why there is no supervisor."""
     return _joined(_empty(explanation))
 
 
@@ -79,11 +79,11 @@ def _part(part: Part) -> str:
 
 
 def _trouble(item: TroubleReport, start: str, here: str) -> Iterator[str]:
-    """A run into trouble.
+    """Yield the lines about a run into trouble.
 
     Args:
         item: The trouble.
-        start: Where a run begins, in words.
+        start: Place where a run begins, in words.
         here: The place where there is no run, in words.
     """
     if not item.way.events:

@@ -1,4 +1,4 @@
-"""How explanations write values and runs."""
+"""Notation of values and runs in explanations."""
 
 from collections.abc import Collection, Sequence
 

@@ -32,7 +32,7 @@ def _whole_quotient(a: Any, b: Any) -> Any:
 
 
 def _remainder(a: Any, b: Any) -> Any:
-    """What division leaves, with the sign of the dividend; unknown for division by zero."""
+    """Return the remainder of a division, with the sign of the dividend; unknown for division by zero."""
     if a is None or b is None or b == 0:
         return None
     return abs(a) % abs(b) * (-1 if a < 0 else 1)
@@ -86,7 +86,7 @@ QUANTIFIER: Mapping[str, Callable[[Any, Any], Any]] = {"any": values.any_of, "al
 """The meaning of each quantifier."""
 
 Elements = tuple[Any, ...]
-"""What the quantifiers around an expression look at, the innermost first."""
+"""Elements that the quantifiers around an expression look at, the innermost first."""
 
 
 def evaluate(
@@ -96,7 +96,7 @@ def evaluate(
     read_received: Callable[[tuple[PathStep, ...]], Any] = lambda path: None,
     elements: Elements = (),
 ) -> Any:
-    """The value of an expression, or None where it is unknown.
+    """Return the value of an expression, or None where it is unknown.
 
     Args:
         expression: A resolved expression.
@@ -104,7 +104,7 @@ def evaluate(
         read_location: Current location of an automaton.
         read_received: Received data of a path, or None where it is unknown; an array is a sequence of values,
             a property of an object a mapping's item.
-        elements: What the quantifiers around it look at.
+        elements: Elements that the quantifiers around it look at.
     """
 
     def part(node: Expression, inner: Elements = elements) -> Any:

@@ -49,7 +49,7 @@ _ORDER = frozenset({"<", "<=", ">", ">="})
 
 @dataclass(frozen=True, slots=True)
 class Scope:
-    """What expressions may name.
+    """Names that expressions may use.
 
     Attributes:
         variables: Type of each variable, by component and name.
@@ -58,7 +58,7 @@ class Scope:
         enum_values: Its values, for a quick look.
         objects: Types of each object's properties, by the object's name.
         data: Types of received data that are known by their paths.
-        has_whole_division: Whether there are `div` and `mod`.
+        has_whole_division: True if there are `div` and `mod`.
     """
 
     variables: Mapping[tuple[str, str], Type]
@@ -174,7 +174,7 @@ class Scope:
 
 
 def has_type(value: Value, type_: Type) -> bool:
-    """Whether a value is one of a type's; an integer is also a double."""
+    """Return True if a value is one of a type's; an integer is also a double."""
     match type_:
         case BooleanType():
             return isinstance(value, bool)
@@ -193,7 +193,7 @@ def has_type(value: Value, type_: Type) -> bool:
 
 
 def is_assignable(type_: Type, to: Type) -> bool:
-    """Whether an expression of one type may stand where another is wanted; ranges are for run time.
+    """Return True if an expression of one type may stand where another is wanted; ranges are for run time.
 
     Enums of one name are one enum: that its values are the same wherever it occurs is checked beforehand.
     """

@@ -42,7 +42,9 @@ _CONDITIONAL = -1
 
 
 def automaton_text(name: str, components: Collection[str]) -> str:
-    """What an automaton is called in a text; `location` behind it and a dot is what the language of properties reads.
+    """Return the name of an automaton in a text.
+
+    The language of properties reads this name with a dot and `location` behind it.
 
     A component has its name, and so has a service or action (whose automaton is called `service calibrate`), unless a
     component has that name: then the bare name would mean the component.

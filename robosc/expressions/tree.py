@@ -40,7 +40,7 @@ class VariableRead(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag=
 
 
 class StateTest(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="state"):
-    """Whether a component is in a state."""
+    """Test of whether a component is in a state."""
 
     component: Name
     state: Name
@@ -78,7 +78,7 @@ class Conditional(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="
 Function = Literal["abs", "min", "max", "clamp", "integer", "double"]
 
 ARGUMENTS: dict[str, int] = {"abs": 1, "min": 2, "max": 2, "clamp": 3, "integer": 1, "double": 1}
-"""How many arguments each function takes."""
+"""Number of arguments that each function takes."""
 
 
 class Call(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="call"):
@@ -92,7 +92,7 @@ class Element(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="elem
     """The element that a quantifier looks at, or a part of it.
 
     Attributes:
-        level: How many quantifiers stand between: 0 is the innermost one around it.
+        level: Number of quantifiers between: 0 is the innermost one around it.
         path: Property names and array indices, outermost first.
     """
 
@@ -123,7 +123,7 @@ class Reduction(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="re
 
 
 class Quantifier(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="quantifier"):
-    """Whether a condition over `Element` is true for any, or for all, elements; unknown if there are none."""
+    """Test of whether a condition over `Element` is true for any, or for all, elements; unknown if there are none."""
 
     word: Literal["any", "all"]
     part: ArrayPart
@@ -209,7 +209,7 @@ def leaves(expression: Expression) -> tuple[Expression, ...]:
 
 
 def simple_parts(condition: Expression) -> tuple[Expression, ...]:
-    """What logical operators join in a condition, and they themselves do not, left to right."""
+    """Return the parts of a condition that logical operators join, without the operators, left to right."""
     stack, result = [condition], []
     while stack:
         match stack.pop():

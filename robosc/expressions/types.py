@@ -34,7 +34,7 @@ class IntegerType(msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag
 
     @property
     def is_bounded(self) -> bool:
-        """Whether the type has a range."""
+        """True if the type has a range."""
         return self.low is not None and self.high is not None
 
 
@@ -76,12 +76,12 @@ Value = bool | int | float | str
 
 
 def is_numeric(type_: Type) -> bool:
-    """Whether arithmetic and order comparisons apply."""
+    """Return True if arithmetic and order comparisons apply."""
     return isinstance(type_, IntegerType | DoubleType)
 
 
 def is_finite(type_: Type) -> bool:
-    """Whether a synthesis variable may have this type."""
+    """Return True if a synthesis variable may have this type."""
     match type_:
         case BooleanType() | EnumType():
             return True

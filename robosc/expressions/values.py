@@ -41,17 +41,17 @@ def implies(a: Any, b: Any) -> Any:
 
 
 def _incomparable(a: Any, b: Any) -> bool:
-    """Whether an operand is unknown or NaN (the only value that differs from itself)."""
+    """Return True if an operand is unknown or NaN (the only value that differs from itself)."""
     return a is None or b is None or a != a or b != b
 
 
 def equal(a: Any, b: Any) -> Any:
-    """Whether two values of one type are equal."""
+    """Tell whether two values of one type are equal."""
     return None if _incomparable(a, b) else a == b
 
 
 def unequal(a: Any, b: Any) -> Any:
-    """Whether two values of one type differ."""
+    """Tell whether two values of one type differ."""
     return None if _incomparable(a, b) else a != b
 
 
@@ -153,10 +153,10 @@ def to_double(a: Any) -> Any:
 
 
 def array_part(value: Any, low: Any = None, high: Any = None) -> Any:
-    """The elements of a received array from `low` to `high`, both included; None where it is no array.
+    """Return the elements of a received array from `low` to `high`, both included; None where it is no array.
 
     Args:
-        value: What was received.
+        value: Received value.
         low: Index of the first element; None for the whole array.
         high: Index of the last element; if it is less than `low`, the array's end is followed by its beginning.
     """
@@ -173,7 +173,7 @@ def array_part(value: Any, low: Any = None, high: Any = None) -> Any:
 
 
 def array_length(elements: Any) -> Any:
-    """How many elements there are."""
+    """Return the number of elements."""
     return None if elements is None else len(elements)
 
 
@@ -274,7 +274,7 @@ def read_element(values: Any, index: int) -> Any:
 
 
 class Absent:
-    """What stands for a part of received data that has no place: beyond the end of an array, and below that."""
+    """Placeholder for a part of received data that has no place: beyond the end of an array, and below that."""
 
 
 ABSENT = Absent()
@@ -311,12 +311,12 @@ def part_at(value: Any, path: Any) -> Any:
 
 
 def assignable_integer(value: Any, low: int, high: int) -> Any:
-    """What a code-only integer variable takes; None (skip the update) outside its range."""
+    """Return the value that a code-only integer variable takes; None (skip the update) outside its range."""
     return value if value is not None and low <= value <= high else None
 
 
 def assignable_double(value: Any) -> Any:
-    """What a double variable takes; None (skip the update) for NaN and infinities."""
+    """Return the value that a double variable takes; None (skip the update) for NaN and infinities."""
     if value is None:
         return None
     value = float(value)

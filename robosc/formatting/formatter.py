@@ -10,7 +10,7 @@ from robosc.source import SourceFile
 
 
 def format_text(text: str, name: str = "<text>") -> str:
-    """The text in the canonical layout.
+    """Return the text in the canonical layout.
 
     The result has the same tokens and comments in the same order. It depends on nothing but these, the author's
     blank lines, and whether a comment stands on a line of its own, at the end of a line or inside one. Its lines end
@@ -18,7 +18,7 @@ def format_text(text: str, name: str = "<text>") -> str:
 
     Args:
         text: A robot or library without syntax errors.
-        name: What findings call it.
+        name: Name of the text in findings.
 
     Raises:
         LanguageError: The text has syntax errors.
@@ -35,7 +35,7 @@ def format_text(text: str, name: str = "<text>") -> str:
 
 
 def _line_end(text: str, tokens: Tokens) -> str:
-    """What ends the first line, texts in quotes aside."""
+    """Return the characters that end the first line, texts in quotes aside."""
     end = 0
     for token, start in zip(tokens.texts, tokens.starts, strict=True):
         place = text.find("\n", end, start)

@@ -1,4 +1,4 @@
-"""What lies between the tokens of a text and is worth keeping: comments and blank lines."""
+"""Comments and blank lines between the tokens of a text, which are worth keeping."""
 
 import re
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ class Gap(NamedTuple):
 
     @property
     def is_breaking(self) -> bool:
-        """Whether a comment ends its line, so that the tokens around the gap cannot share one."""
+        """True if a comment ends its line, so that the tokens around the gap cannot share one."""
         return any(self.segments[:-1])
 
     @property
@@ -38,7 +38,7 @@ class Gap(NamedTuple):
 
     @property
     def has_blank_line(self) -> bool:
-        """Whether there is a blank line anywhere."""
+        """True if there is a blank line anywhere."""
         return any(self.blanks)
 
 

@@ -28,13 +28,13 @@ _NO_LINES = Gap(((), ()), (False, False))
 
 
 def lay_out(texts: Sequence[str], gaps: Mapping[int, Gap], structure: Structure, line_end: str) -> str:
-    """The canonical text.
+    """Return the canonical text.
 
     Args:
         texts: The tokens as written, an empty one behind the last.
         gaps: Comments and blank lines, by the token behind them.
-        structure: What belongs to one line, and where lines may be broken.
-        line_end: What ends a line.
+        structure: Structure that says what belongs to one line, and where lines may be broken.
+        line_end: Characters that end a line.
     """
     writer = _Writer(texts, gaps, structure, line_end)
     for statement in structure.statements:
@@ -50,7 +50,7 @@ class _Open:
         last: Its last token.
         level: Indentation of its lines.
         outer: Indentation of the line with its closing bracket.
-        is_broken: Whether its breaks are taken.
+        is_broken: True if its breaks are taken.
     """
 
     __slots__ = ("is_broken", "last", "level", "outer")
@@ -83,7 +83,7 @@ class _Measures:
             self.stops[index] = index + 1 if can_break else self.stops[index + 1]
 
     def must_break(self, first: int, last: int) -> bool:
-        """Whether a break between these tokens must be taken."""
+        """Return True if a break between these tokens must be taken."""
         return self.forced[last] > self.forced[first]
 
     def width(self, first: int, last: int, *, with_gap: bool) -> int:
@@ -93,10 +93,10 @@ class _Measures:
 
 
 class _Writer:
-    """Writes a text, statement by statement.
+    """Writer of a text, statement by statement.
 
     Attributes:
-        parts: What has been written.
+        parts: Parts of the text that have been written.
     """
 
     def __init__(self, texts: Sequence[str], gaps: Mapping[int, Gap], structure: Structure, line_end: str) -> None:
@@ -143,7 +143,7 @@ class _Writer:
         return line if self._column + len(line) <= WIDTH else None
 
     def _separator(self, index: int) -> str:
-        """What stands before a token on the line of the one before it."""
+        """Return the text that stands before a token on the line of the one before it."""
         gap = self._gaps.get(index)
         if gap is not None and gap.inline:
             before = "" if self._texts[index - 1] in _TIGHT_INSIDE else " "
@@ -154,7 +154,7 @@ class _Writer:
         return " "
 
     def _is_forced(self, index: int) -> bool:
-        """Whether a token in a statement must begin a line: behind a comment, or where a blank line is kept."""
+        """Return True if a token in a statement must begin a line: after a comment, or where a blank line is kept."""
         gap = self._gaps.get(index)
         if gap is None:
             return False
@@ -223,9 +223,9 @@ class _Writer:
         Args:
             index: The token.
             level: Its indentation.
-            comment_level: That of comments on lines of their own.
-            is_closing: Whether it closes something, so that no comment goes before it on its line.
-            keeps_blanks: Whether blank lines are kept.
+            comment_level: Indentation of comments on lines of their own.
+            is_closing: True if it closes something, so that no comment goes before it on its line.
+            keeps_blanks: True if blank lines are kept.
         """
         gap = self._gaps.get(index, _NO_LINES)
         if len(gap.segments) == 1:

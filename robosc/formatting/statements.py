@@ -14,13 +14,13 @@ from robosc.language.tokens import Kind, Tokens
 
 _NAME = int(Kind.NAME)
 _RANKS = {operator: 2 * rank for rank, level in enumerate(LEVELS) for operator in level} | {"=>": 9}
-"""How tightly operators bind; `=>` more tightly than the comparisons, and less than sums."""
+"""Ranks of how tightly operators bind; `=>` more tightly than the comparisons, and less than sums."""
 _CONVERSIONS = ("integer", "double")
 _TYPE_KEYS = ("type", "request", "response", "feedback")
 
 
 class Break(IntEnum):
-    """What a break before a token is, if its group is broken."""
+    """Kind of break before a token, if its group is broken."""
 
     NONE = 0
     """There is no break."""
@@ -38,9 +38,9 @@ class Group(NamedTuple):
     Attributes:
         first: Its first token.
         last: Its last token.
-        levels: How much deeper its lines are indented than those of the group around it.
-        is_bracket: Whether it is a bracket with what stands in it.
-        is_clause: Whether the break before its first token belongs to it.
+        levels: Number of levels by which its lines are indented deeper than those of the group around it.
+        is_bracket: True if it is a bracket with what stands in it.
+        is_clause: True if the break before its first token belongs to it.
     """
 
     first: int
@@ -51,12 +51,12 @@ class Group(NamedTuple):
 
 
 class Statement(NamedTuple):
-    """What begins a line: a definition, the head of one that goes on in braces, or a closing brace.
+    """Statement that begins a line: a definition, the head of one that goes on in braces, or a closing brace.
 
     Attributes:
         first: Its first token.
         last: Its last token.
-        level: How deep it is indented.
+        level: Depth of its indentation.
         groups: Its groups; of two that begin at one token, the inner one comes first.
     """
 
@@ -113,8 +113,8 @@ class _Frame:
     Attributes:
         opening: Its first token.
         around: The run that it is an operand of, or belongs to one.
-        is_conditional: Whether it is a conditional.
-        parts: How many runs of it have ended.
+        is_conditional: True if it is a conditional.
+        parts: Number of its runs that have ended.
     """
 
     __slots__ = ("around", "is_conditional", "opening", "parts")
@@ -165,10 +165,10 @@ class _Expressions:
         """Walk over an expression.
 
         Args:
-            levels: How much deeper its lines are indented than those of the group around it.
+            levels: Number of levels by which its lines are indented deeper than those of the group around it.
 
         Returns:
-            Whether its last line, if it is broken, is nothing but a closing bracket.
+            True if its last line, if it is broken, is nothing but a closing bracket.
         """
         frames: list[_Frame] = []
         run = _Run(self.place)
@@ -235,12 +235,12 @@ class _Expressions:
         return _Frame(opening, around)
 
     def _ends(self, frame: _Frame, run: _Run, levels: int) -> bool:
-        """Whether the innermost frame ends behind this run of it; else another run of it begins.
+        """Return True if the innermost frame ends behind this run of it; else another run of it begins.
 
         Args:
             frame: The frame.
-            run: What has been read of it last.
-            levels: How much deeper the lines of what is around the frame are indented.
+            run: The run of it that was read last.
+            levels: Number of levels by which the lines of what is around the frame are indented deeper.
         """
         index = self.place
         frame.parts += 1
@@ -431,11 +431,11 @@ class _Walker(_Expressions):
         self._end(first, level)
 
     def _clause(self, first: int, *, is_alone: bool) -> None:
-        """The end of a statement that may stand on a line of its own.
+        """Take the end of a statement that may stand on a line of its own.
 
         Args:
             first: Its first token.
-            is_alone: Whether it can stay behind what comes before although that is broken.
+            is_alone: True if it can stay behind what comes before although that is broken.
         """
         self.breaks[first] = Break.LINE
         if is_alone:

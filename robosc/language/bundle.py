@@ -33,7 +33,7 @@ def load_bundle(
         model: The model's file.
         library_paths: More folders to look in.
         interface_paths: Folders with ROS packages whose definitions of middleware types are looked up.
-        unsaved: What an editor has of files, by their real path; it is taken instead of what is saved.
+        unsaved: Texts that an editor has of files, by their real path; they are taken instead of what is saved.
 
     Raises:
         LanguageError: The model, or a library that it needs, is too large or not UTF-8.
@@ -115,7 +115,7 @@ class _Candidate:
     Attributes:
         file: Its text, as far as it could be read.
         declared: The libraries that it declares.
-        fault: Why it cannot be used, or None; an error only of who asks for one of its libraries.
+        fault: Reason why it cannot be used, or None; an error only of who asks for one of its libraries.
     """
 
     file: SourceFile

@@ -23,7 +23,7 @@ _NAME, _WORD, _NUMBER, _STRING, _END = (
 )
 _MAXIMUM_SHOWN = 40
 _NEAR = 0.75
-"""How much a misspelt word must share with the one that was meant."""
+"""Share that a misspelt word must have in common with the one that was meant."""
 
 
 class Fault(Exception):
@@ -35,7 +35,7 @@ class TooManyFaults(Exception):
 
 
 class Extent(NamedTuple):
-    """Where an item of a list stands in the text.
+    """Place of an item of a list in the text.
 
     Attributes:
         item: Its tree.
@@ -49,15 +49,15 @@ class Extent(NamedTuple):
 
 
 class Cursor:
-    """Reads tokens one after the other.
+    """Cursor that reads tokens one after the other.
 
     Attributes:
         texts: The tokens, as written.
         kinds: Their kinds.
         place: Index of the next token.
-        diagnostics: What was found so far.
+        diagnostics: Findings so far.
         extents: The items of lists that were read so far.
-        expected: What could stand at the end of the text, if it ends too early.
+        expected: Words for what could stand at the end of the text, if it ends too early.
     """
 
     def __init__(self, file: SourceFile, tokens: Tokens, places: Places) -> None:
@@ -101,10 +101,10 @@ class Cursor:
         self._possible = (index, words)
 
     def fault(self, *expected: str, related: tuple[RelatedPlace, ...] = ()) -> Fault:
-        """The error that the next token is not what was expected; raise it.
+        """Return the error that the next token is not what was expected; raise it.
 
         Args:
-            expected: What would have fitted, such as `a name` or `'{'`.
+            expected: Words for what would have fitted, such as `a name` or `'{'`.
             related: Other places that explain it.
         """
         index = self.place
@@ -127,7 +127,7 @@ class Cursor:
             self.expected = words
 
     def told(self) -> Fault:
-        """What to raise behind an error that has been reported with `report`."""
+        """Return the error to raise behind one that has been reported with `report`."""
         self._faults += 1
         if len(self.diagnostics) >= MAXIMUM_SYNTAX_ERRORS:
             raise TooManyFaults
@@ -135,7 +135,7 @@ class Cursor:
 
     @property
     def is_whole(self) -> bool:
-        """Whether nothing had to be skipped so far."""
+        """True if nothing had to be skipped so far."""
         return not self._faults
 
     def deeper(self, opening: int, levels: int = 1) -> None:
@@ -278,7 +278,10 @@ class Cursor:
         raise fault
 
     def _ends(self, expected: tuple[str, ...]) -> bool:
-        """Whether the list ends at a token that begins none of its items; reports one that should not be there."""
+        """Return True if the list ends at a token that begins none of its items.
+
+        Reports a token that should not be there.
+        """
         index = self.place
         if self.texts[index] == "}":
             self.place += 1
@@ -298,7 +301,7 @@ class Cursor:
         return self.texts[index] not in self._lists[-1] and self._begins_item(index)
 
     def _begins_item(self, index: int) -> bool:
-        """Whether a token looks like the first word of an item of an open list."""
+        """Return True if a token looks like the first word of an item of an open list."""
         word = self.texts[index]
         follow = STARTS.get(word)
         if follow is None or not any(word in parsers for parsers in self._lists):
@@ -318,7 +321,7 @@ class Cursor:
         return True
 
     def body_of(self, word: str, following: str) -> Callable[[], object] | None:
-        """What reads the list in braces of an item that begins with these words, or None if it has none."""
+        """Return the reader of the list in braces of an item that begins with these words, or None if it has none."""
         raise NotImplementedError
 
     def _recover(self, begin: int) -> None:

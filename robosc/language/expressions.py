@@ -17,7 +17,7 @@ _NAME, _NUMBER, _STRING = int(Kind.NAME), int(Kind.NUMBER), int(Kind.STRING)
 
 
 class _Group(NamedTuple):
-    """What stands inside one pair of parentheses, as far as it has been read."""
+    """Content of one pair of parentheses, as far as it has been read."""
 
     opening: int
     operands: list[syntax.Expression]
@@ -51,7 +51,7 @@ class ExpressionParser(Cursor):
         return syntax.Literal(False, self.at(begin))
 
     def begins_expression(self) -> bool:
-        """Whether the next token can begin an expression."""
+        """Return True if the next token can begin an expression."""
         index = self.place
         kind, token = self.kinds[index], self.texts[index]
         return kind in (_NAME, _NUMBER, _STRING) or token in _OPERAND_SIGNS

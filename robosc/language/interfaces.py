@@ -29,11 +29,11 @@ def _paths(variable: str) -> list[Path]:
 
 
 def find_interfaces(texts: Iterable[str], folders: Sequence[Path]) -> tuple[SourceFile, ...]:
-    """The definitions that some texts use, named like `std_msgs/msg/Bool.msg`, sorted by name.
+    """Return the definitions that some texts use, named like `std_msgs/msg/Bool.msg`, sorted by name.
 
     Args:
         texts: Models and libraries.
-        folders: Where packages lie; the first that has a definition wins.
+        folders: Folders with packages; the first that has a definition wins.
     """
     found: dict[str, SourceFile] = {}
     for type_, package in sorted({use for text in texts for use in _used(text)}):

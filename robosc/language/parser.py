@@ -25,15 +25,15 @@ _QUALITIES = ("reliable", "best_effort", "sensor", "latched")
 
 @dataclass(frozen=True, slots=True)
 class Parsed:
-    """What became of a text.
+    """Result of parsing a text.
 
     Attributes:
         tree: The syntax tree, or None where there are errors.
         diagnostics: Everything that is wrong with the text, by place.
         sound: The syntax tree of the items that are sound, or None where not even the first words are; a name of the
             file that is missing is empty.
-        extents: Where each sound item that stands in a list begins and ends, inner ones first.
-        expected: What could stand at the end of a text that ends too early, such as `'goto'` or `a name`.
+        extents: Begin and end of each sound item that stands in a list, inner ones first.
+        expected: Words for what could stand at the end of a text that ends too early, such as `'goto'` or `a name`.
     """
 
     tree: syntax.File | None
@@ -111,7 +111,7 @@ class _Parser(ExpressionParser):
         return syntax.File(self.texts[index] == "library", name, items)
 
     def _begin_of_file(self) -> int | None:
-        """Where a robot or library begins behind what should not be before it."""
+        """Return the place where a robot or library begins behind what should not be before it."""
         for index in range(self.place, len(self.texts) - 2):
             if self.texts[index] in ("robot", "library") and "{" in self.texts[index + 1 : index + 3]:
                 return index
@@ -129,7 +129,7 @@ class _Parser(ExpressionParser):
             return syntax.Name("", self.at(self.place - 1))
 
     def body_of(self, word: str, following: str) -> Callable[[], object] | None:
-        """What reads the list in braces of an item that begins with these words, or None if it has none."""
+        """Return the reader of the list in braces of an item that begins with these words, or None if it has none."""
         match word, following:
             case "component", _:
                 return self._component_list
@@ -373,7 +373,7 @@ class _Parser(ExpressionParser):
         return syntax.Requirement(self._communications(), True, expression, place)
 
     def _is_invariant(self) -> bool:
-        """Whether the next word is not the name of a communication, variable, state or component."""
+        """Return True if the next word is not the name of a communication, variable, state or component."""
         following = self.texts[self.place + 1]
         if following == "-":
             # `always - 1 > x disables m` and `always -x < 1` begin alike: what ends the expression decides.
@@ -381,7 +381,7 @@ class _Parser(ExpressionParser):
         return following not in _AFTER_NAME
 
     def _disables_follows(self) -> bool:
-        """Whether the word is the begin of an expression with `disables` behind it; reads nothing."""
+        """Return True if the word is the begin of an expression with `disables` behind it; reads nothing."""
         begin, found, possible, faults = self.place, len(self.diagnostics), self._possible, self._faults
         try:
             self.expression()
@@ -433,7 +433,7 @@ class _Parser(ExpressionParser):
 
 @dataclass(frozen=True, slots=True)
 class _Given:
-    """What a `with` list says."""
+    """Content of a `with` list."""
 
     identifier: syntax.Text | None
     types: dict[str, syntax.Type]
@@ -444,4 +444,4 @@ class _Given:
 _AFTER_NAME = frozenset(
     {"needs", "disables", ".", "[", "or", "and", "=", "!=", ">", ">=", "<", "<=", "+", "*", "/", "=>", ""}
 )
-"""What can follow a name that begins a requirement of part A (`-` is looked at more closely)."""
+"""Tokens that can follow a name that begins a requirement of part A (`-` is looked at more closely)."""

@@ -1,4 +1,4 @@
-"""What can be told of a text without reading it by the grammar, so of broken texts too: the libraries it is about."""
+"""Facts about a text without reading it by the grammar, so of broken texts too: the libraries it is about."""
 
 from collections.abc import Iterator
 

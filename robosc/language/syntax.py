@@ -49,7 +49,7 @@ class Access(msgspec.Struct, frozen=True, gc=False):
 
     Attributes:
         root: The first name; None stands for the word `value`.
-        steps: What follows.
+        steps: Steps that follow.
         location: The whole of it.
     """
 
@@ -92,7 +92,7 @@ class Call(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def location(self) -> Location:
-        """Where the function is named."""
+        """Place where the function is named."""
         return self.function.location
 
 
@@ -106,7 +106,7 @@ class Quantifier(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def location(self) -> Location:
-        """Where the word stands."""
+        """Place of the word."""
         return self.word.location
 
 
@@ -149,7 +149,7 @@ class NamedType(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def location(self) -> Location:
-        """Where it is used."""
+        """Place where it is used."""
         return self.name.location
 
 
@@ -217,7 +217,7 @@ class Option(msgspec.Struct, frozen=True, gc=False):
     """`key: value` of a `with` list, other than name and types.
 
     Attributes:
-        key: What it says; `location` is the key's.
+        key: Key of the option; `location` is the key's.
         value: A Name for `qos`, a Text for `stamped`, a number for `depth` and `max_age`, a condition for `when`.
     """
 
@@ -382,7 +382,7 @@ class File(msgspec.Struct, frozen=True, gc=False):
     """A robot or a library.
 
     Attributes:
-        is_library: Which of the two.
+        is_library: True for a library, False for a robot.
         name: Its name.
         items: Its definitions in the order of the text.
     """

@@ -43,7 +43,7 @@ COMMENT = re.compile(f"{_LINE_COMMENT}|{_BLOCK_COMMENT}")
 
 
 class Kind(IntEnum):
-    """What a token is."""
+    """Kind of a token."""
 
     NAME = 1
     """A free name, or any word behind a `^`."""
@@ -62,8 +62,8 @@ class Tokens(NamedTuple):
     """The tokens of a text, column by column; the last ones are of kind `END` and empty.
 
     Attributes:
-        texts: What is written, a `^` included.
-        kinds: What each is.
+        texts: Text of each as written, a `^` included.
+        kinds: Kind of each.
         starts: Offset of each in the text.
     """
 
@@ -131,12 +131,12 @@ def _tokens(text: str, pattern: re.Pattern[str]) -> Tokens:
 
 
 def is_open_comment(token: str) -> bool:
-    """Whether a token of kind `OTHER` is a comment that is never closed."""
+    """Return True if a token of kind `OTHER` is a comment that is never closed."""
     return token.startswith("/*")
 
 
 def is_open_string(token: str) -> bool:
-    """Whether a token of kind `OTHER` is a text in quotes that is never closed."""
+    """Return True if a token of kind `OTHER` is a text in quotes that is never closed."""
     return token[:1] in ("'", '"')
 
 
@@ -159,7 +159,10 @@ def readable_tokens(text: str) -> Tokens:
 
 
 def obstacle(file: SourceFile, tokens: Tokens, places: Places) -> Diagnostic | None:
-    """What hides the rest of a text from the grammar: NUL, a comment or text in quotes that is never closed."""
+    """Return the error that hides the rest of a text from the grammar.
+
+    The cause is NUL, or a comment or text in quotes that is never closed.
+    """
     text = file.text
 
     def found(code: str, message: str, offset: int, mend: str) -> Diagnostic:

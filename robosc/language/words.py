@@ -34,7 +34,10 @@ STARTS: dict[str, Literal[True, "a name"] | frozenset[str]] = {
     "on": frozenset({"request", "response", "feedback", "error", "cancel"}),
     "transition": True,
 }
-"""What follows a word that begins an item: an error inside one item ends where the next one seems to begin."""
+"""Tokens that follow a word that begins an item.
+
+An error inside one item ends where the next one seems to begin.
+"""
 
 _GROUPS: tuple[tuple[str, frozenset[str]], ...] = (
     (
@@ -62,7 +65,7 @@ _FOREIGN = {
     "|": "Write 'or' for '||'.",
     ";": "Remove the ';': nothing ends with one.",
 }
-"""What other languages write."""
+"""Notation of other languages."""
 
 
 def spelled(name: str) -> str:
@@ -71,7 +74,7 @@ def spelled(name: str) -> str:
 
 
 def expected_words(expected: Iterable[str]) -> str:
-    """What was expected, at most eight of it, as one phrase."""
+    """Return what was expected, at most eight of it, as one phrase."""
     words = dict.fromkeys(expected)
     for name, group in _GROUPS:
         if group <= words.keys():
@@ -102,12 +105,12 @@ def unescape(token: str) -> str:
 
 
 def mend_syntax(before: str, token: str, expected: Sequence[str]) -> str:
-    """How to mend a syntax error.
+    """Return advice on how to fix a syntax error.
 
     Args:
         before: The token before the one that does not fit.
-        token: That token; empty at the end of the text.
-        expected: What would have fitted.
+        token: Token that does not fit; empty at the end of the text.
+        expected: Words for what would have fitted.
     """
     if token in _FOREIGN:
         return _FOREIGN[token]

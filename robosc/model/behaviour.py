@@ -45,7 +45,7 @@ _KINDS: dict[CommunicationKind, frozenset[EventKind]] = {
     CommunicationKind.SERVICE: frozenset({EventKind.REQUEST, EventKind.RESPONSE, EventKind.ERROR}),
     CommunicationKind.ACTION: frozenset(set(EventKind) - {EventKind.RESET}),
 }
-"""What a behaviour can react to."""
+"""Kinds of events that a behaviour can react to."""
 
 _PREPOSITIONS = {
     EventKind.REQUEST: "to",
@@ -65,7 +65,7 @@ class BehaviourTree:
 
     Attributes:
         part: The component.
-        location: Where the behaviour begins.
+        location: Place where the behaviour begins.
         variables: Its variables.
         states: Its states.
         transitions: Every transition in the order of the text, with the state it stands in.
@@ -108,7 +108,10 @@ def behaviour_tree(part: Part, findings: Findings) -> BehaviourTree | None:
 
 
 def component_names(part: Part, tree: BehaviourTree | None, types: Types, findings: Findings) -> ComponentNames:
-    """What can be read of a component; reports names that are given twice and types no variable can have."""
+    """Return the names that can be read of a component.
+
+    Reports names that are given twice and types no variable can have.
+    """
     if tree is None:
         return ComponentNames(part.name, frozenset(), {})
     _unique_names(tree, findings)
@@ -159,15 +162,15 @@ def _no_object_variable(variable: syntax.Variable, findings: Findings) -> None:
 
 
 class BehaviourBuilder:
-    """Builds one behaviour.
+    """Builder of one behaviour.
 
     Args:
         tree: The behaviour as written.
         scope: Names in it.
         communications: Every communication of the robot by name.
-        defaults: For each enum type the default value of an uninitialised variable.
-        findings: Where faults are reported.
-        unknown_communication: Called for a name that no communication has.
+        defaults: Default value of an uninitialised variable, for each enum type.
+        findings: Findings to which faults are reported.
+        unknown_communication: Function called for a name that no communication has.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What each name of a text means: where what it names is defined (language A.4)."""
+"""Meaning of each name of a text: the place where what it names is defined (language A.4)."""
 
 from robosc.language import syntax
 from robosc.source import Location
@@ -8,8 +8,8 @@ class Bindings:
     """Names and their definitions, noted by the checks while they resolve them.
 
     Attributes:
-        uses: Where a definition stands, by each place that names it; the definition itself is no use of it.
-        communications: Where each communication of the robot is defined, by name.
+        uses: Place of a definition, by each place that names it; the definition itself is no use of it.
+        communications: Place where each communication of the robot is defined, by name.
     """
 
     def __init__(self) -> None:

@@ -46,13 +46,13 @@ from robosc.source import Bundle
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """What became of a bundle.
+    """Result of checking a bundle.
 
     Attributes:
         model: The robot, or None if there are errors or the main file is a library.
         diagnostics: Every finding, sorted by place.
-        places: Where the parts of the model stand, or None without a model.
-        bindings: What the names of the text mean, as far as it was read.
+        places: Places of the parts of the model, or None without a model.
+        bindings: Meanings of the names of the text, as far as it was read.
     """
 
     model: Model | None
@@ -62,7 +62,7 @@ class Checked:
 
     @property
     def has_errors(self) -> bool:
-        """Whether any finding is an error."""
+        """True if any finding is an error."""
         return any(item.severity is Severity.ERROR for item in self.diagnostics)
 
     def model_or_raise(self) -> Model:
@@ -83,13 +83,13 @@ class Checked:
 
 @dataclass(frozen=True, slots=True)
 class Inspected:
-    """What can be told of a bundle whatever is wrong with it, for editors.
+    """Facts about a bundle, whatever is wrong with it, for editors.
 
     Attributes:
-        checked: As `check` has it.
-        parsed: What became of the main text.
+        checked: Result as `check` has it.
+        parsed: Result of parsing the main text.
         parts: The components of the robot, imports followed.
-        scopes: What names mean in each place of it; None where there is no tree.
+        scopes: Meanings of names in each place of it; None where there is no tree.
         units: The files that were read, the main one first.
         communications: Those of the robot whose types are sound, by name.
     """

@@ -44,12 +44,12 @@ class CommunicationTree:
 
     @property
     def location(self) -> Location:
-        """Where the robot's text speaks of it: its own name, or the import that brings it."""
+        """Place where the robot's text speaks of it: its own name, or the import that brings it."""
         return self.part.place if self.part.is_imported else self.tree.name.location
 
     @property
     def identifier_location(self) -> Location:
-        """Where the name of its topic, service or action is written."""
+        """Place where the name of its topic, service or action is written."""
         return self.tree.identifier.location if self.tree.identifier else self.tree.name.location
 
 
@@ -184,7 +184,10 @@ def middleware_type(communication: Communication, types: Types) -> str:
 
 
 def _agree(first: Communication, second: Communication) -> bool:
-    """Whether two messages on one topic travel alike; where the model is silent, each way has its own default."""
+    """Return True if two messages on one topic travel alike.
+
+    Where the model is silent, each way has its own default.
+    """
     if all(item.quality is None and item.depth is None for item in (first, second)):
         return True
     transports = {(item.effective_quality, item.effective_depth) for item in (first, second)}
@@ -198,7 +201,7 @@ def _quality_text(communication: Communication) -> str:
 def check_topics(
     communications: Iterable[Communication], places: dict[str, Location], types: Types, findings: Findings
 ) -> None:
-    """Who shares an identifier: one middleware type on each, and one component that publishes on it."""
+    """Check shared identifiers: one middleware type on each, and one component that publishes on it."""
     first: dict[tuple[str, str], Communication] = {}
     for item in communications:
         is_topic = item.kind in (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSAGE)

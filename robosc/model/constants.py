@@ -30,11 +30,11 @@ _MAXIMUM_CHAIN = 50
 
 
 class Constants:
-    """Resolves the constants of every file, each once, in whichever order they need each other.
+    """Resolver of the constants of every file, each once, in whichever order they need each other.
 
     Args:
         types: All types.
-        findings: Where faults are reported.
+        findings: Findings to which faults are reported.
     """
 
     def __init__(self, types: Types, findings: Findings) -> None:
@@ -163,7 +163,7 @@ class VisibleConstants(Mapping[str, Typed | None]):
 
     Attributes:
         ambiguous: Names that several libraries define, with the libraries' names.
-        places: Where each is defined.
+        places: Place where each is defined.
     """
 
     def __init__(

@@ -70,11 +70,11 @@ _Step = syntax.Name | syntax.Index | syntax.Slice
 
 
 class ExpressionChecker:
-    """Resolves the expressions of one scope.
+    """Resolver of the expressions of one scope.
 
     Args:
-        scope: What names mean.
-        findings: Where faults are reported.
+        scope: Meanings of names.
+        findings: Findings to which faults are reported.
     """
 
     def __init__(self, scope: Scope, findings: Findings) -> None:
@@ -86,7 +86,7 @@ class ExpressionChecker:
 
     @contextmanager
     def where(self, condition: Expression) -> Iterator[None]:
-        """What is resolved meanwhile has the bounds that it has where a condition, resolved here, is true."""
+        """Give what is resolved meanwhile the bounds that it has where a condition, resolved here, is true."""
         with self._within(narrowed(condition, self._ranges) or {}):
             yield
 
@@ -133,7 +133,7 @@ class ExpressionChecker:
                 return self._quantifier(tree)
 
     def _declaration(self, tree: syntax.Expression) -> tuple[RelatedPlace, ...]:
-        """Where the variable that a tree names is declared, if it names one."""
+        """Return the place where the variable that a tree names is declared, if it names one."""
         if not isinstance(tree, syntax.Access) or tree.root is None or len(tree.steps) > 1:
             return ()
         component, name = self._scope.own, tree.root.text
@@ -220,7 +220,10 @@ class ExpressionChecker:
         return Typed(Binary(tree.operator, left.expression, right.expression), _BOOLEAN)  # type: ignore[arg-type]
 
     def _is_open(self, tree: syntax.Expression) -> bool:
-        """Whether what is wanted decides what a tree means: a bare enum value, or a choice between such."""
+        """Return True if the type that is wanted decides what a tree means.
+
+        Such a tree is a bare enum value, or a choice between such.
+        """
         if isinstance(tree, syntax.Conditional):
             return self._is_open(tree.then) and self._is_open(tree.otherwise)
         if not isinstance(tree, syntax.Access) or tree.root is None or tree.steps:
@@ -516,7 +519,7 @@ class ExpressionChecker:
         return self._read(Received(path), found)
 
     def _read(self, read: Expression, type_: Type) -> Typed:
-        """What is read, with the bounds that it has here."""
+        """Return what is read, with the bounds that it has here."""
         if isinstance(type_, IntegerType):
             declared = bounds_of(type_)
             here = self._ranges.setdefault(read, declared)

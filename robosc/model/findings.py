@@ -19,11 +19,11 @@ _WORD = re.compile("[A-Za-z_][A-Za-z_0-9]*+")
 
 
 class Findings:
-    """A growing list of diagnostics, and what names mean: the one thing that the checks share and add to.
+    """A growing list of diagnostics, and meanings of names: the one thing that the checks share and add to.
 
     Attributes:
-        diagnostics: What was found so far.
-        bindings: What names mean, as far as they mean something.
+        diagnostics: Findings so far.
+        bindings: Meanings of names, as far as they mean something.
     """
 
     def __init__(self) -> None:
@@ -44,7 +44,7 @@ class Findings:
         self._broken_words.update(_WORD.findall(file.text))
 
     def is_broken(self, file: str) -> bool:
-        """Whether a file is a library with errors of its grammar."""
+        """Return True if a file is a library with errors of its grammar."""
         return file in self._broken_files
 
     def error(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
@@ -83,12 +83,12 @@ class Findings:
         """Add an `unknown-name` error with the nearest known name, if one is near.
 
         Args:
-            what: What it should name.
-            name: As it is written.
-            location: Where.
+            what: Kind of thing that it should name.
+            name: The name as it is written.
+            location: Place of the name.
             known: The names of such things.
-            mend: What to do instead of writing the nearest one.
-            words: What the language itself has there.
+            mend: Advice on what to do instead of writing the nearest one.
+            words: Words that the language itself has there.
         """
         if name in self._broken_words:
             return
@@ -106,7 +106,7 @@ class Findings:
         self._broken_communications.update(names)
 
     def explain(self, communication: str) -> bool:
-        """Whether an error that has been reported explains why a communication is not known."""
+        """Return True if an error that has been reported explains why a communication is not known."""
         return communication in self._broken_communications or communication in self._broken_words
 
     def unknown_communication(self, name: str, location: Location, known: Iterable[str]) -> None:
@@ -124,7 +124,7 @@ class Findings:
 
     @property
     def has_errors(self) -> bool:
-        """Whether any finding is an error."""
+        """True if any finding is an error."""
         return any(item.severity is Severity.ERROR for item in self.diagnostics)
 
 

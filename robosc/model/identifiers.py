@@ -1,4 +1,4 @@
-"""What ROS accepts as the name of a topic, service or action.
+"""Names that ROS accepts for a topic, service or action.
 
 Rules of ROS 2: "Topic and Service name mapping to DDS", design.ros2.org, 2018, section "ROS 2 Name Space Tokens" and
 "ROS Topic and Service Name Constraints"; names of ROS 1 are stricter nowhere that matters here.
@@ -10,7 +10,7 @@ _TOKEN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 
 
 def identifier_fault(identifier: str) -> str | None:
-    """Why ROS refuses a name, in words; None for one that it takes."""
+    """Return the reason why ROS refuses a name, in words; None for one that it takes."""
     if not identifier:
         return "it is empty"
     if not identifier.isascii() or re.search(r"[^A-Za-z0-9_/~]", identifier):

@@ -1,4 +1,4 @@
-"""What a model must say to become a supervision layer (language B.13)."""
+"""Statements that a model must make to become a supervision layer (language B.13)."""
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.model.places import Places

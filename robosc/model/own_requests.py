@@ -1,4 +1,4 @@
-"""What the request of an action does to its own requirements (semantics 3.4)."""
+"""Effect of the request of an action on its own requirements (semantics 3.4)."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
@@ -67,7 +67,7 @@ def _telling_states(
 
 
 def _breaks(requirement: Expression, component: str, transition: Transition, state: str) -> bool:
-    """Whether a requirement that may be true in a state is false after a transition from it."""
+    """Return True if a requirement that may be true in a state is false after a transition from it."""
     before = _judged(requirement, component, state, {})
     assigned = {update.variable: _judged(update.expression, component, state, {}) for update in transition.updates}
     after = _judged(requirement, component, transition.target or state, assigned)
@@ -84,7 +84,7 @@ def _judged(expression: Expression, component: str, state: str, variables: Mappi
 
 
 def _tests_knowledge(expression: Expression) -> bool:
-    """Whether an expression asks what is known: here, that something is not known means something else."""
+    """Return True if an expression asks what is known: here, that something is not known means something else."""
     stack = [expression]
     while stack:
         node = stack.pop()

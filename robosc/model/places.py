@@ -1,4 +1,4 @@
-"""Where in the text the parts of a checked model stand, for findings of later stages."""
+"""Places of the parts of a checked model in the text, for findings of later stages."""
 
 from dataclasses import dataclass, field
 

@@ -67,7 +67,7 @@ def _hull(first: Range, second: Range) -> Range:
 
 
 def _comparison(part: Expression) -> tuple[Expression, str, float] | None:
-    """What is read, the operator and the constant of a comparison; the comparison may be denied."""
+    """Return the expression read, the operator and the constant of a comparison; the comparison may be negated."""
     is_denied = isinstance(part, Unary) and part.operator == "not"
     if isinstance(part, Unary) and is_denied:
         part = part.operand

@@ -1,4 +1,4 @@
-"""Which parts of received data are converted when an event happens: the same in every executor."""
+"""Parts of received data that are converted when an event happens: the same in every executor."""
 
 from collections.abc import Iterator
 
@@ -9,7 +9,7 @@ Path = tuple[PathStep, ...]
 
 
 def converted_paths(model: Model, event: str) -> tuple[Path, ...]:
-    """What updates on an event read, then every other enum that it carries, each part once.
+    """Return the parts that updates on an event read, then every other enum that it carries, each part once.
 
     An enum is converted whether an update reads it or not: only then is it noticed that a datum leaves it
     unknown (language B.4). Elements of arrays, of which there may be any number, only count where they are read.

@@ -64,13 +64,13 @@ def _restricted(
 
 
 class ProvideBuilder:
-    """Builds provide statements.
+    """Builder of provide statements.
 
     Args:
-        checker: Resolves expressions of the robot.
+        checker: Checker that resolves expressions of the robot.
         types: All types.
-        findings: Where faults are reported.
-        places: Where each communication is declared.
+        findings: Findings to which faults are reported.
+        places: Place where each communication is declared.
     """
 
     def __init__(

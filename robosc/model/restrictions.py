@@ -20,7 +20,7 @@ _Item = syntax.Requirement | syntax.Invariant | syntax.Provide
 
 @dataclass(frozen=True, slots=True)
 class _Offer:
-    """What a library may bring, by what a component must have for it; with each item its place in the text.
+    """Items that a library may bring, by what a component must have for it; with each item its place in the text.
 
     Attributes:
         by_communication: Requirements by their first communication, provide statements by theirs.
@@ -38,7 +38,7 @@ class _Offer:
 
     @classmethod
     def of(cls, unit: Unit) -> "_Offer":
-        """What a library may bring."""
+        """Return the items that a library may bring."""
         offer = cls()
         for place, item in enumerate(unit.tree.items):
             match item:
@@ -54,15 +54,15 @@ class _Offer:
 
 
 class Restrictions:
-    """Builds them in source order: what an import brings stands where the component is imported.
+    """Builder of restrictions in source order: what an import brings stands where the component is imported.
 
     Args:
         unit: The robot.
         parts: Its components.
         libraries: The libraries that they come from.
-        scopes: What names mean.
+        scopes: Meanings of names.
         types: All types.
-        findings: Where faults are reported.
+        findings: Findings to which faults are reported.
 
     Attributes:
         requirements: Those that are sound.
@@ -110,7 +110,10 @@ class Restrictions:
                 self._add(item, self._unit, communications, places)
 
     def _brought_by(self, component: syntax.Component, own: Sequence[str]) -> Iterator[tuple[Unit, _Item]]:
-        """What importing a component with some communications brings from each library on the way to its definition."""
+        """Yield what importing a component with some communications brings.
+
+        The items come from each library on the way to the component's definition.
+        """
         names = set(own)
         for unit, name in self._libraries.chain(component):
             offer = self._offers.get(unit) or self._offers.setdefault(unit, _Offer.of(unit))
@@ -125,7 +128,10 @@ class Restrictions:
                 yield unit, found[place]
 
     def _is_readable(self, tree: _Item, unit: Unit, part: Part) -> bool:
-        """Whether every component that it reads has been imported; else it is an error of the import."""
+        """Return True if every component that an item reads has been imported.
+
+        Otherwise reports an error of the import.
+        """
         scope = self._scopes.of(unit)
         missing = sorted((_roots_of(tree) & unit.components.keys()) - scope.components.keys())
         if missing:

@@ -1,4 +1,4 @@
-"""What a name can mean at one place of a model (language A.4)."""
+"""Meanings that a name can have at one place of a model (language A.4)."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ComponentNames:
-    """What can be read of a component from outside.
+    """Names that can be read of a component from outside.
 
     Attributes:
         name: Its name in the robot.
         states: Names of its states.
         variables: Types of its variables; None for one whose type is broken.
-        declared: Where the type of each variable is written.
-        places: Where each state and variable is defined.
+        declared: Place where the type of each variable is written.
+        places: Place where each state and variable is defined.
     """
 
     name: str
@@ -47,8 +47,8 @@ class Scope:
         absent: Components whose import has failed, which has been reported.
         constants: Constants by name; None for one that is broken, which has been reported.
         ambiguous: Names of constants and enums that several libraries define, with the libraries' names.
-        component_places: Where each component has the name that it has here.
-        constant_places: Where each constant is defined.
+        component_places: Place where each component has the name that it has here.
+        constant_places: Place where each constant is defined.
     """
 
     types: Types
@@ -94,8 +94,8 @@ class Scopes:
         types: All types, already resolved.
         parts: The components of the robot.
         libraries: The libraries that they come from.
-        names: What can be read of each component, by its name in the robot.
-        constants: Resolves constants.
+        names: Names that can be read of each component, by its name in the robot.
+        constants: Resolver of constants.
     """
 
     def __init__(

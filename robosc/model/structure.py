@@ -35,7 +35,7 @@ class CommunicationKind(StrEnum):
 
 
 class EventKind(StrEnum):
-    """What happens on a communication."""
+    """Kind of event on a communication."""
 
     REQUEST = "request"
     RESPONSE = "response"
@@ -65,7 +65,7 @@ CONTROLLABLE_KINDS = frozenset({EventKind.REQUEST, EventKind.CANCEL, EventKind.R
 
 
 class Deployment(StrEnum):
-    """Where a supervisor stands: it decides itself, or it filters an existing controller."""
+    """Deployment of a supervisor: it decides itself, or it filters an existing controller."""
 
     CONTROLLER = "controller"
     LAYER = "layer"
@@ -93,7 +93,7 @@ class EnumRule(msgspec.Struct, frozen=True, gc=False):
 
 
 class EnumDefinition(msgspec.Struct, frozen=True, gc=False):
-    """How a received datum becomes one of finitely many names: the first true rule, else `default`."""
+    """Conversion of a received datum to one of finitely many names: the first true rule, else `default`."""
 
     name: ScopedName
     source: Type
@@ -110,7 +110,7 @@ class Interface(msgspec.Struct, frozen=True, gc=False):
 
 
 Quality = Literal["reliable", "best_effort", "sensor", "latched"]
-"""How a message travels: delivery guaranteed; the newest only; as sensors do; also to who comes later."""
+"""Transport of a message: delivery guaranteed; the newest only; as sensors do; also to those that come later."""
 
 
 class Communication(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
@@ -119,17 +119,18 @@ class Communication(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     Attributes:
         name: Its name, unique in the robot.
         component: The component that declares it.
-        kind: What it is.
+        kind: Kind of communication.
         identifier: Topic, service or action name.
         request: Type of what the robot's controller sends (incoming message, service, action).
         response: Type of what comes back (outgoing message, service, action).
         feedback: Type of an action's feedback.
         interface: The middleware type, if linked.
-        quality: How a message travels, if the model says so; `QUALITIES` and `effective_quality` have the rest.
-        depth: How many messages are kept for a slow receiver, if the model says so.
+        quality: Transport of a message, if the model says so; `QUALITIES` and `effective_quality` have the rest.
+        depth: Number of messages that are kept for a slow receiver, if the model says so.
         max_age: Seconds after which an outgoing message that was not seen again is stale.
         frame: Frame with which the header of an incoming message, or an action's request, is stamped.
-        when: Which messages on a shared identifier are this one, in a supervision layer (language B.13).
+        when: Condition for the messages on a shared identifier that are this one, in a supervision layer (language
+            B.13).
     """
 
     name: Name
@@ -148,7 +149,7 @@ class Communication(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
     @property
     def effective_quality(self) -> Quality:
-        """How it travels: as the model says, else like a sensor if sensor_msgs has its type, else reliably."""
+        """Transport in effect: as the model says, else like a sensor if sensor_msgs has its type, else reliable."""
         if self.quality is not None:
             return self.quality
         is_sensor = self.interface is not None and self.interface.package == "sensor_msgs"
@@ -156,7 +157,7 @@ class Communication(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
     @property
     def effective_depth(self) -> int:
-        """How many messages are kept: as the model says, else 5 for sensors and 10 for others, 1 if latched."""
+        """Number of messages that are kept: as the model says, else 5 for sensors and 10 for others, 1 if latched."""
         if self.depth is not None:
             return self.depth
         return {"sensor": 5, "latched": 1}.get(self.effective_quality, 10)
@@ -182,7 +183,7 @@ class Variable(msgspec.Struct, frozen=True, gc=False):
         name: Its name, unique among the behaviour's states and variables.
         type: Boolean, integer, double, string or enum.
         initial: The value it starts at.
-        is_synthesis: Whether it takes part in synthesis (language A.6); else it is code-only.
+        is_synthesis: True if it takes part in synthesis (language A.6); else it is code-only.
     """
 
     name: Name
@@ -260,7 +261,7 @@ class Requirement(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def condition(self) -> Expression:
-        """What must be true for a request: E, or `not E` for `disables`."""
+        """Condition that must be true for a request: E, or `not E` for `disables`."""
         return self.expression if self.form is RequirementForm.NEEDS else Unary("not", self.expression)
 
 
@@ -272,7 +273,7 @@ class Invariant(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def condition(self) -> Expression:
-        """What must be true in every state."""
+        """Condition that must be true in every state."""
         return Unary("not", self.expression) if self.is_never else self.expression
 
 
@@ -342,7 +343,7 @@ class Model(msgspec.Struct, frozen=True, gc=False):
 
 
 def is_tau(event: str) -> bool:
-    """Whether an event of the model is a tau event (`<Component>.tau_<n>`)."""
+    """Return True if an event of the model is a tau event (`<Component>.tau_<n>`)."""
     return event.rpartition(".")[2].startswith("tau_")
 
 

@@ -1,4 +1,4 @@
-"""Which variables take part in synthesis, and the rules about them (language A.6)."""
+"""Variables that take part in synthesis, and the rules about them (language A.6)."""
 
 from collections.abc import Iterable, Iterator, Mapping
 

@@ -40,12 +40,12 @@ class Typed:
 
 
 def fits(found: Type, wanted: Type) -> bool:
-    """Whether a value of one type can stand where another is wanted (ranges are judged elsewhere)."""
+    """Return True if a value of one type can stand where another is wanted (ranges are judged elsewhere)."""
     return same_kind(found, wanted) or (isinstance(found, IntegerType) and isinstance(wanted, DoubleType))
 
 
 def may_leave(found: Type, wanted: Type) -> bool:
-    """Whether an integer can lie outside the range that is wanted."""
+    """Return True if an integer can lie outside the range that is wanted."""
     if not isinstance(found, IntegerType) or not isinstance(wanted, IntegerType) or not wanted.is_bounded:
         return False
     (low, high), (least, most) = bounds_of(found), bounds_of(wanted)
@@ -53,7 +53,7 @@ def may_leave(found: Type, wanted: Type) -> bool:
 
 
 def same_kind(first: Type, second: Type) -> bool:
-    """Whether two types are one, whatever the ranges of integers."""
+    """Return True if two types are one, whatever the ranges of integers."""
     if isinstance(first, IntegerType) and isinstance(second, IntegerType):
         return True
     return first == second

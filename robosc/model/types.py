@@ -39,7 +39,7 @@ _FOREIGN_TYPES = {
     "str": "string",
     "void": "none",
 }
-"""What other languages and ROS call the basic types."""
+"""Names of the basic types in other languages and in ROS."""
 
 
 class Types:
@@ -47,11 +47,11 @@ class Types:
 
     Attributes:
         objects: Object definitions by model name.
-        object_places: Where they stand.
+        object_places: Places where they stand.
         enums: Enum types by model name, with the unit and tree they come from.
         sources: Source type of each enum by model name.
-        value_places: Where each value of an enum is defined, by model name and value.
-        property_places: Where each property of an object is defined, by model name and property.
+        value_places: Place where each value of an enum is defined, by model name and value.
+        property_places: Place where each property of an object is defined, by model name and property.
     """
 
     def __init__(self, findings: Findings) -> None:
@@ -151,7 +151,10 @@ class Types:
         self.object_places[key] = tree.name.location
 
     def _depth(self, tree: syntax.ObjectDefinition, properties: Iterable[Property]) -> int:
-        """How deeply an object is nested, arrays counted; after an error 0, so that it is not repeated."""
+        """Return the depth to which an object is nested, arrays counted; after an error 0.
+
+        The 0 keeps the error from being repeated.
+        """
         deepest = 0
         for item in properties:
             type_, arrays = item.type, 0

@@ -44,7 +44,7 @@ class Part:
         name: The name that the robot knows it by.
         unit: The file that defines it.
         tree: Its definition there.
-        place: Where the robot names it.
+        place: Place where the robot names it.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Part:
 
     @property
     def is_imported(self) -> bool:
-        """Whether it comes from a library."""
+        """True if it comes from a library."""
         return self.place is not self.tree.name.location
 
 

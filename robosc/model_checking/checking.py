@@ -42,16 +42,16 @@ def verify_properties(
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> tuple[Verdict, ...]:
-    """Whether properties hold in the controlled system, in their order; the same for every engine.
+    """Verify whether properties hold in the controlled system, in their order; the same for every engine.
 
     Args:
         system: Plants and event conditions.
-        added: What the supervisor adds to events.
+        added: Conditions that the supervisor adds to events.
         properties: The properties.
         engine: Name of the engine for decision diagrams, or more about it. The order changes, if it may, until all
             states are known.
-        should_stop: Asked before each step of the work with one event; once true, the work ends.
-        on_progress: Told where the work is.
+        should_stop: Function called before each step of the work with one event; once true, the work ends.
+        on_progress: Function called with the progress of the work.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
@@ -76,7 +76,7 @@ class _Checker:
         self._known: dict[int, tuple[Formula, Any]] = {}
 
     def verdict(self, claim: Property) -> Verdict:
-        """Whether it holds in every initial state, and a run that shows it."""
+        """Return the verdict on whether a property holds in every initial state, with a run that shows it."""
         outside = self._structure.initial & ~self._whole(claim.formula)
         holds = bool(outside == self._manager.false)
         start = self._structure.one(self._structure.initial if holds else outside)

@@ -28,7 +28,7 @@ from robosc.model_checking.structure import KripkeStructure
 
 @dataclass(frozen=True, slots=True)
 class _Shown:
-    """What has been found: the way, where it closes, and what is left to show."""
+    """Result so far: the way, where it closes, and what is left to show."""
 
     path: Path
     loop: int | None = None
@@ -36,10 +36,10 @@ class _Shown:
 
 
 class Evidence:
-    """Finds runs that show something.
+    """Finder of runs that show something.
 
     Args:
-        structure: What runs go through.
+        structure: Structure that runs go through.
         where: The states in which a formula holds.
         forever: The states from which a run can stay in given ones for ever.
     """
@@ -95,7 +95,7 @@ class Evidence:
                 return self._break(left, right, path)
 
     def _states(self, formula: Formula, holds: bool) -> Any:
-        """Where a formula holds, or does not."""
+        """Return the states where a formula holds, or does not."""
         inside = self._where(formula)
         return inside if holds else self._structure.states & ~inside
 

@@ -16,21 +16,21 @@ from robosc.source import Location
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """Where a condition over locations and synthesis variables is true."""
+    """States where a condition over locations and synthesis variables is true."""
 
     expression: Expression
 
 
 @dataclass(frozen=True, slots=True)
 class Enabled:
-    """Where the controlled system can do an event."""
+    """States where the controlled system can do an event."""
 
     event: str
 
 
 @dataclass(frozen=True, slots=True)
 class Not:
-    """Where a formula does not hold."""
+    """States where a formula does not hold."""
 
     operand: "Formula"
 
@@ -40,7 +40,7 @@ Junction = Literal["and", "or"]
 
 @dataclass(frozen=True, slots=True)
 class Joined:
-    """Where both, or at least one, of two formulas hold."""
+    """States where both, or at least one, of two formulas hold."""
 
     operator: Junction
     left: "Formula"
@@ -91,12 +91,12 @@ Formula = Condition | Enabled | Not | Joined | Temporal
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """What is claimed of the initial state.
+    """Claim about the initial state.
 
     Attributes:
-        name: What the author calls it; empty if it has no name.
+        name: Name that the author gives it; empty if it has no name.
         text: The formula as written.
-        location: Where it stands.
+        location: Place of the formula.
         formula: The claim.
     """
 

@@ -1,4 +1,4 @@
-"""What verification returns: verdicts with the runs that show them, as plain values."""
+"""Results of verification: verdicts with the runs that show them, as plain values."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -11,22 +11,22 @@ State = tuple[Value, ...]
 
 
 class RunKind(StrEnum):
-    """What a run shows."""
+    """Kind of run, by what it shows."""
 
     WITNESS = "witness"
-    """That the property holds."""
+    """Run that shows that the property holds."""
     COUNTEREXAMPLE = "counterexample"
-    """That it does not."""
+    """Run that shows that the property does not hold."""
 
 
 @dataclass(frozen=True, slots=True)
 class Remainder:
-    """What else has to be so for a run to show what it is to show, and this run does not show.
+    """Fact that must hold for a run to show what it is to show, and that this run does not show.
 
     Attributes:
         place: Place of the state in the run.
         formula: Part of the property.
-        holds: Whether it holds in that state.
+        holds: True if it holds in that state.
     """
 
     place: int
@@ -39,12 +39,12 @@ class Run:
     """A run of the controlled system from an initial state.
 
     Attributes:
-        kind: What it shows.
+        kind: Kind of run, by what it shows.
         states: The states that it goes through, one more than events.
-        events: What happens between each two; None where nothing can happen and the state stays as it is.
+        events: Event between each two; None where nothing can happen and the state stays as it is.
         loop: Place of the state to which the run comes back from its last one, which is that state again; None for a
             run that ends.
-        left: What it leaves to be shown; empty if it shows everything.
+        left: Facts that it leaves to be shown; empty if it shows everything.
     """
 
     kind: RunKind
@@ -60,7 +60,7 @@ class Verdict:
 
     Attributes:
         property: The property.
-        holds: Whether it holds in every initial state.
+        holds: True if it holds in every initial state.
         run: A run that shows why, or None where no single run does.
     """
 

@@ -35,7 +35,7 @@ class WrittenProperty:
     Attributes:
         name: Its name; empty if it has none.
         text: Its formula as written.
-        location: Where the formula stands.
+        location: Place where the formula stands.
         tree: The formula; temporal operators are calls whose names end in brackets.
     """
 
@@ -55,11 +55,12 @@ def operator_of(tree: syntax.Expression) -> str | None:
 def read_properties(
     files: Sequence[SourceFile], *, has_lines: bool
 ) -> tuple[tuple[WrittenProperty, ...], tuple[Diagnostic, ...]]:
-    """The properties of some texts and what is wrong with them.
+    """Return the properties of some texts and what is wrong with them.
 
     Args:
         files: The texts.
-        has_lines: Whether each line of a text is a property of its own (or empty, or a comment); else all of it is one.
+        has_lines: True if each line of a text is a property of its own (or empty, or a comment); else all of it is
+            one.
     """
     found: list[WrittenProperty] = []
     diagnostics: list[Diagnostic] = []
@@ -158,7 +159,7 @@ class _PropertyParser(ExpressionParser):
         return tree
 
     def _is_operator(self, index: int) -> bool:
-        """Whether a word stands for an operator: what follows would not fit behind a name."""
+        """Return True if a word stands for an operator: what follows would not fit behind a name."""
         following = self.texts[index + 1]
         return following not in _BINARY and following not in (".", ")", "]", "U", "then", "else", ",", "")
 
@@ -189,7 +190,7 @@ class _PropertyParser(ExpressionParser):
         return tree
 
     def _operand(self) -> syntax.Expression:
-        """What one operator before it takes: an operand behind signs, like that of `!`."""
+        """Parse the operand of one preceding operator: an operand behind signs, like that of `!`."""
         index = self.place
         token = self.texts[index]
         if token in ("!", "-"):

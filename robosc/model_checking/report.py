@@ -53,7 +53,7 @@ def _run_lines(run: Run, system: System, components: frozenset[str]) -> Iterator
 
 
 def _shown(system: System, state: State) -> Iterator[tuple[Subject, Value]]:
-    """What can change: the plants of messages have one location only."""
+    """Yield the subjects that can change, with their values: the plants of messages have one location only."""
     for subject, value in zip(subjects(system), state, strict=True):
         if subject.variable is not None or len(subject_domain(system, subject)) > 1:
             yield subject, value
@@ -76,7 +76,7 @@ def verdicts_json(verdicts: Sequence[Verdict], system: System, model: Model) -> 
 
 
 def property_errors_json(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:
-    """That properties cannot be understood, as JSON values."""
+    """Report as JSON values that properties cannot be understood."""
     return {"status": "property errors", **diagnostics_json(diagnostics)}
 
 

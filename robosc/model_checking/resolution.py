@@ -143,7 +143,7 @@ class _Resolver:
 
 
 def _scope(model: Model, findings: Findings) -> Scope:
-    """What can be named."""
+    """Return everything that can be named."""
     names: dict[str, ComponentNames] = {}
     for communication in model.communications:
         if communication.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION):

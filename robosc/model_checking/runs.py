@@ -26,7 +26,7 @@ class Path:
 
     Attributes:
         states: Single states, as predicates; at least one.
-        events: What happens between each two.
+        events: Event between each two states.
     """
 
     states: tuple[Any, ...]
@@ -51,10 +51,10 @@ class _Layer:
 
 
 class Runs:
-    """Finds runs.
+    """Finder of runs.
 
     Args:
-        structure: What runs go through.
+        structure: Structure that runs go through.
     """
 
     def __init__(self, structure: KripkeStructure) -> None:

@@ -42,8 +42,8 @@ class KripkeStructure:
 
     Args:
         system: Plants and event conditions.
-        place: Where it is encoded.
-        added: What the supervisor adds.
+        place: Workspace in which it is encoded.
+        added: Conditions that the supervisor adds.
 
     Attributes:
         manager: The manager of all predicates.
@@ -89,12 +89,13 @@ class KripkeStructure:
         return steps.names | support(self.manager, allowed)
 
     def leading_to(self, goal: Any, through: Any, is_enough: Callable[[Any], bool] = never_enough) -> Any:
-        """A goal, and the states from which runs through some states lead to it.
+        """Return a goal, and the states from which runs through some states lead to it.
 
         Args:
-            goal: Where the runs end.
-            through: Where they may be before.
-            is_enough: Asked about what has been found again and again; once true, the rest is not found.
+            goal: States in which the runs end.
+            through: States in which they may be before.
+            is_enough: Function called again and again with what has been found; once it returns true, the rest is not
+                found.
         """
         closure = closure_under(self.encoding, self._backwards, goal | (through & self.states), self.watch)
         return closure.of(goal, "states that lead there", is_enough)
@@ -156,7 +157,7 @@ def _value(bits: Bits, assignment: Mapping[str, bool]) -> Value:
 
 
 def diagram_predicate(encoding: Encoding, diagram: DecisionDiagram) -> Any:
-    """Where a decision diagram over locations and variables is true."""
+    """Return the predicate that is true where a decision diagram over locations and variables is true."""
     manager = encoding.manager
     by_name = {(subject.automaton, subject.variable): bits for subject, bits in encoding.subjects.items()}
     built = [manager.false, manager.true]
@@ -170,7 +171,7 @@ def diagram_predicate(encoding: Encoding, diagram: DecisionDiagram) -> Any:
 
 
 def _at_least(manager: Any, bits: Bits, index: int) -> Any:
-    """Where the index that some bits encode is not below `index`."""
+    """Return the predicate that is true where the index encoded by some bits is not below `index`."""
     found = manager.true
     for place, name in enumerate(reversed(bits.names)):
         variable = manager.var(name)

@@ -1,7 +1,7 @@
-"""What synthesis does not guarantee about a controller: finite response, confluence, nonblocking under control.
+"""Controller properties that synthesis does not guarantee: finite response, confluence, nonblocking under control.
 
-After Reijnen, Erens, van de Mortel-Fronczak and Rooda, "Supervisory controller synthesis and implementation for safety
-PLCs", Discrete Event Dynamic Systems 32, 2022, pp. 115-141, with the automaton of our executor
+After Reijnen, Erens, van de Mortel-Fronczak and Rooda, "Supervisory controller synthesis and implementation for
+safety PLCs", Discrete Event Dynamic Systems 32, 2022, pp. 115-141, with the automaton of our executor
 (`robosc.properties.controller`), and one difference: a marked state counts as reached also where silent steps only
 pass through it, since the robot has then completed its task, if only for a moment.
 """

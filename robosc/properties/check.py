@@ -29,20 +29,20 @@ def check_controller(
     semantics: Semantics | None = None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Properties:
-    """Finite response, confluence and nonblocking under control of a supervisor; the same for the same input.
+    """Check finite response, confluence and nonblocking under control of a supervisor; deterministic.
 
     Only what is proved is 'passed', and only what a trace shows is 'failed'.
 
     Args:
         model: The checked robot.
-        deployment: Where the supervisor stands.
+        deployment: Deployment of the supervisor.
         added: The conditions that synthesis adds.
-        is_nonblocking: Whether it is certain that the controlled system is nonblocking.
+        is_nonblocking: True if it is certain that the controlled system is nonblocking.
         states: States of the controlled system, as far as is known: where there are `HOPELESS` times as many as
-            `limit` allows, nothing is searched for nonblocking alone, which only a whole search can tell.
+            `limit` allows, nothing is searched for nonblocking alone, which only a whole search can decide.
         limit: Stable states beyond which a search is given up.
-        semantics: Of the model's automata there, where it was made already.
-        should_stop: Asked now and then; once true, the work ends.
+        semantics: Semantics of the model's automata there, if it was made already.
+        should_stop: Function called now and then; once it returns true, the work ends.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.

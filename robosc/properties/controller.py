@@ -89,10 +89,10 @@ class Goal:
     Attributes:
         index: Its place in `Held`.
         cancel: Its cancel event.
-        place: Where in a state its plant's location stands.
+        place: Place of its plant's location in a state.
         running: The location in which a goal runs.
         requirements: Its requirements.
-        reads: What they read.
+        reads: Subjects that they read.
     """
 
     index: int
@@ -115,8 +115,8 @@ class Run:
         events: The steps; of a run that does not end, those before its cycle.
         cycle: The steps that come again and again; empty where the run ends.
         end: The stable state, once the executor has looked at it; None where the run does not end.
-        is_marked: Whether a state of the run is marked, the first included; of one that does not end, whether one of
-            its cycle is.
+        is_marked: True if a state of the run is marked, the first included; of one that does not end, if one of its
+            cycle is.
         cycle_states: The states of its cycle; empty where the run ends.
     """
 
@@ -132,12 +132,12 @@ class Controller:
 
     Args:
         model: The checked robot.
-        deployment: Where the supervisor stands.
+        deployment: Deployment of the supervisor.
         added: The conditions that synthesis adds.
-        semantics: Of the model's automata there, where it was made already.
+        semantics: Semantics of the model's automata there, if it was made already.
 
     Attributes:
-        is_deterministic: Whether no two transitions apply to one event in one state, whatever a model may say.
+        is_deterministic: True if no two transitions apply to one event in one state, whatever a model may say.
         system: The automata that are executed; their states are those of the model's automata.
         width: Number of places of a state.
         goals: The actions that the executor may cancel, in source order.
@@ -197,12 +197,12 @@ class Controller:
         return self._start
 
     def is_marked(self, node: Node) -> bool:
-        """Whether every automaton is in a marked location."""
+        """Return True if every automaton is in a marked location."""
         state = node[0]
         return all(state[place] in marked for place, marked in self._marked)
 
     def after(self, state: State, event: str) -> State | None:
-        """Where a controllable event leads, or None where it is not enabled."""
+        """Return the state that a controllable event leads to, or None where it is not enabled."""
         if not self._stands(state, event):
             return None
         semantics = self._semantics
@@ -217,7 +217,7 @@ class Controller:
         return min(targets) if len(targets) > 1 else next(iter(targets))
 
     def _stands(self, state: State, event: str) -> bool:
-        """Whether every automaton of an event has an edge here: few have, and this is quickly asked."""
+        """Return True if every automaton of an event has an edge here: few have, and this check is quick."""
         return all(state[place] in sources for place, sources in self._sources[event])
 
     def silent_steps(self, node: Node) -> Iterator[tuple[str, Node]]:
@@ -274,10 +274,10 @@ class Controller:
         return state, looked
 
     def moves(self, node: Node) -> Iterator[tuple[tuple[str, ...], bool, Node]]:
-        """What may happen in a stable state and changes it: first requests, then the environment's, in source order.
+        """Yield the moves that can change a stable state: first requests, then the environment's, in source order.
 
         Returns:
-            Events, whether this can happen under every setting, and the state before any silent step. A state comes
+            Events, True if this can happen under every setting, and the state before any silent step. A state comes
             once for each request, and once for each batch: as a whole one, if it can.
         """
         state, held = node
@@ -290,7 +290,7 @@ class Controller:
                 yield events, is_whole, (target, self._forget(target, held))
 
     def _together(self, state: State, batch: tuple[str, ...]) -> dict[State, tuple[tuple[str, ...], bool]]:
-        """What the events of a batch make of a state: with the events, and whether those are all of them."""
+        """Return the states that the events of a batch lead to, each with the events and True if those are all."""
         if batch not in self._choices:
             return self._apart(state, batch)
         found: dict[State, tuple[tuple[str, ...], bool]] = {}
@@ -343,7 +343,7 @@ class Controller:
         return found
 
     def _forget(self, state: State, held: Held) -> Held:
-        """What is remembered, without the goals that do not run."""
+        """Return the remembered bits, without those of goals that do not run."""
         if not any(held):
             return held
         return tuple(
@@ -352,7 +352,7 @@ class Controller:
 
 
 def _sources(system: System, event: str, places: dict[Subject, int]) -> Iterator[tuple[int, frozenset[str]]]:
-    """Where the automata of an event have edges, but for those that have one in every location."""
+    """Yield place and edge sources of each automaton of an event, but for those with an edge in every location."""
     for automaton in system.automata:
         if event in automaton.alphabet:
             sources = frozenset(edge.source for edge in automaton.edges if edge.event == event)

@@ -23,14 +23,14 @@ MAXIMUM_NAMES = 5
 def controller_findings(
     model: Model, system: System, places: Places, properties: Properties, *, allow_livelock: bool
 ) -> tuple[Diagnostic, ...]:
-    """What is wrong with a controller.
+    """Return the diagnostics about what is wrong with a controller.
 
     Args:
         model: The checked robot.
         system: Its automata.
-        places: Where its parts stand.
-        properties: What was found out.
-        allow_livelock: Whether silent steps that do not end are a warning only.
+        places: Source locations of its parts.
+        properties: Properties that were found out.
+        allow_livelock: True if silent steps that do not end are a warning only.
     """
     found: list[Diagnostic] = []
     if properties.livelock is not None:
@@ -129,7 +129,7 @@ def _blocking(model: Model, system: System, places: Places, blocking: Blocking) 
 
 
 def _place(model: Model, places: Places, event: str) -> Location:
-    """Where an event is written: the transition of a tau, else its communication."""
+    """Return the source location of an event: the transition of a tau, else its communication."""
     name = event.rpartition(".")[0]
     if not is_tau(event):
         return places.communications[name]

@@ -1,9 +1,9 @@
-"""Which data the events of one middleware message can carry together.
+"""Data that the events of one middleware message can carry together.
 
 Several communications may read one message (semantics 3.1): then what they receive comes from the same fields. Enum
 rules are read as conditions over *terms*: a field that is compared with constants, or anything more difficult, which
 then counts as one term that may have any value. Values of a term that no comparison tells apart are one, so all
-choices can be gone through. What is told is never too little: terms that are written differently are taken to be
+choices can be gone through. The reported data is never too little: terms that are written differently are taken to be
 independent, although they may read the same fields.
 """
 
@@ -49,9 +49,9 @@ class Option:
 
     Attributes:
         data: The data.
-        is_unknown: Whether an enum has its default because a rule is unknown: then there is a setting under which the
+        is_unknown: True if an enum has its default because a rule is unknown: then there is a setting under which the
             event does not happen.
-        may_be_left_out: Whether that can be so, as far as is known here.
+        may_be_left_out: True if that can be so, as far as is known here.
     """
 
     data: Carried
@@ -98,7 +98,7 @@ def _has_field(model: Model, type_: Type | None, name: str) -> bool:
 
 
 class _Terms:
-    """What conditions speak of, with the values that they tell apart."""
+    """Terms that conditions use, with the values that the conditions tell apart."""
 
     def __init__(self) -> None:
         self._kinds: dict[Hashable, Type | None] = {}
@@ -114,7 +114,7 @@ class _Terms:
             self._may_be_unknown.add(key)
 
     def combinations(self, keys: Iterable[Hashable]) -> int:
-        """How many choices of values some terms have."""
+        """Return the number of choices of values that some terms have."""
         return prod(len(self.values(key)) for key in keys)
 
     def values(self, key: Hashable) -> tuple[Value | None, ...]:
@@ -148,10 +148,10 @@ class _Reading:
     """A datum, worked out from terms.
 
     Attributes:
-        path: Where it stands in the event's data.
-        slots: For each term that it reads the key, and the range to which a received integer is clamped.
-        rules: Conditions over `Received((n,))`, the n-th slot, each with what the datum is then.
-        default: What it is else; None where it is the first slot itself.
+        path: Path of the datum in the event's data.
+        slots: Key of each term that it reads, with the range to which a received integer is clamped.
+        rules: Conditions over `Received((n,))`, the n-th slot, each with the value of the datum then.
+        default: Value otherwise; None where it is the first slot itself.
     """
 
     path: Path
@@ -285,7 +285,7 @@ class _Event:
         return self._opaque(condition, None, (), reading, enum)
 
     def _term(self, term: Expression, constant: Value, reading: _Reading, enum: EnumDefinition) -> Expression:
-        """What is compared with a constant."""
+        """Return the expression for a term that is compared with a constant."""
         points = () if isinstance(constant, bool) else (constant,)
         if isinstance(term, Received):
             type_ = self._type_at(enum.source, term.path)
@@ -337,7 +337,7 @@ def _slot(reading: _Reading, key: Hashable, range_: IntegerType | None) -> Expre
 
 
 def _has_enum(model: Model, declared: Type | None) -> bool:
-    """Whether a part of data is an enum."""
+    """Return True if a part of data is an enum."""
     return any(isinstance(type_, EnumType) for type_ in _parts(model, declared, set()))
 
 

@@ -19,14 +19,14 @@ _Step = tuple[str, Node]
 
 
 class Orders:
-    """Judges the orders of silent steps, each state once.
+    """Judge of the orders of silent steps, each state once.
 
     Args:
         controller: The automaton.
         limit: States on the way of silent steps beyond which to give up.
 
     Attributes:
-        is_exhausted: Whether the limit is passed: then nothing more is judged.
+        is_exhausted: True if the limit is passed: then nothing more is judged.
     """
 
     def __init__(self, controller: Controller, limit: int) -> None:

@@ -1,4 +1,4 @@
-"""What was found out about a controller: plain values."""
+"""Findings about a controller: plain values."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ class Livelock:
 
     @property
     def size(self) -> tuple[int, int]:
-        """How much there is to read."""
+        """Number of events to read: of the trace and of the cycle."""
         return len(self.trace), len(self.cycle)
 
 
@@ -72,13 +72,13 @@ class Properties:
     """The properties of a controller (semantics 2).
 
     Attributes:
-        finite_response: Whether silent steps end.
-        confluence: Whether their order does not matter.
-        nonblocking: Whether a marked state stays reachable under control.
-        method: How this was found out, in words.
-        livelock: Why there is no finite response, or None.
-        conflict: Why there is no confluence, or None.
-        blocking: Why it is not nonblocking under control, or None.
+        finite_response: Result of checking that silent steps end.
+        confluence: Result of checking that their order does not matter.
+        nonblocking: Result of checking that a marked state stays reachable under control.
+        method: Method by which this was found out, in words.
+        livelock: Reason why there is no finite response, or None.
+        conflict: Reason why there is no confluence, or None.
+        blocking: Reason why it is not nonblocking under control, or None.
     """
 
     finite_response: PropertyResult
@@ -90,5 +90,5 @@ class Properties:
     blocking: Blocking | None = None
 
     def certified(self) -> ControllerProperties:
-        """What stands in a certificate."""
+        """Return the properties that stand in a certificate."""
         return ControllerProperties(self.finite_response, self.confluence, self.nonblocking, self.method)

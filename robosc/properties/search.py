@@ -23,11 +23,11 @@ MAXIMUM_EFFORT = 5_000_000
 
 @dataclass(slots=True)
 class Searched:
-    """What a search found.
+    """Findings of a search.
 
     Attributes:
         states: Stable states that were visited.
-        is_complete: Whether there are no others.
+        is_complete: True if there are no others.
         livelock: Silent steps that do not end, the first by the number of events, or None.
         conflict: Silent steps whose order matters, or None.
         blocking: The nearest state, or cycle of silent steps, from which no marked one is reachable, or None; also
@@ -43,13 +43,13 @@ class Searched:
 
 @dataclass(slots=True)
 class _Graph:
-    """Stable states by number, and how they are connected.
+    """Stable states by number, with their connections.
 
     Attributes:
         nodes: The states.
         numbers: Their numbers.
         distances: Fewest events that lead there, as far as is known.
-        parents: Where those events begin, and which they are.
+        parents: Number of the state in which those events begin, and the events.
         before: For each state those from which it can be reached under every setting.
         good: States that are marked, or pass one on a way that there is under every setting.
     """

@@ -33,7 +33,7 @@ _Steps = dict[tuple[int, Value], list[tuple[Function, str]]]
 
 
 def always_end(system: System, should_stop: Callable[[], bool] = lambda: False) -> bool:
-    """Whether silent steps end in whatever order they are taken, by the taus of every component.
+    """Return True if silent steps end in whatever order they are taken, judged by the taus of every component.
 
     From some step on, a run without end takes only taus that it takes again and again: each lies on a cycle of its
     component's taus, and all that other steps change stands still. So it is enough that no values of what stands
@@ -119,7 +119,7 @@ def _clusters(cyclic: Mapping[str, _Arcs]) -> Iterator[tuple[str, ...]]:
 
 
 def _read(arcs: _Arcs) -> dict[Subject, None]:
-    """What guards read."""
+    """Return the subjects that guards read."""
     found = (
         subject for edges in arcs.values() for edge in edges for subject in sorted(subjects_read(edge.guard), key=str)
     )
@@ -129,7 +129,7 @@ def _read(arcs: _Arcs) -> dict[Subject, None]:
 def _stands_still(
     system: System, cyclic: Mapping[str, _Arcs], cluster: tuple[str, ...], should_stop: Callable[[], bool]
 ) -> bool:
-    """Whether the taus of some automata cannot go round, whatever everything else is."""
+    """Return True if the taus of some automata cannot go round, whatever everything else is."""
     own = [Subject(name) for name in cluster]
     frozen = [
         item for item in dict.fromkeys(item for name in cluster for item in _read(cyclic[name])) if item not in own
@@ -152,7 +152,7 @@ def _stands_still(
 
 
 def _goes_round(steps: _Steps, width: int, states: Iterable[State]) -> bool:
-    """Whether taus lead from one of the states back to it: removing what nothing leads to leaves something over."""
+    """Return True if taus lead from a state back to it: removing states without predecessors leaves some over."""
     after: dict[State, list[State]] = {}
     arriving: dict[State, int] = {}
     for state in states:
@@ -195,14 +195,14 @@ class _Step:
 def never_conflict(
     controller: Controller, added: Iterable[AddedCondition], should_stop: Callable[[], bool] = lambda: False
 ) -> bool:
-    """Whether any two silent steps that are enabled together lead to one state in either order.
+    """Return True if any two silent steps that are enabled together lead to one state in either order.
 
     Where silent steps always end, that is confluence, by Newman's lemma (see `robosc.properties.orders`).
 
     Args:
         controller: The automaton.
         added: The conditions that its supervisor adds.
-        should_stop: Asked now and then; once true, the work ends.
+        should_stop: Function called now and then; once it returns true, the work ends.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
@@ -265,7 +265,7 @@ def _commute(
     read: list[int],
     domains: list[tuple[Value, ...] | range],
 ) -> bool:
-    """Whether two steps that are enabled together lead to one state, for all values of what they read."""
+    """Return True if two steps that are enabled together lead to one state, for all values of what they read."""
     base = list(controller.start[0])
     for values in product(*(domains[place] for place in read)):
         for place, value in zip(read, values, strict=True):
@@ -281,13 +281,13 @@ def _commute(
 
 
 def _taken(controller: Controller, state: State, event: str) -> State | None:
-    """Where a reset or tau leads, or None where it is not taken: a tau that would change nothing is not."""
+    """Return the target of a reset or tau, or None where it is not taken: a tau that would change nothing is not."""
     target = controller.after(state, event)
     return None if target == state else target
 
 
 def stays_nonblocking(model: Model, controller: Controller, added: Iterable[AddedCondition]) -> bool:
-    """Whether a controlled system that is nonblocking stays so under control.
+    """Return True if a controlled system that is nonblocking stays so under control.
 
     Its silent steps are resets alone, and nothing else depends on whether they are taken at once: so every run to a
     marked state, where services are idle, is also one with each reset directly after its answer. And the environment

@@ -23,16 +23,16 @@ def certify(
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> Certificate:
-    """Let the independent verifier judge the result; a fault it finds is ours.
+    """Let the independent verifier judge the result; a fault it finds is an internal error.
 
     Args:
-        semantics: Of plants and event conditions.
+        semantics: Semantics of plants and event conditions.
         result: A supervisor of them.
         bundle: The texts that they were made from.
-        deployment: Where the supervisor will stand.
-        limits: How far the check goes.
-        should_stop: Asked now and then; once true, the work ends.
-        on_progress: Told now and then where the work is, in one short line.
+        deployment: Intended deployment of the supervisor.
+        limits: Limits of the check.
+        should_stop: Function called now and then; once it returns true, the work ends.
+        on_progress: Function called now and then with the progress of the work, in one short line.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.

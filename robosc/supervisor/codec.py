@@ -107,7 +107,7 @@ def _refuse_constant(text: str) -> NoReturn:
 
 
 def _nesting(raw: object) -> int:
-    """How deep objects and arrays are nested, without recursion."""
+    """Return the nesting depth of objects and arrays, without recursion."""
     depth, level = 0, [raw]
     while level := [item for item in level if isinstance(item, dict | list)]:
         depth += 1

@@ -36,7 +36,7 @@ class Words:
         """For each place where it stands in the model's text."""
 
     def key(self, condition: Expression) -> tuple[int, int, Size]:
-        """How conditions are sorted: tests of one place first, by its place in the model's text, then by length."""
+        """Return a sort key of conditions: tests of one place first, by place in the model's text, then by length."""
         tested = {
             self._ranks[leaf.component, leaf.variable if isinstance(leaf, VariableRead) else None]
             for leaf in leaves(condition)
@@ -49,7 +49,7 @@ class Words:
         return self._test(variable, mask)[0].expression
 
     def size(self, variable: int, mask: int) -> Size:
-        """How long that test is; nothing for the test that is always true."""
+        """Return the length of the test that `test` returns; zero for the test that is always true."""
         return (0, 0) if mask == self._space.full[variable] else self._test(variable, mask)[1]
 
     def ranges(self, variable: int, mask: int) -> int:
@@ -73,20 +73,20 @@ class Words:
         return found
 
     def cube_size(self, cube: Cube) -> Size:
-        """How long the tests of a cube are together."""
+        """Return the total length of the tests of a cube."""
         sizes = [self.size(variable, mask) for variable, mask in enumerate(cube)]
         return sum(item[0] for item in sizes), sum(item[1] for item in sizes)
 
 
 def cover(space: Space, words: Words, wanted: Node, forbidden: Node, *, most: int = MAXIMUM_CUBES) -> list[Cube]:
-    """Cubes that together are true where `wanted` is and false where `forbidden` is; none of them can go.
+    """Return cubes that together are true where `wanted` is and false where `forbidden` is; none is redundant.
 
     Args:
         space: The store of both.
-        words: They tell which cubes are short.
-        wanted: Where they must be true.
-        forbidden: Where they must be false; apart from `wanted`.
-        most: How many cubes there may be before some of them are dropped.
+        words: Sizes of tests, which tell which cubes are short.
+        wanted: Node of the states where they must be true.
+        forbidden: Node of the states where they must be false; disjoint from `wanted`.
+        most: Number of cubes that there may be before some of them are dropped.
 
     Raises:
         GaveUp: There would be too many, or it takes too many steps.

@@ -16,7 +16,7 @@ Domains = Mapping[Subject, "SubjectDomain"]
 
 
 class SubjectDomain(Sequence[Value]):
-    """What a place of the state can hold: its values in the order of their indices.
+    """Values that a place of the state can hold, in the order of their indices.
 
     Args:
         values: The values.
@@ -53,11 +53,11 @@ def diagram_domains(system: System) -> dict[Subject, SubjectDomain]:
 
 
 def evaluate(diagram: DecisionDiagram, read: Callable[[str, str | None], int]) -> bool:
-    """Whether a diagram is true in a state.
+    """Return True if a diagram is true in a state.
 
     Args:
         diagram: A valid diagram.
-        read: The index of a location or of a variable's value in its domain.
+        read: Function that returns the index of a location or of a variable's value in its domain.
     """
     number = diagram.root
     while number > 1:

@@ -36,7 +36,7 @@ _WORDS = {
     "updates": "update",
     "variables": "variable",
 }
-"""What a field of the structure is called in a model."""
+"""Names of the fields of the structure in a model."""
 
 _ENCODER = msgspec.json.Encoder(order="sorted")
 _EXPRESSIONS = get_args(Expression)
@@ -80,7 +80,7 @@ def _differences(place: str, told: Any, model: Any) -> Iterator[str]:
 
 
 def _is_leaf(value: Any) -> bool:
-    """Whether a value is told as a whole."""
+    """Return True if a value is reported as a whole."""
     return isinstance(value, (*_EXPRESSIONS, *_TYPES, Interface))
 
 

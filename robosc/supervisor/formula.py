@@ -27,7 +27,7 @@ _LONG = 5
 """Operands from which on a formula is compared with one that chooses between two shorter ones."""
 
 _MAXIMUM_OUTCOMES = 4
-"""What one place may lead to where a formula is divided by its values."""
+"""Maximum number of outcomes of one place where a formula is divided by its values."""
 
 STEPS = 30_000
 """Steps that the search for one formula may take: some hundredths of a second."""
@@ -62,7 +62,7 @@ def _most_cubes(limit: int) -> int:
 
 
 def length(expression: Expression) -> tuple[int, bool, int]:
-    """How long a formula is; of two with as many operands the one without relations reads better."""
+    """Return the length of a formula; of two with as many operands the one without relations reads better."""
     count, characters = size(expression)
     return count, has_relation(expression), characters
 
@@ -70,13 +70,13 @@ def length(expression: Expression) -> tuple[int, bool, int]:
 def to_expression(
     diagram: DecisionDiagram, domains: Domains, *, limit: int = OPERANDS, effort: Effort | None = None
 ) -> Expression | None:
-    """A short formula with the same meaning in every state, or None where none of at most `limit` operands was found.
+    """Return a short formula with the same meaning in every state, or None where none within `limit` was found.
 
     Args:
         diagram: A valid diagram.
-        domains: What the places of the state can hold, in the order of the model's text.
-        limit: Operands that it may have.
-        effort: What the search may take, at most `STEPS` of it; without one, `STEPS`.
+        domains: Values that the places of the state can hold, in the order of the model's text.
+        limit: Maximum number of operands.
+        effort: Effort that the search may take, at most `STEPS` of it; without one, `STEPS`.
     """
     return formula_in(Vocabulary(domains), diagram, limit=limit, effort=Effort(STEPS) if effort is None else effort)
 
@@ -165,7 +165,7 @@ class _Formulas:
         return found
 
     def _tried[Found](self, search: Callable[[], Iterable[Found]]) -> list[Found]:
-        """What a search finds with a third of the steps that are left."""
+        """Return the results that a search finds with a third of the steps that are left."""
         found: list[Found] = []
         try:
             with self._space.within(self._space.effort.part(self._space.effort.left // 3)):
@@ -219,7 +219,7 @@ class _Formulas:
         return told
 
     def _divided(self, node: Node, tested: Iterable[int]) -> Iterator[Expression]:
-        """What is left for the values of each place by itself: it may be relations alone."""
+        """Yield formulas by cases over each place's values: what is left for a case may be relations alone."""
         for variable in tested:
             outcomes: dict[Node, int] = {}
             for place, outcome in enumerate(self._space.fixed(node, variable)):

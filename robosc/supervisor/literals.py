@@ -25,7 +25,7 @@ Indices = tuple[range, ...]
 """Runs of indices into a domain, ascending and apart."""
 
 Size = tuple[int, int]
-"""How long a formula is: its operands, then the characters of its text."""
+"""Length of a formula: its operands, then the characters of its text."""
 
 
 def merged(runs: Iterable[range]) -> Indices:
@@ -44,10 +44,10 @@ class Membership:
     """A test whether a place holds one of some values.
 
     Attributes:
-        operator: What joins the parts.
+        operator: Operator that joins the parts.
         parts: Tests of one value or one range, at least one: of the values, or of all others.
         text: The test as text, however many parts it has.
-        size: How long it is.
+        size: Length of the test.
     """
 
     operator: Literal["and", "or"]
@@ -65,11 +65,11 @@ class Vocabulary:
     """Tests of the places of a state, each put into words once.
 
     Args:
-        domains: What the places can hold.
+        domains: Values that the places can hold.
 
     Attributes:
         domains: The same.
-        ranks: For each place where it stands in the model's text.
+        ranks: Position of each place in the model's text.
     """
 
     def __init__(self, domains: Domains) -> None:
@@ -88,11 +88,11 @@ class Vocabulary:
 def membership(
     subject: Subject, domain: SubjectDomain, indices: Indices, components: Collection[str] = ()
 ) -> Membership:
-    """The shortest test whether a place holds one of some values: some, but not all that it can hold.
+    """Return the shortest test whether a place holds one of some values: some, but not all that it can hold.
 
     Args:
         subject: The place.
-        domain: What it can hold.
+        domain: Values that it can hold.
         indices: Indices of the values.
         components: Names of all components; needed where the text is shown.
     """
@@ -114,7 +114,7 @@ def _is_choice(part: Expression) -> bool:
 
 
 def size(expression: Expression) -> Size:
-    """How long a condition is."""
+    """Return the length of a condition."""
     return operands(expression), _length(expression_text(expression))
 
 
@@ -146,7 +146,7 @@ def operands(expression: Expression) -> int:
 
 
 def has_relation(expression: Expression) -> bool:
-    """Whether a condition compares variables with each other."""
+    """Return True if a condition compares variables with each other."""
     stack = [expression]
     while stack:
         match stack.pop():

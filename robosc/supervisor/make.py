@@ -41,7 +41,7 @@ LIVELOCK_REASON = "no supervisor is made, because silent steps never end (--allo
 
 
 class MadeStatus(StrEnum):
-    """How an attempt to make a supervisor ended."""
+    """Outcome of an attempt to make a supervisor."""
 
     SUPERVISOR = "supervisor"
     EMPTY = "empty"
@@ -51,7 +51,7 @@ class MadeStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where long work is.
+    """Progress of long work.
 
     Attributes:
         stage: `check`, `synthesis`, `verification` or `controller`.
@@ -67,13 +67,13 @@ class Made:
     """The outcome of `make_supervisor`.
 
     Attributes:
-        status: How it ended.
+        status: Status at the end.
         supervisor: The supervisor, or None.
         diagnostics: Every finding about the model, sorted by place; with a supervisor, also what only synthesis
             can tell.
         statistics: Figures of the synthesis, or None where there was none.
-        reason: Why there is no supervisor, in one sentence; empty where there is one.
-        explanation: What is to blame where no supervisor exists.
+        reason: Reason why there is no supervisor, in one sentence; empty where there is one.
+        explanation: Explanation of what is to blame where no supervisor exists.
     """
 
     status: MadeStatus
@@ -90,7 +90,7 @@ class Prepared:
 
     Attributes:
         model: The model.
-        places: Where its parts stand.
+        places: Source locations of its parts.
         system: Its automata.
         diagnostics: Every finding about it.
     """
@@ -132,12 +132,12 @@ def make_supervisor(
 
     Args:
         bundle: The model and its libraries.
-        deployment: Where the supervisor will stand.
-        engine: Name of the engine for decision diagrams, or more about it.
+        deployment: Intended deployment of the supervisor.
+        engine: Name of the engine for decision diagrams, or its options.
         verify_limit: States up to which the result is verified one by one; see `Limits.of`.
-        allow_livelock: Whether a supervisor is made even if silent steps of its executor never end.
-        should_stop: Asked again and again; once true, the work ends.
-        on_progress: Told where the work is.
+        allow_livelock: True if a supervisor is made even if silent steps of its executor never end.
+        should_stop: Function called again and again; once it returns true, the work ends.
+        on_progress: Function called with the progress of the work.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.

@@ -69,17 +69,17 @@ class Space:
     """A store of nodes over the places that some diagrams test.
 
     Args:
-        diagrams: They decide which values are told apart.
-        domains: What the places can hold.
-        effort: What the work may take.
+        diagrams: Diagrams that decide which values are told apart.
+        domains: Values that the places can hold.
+        effort: Effort that the work may take.
         apart: Places whose values are all told apart.
 
     Attributes:
         subjects: The places, in the order of the diagrams.
-        integers: Which of them hold integers, by number.
+        integers: Numbers of the places that hold integers.
         classes: For each place, the indices of each class.
         full: The cube of all states.
-        effort: What further work may take.
+        effort: Effort that further work may take.
 
     Raises:
         GaveUp: They test too many places or tell too many values apart.
@@ -150,7 +150,7 @@ class Space:
         return number
 
     def both(self, a: Node, b: Node) -> Node:
-        """Where both are true."""
+        """Return the node that is true where both are true."""
         if a == b or b == 1:
             return a
         if a == 0 or b == 0:
@@ -158,7 +158,7 @@ class Space:
         return b if a == 1 else self._apply("both", min(a, b), max(a, b))
 
     def either(self, a: Node, b: Node) -> Node:
-        """Where one of them is true."""
+        """Return the node that is true where one of them is true."""
         if a == b or b == 0:
             return a
         if a == 1 or b == 1:
@@ -166,7 +166,7 @@ class Space:
         return b if a == 0 else self._apply("either", min(a, b), max(a, b))
 
     def without(self, a: Node, b: Node) -> Node:
-        """Where the first is true and the second is not."""
+        """Return the node that is true where the first is true and the second is not."""
         if a == b or a == 0 or b == 1:
             return 0
         return a if b == 0 else self._apply("without", a, b)
@@ -246,21 +246,21 @@ class Space:
         masks[first:last] = self.full[first:last]
 
     def all_of(self, nodes: Iterable[Node]) -> Node:
-        """Where all of some nodes are true."""
+        """Return the node that is true where all of some nodes are true."""
         result = 1
         for node in nodes:
             result = self.both(result, node)
         return result
 
     def sum_of(self, cubes: Iterable[Cube]) -> Node:
-        """Where one of some cubes is."""
+        """Return the node that is true where one of some cubes is."""
         node = 0
         for cube in cubes:
             node = self.either(node, self.of_cube(cube))
         return node
 
     def meets(self, node: Node, cube: Cube) -> bool:
-        """Whether a node is true somewhere in a cube."""
+        """Return True if a node is true somewhere in a cube."""
         if node == 1:
             return True
         seen, stack = {0, node}, [node] if node else []
@@ -301,7 +301,7 @@ class Space:
         return found
 
     def _leads(self, node: Node, cube: Cube, known: dict[Node, bool]) -> bool:
-        """Whether a node is true somewhere in a cube."""
+        """Return True if a node is true somewhere in a cube."""
         found = known.get(node)
         if found is None:
             variable, children = self._nodes[node]

@@ -1,8 +1,8 @@
-"""Whether a supervisor that someone hands over is right for a model, whoever made it and whatever it says of itself.
+"""Check that a supervisor that is handed over is right for a model, whoever made it and whatever it claims.
 
 Nothing in the file is believed: its model is compared with the one that is read anew from the texts, its added
 conditions are judged on that one, and its certificate is compared with what is found. A digest in a file proves
-nothing, since who changes the file can change the digest: it is told where it differs, but decides nothing.
+nothing, since whoever changes the file can change the digest: a difference is reported, but decides nothing.
 """
 
 from collections.abc import Callable
@@ -37,8 +37,8 @@ class StateInWords:
     Attributes:
         components: The state of each component with a behaviour.
         variables: The value of each synthesis variable, by `Component.variable`.
-        communications: Where each service and action is; of one that is called like a component, by `service name` or
-            `action name`.
+        communications: Location of each service and action; of one that is named like a component, by `service name`
+            or `action name`.
     """
 
     components: dict[str, str]
@@ -57,13 +57,13 @@ class StateInWords:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What is wrong with a supervisor.
+    """Fault of a supervisor.
 
     Attributes:
         check: `deployment`, `model`, `certificate`, or the property that does not hold.
-        message: What is wrong, in words.
+        message: The fault, in words.
         trace: Events of a run into the trouble, or None where none belongs to it.
-        is_shortest: Whether there is certainly no shorter run.
+        is_shortest: True if there is certainly no shorter run.
         state: The state that it leads to, or None where none belongs to it.
     """
 
@@ -79,9 +79,9 @@ class Recheck:
     """The outcome of checking a supervisor anew.
 
     Attributes:
-        diagnostics: Why the texts hold no model that the supervisor could be for; empty where they do.
-        faults: What is wrong with it; a right one has none.
-        notes: What is worth knowing, but decides nothing.
+        diagnostics: Reasons why the texts hold no model that the supervisor could be for; empty where they do.
+        faults: Faults of the supervisor; a right one has none.
+        notes: Remarks that are worth knowing, but decide nothing.
         judgement: The verifier's, or None where the supervisor is for another model or deployment.
     """
 
@@ -91,7 +91,7 @@ class Recheck:
     judgement: Judgement | None
 
     def outcomes(self) -> dict[str, Outcome]:
-        """What became of each check, in order."""
+        """Return the outcome of each check, in order."""
         faulty = {fault.check for fault in self.faults}
         found = {name: Outcome.FAILED if name in faulty else Outcome.PASSED for name in ("deployment", "model")}
         if self.judgement is None:
@@ -101,11 +101,11 @@ class Recheck:
 
     @property
     def has_passed(self) -> bool:
-        """Whether it is safe, controllable and nonblocking for certain, and nothing is wrong with it."""
+        """True if it is safe, controllable and nonblocking for certain, and nothing is wrong with it."""
         return not self.faults and self.judgement is not None and self.judgement.is_complete
 
     def unchecked(self) -> tuple[str, ...]:
-        """What was not checked."""
+        """Return the names of the checks that were not made."""
         return tuple(name for name, outcome in self.outcomes().items() if outcome is Outcome.NOT_CHECKED)
 
 
@@ -122,13 +122,13 @@ def recheck(
     """Check a supervisor against the texts of its model.
 
     Args:
-        supervisor: As `decode` read it.
+        supervisor: Supervisor as `decode` read it.
         bundle: The texts.
-        limits: How far to go.
-        deployment: Where it is to stand, or None to take its word for that.
+        limits: Limits of the check.
+        deployment: Intended deployment, or None to take the supervisor's word for that.
         engine: Engine of a symbolic search.
-        should_stop: Asked now and then; once true, the work ends.
-        on_progress: Told now and then where the work is, in one short line.
+        should_stop: Function called now and then; once it returns true, the work ends.
+        on_progress: Function called now and then with the progress of the work, in one short line.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
@@ -196,7 +196,7 @@ def recheck(
 
 
 def _notes(certificate: Certificate, bundle: Bundle) -> list[str]:
-    """What differs and decides nothing."""
+    """Return notes on differences that decide nothing."""
     notes = []
     if certificate.bundle_sha256 != bundle.digest:
         notes.append(
@@ -208,7 +208,7 @@ def _notes(certificate: Certificate, bundle: Bundle) -> list[str]:
 
 
 def _false_claims(certificate: Certificate, found: Verification) -> list[str]:
-    """What a certificate says and is not so."""
+    """Return the false claims of a certificate."""
     claims = []
     for what, told, counted in (
         ("states", certificate.states, found.states),
@@ -223,7 +223,7 @@ def _false_claims(certificate: Certificate, found: Verification) -> list[str]:
 
 
 def _false_properties(told: ControllerProperties, found: ControllerProperties) -> list[str]:
-    """What a certificate says of the controller and is not so."""
+    """Return the false claims of a certificate about the controller."""
     return [
         f"it says '{name.replace('_', ' ')} of the controller: passed', which is false"
         for name in ("finite_response", "confluence", "nonblocking")
@@ -232,7 +232,7 @@ def _false_properties(told: ControllerProperties, found: ControllerProperties) -
 
 
 def _beliefs(certificate: Certificate, found: Verification) -> list[str]:
-    """What a certificate says and nobody has checked here."""
+    """Return the claims of a certificate that nobody has checked here."""
     claimed = [
         name.replace("_", " ")
         for name in PROPERTIES

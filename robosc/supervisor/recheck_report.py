@@ -1,4 +1,4 @@
-"""What was found about a supervisor that was handed over, for machines."""
+"""Findings about a supervisor that was handed over, for machines."""
 
 from robosc.errors import InvalidSupervisorError
 from robosc.json_documents import diagnostics_json
@@ -8,17 +8,17 @@ from robosc.supervisor.structure import Supervisor
 
 
 def has_passed(found: Recheck, *, is_strict: bool) -> bool:
-    """Whether a supervisor has passed.
+    """Return True if a supervisor has passed.
 
     Args:
-        found: What was found about it.
-        is_strict: Whether everything must have been checked, permissiveness too.
+        found: Findings about it.
+        is_strict: True if everything must have been checked, permissiveness too.
     """
     return found.has_passed and not (is_strict and found.unchecked())
 
 
 def recheck_json(found: Recheck, supervisor: Supervisor, *, is_strict: bool) -> dict[str, object]:
-    """What was found, as JSON values; `status` is `passed`, `failed` or `not checked`."""
+    """Return the findings as JSON values; `status` is `passed`, `failed` or `not checked`."""
     judgement = found.judgement
     is_right = has_passed(found, is_strict=is_strict)
     return {
@@ -36,7 +36,7 @@ def recheck_json(found: Recheck, supervisor: Supervisor, *, is_strict: bool) -> 
 
 
 def malformed_json(error: InvalidSupervisorError | SignatureError) -> dict[str, object]:
-    """That a file is no supervisor, or not signed as it must be, as JSON values."""
+    """Report as JSON values that a file is no supervisor, or not signed as it must be."""
     return {"status": "failed", "reason": str(error)}
 
 

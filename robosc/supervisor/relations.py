@@ -26,7 +26,7 @@ _MAXIMUM_MIXED = 4
 """Integers up to which sums of some, and differences of sums, are bounded as well."""
 
 _DEPTH = 2
-"""How often relations are looked for in what other relations leave open."""
+"""Number of times that relations are looked for in what other relations leave open."""
 
 Operator = Literal["<=", ">=", "=", "!="]
 
@@ -42,7 +42,7 @@ class Relation:
 
     Attributes:
         form: The sum.
-        operator: How it is compared.
+        operator: Operator of the comparison.
         bound: The number.
     """
 
@@ -63,12 +63,12 @@ class Relation:
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What is true where some relations are, tests of single places are, and something else is not.
+    """Condition that is true where some relations are, tests of single places are, and something else is not.
 
     Attributes:
         relations: The relations.
-        single: What the tests of single places say.
-        inner: What must be false, if there is such a thing.
+        single: Node of the tests of single places.
+        inner: Description that must be false, if there is one.
     """
 
     relations: tuple[Relation, ...]
@@ -82,7 +82,7 @@ class Relations:
     Args:
         space: The store.
         words: Tests of one place, for what relations leave open.
-        domains: What the places can hold.
+        domains: Values that the places can hold.
     """
 
     def __init__(self, space: Space, words: Words, domains: Domains) -> None:
@@ -110,13 +110,13 @@ class Relations:
     def around(
         self, wanted: Node, forbidden: Node, integers: tuple[int, ...], *, depth: int = _DEPTH
     ) -> Iterator[Description]:
-        """Descriptions with relations that are true where `wanted` is and false where `forbidden` is.
+        """Yield descriptions with relations that are true where `wanted` is and false where `forbidden` is.
 
         Args:
-            wanted: Where they must be true; not false.
-            forbidden: Where they must be false; apart from `wanted`.
+            wanted: Node of the states where they must be true; not false.
+            forbidden: Node of the states where they must be false; disjoint from `wanted`.
             integers: The places that relations may name.
-            depth: How often relations may be looked for inside what relations leave open.
+            depth: Number of times that relations may be looked for inside what relations leave open.
 
         Raises:
             GaveUp: It takes too many steps.
@@ -139,7 +139,7 @@ class Relations:
                     todo += [found.relations, *((relation,) for relation in found.relations)]
 
     def _rests(self, wanted: Node, inside: Node, integers: tuple[int, ...], depth: int) -> Iterator[Description]:
-        """What is true where `wanted` is and keeps out what is inside relations but forbidden."""
+        """Yield descriptions that are true where `wanted` is and exclude what is inside relations but forbidden."""
         near = self._space.both(inside, self._space.of_cube(self._space.around(wanted)))
         if depth and near != 0:
             for inner in self.around(near, wanted, integers, depth=depth - 1):
@@ -158,7 +158,7 @@ class Relations:
         yield found
 
     def are_enough(self, wanted: Node, forbidden: Node, integers: tuple[int, ...]) -> bool:
-        """Whether relations and the values that each place takes by itself keep out all that is forbidden."""
+        """Return True if relations and the values that each place takes by itself exclude all that is forbidden."""
         relations = self._holding(wanted, integers)
         inside = self._space.both(self._possible(relations), self._space.of_cube(self._space.around(wanted)))
         return bool(relations) and self._space.both(inside, forbidden) == 0
@@ -183,12 +183,15 @@ class Relations:
         return Binary(relation.operator, left, right)
 
     def states(self, description: Description) -> Node:
-        """Where a description may be true: exactly where it is if all values of its integers are told apart."""
+        """Return the node that is true where a description may be true.
+
+        It is exact if all values of the description's integers are told apart.
+        """
         found = self._space.both(self._possible(description.relations), description.single)
         return found if description.inner is None else self._space.without(found, self._certain(description.inner))
 
     def _certain(self, description: Description) -> Node:
-        """Where a description is true whatever values of a class its integers have."""
+        """Return the node that is true where a description is true whatever values of a class its integers have."""
         found = description.single
         for relation in description.relations:
             for half in _halves(relation):
@@ -196,7 +199,7 @@ class Relations:
         return found if description.inner is None else self._space.without(found, self.states(description.inner))
 
     def _possible(self, relations: Iterable[Relation]) -> Node:
-        """Where each of some relations may be true."""
+        """Return the node that is true where each of some relations may be true."""
         return self._space.all_of(self._built(relation) for relation in relations)
 
     # Which relations hold
@@ -244,7 +247,7 @@ class Relations:
         known: dict[Node, int] = {1: 0}
 
         def greatest(item: Node) -> int:
-            """What the places from its own on can give."""
+            """Return the most that the places from its own on can give."""
             found = known.get(item)
             if found is None:
                 variable, children = self._space.variable(item), self._space.children(item)
@@ -260,7 +263,7 @@ class Relations:
         return below[0] - below[self._space.variable(node)] + greatest(node)
 
     def _is_computable(self, form: Form) -> bool:
-        """Whether no number in any relation of a sum, nor in its opposite, can leave 32 bits."""
+        """Return True if no number in any relation of a sum, nor in its opposite, can leave 32 bits."""
         widest = sum(max(abs(end) for ends in self._values[variable] for end in ends) for variable, _ in form)
         # A bound is one of the sums or one more or less, and is added to a part of the sum.
         return 2 * widest + 2 <= MAXIMUM_INTEGER
@@ -301,7 +304,7 @@ class Relations:
     # As nodes and as words
 
     def _built(self, relation: Relation) -> Node:
-        """Where a relation may be true."""
+        """Return the node that is true where a relation may be true."""
         found = self._nodes.get(relation)
         if found is None:
             found = self._nodes[relation] = self._new(relation)
@@ -327,7 +330,7 @@ class Relations:
         known: dict[tuple[int, int], Node] = {}
 
         def built(place: int, left: int) -> Node:
-            """Where the places from one on give no more than is left."""
+            """Return the node that is true where the places from one on give no more than is left."""
             if most[len(ordered) - place] <= left:
                 return 1
             if least[len(ordered) - place] > left:
@@ -341,7 +344,10 @@ class Relations:
         return built(0, bound)
 
     def _unequal(self, relation: Relation) -> Node:
-        """Where a sum of two places can be another number: not where they have the wrong values and no other ones."""
+        """Return the node that is true where a sum of two places can be another number than the bound.
+
+        It is false where they have the wrong values and no other ones.
+        """
         (first, sign), (second, other) = sorted(relation.form)
         rows = []
         for ends in self._values[first]:

@@ -51,9 +51,9 @@ class DecisionDiagram(msgspec.Struct, frozen=True):
 
 
 class AddedCondition(msgspec.Struct, frozen=True):
-    """What the supervisor adds to a controllable event, simplified against plant, requirements and reachability.
+    """Condition that the supervisor adds to a controllable event.
 
-    Events that are not listed get nothing added.
+    It is simplified against plant, requirements and reachability. Events that are not listed get nothing added.
     """
 
     event: EventName
@@ -67,13 +67,13 @@ PropertyResult = Literal["passed", "failed", "not checked"]
 
 
 class ControllerProperties(msgspec.Struct, frozen=True):
-    """What was found out about supervisor and executor together, which synthesis does not guarantee.
+    """Properties of supervisor and executor together, which synthesis does not guarantee.
 
     Attributes:
-        finite_response: Whether silent steps end.
-        confluence: Whether their order does not matter.
-        nonblocking: Whether a marked state stays reachable under control.
-        method: How this was found out, in words.
+        finite_response: Result of checking that silent steps end.
+        confluence: Result of checking that their order does not matter.
+        nonblocking: Result of checking that a marked state stays reachable under control.
+        method: Method by which this was found out, in words.
     """
 
     finite_response: PropertyResult
@@ -83,13 +83,13 @@ class ControllerProperties(msgspec.Struct, frozen=True):
 
 
 class Certificate(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What was checked about the supervisor, how, and for which model.
+    """Record of what was checked about the supervisor, how, and for which model.
 
     Attributes:
         engine_version: Version of RoboSC that synthesized it.
         bundle_sha256: SHA-256 of the canonical list of every file of the bundle.
         deployment: The deployment it was made for.
-        method: How it was checked, in words.
+        method: Method of the check, in words.
         safe: No reachable bad state, no request against a requirement.
         controllable: No uncontrollable event that the plant enables is disabled.
         nonblocking: From every reachable state a marked state stays reachable.
@@ -117,9 +117,9 @@ class Supervisor(msgspec.Struct, frozen=True):
 
     Attributes:
         model: The checked model (plants, requirements, data).
-        deployment: What it was synthesized for.
+        deployment: Deployment that it was synthesized for.
         added: The conditions that synthesis adds, in source order of their events.
-        certificate: What was checked.
+        certificate: Record of what was checked.
     """
 
     model: Model

@@ -114,7 +114,7 @@ def _told(diagram: DecisionDiagram, formula: Expression | None, components: froz
 
 
 def added_lines(supervisor: Supervisor, system: System) -> list[str]:
-    """What the supervisor adds, for people: formulas, and the lines of diagrams as long as they are few."""
+    """Return the added conditions for people: formulas, and the lines of diagrams as long as they are few."""
     domains, components = diagram_domains(system), _components(supervisor)
     added = _added(supervisor, system)
     width = max((len(event) for event, _, _ in added), default=0)
@@ -139,7 +139,7 @@ def _wrapped(text: str) -> list[str]:
 
 
 def _variables(model: Model) -> tuple[int, int]:
-    """How many variables take part in synthesis, and how many do not."""
+    """Return the number of variables that take part in synthesis, and of those that do not."""
     flags = [
         v.is_synthesis for component in model.components if component.behaviour for v in component.behaviour.variables
     ]

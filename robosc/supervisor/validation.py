@@ -1,4 +1,4 @@
-"""Whether a supervisor that came from outside is consistent in itself.
+"""Check that a supervisor that came from outside is consistent in itself.
 
 Shapes, sizes and identifiers are settled while decoding; this checks what one part says about another, so
 that no later stage meets a name, type or event that is not there. Whether the supervisor is *right* for a
@@ -60,15 +60,15 @@ _DATA = {
     CommunicationKind.SERVICE: (True, True, False),
     CommunicationKind.ACTION: (True, True, True),
 }
-"""Which of request, response and feedback carry data."""
+"""Flags for request, response and feedback: True if it carries data."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Names:
-    """What is looked up again and again, by name.
+    """Items that are looked up again and again, by name.
 
     Attributes:
-        scope: What expressions may name.
+        scope: Names that expressions may use.
         communications: Every communication.
         sources: The type that each enum is made from.
     """
@@ -223,7 +223,7 @@ def _validate_enum(enum: EnumDefinition, scope: Scope) -> None:
 
 
 def _is_read(leaf: Expression) -> bool:
-    """Whether a leaf reads the state of a component."""
+    """Return True if a leaf reads the state of a component."""
     return isinstance(leaf, VariableRead | StateTest)
 
 
@@ -342,7 +342,7 @@ def _validate_tau(transition: Transition, component: str, scope: Scope) -> None:
 
 
 def _received(transition: Transition, names: _Names) -> Type | None:
-    """What the event of a transition carries to the controller."""
+    """Return the type of the data that the event of a transition carries to the controller."""
     name, _, kind = transition.event.partition(".")
     communication = names.communications.get(name)
     if communication is None or transition.event not in communication.events or kind == EventKind.RESET:
@@ -374,7 +374,7 @@ def _require_deterministic(behaviour: Behaviour) -> None:
 
 
 def _request_type(name: str, names: _Names) -> Type:
-    """What is sent with the request of the communication called `name`."""
+    """Return the type of the data sent with the request of the communication called `name`."""
     communication = names.communications.get(name)
     if communication is None:
         raise InvalidSupervisorError(f"there is no communication {name}")
@@ -420,7 +420,10 @@ def _validate_provided(value: ProvidedValue, type_: Type, names: _Names) -> None
 
 
 def _validate_synthesis_variables(model: Model, names: _Names) -> None:
-    """Whatever guards, requirements, data conditions and synthesis variables read is in synthesis and finite."""
+    """Check that all that synthesis reads is in synthesis and finite.
+
+    That is all that guards, requirements, data conditions and synthesis variables read.
+    """
     variables = {
         (component.name, variable.name): variable
         for component in model.components

@@ -24,7 +24,7 @@ TOTAL_STEPS = 500_000
 """Steps that the search for the formulas of one supervisor may take: about two seconds."""
 
 Target = bool | int
-"""Where a case leads: the outcome, or the number of a line."""
+"""Target of a case: the outcome, or the number of a line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +33,8 @@ class Line:
 
     Attributes:
         number: Its number: the root is 1, and lines lead to later ones.
-        cases: Tests of one place, and where the one that is true leads.
-        otherwise: Where it leads if none is.
+        cases: Tests of one place, each with its target if it is true.
+        otherwise: Target if none is.
     """
 
     number: int
@@ -66,12 +66,12 @@ class Formulas:
     """The formulas of one supervisor's diagrams, found with a bounded effort for all of them together.
 
     Args:
-        domains: What the places of the state can hold.
+        domains: Values that the places of the state can hold.
 
     Attributes:
         domains: The same.
-        vocabulary: Puts their tests into words.
-        effort: What the search may still take.
+        vocabulary: Vocabulary that puts their tests into words.
+        effort: Effort that the search may still take.
     """
 
     def __init__(self, domains: Domains) -> None:
@@ -92,7 +92,7 @@ class Formulas:
         return found if found is not None and operands(found) <= limit else None
 
     def _is_longer(self, formula: Expression, diagram: DecisionDiagram) -> bool:
-        """Whether a formula that is not short takes more tests than its diagram, told line by line."""
+        """Return True if a formula that is not short takes more tests than its diagram, written line by line."""
         most = operands(formula)
         # Every line takes a test at least: those of very many need not be told to be counted.
         if most <= SHORT or len(_order(*_branches(diagram, self.domains), diagram.root)) >= most:
@@ -116,17 +116,17 @@ def _negated(text: str) -> str:
 
 
 def size_in_words(diagram: DecisionDiagram) -> str:
-    """How large a diagram is."""
+    """Return the size of a diagram, in words."""
     count = len(diagram.nodes)
     return f"a decision diagram of {count} node{'s' if count != 1 else ''}"
 
 
 def diagram_lines(diagram: DecisionDiagram, domains: Domains, components: Collection[str]) -> tuple[Line, ...]:
-    """A diagram node by node, the root first; a node that decides nothing is left out for what it leads to.
+    """Return a diagram node by node, the root first; a node that decides nothing is left out for what it leads to.
 
     Args:
         diagram: The diagram.
-        domains: What the places of the state can hold.
+        domains: Values that the places of the state can hold.
         components: Names of all components.
     """
     branches, leads_to = _branches(diagram, domains)

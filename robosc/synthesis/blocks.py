@@ -1,4 +1,4 @@
-"""Which places of a state are computed with together, so that their bits are to stand between each other.
+"""Places of a state that are computed with together, so that their bits are to be interleaved.
 
 Where the bits of one integer all stand above those of another, a comparison or a sum has to remember the whole of the
 first: its diagram is exponential in the bits. Bits of equal weight side by side need a carry only.
@@ -79,7 +79,7 @@ class _Sets:
         self._above: dict[Subject | Datum, Subject | Datum] = {}
 
     def root(self, item: Subject | Datum) -> Subject | Datum:
-        """What stands for the set of an item."""
+        """Return the representative of the set of an item."""
         path = []
         while item in self._above:
             path.append(item)
@@ -96,7 +96,7 @@ class _Sets:
 
 
 def _groups(system: System) -> Iterator[list[Subject | Datum]]:
-    """What is computed with together."""
+    """Yield the groups of subjects and data that are computed with together."""
     for automaton in system.automata:
         for edge in automaton.edges:
             yield from _together(edge.guard, edge.event)

@@ -1,4 +1,4 @@
-"""Why an event can never happen in the controlled system: what is to be blamed first, from the plants onwards."""
+"""Reasons why an event can never happen in the controlled system: the first to blame, from the plants onwards."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -15,12 +15,12 @@ from robosc.synthesis.watch import Watch
 
 
 class Causes:
-    """Tells causes; what they are judged by is worked out once it is needed.
+    """Finder of causes; what they are judged by is worked out once it is needed.
 
     Args:
         encoding: The variables.
-        watch: Who waits.
-        problem: What was solved.
+        watch: Watch for the waiting caller.
+        problem: Problem that was solved.
         good: Its good states.
         reachable: States of the controlled system.
     """
@@ -34,7 +34,7 @@ class Causes:
         self._reachable = reachable
 
     def of(self, steps: Steps) -> Never:
-        """Why an event of the problem, which cannot happen in the controlled system, cannot."""
+        """Return the cause why an event of the problem can never happen in the controlled system."""
         event = steps.event.name
         if self._is_nowhere(steps.plant) or self._is_nowhere(steps.plant & self._by_plants):
             return Never(event, Cause.PLANT, is_reached=False)
@@ -52,12 +52,12 @@ class Causes:
 
     @cached_property
     def _by_plants(self) -> Any:
-        """What the plants reach by themselves."""
+        """States that the plants reach by themselves."""
         return self._reached(lambda steps: steps.plant)
 
     @cached_property
     def _under_conditions(self) -> Any:
-        """What they reach where event conditions are heeded and nothing else is."""
+        """States that they reach where event conditions are respected and nothing else is."""
         return self._reached(lambda steps: steps.plant & steps.condition)
 
     def _reached(self, possible: Callable[[Steps], Any]) -> Any:

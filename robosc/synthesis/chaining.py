@@ -18,13 +18,13 @@ from robosc.synthesis.watch import Watch
 
 
 class Chaining:
-    """Closes sets of states under some steps, whatever an engine does with its order meanwhile.
+    """Closure of sets of states under some steps, whatever an engine does with its order meanwhile.
 
     Args:
         levels: The level of each current-state variable at the beginning.
         steps: The steps; of equally close and low ones the first is taken first.
-        within: What states that are added have to keep to.
-        watch: Who waits.
+        within: Predicate that added states have to satisfy.
+        watch: Watch for the waiting caller.
     """
 
     def __init__(self, levels: Mapping[str, int], steps: Sequence[Step], within: Any, watch: Watch) -> None:
@@ -42,12 +42,13 @@ class Chaining:
         self._after = [sorted(set().union(*(users[name] for name in step.names))) for step in self._steps]
 
     def of(self, states: Any, phase: str, is_enough: Callable[[Any], bool] = never_enough) -> Any:
-        """`states` and all that steps from them add.
+        """Return `states` and all that steps from them add.
 
         Args:
-            states: Where to begin, inside of what states have to keep to.
-            phase: What progress is told of.
-            is_enough: Asked about what has been found whenever that has grown; once true, the rest is not found.
+            states: States to begin with; they satisfy the predicate for added states.
+            phase: Phase for which progress is reported.
+            is_enough: Function called with what has been found whenever that has grown; once it returns true, the
+                rest is not found.
         """
         if not self._steps:
             return states

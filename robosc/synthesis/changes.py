@@ -1,4 +1,4 @@
-"""What edges write as constants, and what they do not: only the latter needs variables of the next state."""
+"""Values that edges write as constants, and those that they do not: only the latter need next-state variables."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
@@ -10,7 +10,7 @@ from robosc.expressions import Constant, EnumValue
 
 
 class Leads(Enum):
-    """Where the edges of an automaton for one event lead."""
+    """Kind of target of the edges of an automaton for one event."""
 
     NOWHERE = auto()
     """None of them leaves its location."""
@@ -21,7 +21,7 @@ class Leads(Enum):
 
 
 def leads_of(edges: Sequence[Edge]) -> Leads:
-    """Where the edges of an automaton for one event lead."""
+    """Return the kind of target of the edges of an automaton for one event."""
     if all(edge.source == edge.target for edge in edges):
         return Leads.NOWHERE
     return Leads.TO_ONE_PLACE if len({edge.target for edge in edges}) == 1 else Leads.AWAY

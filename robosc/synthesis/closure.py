@@ -17,13 +17,13 @@ from robosc.synthesis.watch import Watch
 
 
 def closure_under(encoding: Encoding, steps: Iterable[Step], within: Any, watch: Watch) -> Chaining | Saturation:
-    """What closes sets of states under some steps, as its manager does it best.
+    """Return the closure of sets of states under some steps that suits its manager best.
 
     Args:
         encoding: The variables.
         steps: The steps.
-        within: What states that are added have to keep to.
-        watch: Who waits.
+        within: Predicate that added states have to satisfy.
+        watch: Watch for the waiting caller.
     """
     levels = {name: level for level, name in enumerate(encoding.order)}
     if is_reordering(encoding.manager):

@@ -1,4 +1,4 @@
-"""What is asked about the controlled system, answered on predicates: no state is ever looked at by itself."""
+"""Answers to questions about the controlled system, on predicates: no state is ever looked at by itself."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
@@ -22,8 +22,8 @@ class ControlledSystem:
 
     Args:
         encoding: The variables.
-        watch: Who waits.
-        problem: What was solved.
+        watch: Watch for the waiting caller.
+        problem: Problem that was solved.
         good: Its good states.
         reachable: States of the controlled system.
     """
@@ -88,7 +88,7 @@ class ControlledSystem:
         return tuple(sorted(found))
 
     def _restricts(self, restriction: Restriction) -> bool:
-        """Whether, in a state of the controlled system, the plant enables an event and a condition is not true."""
+        """Return True if, in a controlled system state, the plant enables an event and a condition is not true."""
         condition, broken = None, self._manager.false
         conditions = self._encoding.system.conditions
         for item in (*(conditions[place] for place in restriction.conditions), *restriction.watched):
@@ -111,10 +111,11 @@ class ControlledSystem:
         )
 
     def _removable(self, restrictions: Sequence[Restriction], more: list[int], removed: list[int]) -> list[int]:
-        """What can go and nothing changes: what is removed already, and of `more` what can go beside, later ones first.
+        """Return the restrictions that can be removed without any change to the controlled system.
 
-        Where all of them can go together, each can: the less is forbidden, the more is allowed. Else they are tried
-        by halves.
+        They are those that are removed already, and of `more` those that can go beside them, later ones first. Where
+        all of them can go together, each can: the less is forbidden, the more is allowed. Else they are tried by
+        halves.
         """
         if not more or self._is_the_same_without([restrictions[place] for place in (*removed, *more)]):
             return [*removed, *more]
@@ -124,7 +125,7 @@ class ControlledSystem:
         return self._removable(restrictions, more[:middle], self._removable(restrictions, more[middle:], removed))
 
     def _is_the_same_without(self, restrictions: Sequence[Restriction]) -> bool:
-        """Whether the controlled system of the problem without some restrictions allows nothing more."""
+        """Return True if the controlled system of the problem without some restrictions allows nothing more."""
         problem = self._without(restrictions)
         good = FixedPoint(self._encoding, self._watch).good_states(problem, known=self._good)
         return all(

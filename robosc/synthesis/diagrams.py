@@ -45,11 +45,11 @@ class _Extractor:
         return DecisionDiagram(tuple(self._nodes), root)
 
     def _number(self, predicate: Any, first: int) -> int:
-        """The number of a predicate in the diagram: 0 false, 1 true, from 2 on its nodes.
+        """Return the number of a predicate in the diagram: 0 false, 1 true, from 2 on its nodes.
 
         Args:
             predicate: The predicate.
-            first: How many places of the topmost variable's block it does not depend on for certain.
+            first: Number of places of the topmost variable's block that it does not depend on for certain.
         """
         if is_constant(self._manager, predicate):
             return int(predicate == self._manager.true)
@@ -101,7 +101,7 @@ class _Extractor:
         return self._numbers[node]
 
     def _runs(self, subject: Subject, bits: Bits, predicate: Any, place: int) -> list[_Run]:
-        """What is left of a predicate for each index of the bits from `place` on, equal neighbours put together."""
+        """Return the cofactor of a predicate for each index of the bits from `place` on, equal neighbours merged."""
         if place == len(bits.names) or self._is_below(predicate, bits.names[-1]):
             return [(0, predicate)]
         half = 1 << (len(bits.names) - place - 1)
@@ -123,7 +123,7 @@ class _Extractor:
         return runs
 
     def _is_below(self, predicate: Any, name: str) -> bool:
-        """Whether a predicate depends only on what stands below a variable."""
+        """Return True if a predicate depends only on variables below a given one."""
         return is_constant(self._manager, predicate) or self._level[predicate.var] > self._level[name]
 
     def _split(self, predicate: Any, name: str) -> tuple[Any, Any]:

@@ -132,7 +132,7 @@ class Encoding:
     # Predicates
 
     def code(self, bits: Bits, index: int) -> Any:
-        """Where a value has an index."""
+        """Return the predicate that is true where a value has an index."""
         result = self.manager.true
         for place, name in enumerate(reversed(bits.names)):
             variable = self.manager.var(name)
@@ -140,29 +140,29 @@ class Encoding:
         return result
 
     def equals(self, bits: Bits, value: Value) -> Any:
-        """Where a value is `value`."""
+        """Return the predicate that is true where a value is `value`."""
         return self.code(bits, bits.domain.index(value))
 
     def in_location(self, automaton: str, location: str) -> Any:
-        """Where an automaton is in a location."""
+        """Return the predicate that is true where an automaton is in a location."""
         return self.equals(self.subjects[Subject(automaton)], location)
 
     def any_of(self, predicates: Iterable[Any]) -> Any:
-        """Where one of the predicates is true."""
+        """Return the predicate that is true where one of the predicates is true."""
         result = self.manager.false
         for predicate in predicates:
             result = result | predicate
         return result
 
     def all_of(self, predicates: Iterable[Any]) -> Any:
-        """Where all of the predicates are true."""
+        """Return the predicate that is true where all of the predicates are true."""
         result = self.manager.true
         for predicate in predicates:
             result = result & predicate
         return result
 
     def valid(self, bits: Bits) -> Any:
-        """Where the bits encode a value at all."""
+        """Return the predicate that is true where the bits encode a value at all."""
         count = len(bits.domain)
         if count == 1 << len(bits.names):
             return self.manager.true
@@ -177,24 +177,24 @@ class Encoding:
         return result
 
     def valid_states(self) -> Any:
-        """Where every place of the state encodes a value."""
+        """Return the predicate that is true where every place of the state encodes a value."""
         if self._valid_states is None:
             self._valid_states = self.all_of(self.valid(bits) for bits in self.subjects.values())
         return self._valid_states
 
     def initial_places(self) -> Any:
-        """Where every location and variable has a value that it may begin with."""
+        """Return the predicate that is true where every location and variable has a value that it may begin with."""
         begin = zip(subjects(self.system), initial_values(self.system), strict=True)
         return self.all_of(self.one_of(self.subjects[subject], values) for subject, values in begin)
 
     def one_of(self, bits: Bits, values: Sequence[Value]) -> Any:
-        """Where a value is one of `values`."""
+        """Return the predicate that is true where a value is one of `values`."""
         if len(values) == len(bits.domain):
             return self.valid(bits)
         return self.any_of(self.equals(bits, value) for value in values)
 
     def marked_locations(self) -> Any:
-        """Where every automaton is in a marked location."""
+        """Return the predicate that is true where every automaton is in a marked location."""
         return self.all_of(
             self.any_of(self.in_location(automaton.name, location) for location in sorted(automaton.marked))
             for automaton in self.system.automata
@@ -238,7 +238,7 @@ def _interleaved(block: Sequence[tuple[Bits, bool, Sequence[Bits]]]) -> list[str
 
 
 def _implied(later: InputVariable, earlier: InputVariable) -> bool:
-    """Whether an element is known wherever another one is.
+    """Return True if an element is known wherever another one is.
 
     It is if every array that its path goes through is one of the other's and is indexed lower or alike there.
     """
@@ -255,5 +255,5 @@ Inputs = Mapping[tuple[PathStep, ...], Bits]
 
 
 def offset_of(bits: Bits) -> int:
-    """What is added to an index to get an integer's value."""
+    """Return the number that is added to an index to get an integer's value."""
     return int(bits.domain[0]) if isinstance(bits.type, IntegerType) else 0

@@ -17,13 +17,13 @@ from robosc.errors import NodeLimitError, RoboscError
 ENTRY_POINTS = "robosc.bdd_engines"
 
 _CUDD_BASE_BYTES = 32 * 2**20
-"""What CUDD takes beside nodes: caches and tables at the beginning."""
+"""Memory that CUDD takes beside nodes, in bytes: caches and tables at the beginning."""
 
 _CUDD_NODE_BYTES = 64
 """A node, its place in the unique table and its share of the cache."""
 
 _SLACK = 4
-"""How much more than the limit one operation may have for what it needs on its way."""
+"""Factor over the limit that one operation may take for what it needs on its way."""
 
 _NEARLY = 0.9
 """Of the memory that CUDD may have: at this much it was that which stopped it, and not the machine."""
@@ -51,7 +51,7 @@ class Manager(Protocol):
     false: Any
 
     def __len__(self) -> int:
-        """How many nodes there are, of all predicates together."""
+        """Return the number of nodes, of all predicates together."""
 
     def declare(self, *names: str) -> Any:
         """Add variables below those there are."""
@@ -66,18 +66,18 @@ class Manager(Protocol):
         """Substitute variables at once: all by truth values, all by names, or all by predicates."""
 
     def exist(self, names: Iterable[str], node: Any) -> Any:
-        """Where some value of the variables makes a predicate true."""
+        """Return the predicate that is true where some value of the variables makes a predicate true."""
 
 
 @dataclass(frozen=True, slots=True)
 class EngineOptions:
-    """How decision diagrams are made.
+    """Options for making decision diagrams.
 
     Attributes:
         name: Name of the engine; `auto` is the fastest installed.
-        is_reordering: Whether the engine may change the order of variables during the fixed points (sifting; R. Rudell,
-            "Dynamic variable ordering for ordered binary decision diagrams", ICCAD 1993, pp. 42-47). The static
-            order is mostly better and takes no time; what comes out is the same.
+        is_reordering: True if the engine may change the order of variables during the fixed points (sifting;
+            R. Rudell, "Dynamic variable ordering for ordered binary decision diagrams", ICCAD 1993, pp. 42-47). The
+            static order is mostly better and takes no time; what comes out is the same.
         maximum_nodes: Nodes of all predicates together beyond which work is given up; None for no limit.
     """
 
@@ -227,7 +227,7 @@ def _memory_of(manager: Any) -> float:
 
 
 def node_check(manager: Manager, maximum_nodes: int | None) -> Callable[[], None]:
-    """What raises NodeLimitError once a manager has more nodes in use than it may."""
+    """Return a check that raises NodeLimitError once a manager has more nodes in use than it may."""
 
     def check() -> None:
         if maximum_nodes is not None and len(manager) > maximum_nodes and node_count_of(manager) > maximum_nodes:
@@ -237,29 +237,29 @@ def node_check(manager: Manager, maximum_nodes: int | None) -> Callable[[], None
 
 
 def node_limit_error(maximum_nodes: int) -> NodeLimitError:
-    """What is told when diagrams have become too large."""
+    """Return the error for diagrams that have become too large."""
     return NodeLimitError(f"the decision diagrams need more than the {maximum_nodes} nodes that they may have")
 
 
 def is_compiled(manager: Manager) -> bool:
-    """Whether an engine is CUDD, beside which every node that Python looks at is expensive."""
+    """Return True if an engine is CUDD, beside which every node that Python looks at is expensive."""
     return "cudd" in type(manager).__module__
 
 
 def is_reordering(manager: Manager) -> bool:
-    """Whether an engine may change its order by itself now."""
+    """Return True if an engine may change its order by itself now."""
     configure = getattr(manager, "configure", None)
     return bool(configure and configure().get("reordering"))
 
 
 @contextmanager
 def reordering(manager: Manager, order: Sequence[str], *, is_wanted: bool = True) -> Iterator[None]:
-    """Let an engine change the order of variables meanwhile, if that is wanted; afterwards it is the given one again.
+    """Let an engine change the order of variables meanwhile, if that is wanted; then restore the given order.
 
     Args:
         manager: A manager.
         order: Its variables, topmost first.
-        is_wanted: Whether to do anything at all.
+        is_wanted: True if anything is to be done at all.
 
     Raises:
         UnknownEngineError: The engine cannot do that.

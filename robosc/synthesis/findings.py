@@ -1,13 +1,14 @@
-"""What only synthesis can tell about a model: warnings about what its controlled system never does, or does twice.
+"""Warnings that only synthesis can give about a model: what its controlled system never does, or does twice.
 
 - `never-enabled`: an event that can happen in no state of the controlled system. Where a communication can never be
-  requested, that alone is told, not also that nothing ever comes back. A request counts whether or not a behaviour
-  reacts to it: whoever declares it wants it. Cancel counts only where a behaviour reacts to it: else nobody wrote it,
-  and an action whose requirements hold as long as it runs needs none. Resets belong to the protocol and count.
+  requested, that alone is reported, not also that nothing ever comes back. A request counts whether or not a
+  behaviour reacts to it: whoever declares it wants it. Cancel counts only where a behaviour reacts to it: else nobody
+  wrote it, and an action whose requirements hold as long as it runs needs none. Resets belong to the protocol and
+  count.
 - `unused-requirement`: a written requirement that never restricts any of its communications. For an action it
   also restricts where it turns false while the action runs, for then it is a reason to cancel; and any
   requirement where synthesis keeps away from states because of it, as it does for one that must always hold (or
-  never): what counts is whether the controlled system would do more without it. All that are told can go
+  never): what counts is whether the controlled system would do more without it. All that are reported can go
   together. What never is requested is never restricted.
 - `competing-requests`: two communications of one kind (topics, services and actions have name spaces of their own)
   with one identifier that can be requested in one state, with a shortest run to such a state. Only for the
@@ -41,7 +42,7 @@ MAXIMUM_NAMES = 5
 
 
 def questions_about(model: Model, system: System, deployment: Deployment) -> Questions:
-    """What `findings` needs to know about the controlled system of a model's automata."""
+    """Return the questions that `findings` needs answered about the controlled system of a model's automata."""
     return Questions(
         events=tuple(event.name for event in system.events),
         restrictions=(
@@ -53,7 +54,7 @@ def questions_about(model: Model, system: System, deployment: Deployment) -> Que
 
 
 def _restrictions(model: Model, system: System) -> Iterator[Restriction]:
-    """What each requirement on requests brings: the n-th one on a request is the n-th condition on that event."""
+    """Yield the restriction of each requirement on requests: the n-th on a request is that event's n-th condition."""
     communications = {item.name: item for item in model.communications}
     places = defaultdict[str, deque[int]](deque)
     for place, condition in enumerate(system.conditions):
@@ -80,11 +81,11 @@ def _rivals(model: Model) -> tuple[tuple[str, ...], ...]:
 
 
 def findings(model: Model, places: Places, answers: Answers) -> tuple[Diagnostic, ...]:
-    """The warnings about a model.
+    """Return the warnings about a model.
 
     Args:
         model: The checked model.
-        places: Where its parts stand.
+        places: Source locations of its parts.
         answers: The answers to `questions_about` it.
     """
     never = {item.event: item for item in answers.never}
@@ -136,7 +137,7 @@ _EXPLANATIONS = {
         "by 'robosc explain-synthesis'.",
     ),
 }
-"""Why, and what to do, by the cause and by whether the event would be allowed without it in a state that is reached."""
+"""Reason and remedy, by the cause and by whether the event would be allowed without it in a state that is reached."""
 
 _NEVER_TAKEN = (
     "its component never gets to a state where it stands and its guard holds",
@@ -227,7 +228,7 @@ def _competing(model: Model, places: Places, pair: Together) -> Diagnostic:
 
 
 def _after(trace: Sequence[str]) -> str:
-    """When it happens: a run, cut where it is long."""
+    """Return the words for when it happens: a run, cut where it is long."""
     if not trace:
         return "in the initial state"
     shown = ", ".join(trace[:MAXIMUM_EVENTS])

@@ -24,7 +24,7 @@ from robosc.synthesis.watch import Watch
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What a supervisor has to keep to.
+    """Restrictions that a supervisor has to keep to.
 
     Attributes:
         steps: The events under their conditions, in the system's order.
@@ -37,12 +37,12 @@ class Problem:
 
 @dataclass(frozen=True, slots=True)
 class GoodStates:
-    """Where a supervisor can keep the system safe and nonblocking.
+    """States in which a supervisor can keep the system safe and nonblocking.
 
     Attributes:
         states: The states; where the initial one is none of them, what was left when that was found.
         rounds: Rounds of the fixed point.
-        reason: Why the initial state is none of them; empty if it is one.
+        reason: Reason why the initial state is none of them; empty if it is one.
     """
 
     states: Any
@@ -51,13 +51,13 @@ class GoodStates:
 
 
 def safe_states(encoding: Encoding, invariants: Iterable[Expression]) -> Any:
-    """Where every place of the state encodes a value and every invariant is true."""
+    """Return the predicate that is true where every place of the state encodes a value and every invariant holds."""
     symbols = Symbols(encoding)
     return encoding.all_of([encoding.valid_states(), *(symbols.holds(item) for item in invariants)])
 
 
 def initial_states(encoding: Encoding) -> Any:
-    """Where the uncontrolled system may begin."""
+    """Return the states in which the uncontrolled system may begin."""
     return encoding.initial_places() & Symbols(encoding).holds(encoding.system.initial)
 
 
@@ -67,11 +67,11 @@ def marked_states(encoding: Encoding) -> Any:
 
 
 class FixedPoint:
-    """Works out good states and controlled systems.
+    """Computation of good states and controlled systems.
 
     Args:
         encoding: The variables.
-        watch: Who waits.
+        watch: Watch for the waiting caller.
     """
 
     def __init__(self, encoding: Encoding, watch: Watch) -> None:
@@ -148,7 +148,10 @@ class FixedPoint:
         return Step(lambda states: steps.image(states & source), names)
 
     def _source(self, steps: Steps, good: Any) -> tuple[Any, frozenset[str]]:
-        """Where an event may happen as far as neither its source nor its target tells, and what decides that."""
+        """Return the predicate of where an event may happen, and the variables that decide that.
+
+        The predicate leaves out what the event's source or target already decides.
+        """
         if not steps.event.is_controllable:
             return self._encoding.manager.true, steps.names
         source = steps.plant & steps.condition

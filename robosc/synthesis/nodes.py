@@ -17,7 +17,7 @@ def cofactors(node: Any) -> tuple[Any, Any]:
 
 
 def is_constant(manager: Manager, node: Any) -> bool:
-    """Whether a predicate is true or false everywhere."""
+    """Return True if a predicate is true everywhere or false everywhere."""
     return bool(node == manager.true or node == manager.false)
 
 
@@ -100,7 +100,7 @@ class _Counter:
         self._known: dict[int, tuple[Any, int]] = {}
 
     def place(self, node: Any) -> int:
-        """How many variables stand before a node's own."""
+        """Return the number of variables that stand before a node's own."""
         return len(self._position) if is_constant(self._manager, node) else self._position[node.var]
 
     def from_node(self, node: Any) -> int:

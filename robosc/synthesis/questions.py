@@ -1,4 +1,4 @@
-"""What can be asked about a controlled system beside its supervisor, and the answers: plain values."""
+"""Questions about a controlled system beside its supervisor, and the answers: plain values."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -7,7 +7,7 @@ from robosc.automata.structure import EventCondition
 
 
 class Cause(StrEnum):
-    """Why an event can never happen: the first of these that explains it."""
+    """Cause why an event can never happen: the first of these that explains it."""
 
     PLANT = "plant"
     """The plants by themselves never enable it, or taking it would always leave a variable's range."""
@@ -25,8 +25,8 @@ class Never:
 
     Attributes:
         event: The event.
-        cause: Why it cannot.
-        is_reached: Whether it is allowed, but for its cause, in some state that is reached: of a requirement, under
+        cause: Cause why it cannot.
+        is_reached: True if it is allowed, but for its cause, in some state that is reached: of a requirement, under
             the event conditions, where the plants enable it; of an invariant or the supervisor, in the controlled
             system, where the plants enable it and its own conditions are true.
         invariants: Places in `System.invariants` of those that it would break at once.
@@ -40,13 +40,13 @@ class Never:
 
 @dataclass(frozen=True, slots=True)
 class Restriction:
-    """Event conditions and invariants that stand or fall together, such as all that one written requirement brings.
+    """Event conditions and invariants that stand or fall together, such as all those of one written requirement.
 
     Attributes:
         conditions: Places in `System.conditions`.
         invariants: Places in `System.invariants`.
-        watched: Where else it shows that the restriction is used: the plants enable the event, and the condition is
-            not true.
+        watched: Further event conditions that show that the restriction is used: the plants enable the event, and the
+            condition is not true.
     """
 
     conditions: tuple[int, ...] = ()
@@ -56,7 +56,7 @@ class Restriction:
 
 @dataclass(frozen=True, slots=True)
 class Questions:
-    """What to find out about the controlled system.
+    """Questions about the controlled system.
 
     Attributes:
         events: Events of which to tell whether they can ever happen.
@@ -86,7 +86,7 @@ class Together:
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What was found out; each part in the order of its questions.
+    """Answers that were found; each part in the order of its questions.
 
     Attributes:
         never: Events that can never happen.

@@ -1,4 +1,4 @@
-"""What synthesis returns: outcomes are values."""
+"""Results that synthesis returns: outcomes are values."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -8,7 +8,7 @@ from robosc.synthesis.questions import Answers
 
 
 class SynthesisStatus(StrEnum):
-    """How a synthesis ended."""
+    """Status at the end of a synthesis."""
 
     SUPERVISOR = "supervisor"
     EMPTY = "empty"
@@ -17,7 +17,7 @@ class SynthesisStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where a synthesis is.
+    """Progress of a synthesis.
 
     Attributes:
         phase: `encoding`; `coreachability`, `controllability` and, around these two, `fixed point`; `reachability`;
@@ -59,12 +59,12 @@ class SynthesisResult:
     """The outcome of a synthesis.
 
     Attributes:
-        status: How it ended.
-        added: What the supervisor adds, for events to which it adds something, in the system's order.
-        initial: Where the supervisor lets the system begin, of its initial states; None if everywhere.
+        status: Status at the end.
+        added: Conditions that the supervisor adds, for events to which it adds something, in the system's order.
+        initial: Condition on the initial states in which the supervisor lets the system begin; None if in all.
         statistics: Figures.
-        reason: Why there is no supervisor, in words; empty where there is one.
-        answers: What else was asked about the controlled system; empty where there is none.
+        reason: Reason why there is no supervisor, in words; empty where there is one.
+        answers: Answers to the other questions about the controlled system; empty where there is none.
     """
 
     status: SynthesisStatus

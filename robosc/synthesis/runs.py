@@ -44,7 +44,7 @@ class Run:
     Attributes:
         events: Its events.
         states: The states before, between and after them.
-        is_shortest: Whether it is known that no run is shorter.
+        is_shortest: True if it is known that no run is shorter.
     """
 
     events: tuple[str, ...]
@@ -57,10 +57,10 @@ class ShortestRuns:
 
     Args:
         encoding: The variables.
-        watch: Who waits.
+        watch: Watch for the waiting caller.
         steps: The events, in the order in which equally short runs are preferred.
         possible: For each event the states in which it may happen, such as those of the controlled system.
-        start: Where runs begin.
+        start: States in which runs begin.
     """
 
     def __init__(

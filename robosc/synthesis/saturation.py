@@ -23,14 +23,14 @@ from robosc.synthesis.watch import Watch
 
 
 class Saturation:
-    """Closes sets of states under some steps, in a manager whose order stays as it is meanwhile.
+    """Closure of sets of states under some steps, in a manager whose order stays as it is meanwhile.
 
     Args:
         manager: The manager.
         levels: The level of each current-state variable.
         steps: The steps; of those that begin at one level the first is taken first.
-        within: What states that are added have to keep to.
-        watch: Who waits.
+        within: Predicate that added states have to satisfy.
+        watch: Watch for the waiting caller.
     """
 
     def __init__(
@@ -51,13 +51,13 @@ class Saturation:
         self._taken = self._told = 0
 
     def of(self, states: Any, phase: str, is_enough: Callable[[Any], bool] = never_enough) -> Any:
-        """`states` and all that steps from them add.
+        """Return `states` and all that steps from them add.
 
         Args:
-            states: Where to begin, inside of what states have to keep to.
-            phase: What progress is told of.
-            is_enough: Asked about what has been found whenever the topmost steps have added to it; once true, the rest
-                is not found.
+            states: States to begin with; they satisfy the predicate for added states.
+            phase: Phase for which progress is reported.
+            is_enough: Function called with what has been found whenever the topmost steps have added to it; once it
+                returns true, the rest is not found.
         """
         if not self._groups:
             return states
@@ -114,7 +114,10 @@ class Saturation:
         return states
 
     def _split(self, predicate: Any, node: Any) -> tuple[Any, Any]:
-        """What is left of a predicate where the variable of a node, none of its own above it, is false and true."""
+        """Return the cofactors of a predicate where the variable of a node is false and where it is true.
+
+        None of the predicate's own variables stands above that variable.
+        """
         if is_constant(self._manager, predicate) or predicate.level > node.level:
             return predicate, predicate
         return cofactors(predicate)

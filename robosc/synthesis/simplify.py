@@ -1,10 +1,10 @@
-"""What the supervisor adds to an event: of the conditions that do the same in every state that matters, a short one.
+"""Short condition that the supervisor adds to an event, of those that do the same in every state that matters.
 
-A condition matters where the controlled system can be, the plant enables the event and the requirements allow it. Among
-those that agree there, candidates are found in five ways: by restricting, by leaving out places of the state, as
-relations between integers, and as sums of products for what is wanted and for what is not. The one with the shortest
-formula is kept, and without any the one with the smallest diagram. What is kept is what the supervisor holds, so its
-formula is right in all states.
+A condition matters where the controlled system can be, the plant enables the event and the requirements allow it.
+Among those that agree there, candidates are found in five ways: by restricting, by leaving out places of the state,
+as relations between integers, and as sums of products for what is wanted and for what is not. The one with the
+shortest formula is kept, and without any the one with the smallest diagram. What is kept is what the supervisor
+holds, so its formula is right in all states.
 
 Source: O. Coudert and J. C. Madre, "A unified framework for the formal verification of sequential circuits", IEEE
 ICCAD 1990, pp. 126-129 (restrict).
@@ -44,7 +44,7 @@ MAXIMUM_SUBJECTS = 40
 
 
 _Length = tuple[bool, tuple[int, bool, int], int]
-"""Whether there is no formula, how long it is, and the nodes of the diagram."""
+"""Flag that there is no formula, the length of the formula, and the number of nodes of the diagram."""
 
 _SHORT: _Length = (False, (2, False, 0), 0)
 """Longer than a condition than which none is shorter."""
@@ -104,7 +104,7 @@ class Simplifier:
         return min(found, key=lambda diagram: found[diagram])
 
     def _length(self, diagram: DecisionDiagram, limit: int = OPERANDS) -> _Length:
-        """How long a condition's formula is; one without a formula is longer than any with."""
+        """Return the length of a condition's formula; one without a formula is longer than any with."""
         nodes = len(diagram.nodes)
         formula = None
         # Unless places are tested again, or compared with each other, no formula has more nodes than operands.

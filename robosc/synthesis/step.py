@@ -7,7 +7,7 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What one event adds to a set of states.
+    """Contribution of one event to a set of states.
 
     Attributes:
         add: The states that it leads to from a set of states.

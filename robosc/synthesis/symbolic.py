@@ -84,7 +84,7 @@ class Symbols:
         self._inputs = inputs or {}
 
     def holds(self, expression: Expression) -> Any:
-        """Where a condition is true (not unknown)."""
+        """Return the predicate that is true where a condition is true (not unknown)."""
         return self._truth(self.translate(expression)).true
 
     def translate(self, expression: Expression) -> Symbolic:
@@ -143,7 +143,7 @@ class Symbols:
     # Choices and functions
 
     def _choose(self, test: Truth, then: Symbolic, otherwise: Symbolic) -> Symbolic:
-        """What a conditional expression is; unknown where its condition is."""
+        """Return the value of a conditional expression; unknown where its condition is."""
         yes, no = test.true, test.false
         match then, otherwise:
             case Truth(), Truth():
@@ -321,7 +321,7 @@ class Symbols:
         return self._encoding.any_of(predicate for _, predicate in a.cases)
 
     def _equal(self, a: Partition, b: Partition) -> Any:
-        """Where both are known and equal, in time linear in their values: there are enums with many."""
+        """Return the predicate that both are known and equal, in time linear in their values: enums can have many."""
         false = self._manager.false
         others: dict[Value, Any] = {}
         for value, predicate in b.cases:
@@ -329,7 +329,7 @@ class Symbols:
         return self._encoding.any_of(predicate & others.get(value, false) for value, predicate in a.cases)
 
     def _less(self, a: Partition, b: Partition) -> Any:
-        """Where both are known and a < b: for each value of b, from below, where a is smaller."""
+        """Return the predicate that both are known and a < b: for each value of b, from below, where a is smaller."""
         cases = [(value, 0, predicate) for value, predicate in b.cases]
         cases += [(value, 1, predicate) for value, predicate in a.cases]
         # Of equal values those of b come first, so that only smaller ones of a have been met.

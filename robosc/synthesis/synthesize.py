@@ -34,14 +34,14 @@ def synthesize(
     should_stop: Callable[[], bool] = _never,
     on_progress: Callable[[Progress], None] = _silent,
 ) -> SynthesisResult:
-    """The safe, controllable, nonblocking and maximally permissive supervisor of a system.
+    """Synthesize the safe, controllable, nonblocking and maximally permissive supervisor of a system.
 
     Args:
         system: Plants and event conditions.
-        engine: Name of the engine for decision diagrams, or more about it; `auto` is the fastest installed.
-        questions: What else to find out about the controlled system.
-        should_stop: Asked before each step of the work with one event; once true, the work ends.
-        on_progress: Told after each event's encoding and after each round.
+        engine: Name of the engine for decision diagrams, or its options; `auto` is the fastest installed.
+        questions: Other questions about the controlled system.
+        should_stop: Function called before each step of the work with one event; once it returns true, the work ends.
+        on_progress: Function called after each event's encoding and after each round.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.

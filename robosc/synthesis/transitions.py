@@ -22,14 +22,14 @@ from robosc.synthesis.symbolic import Symbols
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """What one event does; predicates are over current-state variables and `hidden` ones.
+    """Effect of one event; predicates are over current-state variables and `hidden` ones.
 
     Attributes:
         event: The event.
-        possible: Where every automaton takes an edge, for data that can come.
-        out_of_range: Where, taking it, an update leaves its variable's range.
-        condition: Where its event conditions are true (current-state variables only).
-        watched: Where every requirement automaton has an edge for it (current-state variables only).
+        possible: Predicate that every automaton takes an edge, for data that can come.
+        out_of_range: Predicate that an update leaves its variable's range when the event is taken.
+        condition: Predicate that its event conditions are true (current-state variables only).
+        watched: Predicate that every requirement automaton has an edge for it (current-state variables only).
         functions: Value of each changed bit after it, right where the event is possible.
         hidden: Variables of received data and of choices between edges.
     """
@@ -53,7 +53,7 @@ class _Arc:
 
 
 def transition_of(encoding: Encoding, event: Event) -> Transition:
-    """What an event of the encoded system does."""
+    """Return the effect of an event of the encoded system."""
     manager, system = encoding.manager, encoding.system
     symbols = Symbols(encoding, encoding.inputs_of(event.name))
     participants = [automaton for automaton in system.automata if event.name in automaton.alphabet]
@@ -218,11 +218,11 @@ class Steps:
         enabled = self._without_hidden(transition.possible)
         self.event = transition.event
         self.plant = enabled & ~self._leaving if self.event.is_controllable else enabled
-        """Where the plant enables the event; a controllable one must stay in every range."""
+        """States in which the plant enables the event; a controllable one must stay in every range."""
         self.condition = transition.condition & transition.watched
-        """Where its event conditions are true, and no requirement automaton is against it."""
+        """States in which its event conditions are true, and no requirement automaton is against it."""
         self.is_deterministic = not transition.hidden
-        """Whether it leads to one state at most."""
+        """True if it leads to one state at most."""
         self.names = _names(encoding, transition)
         """The current-state variables that it reads or changes."""
         self._state_names = encoding.state_names
@@ -249,7 +249,7 @@ class Steps:
         return other
 
     def moving(self) -> Any:
-        """Where the event can lead to another state than the one it happens in."""
+        """Return the states in which the event can lead to another state than the one it happens in."""
         manager = self._manager
         found = manager.false
         for name, function in self._transition.functions.items():
@@ -257,11 +257,11 @@ class Steps:
         return self._without_hidden(self._in_range & found)
 
     def some(self, predicate: Any) -> Any:
-        """Where the event can lead into a predicate."""
+        """Return the states from which the event can lead into a predicate."""
         return self._without_hidden(self._in_range & self._after(predicate))
 
     def only(self, predicate: Any) -> Any:
-        """Where the event, if it happens, leads into a predicate for all data."""
+        """Return the states from which the event, if it happens, leads into a predicate for all data."""
         return ~self._without_hidden(self._in_range & ~self._after(predicate))
 
     def image(self, states: Any) -> Any:
@@ -280,7 +280,7 @@ class Steps:
         return moved & self._arrival
 
     def _after(self, predicate: Any) -> Any:
-        """Where a predicate will be true after the event: substitution of the next-state functions."""
+        """Return the predicate that another will be true after the event, by substituting next-state functions."""
         # Constants first: what the other functions bring in are values from before the event.
         if self._constants:
             predicate = self._manager.let(self._constants, predicate)

@@ -121,7 +121,7 @@ class Arithmetic:
         return Vector(self._extend(a, width_for(low, high)), low, high)
 
     def less(self, a: Vector, b: Vector) -> Any:
-        """Where a < b."""
+        """Return the predicate that a < b."""
         if a.high < b.low:
             return self._manager.true
         if a.low >= b.high:
@@ -129,7 +129,7 @@ class Arithmetic:
         return self.subtract(a, b).bits[-1]
 
     def equal(self, a: Vector, b: Vector) -> Any:
-        """Where a = b."""
+        """Return the predicate that a = b."""
         width = max(len(a.bits), len(b.bits))
         result = self._manager.true
         for first, second in zip(self._extend(a, width), self._extend(b, width), strict=True):

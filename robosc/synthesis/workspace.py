@@ -1,4 +1,4 @@
-"""What all work on predicates begins with: an engine, a system encoded in it, and who waits for the result."""
+"""Basis of all work on predicates: an engine, a system encoded in it, and the caller that waits for the result."""
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -26,8 +26,8 @@ class Workspace:
     Attributes:
         engine: Name of the engine that was resolved.
         encoding: The variables.
-        watch: Who waits; it also counts nodes where they are limited.
-        is_reordering: Whether the engine may change its order.
+        watch: Watch for the waiting caller; it also counts nodes where they are limited.
+        is_reordering: True if the engine may change its order.
     """
 
     engine: str

@@ -1,6 +1,6 @@
-"""Where a controllable event is allowed, in words and as conditions: the same for every language that is generated.
+"""Conditions that allow a controllable event, also in words: the same for every language that is generated.
 
-What the supervisor adds comes on top; each generator writes decision diagrams in its own way.
+The conditions that the supervisor adds come on top; each generator writes decision diagrams in its own way.
 """
 
 from typing import NamedTuple
@@ -42,7 +42,7 @@ Condition = Expression | InOneOf | StaysInRange
 
 
 def enabling_conditions(supervisor: Supervisor, event: str) -> list[tuple[str, Condition]]:
-    """What must hold for a controllable event, each with words: plants, ranges, requirements."""
+    """Return the conditions that a controllable event needs, each with words: plants, ranges, requirements."""
     model = supervisor.model
     name, kind = split(event)
     result: list[tuple[str, Condition]] = []
@@ -63,7 +63,7 @@ def enabling_conditions(supervisor: Supervisor, event: str) -> list[tuple[str, C
 
 
 def accepting_conditions(model: Model, event: str) -> list[tuple[str, Condition]]:
-    """Where the behaviours accept a controllable event, without leaving a range of a synthesis variable."""
+    """Return the conditions for behaviours to accept a controllable event and keep synthesis variables in range."""
     if is_tau(event):
         return [_tau_condition(model, event)]
     return [
@@ -112,7 +112,7 @@ def _changes_something(model: Model, event: str) -> tuple[str, Condition]:
 
 
 def _component_conditions(component: str, behaviour: Behaviour, event: str) -> list[tuple[str, Condition]]:
-    """Where a component accepts a request, and that no update of a synthesis variable leaves its range."""
+    """Return the conditions for a component to accept a request and keep every synthesis variable in its range."""
     if not any(item.event == event for item in behaviour.transitions):
         return []
     taken = {state.name: taken_transition(behaviour, event, state.name) for state in behaviour.states}

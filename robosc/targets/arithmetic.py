@@ -1,4 +1,4 @@
-"""What generators of code know of arithmetic before they write any."""
+"""Arithmetic that code generators know about before they write any."""
 
 from robosc.expressions import Constant, Expression
 
@@ -10,7 +10,7 @@ Bounds = tuple[int, int]
 
 
 def is_safe_divisor(divisor: Expression) -> bool:
-    """Whether every 32-bit integer divided by it is a finite number."""
+    """Return True if every 32-bit integer divided by it is a finite number."""
     match divisor:
         case Constant(value=int() | float() as constant):
             return abs(constant) >= _LEAST_NATIVE_DIVISOR

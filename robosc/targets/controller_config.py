@@ -30,14 +30,14 @@ class ControllerConfigError(RoboscError, ValueError):
 
 @dataclass(frozen=True, slots=True)
 class ControllerConfig:
-    """What such a file says.
+    """Content of such a file.
 
     Attributes:
-        publish_state: Whether `/state` is published.
-        log_events: Whether the event log is written.
+        publish_state: True if `/state` is published.
+        log_events: True if the event log is written.
         locations: Folder to generate into by target, below the folder of the file.
         supervised: The existing controller, or None.
-        warnings: What was found and not understood, one sentence each.
+        warnings: Things that were found and not understood, one sentence each.
     """
 
     publish_state: bool = False
@@ -47,12 +47,12 @@ class ControllerConfig:
     warnings: tuple[str, ...] = ()
 
     def options(self, package: str | None) -> GenerateOptions:
-        """What a target is asked for."""
+        """Return the options that a target is asked for."""
         return GenerateOptions(package, self.publish_state, self.log_events, self.supervised)
 
 
 def read_controller_config(folder: Path) -> ControllerConfig:
-    """What the file in a folder says; the defaults where there is none.
+    """Return the content of the file in a folder; the defaults where there is none.
 
     Raises:
         ControllerConfigError: It is there and cannot be used.
@@ -154,7 +154,7 @@ class _Reader:
 
 
 def _is_below(folder: str) -> bool:
-    """Whether a path stays below where it starts, links apart."""
+    """Return True if a path stays below its start, links apart."""
     path = PurePosixPath(folder)
     return (
         bool(folder)

@@ -1,4 +1,4 @@
-"""What every generator asks of a model's events: their order, who causes them, how they move a plant."""
+"""Facts about a model's events for every generator: their order, who causes them, how they move a plant."""
 
 from collections.abc import Iterable
 
@@ -26,12 +26,12 @@ def split(event: str) -> tuple[str, str]:
 
 
 def is_controllable(event: str) -> bool:
-    """Whether an event is caused by the executor rather than the environment."""
+    """Return True if an event is caused by the executor rather than the environment."""
     return is_tau(event) or split(event)[1] in CONTROLLABLE_KINDS
 
 
 def has_plant_location(communication: Communication) -> bool:
-    """Whether its plant has more than one location."""
+    """Return True if its plant has more than one location."""
     return communication.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 
 
@@ -60,7 +60,7 @@ Branch = tuple[tuple[str, ...], Transition]
 
 
 def branches_of(behaviours: Iterable[tuple[str, Behaviour]], event: str) -> list[tuple[str, Behaviour, list[Branch]]]:
-    """Which transition each component takes, by state; components that take none are left out."""
+    """Return the transition that each component takes, by state; components that take none are left out."""
     found = []
     for component, behaviour in behaviours:
         by_transition: dict[int, list[str]] = {}

@@ -45,14 +45,14 @@ def require_generatable(name: str) -> None:
 
 
 def generated(made: Made, target: str, options: GenerateOptions | None = None) -> tuple[Made, GeneratedFiles | None]:
-    """The files of a target, or of all of them; and what was made as the target sees it.
+    """Return the files of a target, or of all of them; and the outcome as the target sees it.
 
     Where all are asked for, one that refuses the model is left out, and the bundle's `README.md` says why.
 
     Args:
         made: The outcome of `make_supervisor`.
         target: Name of a target, or `ALL`.
-        options: What the user chose; the defaults if None.
+        options: Choices of the user; the defaults if None.
 
     Returns:
         The outcome with the target's own errors, and the files: none where the outcome has no supervisor.

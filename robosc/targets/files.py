@@ -32,7 +32,7 @@ class UnwritableError(OverwriteError, OSError):
 
 @dataclass(frozen=True, slots=True)
 class Removal:
-    """What became of an earlier run's files.
+    """Outcome for the files of an earlier run.
 
     Attributes:
         removed: Paths of the files that are gone, sorted.
@@ -196,7 +196,7 @@ def _read_manifest(directory: Path) -> dict[str, str]:
 
 
 def _content(place: Path) -> bytes | None:
-    """What a file holds, or None if there is none."""
+    """Return the content of a file, or None if there is none."""
     try:
         return place.read_bytes()
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""What was made, as a target sees it: some warnings of the check are errors for who generates (language A.7, B.11)."""
+"""Outcome as a target sees it: some warnings of the check are errors for whoever generates (language A.7, B.11)."""
 
 from dataclasses import replace
 

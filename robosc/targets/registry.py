@@ -50,12 +50,12 @@ class SupervisedController:
 
 @dataclass(frozen=True, slots=True)
 class GenerateOptions:
-    """What a user may choose about generated files.
+    """Choices of a user about generated files.
 
     Attributes:
         package: Name of the generated package, or None for one made from the robot's name.
-        publish_state: Whether a generated node publishes `/state` unless its parameters say otherwise.
-        log_events: Whether a generated node writes its event log unless its parameters say otherwise.
+        publish_state: True if a generated node publishes `/state` unless its parameters say otherwise.
+        log_events: True if a generated node writes its event log unless its parameters say otherwise.
         supervised: The existing controller that a generated layer's launch file starts, or None to leave that to its
             arguments.
     """

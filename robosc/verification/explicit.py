@@ -21,7 +21,7 @@ class ExplicitSupervisor:
     """The maximally permissive supervisor of a system.
 
     Attributes:
-        is_empty: Whether no supervisor exists: no initial state is good.
+        is_empty: True if no supervisor exists: no initial state is good.
         explored: States that the plant can reach under the event conditions, without going on from bad ones.
         good: Those of them from which a supervisor can keep the system safe and nonblocking.
         allowed: State and controllable event, where the state is good and the event may happen.
@@ -35,7 +35,7 @@ class ExplicitSupervisor:
     reachable: frozenset[State]
 
     def allows(self, state: State, event: str) -> bool:
-        """Whether a controllable event may happen in an explored state."""
+        """Return True if a controllable event may happen in an explored state."""
         return (state, event) in self.allowed
 
 
@@ -184,7 +184,7 @@ def _initial_states(graph: _Graph, good: set[int]) -> list[int]:
 
 
 def _controlled_states(graph: _Graph, good: set[int]) -> set[int]:
-    """What is reachable from initial states of `good` under the supervisor that keeps to it."""
+    """Return the states reachable from initial states of `good` under the supervisor that keeps to it."""
     frontier = _initial_states(graph, good)
     found = set(frontier)
     while frontier:

@@ -15,7 +15,7 @@ DEFAULT_STATES = 200_000
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """How far a check goes; all is counted, so that it ends alike on every machine.
+    """Limits of a check; all is counted, so that it ends alike on every machine.
 
     Attributes:
         states: States up to which the controlled system is searched one by one.
@@ -35,11 +35,11 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What was found, and how.
+    """Findings of a check, and their method.
 
     Attributes:
         verification: The outcomes.
-        method: What was done, in one line.
+        method: Description of what was done, in one line.
     """
 
     verification: Verification
@@ -47,7 +47,7 @@ class Judgement:
 
     @property
     def is_complete(self) -> bool:
-        """Whether all was checked but permissiveness."""
+        """True if all was checked but permissiveness."""
         found = self.verification
         return Outcome.NOT_CHECKED not in (found.safe, found.controllable, found.nonblocking)
 
@@ -63,18 +63,18 @@ def judge(
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> Judgement:
-    """Whether a supervisor is safe, controllable, nonblocking and, where that can be told, maximally permissive.
+    """Judge whether a supervisor is safe, controllable, nonblocking and, where feasible, maximally permissive.
 
     Args:
         system: Plants and event conditions.
         added: For each event to which the supervisor adds a condition, that condition.
-        limits: How far to go.
+        limits: Limits of the check.
         expected_states: States that the controlled system is said to have: where these are too many, the search one
             by one is not even begun.
         engine: Engine of the symbolic search: see `verify_symbolically`.
-        semantics: Of the system, where it was made already.
-        should_stop: Asked now and then; once true, the work ends.
-        on_progress: Told now and then where the work is, in one short line.
+        semantics: Semantics of the system, if it was made already.
+        should_stop: Function called now and then; once it returns true, the work ends.
+        on_progress: Function called now and then with the progress of the work, in one short line.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.

@@ -26,7 +26,7 @@ CodeTest = Callable[[int], bool]
 
 
 class Packing:
-    """Where each place of a state has its field.
+    """Position of the field of each place of a state.
 
     Args:
         semantics: The uncontrolled system.
@@ -34,7 +34,7 @@ class Packing:
     Attributes:
         semantics: The uncontrolled system.
         places: Place of each subject.
-        wide_steps: How many steps were worked out so far beyond `ORDINARY_STEPS` of an event in one state.
+        wide_steps: Number of steps that were worked out so far beyond `ORDINARY_STEPS` of an event in one state.
     """
 
     def __init__(self, semantics: Semantics) -> None:
@@ -83,7 +83,7 @@ class Packing:
         return sum(self._indices[place](state[place]) << self.shifts[place] for place in places)
 
     def marking(self) -> CodeTest:
-        """Whether a state is marked."""
+        """Return a test for whether a state is marked."""
         deciding = {
             self.places[Subject(item.name)] for item in self.system.automata if item.marked != {*item.locations}
         }
@@ -119,7 +119,7 @@ class Packing:
         return remembering(self.field(added.places()), holds)
 
     def tables(self, events: Iterable[Event], added: Added) -> list["EventTable"]:
-        """What some events do."""
+        """Return the tables of the effects of some events."""
         return [EventTable(self, event, added.get(event.name)) for event in events]
 
 
@@ -140,7 +140,7 @@ def remembering(field: int, holds: CodeTest) -> CodeTest:
 
 
 class EventTable:
-    """What one event does in packed states.
+    """Effect of one event in packed states.
 
     Attributes:
         event: The event.
@@ -148,7 +148,7 @@ class EventTable:
         known: For the values of these bits met so far, what each possible step changes: bits to turn over. Nothing
             where the plants, the ranges or, for a controllable event, its conditions do not let it happen.
         trouble: The values with which the event makes a state bad.
-        condition: What the supervisor adds, or None.
+        condition: Condition that the supervisor adds, or None.
     """
 
     def __init__(self, packing: Packing, event: Event, added: Callable[[State], bool] | None) -> None:
@@ -166,7 +166,7 @@ class EventTable:
         return self._packing.semantics.only(self.event)
 
     def changes(self, code: int) -> tuple[int, ...]:
-        """What each possible step in a state changes; see `known`.
+        """Return the bits that each possible step in a state changes; see `known`.
 
         Raises:
             TooManyChoicesError: There are too many steps to go through them.
@@ -198,11 +198,11 @@ class EventTable:
         return result
 
     def enabled(self, code: int) -> bool:
-        """Whether the plants enable the event; a controllable one must also stay in every range."""
+        """Return True if the plants enable the event; a controllable one must also stay in every range."""
         return self._semantics.enabled(self._packing.decode(code), self.event.name)
 
     def is_bad(self, code: int) -> bool:
-        """Whether the event makes a state bad whose changes have been asked for."""
+        """Return True if the event makes a state bad whose changes have been asked for."""
         return code & self.field in self.trouble
 
 

@@ -13,15 +13,15 @@ from robosc.verification.search import Effort
 
 @dataclass(frozen=True, slots=True)
 class Allowed:
-    """What a supervisor can allow.
+    """States and steps that a supervisor can allow.
 
     Attributes:
         numbers: The number of each state that plants and conditions can reach without going on from bad ones.
         events: The table number of each step's event.
-        steps: Where each state's steps begin, and where the last one's end.
+        steps: Index where each state's steps begin, and where the last one's end.
         targets: The states that steps lead to, one step's after another's.
-        offsets: Where each step's targets begin, and where the last one's end.
-        good: Whether a supervisor can keep the system safe and nonblocking, for each state.
+        offsets: Index where each step's targets begin, and where the last one's end.
+        good: True for each state where a supervisor can keep the system safe and nonblocking.
     """
 
     numbers: dict[int, int]
@@ -32,7 +32,7 @@ class Allowed:
     good: bytearray
 
     def allows(self, code: int, event: int) -> bool:
-        """Whether a controllable event (the number of its table) may happen in a state."""
+        """Return True if a controllable event (the number of its table) may happen in a state."""
         number = self.numbers.get(code)
         if number is None or not self.good[number]:
             return False
@@ -42,12 +42,12 @@ class Allowed:
         return False
 
     def stays(self, step: int) -> bool:
-        """Whether a step leads to good states only."""
+        """Return True if a step leads to good states only."""
         return all(self.good[target] for target in self.targets[self.offsets[step] : self.offsets[step + 1]])
 
 
 def allowed(packing: Packing, tables: list[EventTable], effort: Effort) -> Allowed | None:
-    """What the maximally permissive supervisor allows, or None if there are more states than the effort allows.
+    """Return all that the maximally permissive supervisor allows, or None for more states than the effort allows.
 
     Raises:
         SynthesisCancelled: The work is to end.

@@ -23,13 +23,13 @@ One wide integer that is received makes tens of thousands of them at a time, and
 
 
 class Effort:
-    """Bounds a search and tells of it.
+    """Bound of a search, which also reports progress.
 
     Args:
         limit: Number of states, and of `TRANSITIONS_PER_STATE` transitions, beyond which to give up.
-        should_stop: Asked now and then; once true, the work ends.
-        on_progress: Told now and then where the work is, in one short line.
-        what: What is counted, for that line.
+        should_stop: Function called now and then; once it returns true, the work ends.
+        on_progress: Function called now and then with the progress of the work, in one short line.
+        what: Name of what is counted, for that line.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class Effort:
             self._on_progress(f"{handled} {self._what}")
 
     def is_exceeded(self, states: int, transitions: int, packing: Packing) -> bool:
-        """Whether there is too much to go on."""
+        """Return True if there is too much to go on."""
         return (
             states > self.limit
             or transitions > TRANSITIONS_PER_STATE * self.limit
@@ -65,13 +65,13 @@ class Reached:
     """The controlled system; a state's number is its place in `codes`.
 
     Attributes:
-        packing: How states are packed.
-        tables: What each event does, by name.
+        packing: Packing of the states.
+        tables: Effect of each event, by name.
         codes: Reachable states, breadth-first, the initial ones first.
         parents: For each state the number of the state it was found from; an initial one's is itself.
         causes: For each state the number of the table of the event it was found by.
         targets: The steps of all states, one state's after another's.
-        offsets: Where each state's steps begin, and where the last one's end.
+        offsets: Index where each state's steps begin, and where the last one's end.
     """
 
     packing: Packing

@@ -26,7 +26,7 @@ DEFAULT_PERMISSIVE_LIMIT = 100_000
 
 
 class Outcome(StrEnum):
-    """What became of the check of one property."""
+    """Outcome of the check of one property."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -35,15 +35,15 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """Why a property does not hold.
+    """Reason why a property does not hold.
 
     Attributes:
         property: `safe`, `controllable`, `nonblocking` or `maximally permissive`.
         trace: Events of a shortest run from an initial state into the trouble.
         state: The state that it leads to, in the order of `subjects`.
-        reason: What is wrong there, in words.
+        reason: Fault in that state, in words.
         message: The same, and the state.
-        is_shortest: Whether there is certainly no shorter run; a symbolic search may have to do with any run.
+        is_shortest: True if there is certainly no shorter run; a symbolic search may have to do with any run.
     """
 
     property: str
@@ -98,18 +98,18 @@ def verify(
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> Verification:
-    """Whether a supervisor is safe, controllable, nonblocking and maximally permissive.
+    """Check that a supervisor is safe, controllable, nonblocking and maximally permissive.
 
     Args:
         system: Plants and event conditions.
         added: For each event to which the supervisor adds a condition, that condition over states.
-        initial: In which of its initial states the supervisor lets the system begin; None: in all of them.
+        initial: Test for the initial states in which the supervisor lets the system begin; None: in all of them.
         limit: Number of states of the controlled system beyond which nothing is checked.
         permissive_limit: Number of states that the plants reach under the event conditions beyond which
             permissiveness is not checked. Both count `TRANSITIONS_PER_STATE` transitions as a state, too.
-        semantics: Of the system, where it was made already.
-        should_stop: Asked now and then; once true, the work ends.
-        on_progress: Told now and then where the work is, in one short line.
+        semantics: Semantics of the system, if it was made already.
+        should_stop: Function called now and then; once it returns true, the work ends.
+        on_progress: Function called now and then with the progress of the work, in one short line.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.

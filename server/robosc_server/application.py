@@ -58,7 +58,7 @@ KEEPALIVE = (
     # How long an answer to a ping is awaited goes by this one; a minute unless it is set.
     ("grpc.http2.ping_timeout_ms", 10_000),
 )
-"""Who has gone without a word is found out, so that nobody works for it."""
+"""gRPC keepalive options: peers that have gone without a word are detected, so that nobody works for them."""
 
 _RESERVED_TASKS = 1
 """Tasks that may run beyond the workers' number, of callers of whom none runs."""
@@ -88,14 +88,14 @@ class StartError(Exception):
 
 @asynccontextmanager
 async def running_server(settings: Settings, workers: Workers | None = None) -> AsyncIterator[str]:
-    """A server that answers inside the context; yields `HOST:PORT`.
+    """Run a server that answers inside the context; yield `HOST:PORT`.
 
     Args:
-        settings: How it is.
-        workers: Who does the tasks, not started yet; None: as the settings say.
+        settings: Settings of the server.
+        workers: Workers that do the tasks, not started yet; None: as the settings say.
 
     Raises:
-        StartError: It cannot start as it is told to.
+        StartError: It cannot start as configured.
     """
     try:
         async with AsyncExitStack() as stack:
@@ -245,7 +245,7 @@ async def _is_true(condition: Any) -> bool:
 
 
 def _finish(settings: Settings) -> Callable[[TaskKind, Result], Result]:
-    """What is done to a result before it is sent.
+    """Return the function that is applied to a result before it is sent.
 
     Raises:
         SigningError: The key cannot be used.

@@ -1,4 +1,4 @@
-"""Where an accepted task gets its result: one that is kept, or what a worker makes of it."""
+"""Desk that gives an accepted task its result: one that is kept, or the one that a worker makes."""
 
 from robosc_server.failures import RefusedError, for_callers
 from robosc_server.jobs import Results, Scheduler
@@ -9,14 +9,14 @@ from robosc_server.workers import OnReport
 
 
 class Desk:
-    """Sees to the tasks of calls, which end with their call.
+    """Desk for the tasks of calls, which end with their call.
 
     Args:
-        results: What is kept.
-        scheduler: Whose turn it is.
-        quotas: What each caller may ask for.
-        limits: What one task may take.
-        metrics: Told what was kept and what was not.
+        results: Kept results.
+        scheduler: Scheduler that decides whose turn it is.
+        quotas: Quotas of what each caller may ask for.
+        limits: Limits of one task.
+        metrics: Metrics that count the results that were kept and those that were not.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""How failures are told over gRPC: a status code, and details in the form of google.rpc (AIP-193)."""
+"""Reporting of failures over gRPC: a status code, and details in the form of google.rpc (AIP-193)."""
 
 from typing import Any, NoReturn
 
@@ -41,7 +41,7 @@ class RefusedError(Exception):
     """A call that ends without an answer.
 
     Attributes:
-        reason: Why.
+        reason: Reason why there is no answer.
         message: One sentence for the caller.
         retry_after_s: Seconds after which it may be worth another try; None: it is not.
     """
@@ -77,5 +77,5 @@ def for_callers(failure: Failure) -> Failure:
 
 
 def fault_words(identity: str) -> str:
-    """What a caller is told of a fault that the log has under an id."""
+    """Return the words for a caller about a fault that the log has under an id."""
     return f"internal error {identity}, please report it with the server's log"

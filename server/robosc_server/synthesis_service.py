@@ -24,7 +24,7 @@ SERVICE_NAME = _SERVICE.full_name
 METHODS = tuple(method.name for method in _SERVICE.methods)
 
 PATIENCE_S = 0.05
-"""How long work may take before its caller is told of it, and between one such message and the next."""
+"""Time that work may take before its caller is informed of it, and between two such messages, in seconds."""
 
 type Context = grpc.aio.ServicerContext[Any, Any]
 type OnReport = Callable[[Report], Awaitable[None]]
@@ -39,7 +39,7 @@ _STREAMS = {
 
 
 class Desk(Protocol):
-    """Where an accepted task gets its result."""
+    """Desk that gives an accepted task its result."""
 
     def kept(self, key: str) -> Result | None:
         """The result of an equal task, if it is in memory."""
@@ -53,12 +53,12 @@ class Desk(Protocol):
 
 
 class SynthesisService:
-    """Answers the calls of the service.
+    """Implementation of the service, which answers its calls.
 
     Args:
-        desk: Who has tasks done.
-        outgoing: Sends results.
-        limits: What a request may be.
+        desk: Desk that has tasks done.
+        outgoing: Sender of results.
+        limits: Limits of a request.
         targets: The answer of ListTargets, serialized.
         version: The answer of GetVersion, serialized.
     """
@@ -70,7 +70,7 @@ class SynthesisService:
         self._fixed = {"ListTargets": (pb.ListTargetsRequest, targets), "GetVersion": (pb.GetVersionRequest, version)}
 
     def handler(self) -> grpc.GenericRpcHandler:
-        """What a server is given; messages are bytes on both sides."""
+        """Return the handler for a server; messages are bytes on both sides."""
         methods: dict[str, Any] = {}
         for name, kind in _UNARY.items():
             methods[name] = grpc.unary_unary_rpc_method_handler(self._unary(kind))

@@ -111,7 +111,7 @@ def test_what_was_reserved_stays_so(today: FileDescriptorSet, tmp_path: Path) ->
 
 
 def told_by_buf(folder: Path, against: FileDescriptorSet) -> tuple[bool, str]:
-    """Whether another checker of interfaces, buf, finds something that breaks callers, and its words."""
+    """Return True if buf, another checker of interfaces, finds something that breaks callers, and its output."""
     before = folder / "before.binpb"
     before.write_bytes(against.SerializeToString())
     shutil.copy(PROTO / "buf.yaml", folder / "proto")

@@ -26,7 +26,7 @@ _SYNTAX = 12
 
 
 def named(file: FileDescriptorProto) -> Iterator[tuple[tuple[int, ...], str]]:
-    """Where everything with a name stands in a file, and its name."""
+    """Yield the location in a file of everything that has a name, and the name."""
     for number, message in enumerate(file.message_type):
         yield from _named_in(message, (_MESSAGE, number), message.name)
     for number, enum in enumerate(file.enum_type):

@@ -57,7 +57,7 @@ def silent(channel: Any, name: str) -> Any:
 
 
 def waits(prompt: PromptRequests, stream: str = "") -> int:
-    """How many calls wait for their first request, or those of a kind for a further one."""
+    """Return the number of calls waiting for their first request, or of those of a kind waiting for a further one."""
     return len((prompt._next[stream] if stream else prompt._first)._since_s)
 
 
@@ -150,7 +150,7 @@ def test_streams_that_nothing_is_said_of_are_left_alone() -> None:
 
 
 def test_the_wait_is_for_the_request_alone() -> None:
-    """What is done with a request may take as long as it likes, and a caller may go at any time."""
+    """Check that handling a request may take any time, and that a caller may go at any time."""
     goes_on = asyncio.Event()
     begun: list[str] = []
     cancelled: list[str] = []

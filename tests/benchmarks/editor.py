@@ -1,8 +1,8 @@
-"""How long an editor waits after a keystroke, and what the language server keeps after many.
+"""Benchmark of the waiting time of an editor after a keystroke, and of the language server's memory after many.
 
 A real server on its standard input and output, asked by pygls' client. The model is that of the benchmark of the
 language. Each keystroke takes the first character of a name in the middle of the text, or puts it back; between two,
-the server is given time to be done, as by somebody who types.
+the server is given time to finish, as by somebody who types.
 """
 
 import asyncio
@@ -32,7 +32,7 @@ def _resident_mb(pid: int) -> float:
 
 
 def _typed(editor: Editor, name: str) -> tuple[int, str]:
-    """Where to type, and which word: a state that a transition goes to, in the middle of the text."""
+    """Return the place to type at, and the word: a state that a transition goes to, in the middle of the text."""
     text = editor.texts[name]
     begin = text.index("goto ", len(text) // 2) + len("goto ")
     return begin, text[begin : begin + 1]

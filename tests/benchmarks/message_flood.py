@@ -36,16 +36,16 @@ _CORRECTION = 'identifier: "/line/correction", type: double'
 
 @dataclass(frozen=True)
 class Soak:
-    """What was measured.
+    """Results of the measurement.
 
     Attributes:
         sent: Messages that were sent.
-        received: How many of them stand in the node's event log.
+        received: Number of them that stand in the node's event log.
         dropped: Entries that the log lost.
-        resident_kb: Memory of the node, after a warm-up and at the end.
-        cpu_s: Time of a processor that it took in between.
-        latencies_s: From sending a message to the entry in the log.
-        seconds: How long it took to send them.
+        resident_kb: Memory of the node in kB, after a warm-up and at the end.
+        cpu_s: Time of a processor that it took in between, in seconds.
+        latencies_s: Times from sending a message to the entry in the log, in seconds.
+        seconds: Duration of sending them, in seconds.
     """
 
     sent: int
@@ -108,7 +108,7 @@ class _Driver:
             return log.read().decode(errors="replace")
 
     def received(self) -> tuple[dict[int, float], int]:
-        """When each number was taken, and how many entries the log lost; after the end of the node."""
+        """Return the time at which each number was taken and the count of lost log entries, after the node's end."""
         entries = [json.loads(line) for line in self._log.read_text(encoding="utf-8").splitlines()]
         taken = {
             int(entry["data"]["value"]): float(entry["time"])
@@ -119,12 +119,12 @@ class _Driver:
 
 
 def soak(seconds: float, depth: int = DEPTH, every: str = "period") -> Soak:
-    """Measure.
+    """Measure a node while messages are sent to it.
 
     Args:
-        seconds: For how long to send.
+        seconds: Duration of sending, in seconds.
         depth: Messages that the topic's queue holds.
-        every: When the node decides.
+        every: Occasion at which the node decides.
     """
     text = (EXAMPLES / "line_follower" / "line_follower.rscd").read_text(encoding="utf-8")
     made = make_supervisor(bundle_of(text.replace(_CORRECTION, f"{_CORRECTION}, depth: {depth}"))).supervisor

@@ -1,4 +1,4 @@
-"""What a client takes from a server, and what it refuses: no server is needed for that."""
+"""Tests of the data that a client takes from a server, and of its refusals: no server is needed for that."""
 
 import copy
 import hashlib
@@ -231,7 +231,7 @@ class TestGeneration:
 
     @given(st.data())
     def test_nothing_is_collected_beyond_what_was_declared(self, data: st.DataObject) -> None:
-        """Whatever pieces come: no more bytes are held than the sizes allow, and a result is what was meant."""
+        """Check for any pieces: no more bytes are held than the sizes allow, and a result is what was meant."""
         files = {"a": (b"12", False), "b": (b"", False), "c": (b"345", False)}
         head = generation(files)[0]
         found = GenerationAssembly()

@@ -449,7 +449,7 @@ class TestWatch:
         return watched(*(job(number) for number in first), job(last, jobs_pb2.JOB_STATE_SUCCEEDED))
 
     def test_resumed_after_lost_connections(self, connect: Any) -> None:
-        """What ends a watch before its job: an error, and a stream that ends; nothing is told twice."""
+        """Check what ends a watch before its job: an error, and a stream that ends; nothing is reported twice."""
         parts = [[AWAY], [*watched(job(1), job(4)), AWAY], watched(job(5)), [AWAY], [AWAY], self.states(7, 9)]
         with (
             scripted(WatchJob=parts) as (address, script),

@@ -152,7 +152,7 @@ class TestSubmit:
 
     @pytest.mark.parametrize("more", [[], ["--json"]])
     def test_the_id_is_told_before_anything_is_waited_for(self, more: Any) -> None:
-        """So that Ctrl-C, or whatever else ends the waiting, does not lose the job."""
+        """Check that Ctrl-C, or whatever else ends the waiting, does not lose the job."""
         left = threading.Event()
 
         def stuck(context: grpc.ServicerContext) -> None:
@@ -358,7 +358,7 @@ class TestGet:
         assert not (tmp_path / "out").exists()
 
     def test_a_text_on_a_terminal_and_in_a_file(self, tmp_path: Path) -> None:
-        """What would move the cursor is shown, and not obeyed; a file has every byte."""
+        """Check that text that would move the cursor is shown, and not obeyed; a file has every byte."""
         text = "robot R {\n\t// \x1b]0;owned\x07 \x9b2J\r\n}\n"
         with scripted(**job_answers("format", [pb.FormatResponse(text=text)])) as (address, _):
             command = [sys.executable, "-m", "robosc_client.main", "get", "job-1", "--result", "--server", address]

@@ -572,7 +572,7 @@ class TestExitCodes:
             assert self.run(capfd, "verify", supervisors / "right.rsup", NAVIGATION, "--server", address)[0] == 1
 
     def test_nothing_moves_the_cursor(self, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-        """Whatever text comes from a server: neither stream gets a character that a terminal obeys."""
+        """Check for any text from a server: neither stream gets a character that a terminal obeys."""
         evil = "\x1b]0;owned\x07\x9b2J\u202e"
         place = pb.Location(file=evil, line=1, column=1, length=1)
         finding = pb.Diagnostic(

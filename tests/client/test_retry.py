@@ -139,7 +139,7 @@ def test_why_nobody_answers() -> None:
 def test_delays_are_sound(
     most: int, first_s: float, factor: float, chance: float, asked: list[float | None], deadline_s: float
 ) -> None:
-    """Whatever the policy and whatever a server asks for: never too many, too long or beyond the deadline."""
+    """Check delays for any policy and any demand of a server: never too many, too long or beyond the deadline."""
     clock = Clock()
     attempts = attempts_of(clock, deadline_s, attempts=most, first_s=first_s, factor=factor, scatter=lambda: chance)
     waited = []

@@ -98,7 +98,7 @@ class World:
                 return ["tick", LONGER_THAN_TIMEOUT_S if is_long else PERIOD_S]
 
     def _data(self, type_: Type | None, constants: Sequence[Any] = ()) -> Any:
-        """What could come as data of a type; now and then something that does not fit."""
+        """Return possible data of a type; now and then something that does not fit."""
         dice = self._dice
         if dice.random() < 0.02:
             return dice.choice([None, "no such thing", True, -1, {"float": "nan"}])

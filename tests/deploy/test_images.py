@@ -20,7 +20,7 @@ from support.dockerfiles import Ignored, Stage, context_files, parse_dockerfile
 DOCKERFILES = sorted(IMAGES.glob("*.Dockerfile"))
 COMPOSE = TOP / "deploy" / "compose"
 SERVER_SECRETS = {"tls_certificate", "tls_key", "tokens", "database_login"}
-"""What the server of compose reads."""
+"""Secrets that the server of compose reads."""
 
 
 @pytest.fixture(scope="module")

@@ -38,7 +38,7 @@ def test_a_wrong_manifest_would_be_found(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_pods_keep_to_the_strictest_standard(variant: str) -> None:
-    """What the Pod Security Standard `restricted` asks for, and more."""
+    """Check that pods meet the Pod Security Standard `restricted`, and more."""
     for pod in _pods(variant):
         spec, security = pod["spec"], pod["spec"]["securityContext"]
         assert security["runAsNonRoot"] is True and security["runAsUser"] > 10000
@@ -157,7 +157,7 @@ def test_several_servers_share_a_database_and_one_alone_does_not() -> None:
 
 
 def test_a_key_that_signs_is_handed_over_for_its_reader_alone(tmp_path: Path) -> None:
-    """What Kubernetes makes of a secret is for a group, too, and refused."""
+    """Check that the file that Kubernetes makes of a secret, which is also for a group, is refused."""
     pod = named("overlays/signed", "Deployment", "robosc-server")["spec"]["template"]["spec"]
     (first,) = pod["initContainers"]
     folders = {mount["mountPath"]: tmp_path / mount["name"] for mount in first["volumeMounts"]}

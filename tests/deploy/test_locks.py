@@ -17,7 +17,7 @@ coverage{{extra}}==7.17.3 --hash=sha256:{"0" * 64}
 pytest-cov==7.0.0 \\
     --hash=sha256:{"1" * 64}
 """
-"""What kept every change from landing for a day, when 7.17.4 was released."""
+"""Lock file that kept every change from landing for a day, when 7.17.4 was released."""
 
 NEEDS = {"pytest-cov": ["coverage[toml]>=7.10.6", 'hunter; extra == "testing"'], "coverage": []}
 

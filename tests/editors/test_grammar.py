@@ -39,7 +39,7 @@ Scopes = list[list[str]]
 
 
 def coloured(texts: Sequence[str]) -> list[Scopes]:
-    """What the grammar makes of texts, by one process of Node for all of them."""
+    """Return the scopes that the grammar finds in texts, by one process of Node for all of them."""
     node_tool("vscode-tmgrammar-snap", EXTENSION_FOLDER)
     ran = subprocess.run(
         ["node", GRAMMAR / "tokens.mjs"], input=json.dumps(texts), capture_output=True, text=True, timeout=LIMIT_S
@@ -139,7 +139,7 @@ def nodes(tree: object) -> Iterator[object]:
 
 
 def is_unseen(text: str, texts: Sequence[str], starts: Sequence[int], index: int) -> bool:
-    """Whether what tells the meaning of a word stands too far behind it: such a grammar sees one line at a time."""
+    """Return True if the key to a word's meaning stands too far behind it: such a grammar sees one line at a time."""
     is_split = "\n" in text[starts[index] : starts[index + 1]]
     if texts[index] in ("always", "never") and texts[index - 1] == "requirement":
         return is_split or texts[index + 1] == "-"

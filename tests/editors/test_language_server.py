@@ -55,12 +55,12 @@ def editor(tmp_path: Path) -> Iterator[Editor]:
 
 
 def labels(found: lsp.CompletionList) -> list[str]:
-    """What is offered, in order."""
+    """Return the labels of the offered completions, in order."""
     return [item.label for item in sorted(found.items, key=lambda item: item.sort_text or "")]
 
 
 def complete(editor: Editor, name: str, words: str) -> list[str]:
-    """What is offered at the `|` of some words."""
+    """Return the completions that are offered at the `|` of some words."""
     place = editor.at(name, words)
     found = editor.run(
         editor.client.text_document_completion_async(lsp.CompletionParams(place.text_document, place.position))
@@ -69,7 +69,7 @@ def complete(editor: Editor, name: str, words: str) -> list[str]:
 
 
 def typed(editor: Editor, words: str, instead_of: str = "") -> list[str]:
-    """What is offered at the `|` of some words that are put into the robot instead of others."""
+    """Return the completions at the `|` of some words that are put into the robot instead of others."""
     new = ROBOT.replace(instead_of, words.replace("|", "")) if instead_of else words.replace("|", "")
     editor.replace("walker.rscd", new)
     return complete(editor, "walker.rscd", words)
@@ -191,7 +191,7 @@ def test_without_synthesis_there_are_the_findings_of_the_checks(tmp_path: Path) 
 
 
 def hover(editor: Editor, name: str, words: str) -> str:
-    """What is told of the name at the `|` of some words."""
+    """Return the hover text for the name at the `|` of some words."""
     place = editor.at(name, words)
     found = editor.run(editor.client.text_document_hover_async(lsp.HoverParams(place.text_document, place.position)))
     assert found is not None
@@ -238,7 +238,7 @@ def test_of_words_and_comments_nothing_is_told(editor: Editor) -> None:
 
 
 def definition(editor: Editor, name: str, words: str) -> lsp.Location:
-    """Where the name at the `|` of some words is defined."""
+    """Return the place where the name at the `|` of some words is defined."""
     place = editor.at(name, words)
     found = editor.run(
         editor.client.text_document_definition_async(lsp.DefinitionParams(place.text_document, place.position))
@@ -269,7 +269,7 @@ def test_of_a_file_that_is_not_open_places_are_as_an_editor_will_show_it(tmp_pat
 
 
 def references(editor: Editor, name: str, words: str, *, declared: bool = True) -> list[lsp.Location]:
-    """Where the name at the `|` of some words stands."""
+    """Return the places where the name at the `|` of some words stands."""
     place = editor.at(name, words)
     context = lsp.ReferenceContext(include_declaration=declared)
     found = editor.run(

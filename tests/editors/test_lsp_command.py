@@ -94,7 +94,7 @@ def test_it_ends_when_its_input_does() -> None:
 
 
 class Written(io.BytesIO):
-    """What the server writes; can still be read when it has closed it."""
+    """Output of the server, which can still be read when the server has closed it."""
 
     def close(self) -> None:
         pass

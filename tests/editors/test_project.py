@@ -1,4 +1,4 @@
-"""What the language server knows of several files as they are edited: the same as if it saw them for the first time."""
+"""Tests of the language server's knowledge of several edited files: the same as if it saw them for the first time."""
 
 from pathlib import Path
 

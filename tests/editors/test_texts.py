@@ -15,7 +15,7 @@ TEXTS = st.lists(CHARACTERS, max_size=30).map("".join)
 
 
 def is_between_lines(text: str, offset: int) -> bool:
-    """Whether an offset is that between the two characters of a line's end."""
+    """Return True if an offset is that between the two characters of a line's end."""
     return text[offset - 1 : offset + 1] == "\r\n" and offset > 0
 
 

@@ -96,12 +96,12 @@ def navigate(twin: SteppedTwin) -> Judge:
 
 @dataclass(frozen=True)
 class Play:
-    """What a robot does.
+    """Activity of a robot.
 
     Attributes:
-        scene: Where.
-        act: Lets it: what judges its motion.
-        deployment: Of its supervisor.
+        scene: Function that makes the scene.
+        act: Function that lets the robot act; returns the judge of its motion.
+        deployment: Deployment of its supervisor.
     """
 
     scene: Callable[[], Scene]

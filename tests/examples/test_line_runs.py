@@ -14,7 +14,7 @@ DARK, LIGHT = 30, 220
 
 
 def has_one_largest(marks: np.ndarray[tuple[int, int], np.dtype[np.uint8]]) -> bool:
-    """Which of two patches of one size counts is not said."""
+    """Return True unless two patches share the largest size: which of them counts is not specified."""
     _, _, figures, _ = cv2.connectedComponentsWithStats(marks)
     areas = sorted(figures[1:, cv2.CC_STAT_AREA])
     return len(areas) < 2 or areas[-1] != areas[-2]

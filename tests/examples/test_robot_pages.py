@@ -1,4 +1,4 @@
-"""What the pages and launch files of the example robots say is so."""
+"""Tests that the pages and launch files of the example robots are correct."""
 
 import re
 import shlex

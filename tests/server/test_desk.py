@@ -1,4 +1,4 @@
-"""Where tasks of calls get their results: what is counted, and what is not done twice."""
+"""Tests of the desk from which tasks of calls get their results: what is counted, and what is not done twice."""
 
 import asyncio
 from pathlib import Path

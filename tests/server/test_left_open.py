@@ -1,4 +1,4 @@
-"""What callers leave open: connections without a word, calls without a request, streams that say nothing more."""
+"""Tests of things callers leave open: connections without a word, calls without a request, streams gone silent."""
 
 import socket
 import struct

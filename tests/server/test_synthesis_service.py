@@ -45,7 +45,7 @@ def bundle(text: str = "", name: str = "robot.rscd") -> pb.Bundle:
 
 
 def check(channel: Any, text: str, **more: Any) -> str:
-    """What an echo said."""
+    """Return the message of an echo."""
     response = STUB(channel).Check(pb.CheckRequest(bundle=bundle(text)), **{"timeout": PATIENCE_S, **more})
     return str(response.diagnostics[0].message)
 

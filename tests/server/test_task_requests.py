@@ -1,4 +1,4 @@
-"""What the server accepts, byte by byte, and what it takes for the same."""
+"""Tests of the requests that the server accepts, byte by byte, and of those that it takes for the same."""
 
 import random
 import re
@@ -348,7 +348,7 @@ def message_of(kind: TaskKind, given_: dict[str, Any], seed: int) -> Any:
 
 
 def meaning_of(kind: TaskKind, given_: dict[str, Any]) -> Any:
-    """What a request means, as values that are equal exactly where it is the same."""
+    """Return the meaning of a request, as values that are equal exactly where it is the same."""
     files, interfaces, searched = given_["bundle"]
     main = next(iter(files.items()))
     if kind is TaskKind.FORMAT:
@@ -541,7 +541,7 @@ class TestRecentRequests:
 
 
 def told(accept: Callable[[TaskKind, bytes], Task], kind: TaskKind, content: bytes) -> object:
-    """What came of a request: a task, or the refusal's reason and words."""
+    """Return the outcome of a request: a task, or the refusal's reason and words."""
     try:
         return accept(kind, content)
     except RefusedError as error:

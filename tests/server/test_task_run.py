@@ -37,7 +37,7 @@ KEPT_TEXT = """robot R { component C {
 
 
 def outcome(kind: TaskKind, request: Any, limits: TaskLimits = LIMITS) -> Outcome:
-    """How an accepted request ends."""
+    """Return the outcome of an accepted request."""
     task = accepted(kind, request.SerializeToString(), RequestLimits())
     return run_task(kind, task.request, limits, lambda report: None)
 

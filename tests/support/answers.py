@@ -19,7 +19,7 @@ GRAPH = {
 
 
 def progress(number: int = 1, stage: str = "synthesis") -> Any:
-    """Where a synthesis is."""
+    """Return a response with the progress of a synthesis."""
     return pb.SynthesizeResponse(progress=pb.Progress(stage=stage, message=f"step {number}"))
 
 
@@ -105,7 +105,7 @@ def job(revision: int = 1, state: Any = jobs_pb2.JOB_STATE_RUNNING, **fields: An
 
 
 def watched(*jobs: Any) -> list[Any]:
-    """What a watcher is told."""
+    """Return the responses that a watcher gets."""
     return [jobs_pb2.WatchJobResponse(job=item) for item in jobs]
 
 

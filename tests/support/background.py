@@ -40,12 +40,12 @@ class BackgroundLoop:
         return asyncio.run_coroutine_threadsafe(work, self._loop)
 
     def run[T](self, work: Coroutine[Any, Any, T]) -> T:
-        """What a piece of work gives."""
+        """Run a piece of work, and return its result."""
         return self.start(work).result(PATIENCE_S)
 
 
 def is_running(pid: int) -> bool:
-    """Whether there is a process of that number."""
+    """Return True if there is a process of that number."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -54,7 +54,10 @@ def is_running(pid: int) -> bool:
 
 
 def has_ended(pid: int) -> bool:
-    """Whether a process has; nobody need have asked for its status, since those whose parent is gone wait for that."""
+    """Return True if a process has ended.
+
+    Nobody need have asked for its status, since processes whose parent is gone wait for that.
+    """
     try:
         return _fields(pid)[0] == "Z"
     except (FileNotFoundError, ProcessLookupError):
@@ -62,7 +65,7 @@ def has_ended(pid: int) -> bool:
 
 
 def is_stopped(pid: int) -> bool:
-    """Whether a process rests, as after Ctrl-Z."""
+    """Return True if a process is stopped, as after Ctrl-Z."""
     return _fields(pid)[0] == "T"
 
 
@@ -87,5 +90,5 @@ def cpu_ticks(pid: int) -> int:
 
 
 def _fields(pid: int) -> list[str]:
-    """What the kernel tells of a process, after its name."""
+    """Return the kernel's data on a process, after its name."""
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()

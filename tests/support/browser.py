@@ -17,11 +17,11 @@ FLAGS = (
 )  # fmt: skip
 
 LIMIT_S = 90.0
-"""How long pages and what is in them are waited for."""
+"""Maximum waiting time for pages and what is in them, in seconds."""
 
 WIDE = (1720, 1150)
 SCREENSHOTS = Path(__file__).parents[2] / "out" / "screenshots"
-"""Where pictures of pages are kept, for whoever wants to see what the tests saw."""
+"""Folder in which pictures of pages are kept, for anyone who wants to see what the tests saw."""
 
 
 @contextmanager
@@ -40,11 +40,11 @@ def running_browser() -> Iterator[Browser]:
 
 
 class Visit:
-    """A page that is open, and what went on around it.
+    """An open page, and the events around it.
 
     Attributes:
         page: The page.
-        errors: What went wrong in it: exceptions, and errors of the console.
+        errors: Errors in it: exceptions, and errors of the console.
         asked: Addresses of everything that it asked for, WebSockets too.
     """
 
@@ -58,7 +58,7 @@ class Visit:
         page.on("websocket", lambda socket: self.asked.append(socket.url))
 
     def text(self, selector: str) -> str:
-        """What an element says, in one line."""
+        """Return the text of an element, in one line."""
         return " ".join(self.page.locator(selector).inner_text().split())
 
     def wait(self, condition: str, argument: Any = None) -> None:
@@ -66,7 +66,7 @@ class Visit:
         self.page.wait_for_function(condition, arg=argument)
 
     def found(self, question: str, argument: Any = None) -> Any:
-        """What a JavaScript function answers, as soon as it answers with anything but nothing, false or zero."""
+        """Return the answer of a JavaScript function, as soon as it is anything but nothing, false or zero."""
         return self.page.wait_for_function(question, arg=argument).json_value()
 
     def picture(self, name: str) -> Path:
@@ -79,13 +79,13 @@ class Visit:
 
 @contextmanager
 def visit(browser: Browser, address: str, size: tuple[int, int] = WIDE, **options: Any) -> Iterator[Visit]:
-    """A page in a window of its own, without anything that was kept before.
+    """Open a page in a window of its own, without anything that was kept before.
 
     Args:
         browser: The browser.
-        address: Where to go.
-        size: Of the window, in pixels.
-        options: What the browser tells about its user, as `Browser.new_context` takes it.
+        address: Address to go to.
+        size: Size of the window, in pixels.
+        options: Data that the browser reports about its user, as `Browser.new_context` takes it.
     """
     context = browser.new_context(viewport={"width": size[0], "height": size[1]}, **options)
     context.set_default_timeout(LIMIT_S * 1000)

@@ -47,13 +47,13 @@ def compiled(supervisor: Supervisor, folder: Path, *options: str) -> Path:
 
 
 def built(supervisor: Supervisor, program: str, folder: Path, *options: str) -> Path:
-    """A program around generated C.
+    """Build a program around generated C.
 
     Args:
-        supervisor: What is generated.
+        supervisor: Supervisor from which the C is generated.
         program: The text of the file with `main`.
-        folder: Where to compile.
-        options: For the compiler.
+        folder: Folder in which to compile.
+        options: Options for the compiler.
     """
     unit = [*WARNINGS, "-ffp-contract=off", *options, "-c", f"{make_layout(supervisor).prefix}.c", "-o", "unit.o"]
     whole = ["-std=c99", *options, "test.c", "unit.o", "-lm", "-o", "test"]
@@ -151,7 +151,7 @@ class Reference:
         return data
 
     def is_default(self, communication: str, message: Any) -> bool:
-        """Whether everything is zero or empty."""
+        """Return True if everything is zero or empty."""
         if isinstance(message, dict):
             return all(self.is_default(communication, part) for part in message.values())
         return message is None or message in (0, "")
@@ -365,7 +365,7 @@ class Reference:
     # Data.
 
     def _datum(self, type_: Type) -> Any:
-        """What may come as a type, as far as C can tell it."""
+        """Return a possible datum of a type, as far as C can tell it."""
         dice = self.dice
         match type_:
             case EnumType():
@@ -409,7 +409,7 @@ def settings_words(layout: Layout, settings: Settings) -> list[object]:
 
 
 def lonely_end(supervisor: Supervisor) -> str:
-    """What an example program, to which nothing is ever sent, prints at its end after a second."""
+    """Return the line that an example program, to which nothing is ever sent, prints at its end after a second."""
     ages = [item.max_age for item in supervisor.model.communications if item.max_age is not None]
     status = 4 if any(age <= 1.0 for age in ages) else 1 if ages else 2  # Stopped by a stale sensor, waiting, running.
     return f"status {status} after 1000000 us"

@@ -101,7 +101,7 @@ class LayerReference(Reference):
         self._told(["x", sum(2 ** CALLBACKS.index(name) for name in names)])
 
     def number(self, message: Any) -> int:
-        """Which message something is: the last that it is."""
+        """Return the number of a message: its last one."""
         found = next(place for place in reversed(range(len(self.messages))) if self.messages[place] is message)
         return found % TOKENS
 
@@ -296,7 +296,7 @@ class LayerReference(Reference):
         return {**message, "other": [math.nan if dice.random() < 0.07 else 0.0]} if dice.random() < 0.8 else message
 
     def is_default(self, communication: str, message: Any) -> bool:
-        """Whether everything is zero or empty."""
+        """Return True if everything is zero or empty."""
         if isinstance(message, list):
             return all(self.is_default(communication, part) for part in message)
         return super().is_default(communication, message)

@@ -17,7 +17,7 @@ CALLBACKS = (
     *("publish", "default", "call", "goal", "cancel", "pass", "blocked"),
     *("answer", "no_answer", "accept", "reject", "feedback", "end"),
 )
-"""What each callback is called here, in the order of the struct; also the bits of what is to fail."""
+"""Names of the callbacks here, in the order of the struct; also the bits of those that are to fail."""
 
 _CALLBACK = """
 static bool do_@name@(void *context@parameters@)

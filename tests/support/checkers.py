@@ -11,12 +11,12 @@ _PLACES = (TOP / ".venv-checkers" / "bin", TOP / ".venv-checkers" / "prometheus"
 
 
 def checked(name: str, *arguments: object, folder: Path = TOP, text: str | None = None) -> str:
-    """What a checker says that finds no fault; one that finds any fails the test.
+    """Return the output of a checker that finds no fault; one that finds any fails the test.
 
     Args:
-        name: Of the program; where it is not there, the test is skipped.
-        *arguments: Its words.
-        folder: Where it is started.
+        name: Name of the program; where it is not there, the test is skipped.
+        *arguments: Arguments of the program.
+        folder: Folder in which it is started.
         text: Its standard input.
     """
     program = found(name)
@@ -27,7 +27,7 @@ def checked(name: str, *arguments: object, folder: Path = TOP, text: str | None 
 
 
 def found(name: str) -> str:
-    """Where a checker is; where it is not, the test is skipped."""
+    """Return the path of a checker; where it is not there, the test is skipped."""
     program = shutil.which(name, path=":".join(map(str, _PLACES)))
     if program is None:
         pytest.skip(f"there is no {name}: make checkers")

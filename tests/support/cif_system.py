@@ -30,11 +30,11 @@ class _Arc:
 
 @dataclass(frozen=True)
 class Step:
-    """What an event can do in a state.
+    """Possible effect of an event in a state.
 
     Attributes:
-        possible: Whether every automaton with the event in its alphabet has an edge for it.
-        leaves: Whether an update can leave its variable's range.
+        possible: True if every automaton with the event in its alphabet has an edge for it.
+        leaves: True if an update can leave its variable's range.
         targets: The states that it can lead to.
     """
 
@@ -47,10 +47,10 @@ class CifSystem:
     """A specification that can be run.
 
     Args:
-        text: A file.
+        text: Text of a file.
 
     Attributes:
-        events: Whether each event is controllable, by `automaton.event`.
+        events: True for each event that is controllable, by `automaton.event`.
         initial: The initial state.
 
     Raises:
@@ -133,7 +133,7 @@ class CifSystem:
         return found
 
     def step(self, state: Values, event: str) -> Step:
-        """What an event can do in a state.
+        """Return the possible effect of an event in a state.
 
         Raises:
             TooManyValuationsError: Its inputs have too many values.
@@ -184,7 +184,7 @@ _ROW = re.compile(r"^//   (\S+) += (\w+) (.*)$", re.MULTILINE)
 
 
 class Table:
-    """What the comments of a file say that its names stand for.
+    """Meaning of a file's names, as its comments say.
 
     Attributes:
         automata: The model's name of each automaton; `data m` for a data plant.

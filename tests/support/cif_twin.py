@@ -1,4 +1,4 @@
-"""Whether the two CIF files of a supervisor say what the supervisor says: state by state, event by event."""
+"""Checks of the two CIF files of a supervisor against the supervisor: state by state, event by event."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

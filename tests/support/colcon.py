@@ -24,7 +24,7 @@ _ENTER = 'unset LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONPATH; . "$0
 
 @contextmanager
 def locked(file: Path) -> Iterator[None]:
-    """What only one process at a time does."""
+    """Let only one process at a time execute a block."""
     with file.open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
@@ -77,7 +77,7 @@ class Workspace:
         self._colcon = colcon_program()
 
     def colcon(self, *arguments: str) -> str:
-        """What colcon prints.
+        """Run colcon, and return its output.
 
         Raises:
             AssertionError: It failed.

@@ -34,7 +34,7 @@ _TOOLS = ("unshare", "nsenter", "mount", "setpriv", "ip", "ldconfig")
 
 
 def why_not(wheels: Path) -> str:
-    """Why no container can be imitated here; empty: it can be."""
+    """Return the reason why no container can be imitated here; empty: it can be."""
     missing = [name for name in _TOOLS if shutil.which(name, path=f"{os.environ['PATH']}:/usr/sbin:/sbin") is None]
     if sys.platform != "linux" or os.geteuid() != 0 or missing:
         return "namespaces need Linux, root and util-linux" + (f": no {', '.join(missing)}" if missing else "")
@@ -47,10 +47,10 @@ def why_not(wheels: Path) -> str:
 
 @dataclass(frozen=True)
 class Image:
-    """What came of a Dockerfile.
+    """Result of a Dockerfile.
 
     Attributes:
-        root: Its files, but for those of the base.
+        root: Folder of its files, but for those of the base.
         stage: Its last stage.
     """
 
@@ -59,7 +59,7 @@ class Image:
 
     @property
     def environment(self) -> dict[str, str]:
-        """What its programs are given."""
+        """Environment that its programs are given."""
         return self.stage.environment({"PATH": _BASE_PATH})
 
     @property
@@ -72,12 +72,14 @@ class Image:
 
 
 def build(name: str, wheels: Path, folder: Path) -> Image:
-    """Carry out a Dockerfile; what its first RUN made, of nothing but locked requirements, is kept for the next time.
+    """Carry out a Dockerfile.
+
+    The result of its first RUN, of nothing but locked requirements, is kept for the next time.
 
     Args:
-        name: Such as `server`.
-        wheels: Where pip finds packages, and nowhere else.
-        folder: New, for the image.
+        name: Name of the Dockerfile, such as `server`.
+        wheels: Folder in which pip finds packages, and nowhere else.
+        folder: New folder for the image.
     """
     stages = parse_dockerfile((IMAGES / f"{name}.Dockerfile").read_text())
     roots: dict[str, Path] = {}
@@ -217,7 +219,7 @@ class Network:
 
     @property
     def entry(self) -> list[str]:
-        """What is put before a command that is to run within."""
+        """Words that are put before a command that is to run within."""
         return ["nsenter", f"--net=/proc/{self._holder.pid}/ns/net"]
 
     def __enter__(self) -> Self:
@@ -230,18 +232,18 @@ class Network:
 
 @dataclass(frozen=True)
 class Start:
-    """How a container is started: what an engine is told beside the image.
+    """Start of a container: settings that an engine gets beside the image.
 
     Attributes:
         command: Entry point and words.
-        environment: Beside that of the image.
+        environment: Variables beside those of the image.
         user: Numbers of user and group.
         files: Files and folders by their place within, read-only.
         volumes: Folders by their place within, for the user to write.
         temporary: Places within for files that are forgotten.
-        folder: Where it starts.
+        folder: Folder in which it starts.
         hosts: Names of the machine itself.
-        is_memory_sealed: Whether no memory may be written and executed (MemoryDenyWriteExecute of systemd).
+        is_memory_sealed: True if no memory may be written and executed (MemoryDenyWriteExecute of systemd).
     """
 
     command: Sequence[str]
@@ -285,7 +287,7 @@ class Container:
 
     @property
     def output(self) -> str:
-        """What it has written so far."""
+        """Output that it has written so far."""
         return self._output.read_text(errors="replace")
 
     @property
@@ -334,7 +336,7 @@ class Container:
 
 
 def wheels_of(name: str) -> Path:
-    """Where the packages of an image lie, once `make images` has fetched them."""
+    """Return the folder of an image's packages, once `make images` has fetched them."""
     return TOP / "out" / "wheels" / name
 
 

@@ -130,13 +130,13 @@ class _World:
         return next(goal.number for goal in self.executor._replies._goals.all() if goal.action == action)
 
     def _is_known(self, enum: str, data: dict[str, int]) -> bool:
-        """Whether every rule of an enum is true or false."""
+        """Return True if every rule of an enum is true or false."""
         rules = self.system.supervisor.model.enum(enum).rules
         values = (evaluate(rule.condition, _nothing, _nothing, lambda path: data[str(path[0])]) for rule in rules)
         return None not in values
 
     def moves(self) -> Iterator[tuple[Move, bool]]:
-        """What may happen now, and whether it may under every setting."""
+        """Yield every move that may happen now, and True if it may under every setting."""
         model = self.system.supervisor.model
         for number in self.executor._decisions._find_enabled():
             yield ("request", self.executor._request_names[number]), True
@@ -162,13 +162,13 @@ class _World:
 
 @dataclass
 class Twin:
-    """What the executor showed.
+    """Behaviour that the executor showed.
 
     Attributes:
-        states: The stable states that it got to.
-        has_livelock: Whether silent steps did not end.
-        has_conflict: Whether their order mattered.
-        is_blocking: Whether it got to a state from which no marked one can be reached.
+        states: Stable states that it got to.
+        has_livelock: True if silent steps did not end.
+        has_conflict: True if their order mattered.
+        is_blocking: True if it got to a state from which no marked one can be reached.
     """
 
     states: set[StateKey] = field(default_factory=set)
@@ -178,7 +178,7 @@ class Twin:
 
 
 def twin_of(supervisor: Supervisor, limit: int) -> Twin | None:
-    """What the reference executor does in every world, or None if it gets to more than `limit` stable states."""
+    """Return the reference executor's behaviour in every world, or None if it gets to over `limit` stable states."""
     found = Twin()
     histories: dict[StateKey, tuple[Move, ...]] = {}
     sure: dict[StateKey, set[StateKey]] = {}
@@ -239,12 +239,12 @@ def twin_of(supervisor: Supervisor, limit: int) -> Twin | None:
 
 
 def _live(world: _World, state: dict[Any, Any], held: Held) -> Held:
-    """What is remembered of goals that still run."""
+    """Return the data that is remembered of goals that still run."""
     return tuple((name, kept) for name, kept in held if state[f"action {name}", None] == "executing")
 
 
 def _silent_steps(system: _Watched, state: dict[Any, Any], held: Held) -> list[tuple[dict[Any, Any], Held]]:
-    """Where every enabled silent step leads; the executor's choice first."""
+    """Return the target of every enabled silent step; the executor's choice first."""
     found = []
     kept = system._state
     candidates = [
@@ -273,7 +273,7 @@ def _requirements(system: _Watched, state: dict[Any, Any], name: str) -> tuple[b
 
 
 def _outcomes(system: _Watched, state: dict[Any, Any], held: Held, tried: set[Any]) -> int:
-    """How many outcomes the orders of silent steps from a state have: stable states, and `without end`."""
+    """Count the outcomes of the orders of silent steps from a state: stable states, and `without end`."""
     start = (tuple(state.items()), held)
     if start in tried:
         return 1

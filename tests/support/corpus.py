@@ -36,7 +36,7 @@ SMALL = 100
 """States below which a recording holds the whole graph, not only its digest."""
 
 Stimulus = list[Any]
-"""What happens to an executor: its kind, and more by kind (see `Run.apply`)."""
+"""Input to an executor: its kind, and more by kind (see `Run.apply`)."""
 
 Recording = dict[str, Any]
 
@@ -47,12 +47,12 @@ def cases() -> tuple[str, ...]:
 
 
 def recording_path(case: str) -> Path:
-    """Where a case's recording stands."""
+    """Return the path of a case's recording."""
     return CORPUS / f"{case}.json"
 
 
 def recorded(case: str) -> Recording:
-    """What was recorded of a case."""
+    """Return the recording of a case."""
     found: Recording = json.loads(recording_path(case).read_text(encoding="utf-8"))
     return found
 
@@ -75,7 +75,7 @@ def _written(value: Any, depth: int) -> str:
 
 
 def outcome(case: str, stimuli: Sequence[Stimulus]) -> Recording:
-    """What a case means now, in the form of its recording; the executor meets the given stimuli."""
+    """Return the meaning of a case now, in the form of its recording; the executor meets the given stimuli."""
     found: Recording = json.loads(json.dumps(_outcome(case, stimuli)))
     return found
 
@@ -129,7 +129,7 @@ def _finding(item: Diagnostic) -> str:
 
 
 def _has_a_layer(model: Model) -> bool:
-    """Whether a supervision layer can tell the model's incoming messages apart by their identifiers."""
+    """Return True if a supervision layer can tell the model's incoming messages apart by their identifiers."""
     identifiers = [item.identifier for item in model.communications if item.kind is CommunicationKind.INCOMING_MESSAGE]
     return len(set(identifiers)) == len(identifiers)
 
@@ -253,7 +253,7 @@ class Run:
 
 
 _WORDY = ("what", "unknown", "time", "state", "decision_us", "kind", "controllable")
-"""What an entry says in words, or what depends on nothing that a model means, or is recorded otherwise."""
+"""Keys of an entry that are words, depend on nothing that a model means, or are recorded otherwise."""
 
 
 def _entry(entry: Entry) -> str:
@@ -292,7 +292,7 @@ _LONGEST = 160
 
 
 def differences(was: Any, now: Any, where: str = "") -> list[str]:
-    """Where two recordings differ, one readable line each, in the order of the file."""
+    """Return the differences of two recordings, one readable line each, in the order of the file."""
     if _shown(was) == _shown(now):
         return []
     if isinstance(was, Mapping) and isinstance(now, Mapping):

@@ -135,7 +135,7 @@ class Scene:
             self.daemon.post(ResetDone())
 
     def exchange(self) -> None:
-        """What the drive base's thread does: the robot moves as it is told."""
+        """Do what the drive base's thread does: the robot moves as it is told."""
         output = self.safety.output(self.clock.monotonic())
         self.torque, self.out = output.is_torque_wanted, output.velocity
         self.heading_rad = math.remainder(self.heading_rad + self.out.angular_rad_s * PERIOD_S, math.tau)
@@ -178,10 +178,10 @@ class Connected:
     """A program that notes what it is told.
 
     Args:
-        scene: With the daemon that it is connected to.
+        scene: Scene with the daemon that it is connected to.
         name: Its name.
-        serves: What of the model it answers.
-        may_request: Whether it may be the caller of a layer.
+        serves: Parts of the model that it answers.
+        may_request: True if it may be the caller of a layer.
     """
 
     def __init__(self, scene: Scene, name: str, serves: tuple[str, ...] = (), *, may_request: bool = True) -> None:
@@ -196,7 +196,7 @@ class Connected:
         return self.turn()
 
     def turn(self) -> list[ToProgram]:
-        """What it is told in a turn of the loop."""
+        """Run a turn of the loop, and return the messages to the program."""
         self.told.clear()
         self.scene.daemon.turn()
         return list(self.told)

@@ -36,7 +36,7 @@ class Demonstration:
         raise AssertionError(f"it ended without telling {text!r}")
 
     def passes(self) -> str:
-        """What it tells until it has passed, and left nothing."""
+        """Wait until it has passed and left nothing, and return its output."""
         output, errors = self.child.communicate(timeout=self.limit_s)
         assert self.child.returncode == 0, output + errors
         assert self.leftovers() == []
@@ -67,12 +67,12 @@ class Demonstration:
 
 @contextmanager
 def demonstration(script: str, *words: str, folder: Path, limit_s: float) -> Iterator[Demonstration]:
-    """Run one; it is killed at the end of the block.
+    """Run a demonstration; it is killed at the end of the block.
 
     Args:
         script: Its file in `deploy/demo`.
-        words: What it is told.
-        folder: For its temporary files; is made.
+        words: Arguments of the script.
+        folder: Folder for its temporary files; is made.
         limit_s: See `Demonstration`.
     """
     folder.mkdir()

@@ -1,4 +1,4 @@
-"""What stands in a Dockerfile, and in a `.dockerignore`: as much of them as ours use; anything else is an error."""
+"""Contents of a Dockerfile, and of a `.dockerignore`: as much of them as ours use; anything else is an error."""
 
 import json
 import re
@@ -14,9 +14,9 @@ class Instruction:
     """One instruction.
 
     Attributes:
-        name: Such as `RUN`.
-        flags: Such as `{"from": "build"}`.
-        text: What follows them.
+        name: Name, such as `RUN`.
+        flags: Flags, such as `{"from": "build"}`.
+        text: Text that follows them.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Stage:
         return [item for item in self.instructions if item.name == name]
 
     def last(self, name: str) -> Instruction | None:
-        """What counts where a later instruction replaces those before."""
+        """Return the instruction that counts where a later one replaces those before."""
         found = self.all(name)
         return found[-1] if found else None
 
@@ -54,7 +54,7 @@ class Stage:
         return [] if found is None else found.words
 
     def environment(self, inherited: dict[str, str]) -> dict[str, str]:
-        """What its `ENV` instructions make of an environment."""
+        """Return an environment as its `ENV` instructions change it."""
         result = dict(inherited)
         for item in self.all("ENV"):
             for word in shlex.split(item.text):
@@ -107,7 +107,9 @@ def _logical_lines(text: str) -> Iterator[str]:
 
 
 class Ignored:
-    """What a `.dockerignore` keeps out of a build: of the patterns that fit a file or a folder above, the last says.
+    """Files that a `.dockerignore` keeps out of a build.
+
+    Of the patterns that fit a file or a folder above, the last one decides.
 
     Args:
         text: Its lines.
@@ -134,7 +136,7 @@ class Ignored:
 
 
 def context_files(top: Path, sources: Sequence[str], ignored: Ignored) -> Iterator[tuple[str, Path]]:
-    """What `COPY` takes of a build's folder: the source that it belongs to, and the file."""
+    """Yield the files that `COPY` takes of a build's folder: the source that each belongs to, and the file."""
     for source in sources:
         found = top / source
         for file in [found] if found.is_file() else sorted(found.rglob("*")):

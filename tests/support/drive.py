@@ -118,13 +118,13 @@ class Rig:
             self.host.sleep(0.001)
 
     def goals_rad_s(self) -> tuple[float, float]:
-        """What the wheels' motors are told to do, forward positive; 0 without torque."""
+        """Return the commanded speeds of the wheels' motors in rad/s, forward positive; 0 without torque."""
         wheels = (self.robot.world.left, self.robot.world.right)
         left, right = (wheel.goal_rad_s if wheel.is_driven else 0.0 for wheel in wheels)
         return left, right
 
     def stops_within(self, seconds: float) -> bool:
-        """Whether the motors are told to stand still in time, without anything being exchanged."""
+        """Return True if the motors are commanded to stand still in time, without anything being exchanged."""
         end_s = self.host.monotonic() + seconds
         while self.goals_rad_s() != (0.0, 0.0):
             if self.host.monotonic() > end_s:

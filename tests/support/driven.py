@@ -28,7 +28,7 @@ LIMIT_S = 15.0
 """Longer than anything takes that works."""
 
 HANDOVERS = 4
-"""So many threads, each of which may be late, take part in a stop: test or loop, the drive's, the line's, and back."""
+"""Number of threads, each maybe late, that take part in a stop: test or loop, the drive's, the line's, and back."""
 
 PATIENT = "{answer_limit_s: 0.3}"
 """Options of a drive whose answers come for certain, on a machine that may be busy."""
@@ -110,10 +110,10 @@ class HangingLog(MemoryLog):
     """An event log that a test lets hang: it is written by the loop's thread, from inside the executor.
 
     Args:
-        host: Where it hangs.
+        host: Host on which it hangs.
 
     Attributes:
-        hangs: Whether the next entry waits.
+        hangs: True if the next entry waits.
     """
 
     def __init__(self, host: Host) -> None:
@@ -136,15 +136,15 @@ class Driven:
     """A bridge at work.
 
     Attributes:
-        host: On which it runs.
-        robot: The simulated one.
+        host: Host on which it runs.
+        robot: The simulated robot.
         machine: The daemon and its devices' threads.
-        limits: Of its safety layer.
-        log: Of the executor.
-        trace: What the wheels were told.
-        messages: What a person was told, warnings and worse.
-        thread: The loop's.
-        error: What has ended the loop.
+        limits: Limits of its safety layer.
+        log: Event log of the executor.
+        trace: Commands that the wheels were given.
+        messages: Messages to a person, warnings and worse.
+        thread: Thread of the loop.
+        error: Error that has ended the loop.
     """
 
     host: Host
@@ -179,7 +179,7 @@ class Driven:
 
     @property
     def wheels_m_s(self) -> tuple[float, float]:
-        """What the motors are told now."""
+        """Current commanded speeds of the motors, in m/s."""
         self.trace.look()
         return self.trace.told[-1][1:]
 
@@ -195,11 +195,11 @@ class Driven:
         )
 
     def stopped_after(self, cause: Callable[[], object], limit_s: float) -> float:
-        """Let something happen to a robot that moves; how long until both wheels' commanded speed is zero, for good.
+        """Let something happen to a moving robot; return the time until both wheels' commanded speed stays zero.
 
         Args:
-            cause: What happens.
-            limit_s: When it must have been so; in real time, a busy machine's lateness is added.
+            cause: Action that happens.
+            limit_s: Time by which it must have been so, in seconds; in real time, a busy machine's lateness is added.
         """
         self.steady()
         with Lateness() if self.host is SYSTEM_HOST else nullcontext() as lateness:
@@ -215,7 +215,7 @@ class Driven:
         return took_s
 
     def _is_still(self, begin_s: float) -> bool:
-        """Whether the wheels have been told to stand still, and nothing else since then."""
+        """Return True if the wheels have been commanded to stand still, and nothing else since then."""
         at_s, *wheels = self.trace.told[-1]
         return at_s >= begin_s and wheels == [0.0, 0.0] and self.robot.time.now_s() - at_s > 0.15
 
@@ -269,15 +269,16 @@ def driven(
     before: Callable[[SimulatedTurtleBot3], None] = lambda robot: None,
     **sections: str,
 ) -> Iterator[Driven]:
-    """A bridge that begins to drive a Burger in a circle, until it is left.
+    """Run a bridge that begins to drive a Burger in a circle, until the block is left.
 
     Args:
         base: Driver of its drive base.
         lidar: Its LiDAR.
-        velocity: That its supervisor wants, always.
-        host: On which it runs; None: a virtual one.
-        before: What happens to the robot before the bridge starts.
-        sections: Of the configuration, in YAML; `options`: of the drive (default: `PATIENT` where it is asked).
+        velocity: Velocity that its supervisor always wants.
+        host: Host on which it runs; None: a virtual one.
+        before: Action on the robot before the bridge starts.
+        sections: Sections of the configuration, in YAML; `options`: those of the drive (default: `PATIENT` where it
+            is asked).
     """
     supervisor = supervisor_of(MODEL.replace("LINEAR", str(velocity[0])).replace("ANGULAR", str(velocity[1])))
     handler = _Messages()

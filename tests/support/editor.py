@@ -27,7 +27,7 @@ from robosc_lsp.command import parser
 from robosc_lsp.server import make_server
 
 LIMIT_S = 120.0
-"""What has not come by then does not come, however slow the machine is."""
+"""Time after which nothing is expected to come any more, however slow the machine is, in seconds."""
 
 _UNITS = {"utf-8": ("utf-8", 1), "utf-16": ("utf-16-le", 2), "utf-32": ("utf-32-le", 4)}
 
@@ -54,7 +54,7 @@ def offset_of(text: str, position: lsp.Position, encoding: str = "utf-16") -> in
 
 
 def part_of(text: str, where: lsp.Range) -> str:
-    """What stands in a range."""
+    """Return the text in a range."""
     return text[offset_of(text, where.start) : offset_of(text, where.end)]
 
 
@@ -70,14 +70,15 @@ _converter = cache(default_converter)
 
 
 class Editor:
-    """An editor that works on a folder, with a server in this process; leaving its block ends it, and it must end well.
+    """An editor that works on a folder, with a server in this process.
 
-    The two exchange the bytes of the protocol over a pair of sockets. While the test does not wait, none of them runs.
+    Leaving its block ends it, and it must end well. The two exchange the bytes of the protocol over a pair of
+    sockets. While the test does not wait, none of them runs.
 
     Args:
-        folder: With the files.
-        options: Of the server's command line.
-        encodings: What it can count columns in, in its order.
+        folder: Folder with the files.
+        options: Options of the server's command line.
+        encodings: Encodings in which it can count columns, in its order.
     """
 
     def __init__(self, folder: Path, *options: str, encodings: Sequence[str] = ("utf-16",)) -> None:
@@ -196,7 +197,7 @@ class Editor:
         return (self.folder / name).as_uri() if ":" not in name else name
 
     def document(self, name: str) -> lsp.TextDocumentIdentifier:
-        """How a file is told of."""
+        """Return the identifier of a file."""
         return lsp.TextDocumentIdentifier(self.uri(name))
 
     def save(self, name: str, text: str) -> None:
@@ -283,7 +284,7 @@ class Editor:
     def findings(
         self, name: str, such: Callable[[list[lsp.Diagnostic]], bool] = lambda found: True
     ) -> list[lsp.Diagnostic]:
-        """What is found in the text as it is shown, once it is told and as it is wanted."""
+        """Return the findings in the text as it is shown, once they are reported and as wanted."""
         uri = self.uri(name)
 
         def is_told() -> bool:

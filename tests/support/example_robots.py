@@ -21,12 +21,12 @@ HELPERS = EXAMPLES / "robosc_examples"
 
 
 def generated_package(model: str, folder: Path, deployment: Deployment = Deployment.CONTROLLER) -> Path:
-    """The generated ROS 2 package of an example robot.
+    """Generate the ROS 2 package of an example robot.
 
     Args:
         model: Its name, which is that of its folder; that of a layer has `_layer` at its end.
-        folder: Where to put it.
-        deployment: Where its supervisor stands.
+        folder: Folder to put it in.
+        deployment: Deployment of its supervisor.
     """
     made = make_supervisor(
         load_bundle(EXAMPLES / model.removesuffix("_layer") / f"{model}.rscd"), deployment=deployment
@@ -37,12 +37,12 @@ def generated_package(model: str, folder: Path, deployment: Deployment = Deploym
 
 
 class Stage:
-    """Where an example robot plays: a domain of its own, its processes, and the test's side.
+    """Stage of an example robot: a domain of its own, its processes, and the test's side.
 
     Args:
         folder: Folder for everything that the processes write.
         domain: Domain id.
-        stack: Ends the processes.
+        stack: Exit stack that ends the processes.
     """
 
     def __init__(self, folder: Path, domain: int, stack: ExitStack) -> None:

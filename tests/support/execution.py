@@ -98,10 +98,10 @@ def _is_zero(message: Any) -> bool:
 
 
 class Observed:
-    """What is asked of an executor in a test.
+    """Questions that a test asks an executor.
 
     Attributes:
-        system: What it executes.
+        system: System that it executes.
         executor: The executor.
         log: Its log.
     """
@@ -111,7 +111,7 @@ class Observed:
     log: MemoryLog
 
     def status(self) -> Status:
-        """What the executor is doing."""
+        """Return the status of the executor."""
         return self.executor.status
 
     def state(self, component: str) -> str:
@@ -136,8 +136,8 @@ class Bench(Observed):
     """An executor with everything around it.
 
     Args:
-        system: What to execute.
-        start: Whether to start it.
+        system: System to execute.
+        start: True if it is started.
         settings: Settings by name.
     """
 

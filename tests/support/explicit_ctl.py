@@ -27,11 +27,11 @@ States = frozenset[int]
 
 
 class ExplicitChecker:
-    """Judges formulas on the graph of a controlled system.
+    """Checker of formulas on the graph of a controlled system.
 
     Args:
         system: Plants and event conditions.
-        added: What the supervisor adds.
+        added: Conditions that the supervisor adds.
         limit: States beyond which there is no graph.
 
     Attributes:
@@ -49,7 +49,7 @@ class ExplicitChecker:
         self._all = frozenset(range(len(self._next)))
 
     def holds(self, formula: Formula) -> bool:
-        """Whether a formula holds in the initial state."""
+        """Return True if a formula holds in the initial state."""
         return 0 in self.where(formula)
 
     def where(self, formula: Formula) -> States:
@@ -118,7 +118,10 @@ class Replayed:
         self._path = path
 
     def shows(self, formula: Formula, holds: bool, place: int = 0) -> bool:
-        """Whether it shows that a formula holds, or does not, in the state at a place of it, but for what it leaves."""
+        """Return True if the run shows that a formula holds, or does not, in the state at a place of it.
+
+        Parts that the run leaves to be shown are excepted.
+        """
         if any(item.formula is formula and (item.place, item.holds) == (place, holds) for item in self._run.left):
             return self._is_so(formula, holds, place)
         match formula:

@@ -55,10 +55,10 @@ def written(test: str, folder: Path) -> str:
 
     Args:
         test: The test's name.
-        folder: Where all of them are; what is there of the same test and seed is replaced.
+        folder: Folder of all of them; files there of the same test and seed are replaced.
 
     Returns:
-        What to tell: each text, where it is, and how to make a test of it; empty if nothing was made.
+        Text to report: each text, where it is, and how to make a test of it; empty if nothing was made.
     """
     return "\n".join(_written(test, maker, seed, files, folder) for (maker, seed), files in _last.items())
 
@@ -84,7 +84,7 @@ def _written(test: str, maker: str, seed: int | None, files: Callable[[], Files]
 
 
 def _kept(place: Path, names: tuple[str, ...]) -> str:
-    """How a model becomes a test."""
+    """Explain how to make a test of a model."""
     main, *libraries = names
     copy = [f"cp {place / main} tests/corpus/found/NAME.rscd"]
     if libraries:

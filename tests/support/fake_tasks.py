@@ -72,7 +72,7 @@ def fake_task(text: str, kind: TaskKind = TaskKind.CHECK, key: str = "0" * 64) -
 
 
 def said(outcome: Outcome) -> str:
-    """What the answer to a check says with `echo` and the like."""
+    """Return the message in the answer to a check with `echo` and the like."""
     assert isinstance(outcome, Result), outcome
     (message,) = outcome.messages
     return pb.CheckResponse.FromString(message).diagnostics[0].message

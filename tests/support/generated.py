@@ -48,7 +48,7 @@ def imported(files: GeneratedFiles, folder: Path, module: str) -> Iterator[Any]:
 
 @cache
 def _runtime_code(deployment: Deployment) -> types.CodeType:
-    """What every generated module of a deployment begins with, compiled once."""
+    """Return the code that every generated module of a deployment begins with, compiled once."""
     runtime = bundle(RUNTIME[deployment])
     lines = ["from __future__ import annotations", *runtime.imports, "", runtime.text()]
     return compile("\n".join(lines), "runtime", "exec", dont_inherit=True)

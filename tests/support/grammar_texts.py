@@ -42,7 +42,7 @@ _SAMPLES: dict[str, tuple[str, ...]] = {
 }
 
 _REPEATED = {"ImplicationRest": 0.02, "Option": 0.25, "Step": 0.3}
-"""How probable it is that a rule is repeated once more, where that is not the usual."""
+"""Probability that a rule is repeated once more, where it is not the usual one."""
 
 _EXPRESSION = 8
 """Tokens beyond which an expression comes to its end: else the first one would be the whole text."""
@@ -123,7 +123,7 @@ def damaged_text(text: str, random: Random) -> str:
 
 
 def _would_merge(token: str, following: str) -> bool:
-    """Whether two tokens without a blank between them are read as one; `0and` is two, `x1and` is not."""
+    """Return True if two tokens without a blank between them are read as one; `0and` is two, `x1and` is not."""
     if not token or not (following[0].isalnum() or following[0] == "_"):
         return False
     if token[0].isdigit():
@@ -166,7 +166,7 @@ def _walk(node: Any, random: Random, size: int, found: list[str]) -> None:
 
 
 def _goes_on(node: Any, random: Random, size: int, found: list[str]) -> bool:
-    """Whether the parts of a node are taken, or taken once more."""
+    """Return True if the parts of a node are taken, or taken once more."""
     if isinstance(node, Optional):
         return len(found) < size and random.random() < 0.5
     if not isinstance(node, ZeroOrMore | OneOrMore):

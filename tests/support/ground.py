@@ -67,7 +67,7 @@ def scan_of(ranges_m: Mapping[int, float], time_s: float = 100.0) -> Scan:
 
 
 def reading_of(time_s: float = 100.0, **values: Any) -> DriveReading:
-    """What a drive base tells."""
+    """Return a reading of a drive base."""
     told: dict[str, Any] = {"pose": Pose(), "velocity": Velocity(), "wheels_m_s": (0.0, 0.0), "is_torque_on": False}
     return DriveReading(time_s=time_s, **{**told, **values})
 
@@ -94,10 +94,10 @@ class PlayedDaemon:
     """A daemon of which a test says what it shows and answers.
 
     Attributes:
-        orders: That came, oldest first.
-        told: What programs told it.
-        seen: How often the operator was seen.
-        answers: To orders at once, by command; others wait for `answer`.
+        orders: Orders that came, oldest first.
+        told: Messages that programs sent to it.
+        seen: Number of times that the operator was seen.
+        answers: Immediate answers to orders, by command; others wait for `answer`.
     """
 
     is_layer: bool = False
@@ -136,7 +136,7 @@ class PlayedDaemon:
 
     @property
     def commands(self) -> list[Command]:
-        """That were ordered."""
+        """Commands that were ordered."""
         return [order.command for order in self.orders]
 
     def show(self, **values: Any) -> None:

@@ -27,12 +27,12 @@ class Talk:
         self.session = Session(self.daemon.operations, self.settings, self.now_s)
 
     def say(self, data: bytes = b"", after_s: float = 0.0) -> list[Any]:
-        """What is answered."""
+        """Return the answers."""
         self.now_s += after_s
         return self.station.hear(self.session.step(self.now_s, data))
 
     def live(self, seconds: float, step_s: float = 0.05, *, is_fresh: bool = True) -> list[Any]:
-        """What comes within some time, while the loop turns or hangs."""
+        """Return everything that comes within some time, while the loop turns or hangs."""
         found = []
         for _ in range(round(seconds / step_s)):
             if is_fresh:

@@ -16,13 +16,13 @@ _IN_THE_CLEAR = ServerSecurity()
 def answering(
     whole: int, security: ServerSecurity = _IN_THE_CLEAR, most_calls: int | None = None, **services: int
 ) -> Iterator[str]:
-    """A server that is well or not, and answers so many calls at once; yields its address.
+    """Run a server, healthy or not, that answers up to `most_calls` calls at once; yield its address.
 
     Args:
-        whole: How the server itself is.
-        security: How it listens.
-        most_calls: At once; None: any number.
-        **services: How each service is.
+        whole: Health of the server itself.
+        security: Security of its listening port.
+        most_calls: Maximum number of calls at once; None: any number.
+        **services: Health of each service.
     """
     servicer = health.HealthServicer()
     servicer.set("", whole)

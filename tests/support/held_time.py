@@ -60,7 +60,7 @@ class HeldLoop(asyncio.SelectorEventLoop):
 
 
 def on_held_time[T](test: Callable[[HeldLoop], Coroutine[Any, Any, T]]) -> T:
-    """What a test gives that is run on such a loop."""
+    """Run a test on a `HeldLoop` and return its result."""
     loops: list[HeldLoop] = []
 
     def made() -> HeldLoop:

@@ -75,12 +75,12 @@ class _Names:
 
 
 def hostile_text(seed: int, canary: Path, *, is_on_ros: bool = False) -> str:
-    """A robot with every kind of name and text, that does something.
+    """Return the text of a robot with every kind of name and text, that does something.
 
     Args:
-        seed: Decides everything else.
+        seed: Seed that decides everything else.
         canary: The file that must not appear.
-        is_on_ros: Whether its properties are those of messages of ROS.
+        is_on_ros: True if its properties are those of messages of ROS.
     """
     dice = Random(seed)
     names = _Names(dice, dice.choice((WORDS, COLLIDING, WORDS + COLLIDING)))

@@ -1,4 +1,4 @@
-"""What a program would try that has got hold of a worker; each answers `done`, or the name of the error it was told.
+"""Attempts of a program that has got hold of a worker; each answers `done`, or the name of the error that it got.
 
 read A              reads the file A
 list A              lists the folder A

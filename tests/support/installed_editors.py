@@ -42,7 +42,7 @@ EMACS = shutil.which("emacs") if shutil.which("emacsclient") else None
 
 
 def settings_of(editor: str, language: str) -> str:
-    """What the manual tells to write into an editor's file, with the path of this project's folder."""
+    """Return the manual's settings for an editor's file, with the path of this project's folder."""
     section = re.search(rf"^## {editor}\n(.*?)(?=^## |\Z)", MANUAL.read_text("utf-8"), re.DOTALL | re.MULTILINE)
     assert section is not None
     blocks = re.findall(rf"^```{language}\n(.*?)^```", section[1], re.DOTALL | re.MULTILINE)
@@ -96,7 +96,7 @@ class Home:
         return [int(number) for number in self._started.read_text().split()]
 
     def is_quiet(self) -> bool:
-        """Whether every server ends before long."""
+        """Return True if every server ends before long."""
         return eventually(lambda: all(map(has_ended, self.servers)))
 
 
@@ -104,8 +104,8 @@ class Neovim:
     """Neovim without a screen, that shows some files; it speaks MessagePack-RPC on its standard streams.
 
     Args:
-        home: Of who uses it.
-        arguments: What it shows, and how.
+        home: Home of its user.
+        arguments: Arguments that say what it shows, and how.
     """
 
     def __init__(self, home: Home, *arguments: str | Path) -> None:
@@ -125,7 +125,7 @@ class Neovim:
         self._came = b""
 
     def lua(self, code: str, *arguments: Any) -> Any:
-        """What a piece of Lua returns."""
+        """Run a piece of Lua and return its result."""
         return self._call("nvim_exec_lua", code, arguments)
 
     def type(self, keys: str) -> None:
@@ -134,7 +134,7 @@ class Neovim:
 
     @property
     def is_asking(self) -> bool:
-        """Whether it waits for an answer in its last line; some versions do nothing else then."""
+        """True if it waits for an answer in its last line; some versions do nothing else then."""
         now = self._call("nvim_get_mode")
         return bool(now["blocking"] or now["mode"] == "c")
 
@@ -145,7 +145,7 @@ class Neovim:
 
     @property
     def findings(self) -> list[tuple[str, str]]:
-        """What is found in the text that is shown: the code, and the words that it is told of."""
+        """Findings in the text that is shown: the code, and the words that it refers to."""
         return [
             (item["code"], item["words"])
             for item in self.lua(
@@ -215,8 +215,8 @@ class Emacs:
     """Emacs on a pseudo-terminal, that shows a file; it is asked by `emacsclient`.
 
     Args:
-        home: Of who uses it.
-        file: What it shows.
+        home: Home of its user.
+        file: File that it shows.
     """
 
     def __init__(self, home: Home, file: Path) -> None:
@@ -272,7 +272,7 @@ class Emacs:
             return
 
     def ask(self, form: str) -> Any:
-        """What a form gives in the buffer that is shown."""
+        """Return the value of a form in the buffer that is shown."""
         encoded = (
             "(with-current-buffer (window-buffer (selected-window)) (require 'json)"
             f" (base64-encode-string (encode-coding-string (json-encode {form}) 'utf-8) t))"
@@ -309,7 +309,7 @@ class Emacs:
 
     @property
     def findings(self) -> list[tuple[str, str]]:
-        """What is found in the text that is shown: what is told, and the words that it is told of."""
+        """Findings in the text that is shown: the message, and the words that it refers to."""
         found = self.ask(
             """(vconcat (mapcar (lambda (item)
                                   (vector (flymake-diagnostic-text item)
@@ -344,7 +344,7 @@ class Emacs:
 
 
 def _offset(text: str, words: str) -> int:
-    """Where the `|` of some words is, which stand once in a text."""
+    """Return the offset of the `|` of some words, which stand once in a text."""
     plain = words.replace("|", "")
     assert text.count(plain) == 1, f"{plain!r} stands {text.count(plain)} times there"
     return text.index(plain) + words.index("|")

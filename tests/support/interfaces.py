@@ -52,10 +52,10 @@ def enums(file: FileDescriptorProto) -> Iterator[tuple[str, EnumDescriptorProto]
 
 
 def breaks(before: FileDescriptorSet, after: FileDescriptorSet) -> list[str]:
-    """What a caller of an earlier version would stumble over in a later one, a line each; what is new breaks nothing.
+    """List changes that break callers of an earlier version in a later one, a line each; additions break nothing.
 
-    Bytes on the wire, JSON and the names in generated code count, so that nothing may go, and nothing may be called or
-    typed otherwise.
+    Bytes on the wire, JSON and the names in generated code count, so that nothing may go, and nothing may be called
+    or typed otherwise.
     """
     old, new = _facts(before), _facts(after)
     gone = [f"{what}: gone" for what in old if what not in new]

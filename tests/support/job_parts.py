@@ -62,7 +62,7 @@ class Parts:
 
 @dataclass
 class Choices:
-    """How the parts are made."""
+    """Choices for making the parts."""
 
     url: str = ""
     limits: JobLimits = field(default_factory=lambda: JobLimits(look_s=0.02, sweep_s=3600.0))
@@ -128,12 +128,15 @@ async def ended(manager: JobManager, job_id: str, caller: Caller = ME) -> JobRec
 
 
 async def has_begun(made: Parts, job_id: str, tasks: int = 1) -> bool:
-    """Whether a job is at work: it is marked as running before its worker begins, which has then begun so many."""
+    """Return True if a job is at work and so many tasks have begun.
+
+    It is marked as running before its worker begins.
+    """
     return len(made.workers.begun) == tasks and await is_in(made.manager, job_id, JobState.RUNNING)
 
 
 async def is_in(manager: JobManager, job_id: str, state: JobState) -> bool:
-    """Whether a job is in a state."""
+    """Return True if a job is in a state."""
     return (await manager.get(job_id, ME)).state is state
 
 

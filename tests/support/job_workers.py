@@ -20,10 +20,10 @@ _LOOK_S = 0.005
 
 
 class ScriptedWorkers:
-    """Such workers.
+    """Workers that do what the text of a task's main file says.
 
     Args:
-        capacity: How many there are; may be changed.
+        capacity: Number of workers; may be changed.
     """
 
     def __init__(self, capacity: int = 2) -> None:
@@ -97,7 +97,7 @@ def main_text(request: bytes) -> str:
 
 
 def messages_for(kind: TaskKind, text: str, size: int) -> tuple[bytes, ...]:
-    """What the workers make of a text."""
+    """Return the messages that the workers make of a text."""
     if kind is TaskKind.CHECK:
         return (pb.CheckResponse(diagnostics=[pb.Diagnostic(message=text)]).SerializeToString(),)
     if kind is TaskKind.SYNTHESIZE:

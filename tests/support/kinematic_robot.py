@@ -50,7 +50,10 @@ class Thing:
 
 @dataclass(slots=True)
 class World:
-    """What is around the robot. The LiDAR sees walls and obstacles, the camera things, the nearest over the others."""
+    """Surroundings of the robot.
+
+    The LiDAR sees walls and obstacles, the camera things, the nearest over the others.
+    """
 
     walls: list[Wall] = field(default_factory=list)
     obstacles: list[Thing] = field(default_factory=list)
@@ -62,12 +65,12 @@ class KinematicRobot:
 
     Args:
         peer: The node that it talks through.
-        world: What is around it.
-        camera: Makes its pictures (rgb8 or mono8, by their shape); None for no camera.
+        world: Surroundings of the robot.
+        camera: Function that makes its pictures (rgb8 or mono8, by their shape); None for no camera.
 
     Attributes:
-        has_odometry: Whether odometry is published.
-        on_step: Called when the robot has moved: what it does to the world.
+        has_odometry: True if odometry is published.
+        on_step: Function called when the robot has moved: its effect on the world.
     """
 
     def __init__(self, peer: Peer, world: World, camera: Callable[["KinematicRobot"], Picture] | None = None) -> None:
@@ -139,7 +142,7 @@ class KinematicRobot:
         self._peer.publish(message, "/scan", qos_profile_sensor_data)
 
     def ranges(self) -> NDArray[np.float64]:
-        """What the LiDAR measures; infinity where nothing is near enough."""
+        """Return the ranges that the LiDAR measures; infinity where nothing is near enough."""
         angles = self.yaw + np.arange(BEAMS) * math.tau / BEAMS
         directions = np.stack([np.cos(angles), np.sin(angles)])
         nearest = np.full(BEAMS, math.inf)
@@ -184,7 +187,7 @@ class KinematicRobot:
 
 
 def coloured_picture(robot: KinematicRobot) -> Picture:
-    """What a camera sees that looks straight ahead: every thing as a disc, nearer ones lower and over the others."""
+    """Draw the view of a camera that looks straight ahead: things as discs, nearer ones lower and over the others."""
     picture = np.full((PICTURE_HEIGHT, PICTURE_WIDTH, 3), 200, np.uint8)
     rows, columns = np.mgrid[0:PICTURE_HEIGHT, 0:PICTURE_WIDTH]
     pixels = PICTURE_WIDTH / (2 * math.tan(FIELD_OF_VIEW_RAD / 2))
@@ -198,7 +201,7 @@ def coloured_picture(robot: KinematicRobot) -> Picture:
 
 
 def floor_picture(robot: KinematicRobot, look_ahead: float = 0.3, view: float = 0.6) -> Picture:
-    """What a camera that looks down sees of a dark line along the x axis, at that distance and width of view."""
+    """Draw a dark line along the x axis as a camera that looks down sees it, at that distance and width of view."""
     picture = np.full((48, 64), 220, np.uint8)
     aside = -(robot.y + look_ahead * math.sin(robot.yaw)) / view
     middle = 64 * (0.5 - aside)

@@ -64,7 +64,7 @@ def recorded_launch(share: Path) -> Iterator[None]:
 
 
 def launch_actions(file: Path, share: Path) -> dict[str, list[Recorded]]:
-    """What the description of a launch file holds, by the name of its class.
+    """Return the actions in the description of a launch file, by the name of their class.
 
     Args:
         file: The launch file.
@@ -83,7 +83,7 @@ def launch_actions(file: Path, share: Path) -> dict[str, list[Recorded]]:
 
 
 def evaluated(item: Any, arguments: Mapping[str, str]) -> str:
-    """What a substitution stands for, given the launch file's arguments."""
+    """Return the value of a substitution, given the launch file's arguments."""
     if isinstance(item, str):
         return item
     if isinstance(item, list | tuple):

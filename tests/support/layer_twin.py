@@ -63,20 +63,20 @@ class Acting:
 
 
 def turned(history: list[Holds]) -> bool:
-    """Whether something held in an earlier state and does not in the last."""
+    """Return True if something held in an earlier state and does not in the last."""
     *earlier, last = history
     return any(state[place] and not now for state in earlier for place, now in enumerate(last))
 
 
 def has_bad_number(message: Any) -> bool:
-    """Whether a message of mappings has a NaN or an infinity."""
+    """Return True if a message of mappings has a NaN or an infinity."""
     if isinstance(message, dict):
         return any(map(has_bad_number, message.values()))
     return isinstance(message, float) and not math.isfinite(message)
 
 
 def is_zero(message: Any) -> bool:
-    """Whether it is the all-default message."""
+    """Return True if a message is the all-default message."""
     return message is None or all(value == 0 for value in message.values())
 
 
@@ -85,19 +85,20 @@ def _nothing(*names: str) -> str:
 
 
 def is_true(condition: Expression | None, message: Any) -> bool:
-    """Whether a condition over a message is true."""
+    """Return True if a condition over a message is true."""
     if condition is None:
         return True
     return evaluate(condition, _nothing, _nothing, lambda path: (message or {}).get(path[0])) is True
 
 
 class LayerTwin:
-    """What a layer should do.
+    """Expected behaviour of a layer.
 
     Attributes:
-        told: Everything that either side was told, in order; the caller's ends of one step come last, sorted.
+        told: Everything that was reported to either side, in order; the caller's ends of one step come last, sorted.
         events: Every event that happened.
-        unexpected: Replies that the model did not wait for, and cancels of what has ended for the caller.
+        unexpected: Number of replies that the model did not wait for, and of cancels of what has ended for the
+            caller.
     """
 
     def __init__(self, supervisor: Supervisor, settings: dict[str, Any]) -> None:

@@ -57,8 +57,8 @@ class LayerBench(Observed):
     """A layer with everything around it.
 
     Args:
-        system: What to execute.
-        start: Whether to start it.
+        system: System to execute.
+        start: True if it is started.
         settings: Settings by name.
     """
 

@@ -93,11 +93,11 @@ def supervisor_without_synthesis(text: str) -> Supervisor:
 
 
 class LiveRobot:
-    """A daemon whose supervisor is at work; every event is told to the feed, and every state is shown.
+    """A daemon whose supervisor is at work; every event is reported to the feed, and every state is shown.
 
     Args:
-        supervisor: What is executed.
-        seed: Of what happens.
+        supervisor: Supervisor that is executed.
+        seed: Seed of what happens.
     """
 
     def __init__(self, supervisor: Supervisor, seed: int = 1) -> None:

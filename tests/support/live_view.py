@@ -34,8 +34,8 @@ class StandIn:
     """The server, in a thread of its own; a context manager.
 
     Attributes:
-        port: Where it listens; the same again after `away`.
-        received: What pages have sent, decoded.
+        port: Port that it listens on; the same again after `away`.
+        received: Messages that pages have sent, decoded.
         texts: The same as it came.
     """
 
@@ -78,7 +78,7 @@ class StandIn:
         self._do(self._open())
 
     def greet(self, greeting: list[Message]) -> None:
-        """What whoever comes from now on is told first."""
+        """Set the messages that every page that connects from now on receives first."""
         self._greeting = greeting
         self._latest = _latest_of(greeting)
 

@@ -1,4 +1,4 @@
-"""What Kustomize makes of the folders in deploy/kubernetes."""
+"""Manifests that Kustomize makes of the folders in deploy/kubernetes."""
 
 import functools
 import shutil
@@ -15,7 +15,7 @@ type Manifest = dict[str, Any]
 
 
 def has_kustomize() -> bool:
-    """Whether there is a kubectl, which knows Kustomize."""
+    """Return True if there is a kubectl, which knows Kustomize."""
     return shutil.which("kubectl") is not None
 
 

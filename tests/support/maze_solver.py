@@ -19,11 +19,11 @@ class MazeSolver:
     """The robot and its supervisor.
 
     Attributes:
-        scene: In which it is.
-        latency_s: How old a scan is when the supervisor is told of it.
-        scan_s: Time between two of them.
-        tolerance_rad: By how much a turn may be off.
-        seed: Of the world's chance.
+        scene: Scene that it is in.
+        latency_s: Age of a scan when it is reported to the supervisor, in seconds.
+        scan_s: Time between two of them, in seconds.
+        tolerance_rad: Error that a turn may have, in radians.
+        seed: Seed of the world's chance.
     """
 
     scene: Scene

@@ -125,7 +125,7 @@ class _Writer:
         return f"{item.kind} {spelled(item.name)} with {', '.join(given)}{links}"
 
     def _source(self, type_: Type) -> Type:
-        """What a type crosses the middleware as."""
+        """Return the type as which a type crosses the middleware."""
         return self._source(self._model.enum(type_.name).source) if isinstance(type_, EnumType) else type_
 
     def _behaviour(self, item: Behaviour) -> str:

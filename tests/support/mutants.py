@@ -25,7 +25,7 @@ class Mutant[T]:
     """Something that was tampered with.
 
     Attributes:
-        name: How.
+        name: Kind of change.
         value: The result.
     """
 
@@ -103,7 +103,7 @@ def added_mutants(
 
 
 def is_right(system: System, added: Added, right: ExplicitSupervisor) -> bool:
-    """Whether conditions do, in every state that can be reached under them, what the right supervisor does."""
+    """Return True if conditions do what the right supervisor does, in every state that is reachable under them."""
     semantics = Semantics(system)
     graph = controlled_graph(semantics, added, limit=20_000)
     assert graph is not None

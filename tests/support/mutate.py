@@ -30,12 +30,12 @@ DEPTHS = (1, 10, 150, 199, 201, 1000, 20_000)
 
 
 def mutated(text: str, others: Sequence[str], dice: Random) -> str:
-    """A text with one to four random damages.
+    """Return a text with one to four random damages.
 
     Args:
-        text: What is damaged.
+        text: Text to damage.
         others: Texts that pieces may be taken from.
-        dice: Decides everything.
+        dice: Source of chance that decides everything.
     """
     for _ in range(dice.choice((1, 1, 2, 4))):
         text = dice.choice(_DAMAGES)(text, others, dice)
@@ -43,7 +43,7 @@ def mutated(text: str, others: Sequence[str], dice: Random) -> str:
 
 
 def _tokens(text: str, dice: Random) -> tuple[list[int], int]:
-    """Where the tokens begin, and the number of one of them."""
+    """Return the starts of the tokens, and the number of one of them."""
     starts = tokenize(text).starts
     return starts, dice.randrange(len(starts))
 

@@ -1,4 +1,4 @@
-"""What tests have of the npm registry: see package.json in tests/node, acceptance/vscode and editors/vscode."""
+"""Programs of the npm registry for tests: see package.json in tests/node, acceptance/vscode and editors/vscode."""
 
 import shutil
 from pathlib import Path

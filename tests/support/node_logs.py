@@ -48,7 +48,7 @@ class Recording:
         return data
 
     def is_default(self, communication: str, message: Any) -> bool:
-        """Whether everything is zero or empty."""
+        """Return True if everything is zero or empty."""
         if isinstance(message, dict):
             return all(self.is_default(communication, part) for part in message.values())
         return message in (None, 0, "")
@@ -90,7 +90,7 @@ class Reference:
 
     @property
     def entries(self) -> list[Entry]:
-        """What it has logged."""
+        """Entries that it has logged."""
         return self._log.entries
 
 
@@ -148,7 +148,10 @@ def _last_of_batches(model: Model) -> frozenset[str]:
 
 
 def comparable(entries: Iterable[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
-    """What must be the same of entries: all but times, and the data of what came, which each middleware has its own."""
+    """Return the parts of entries that must be equal.
+
+    These are all parts except times and the data of what came, of which each middleware has its own.
+    """
     found: list[tuple[Any, ...]] = []
     for entry in entries:
         if entry["kind"] == "event":

@@ -6,11 +6,11 @@ import sys
 from pathlib import Path
 
 PYTEST = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "test")
-"""What a package's page tells to run its tests with."""
+"""Command that a package's page says to run its tests with."""
 
 
 def own_tests(folder: Path, command: tuple[str, ...] = PYTEST) -> "subprocess.CompletedProcess[str]":
-    """What becomes of a generated package's own tests.
+    """Run a generated package's own tests and return the outcome.
 
     Args:
         folder: The package.

@@ -27,7 +27,7 @@ class Diagram:
 
 @dataclass
 class Section:
-    """What stands below a heading, up to the next one of any level."""
+    """Content below a heading, up to the next one of any level."""
 
     level: int
     title: str
@@ -76,7 +76,7 @@ def _line(line: str) -> str:
 
 
 def read_text(text: str) -> str:
-    """What a reader sees of Markdown on one line: plain words and code."""
+    """Return the text that a reader sees of Markdown on one line: plain words and code."""
     found, place = [], 0
     for match in _CODE.finditer(text):
         # Entities are read in HTML; in a code span every character is itself.

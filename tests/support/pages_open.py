@@ -54,7 +54,7 @@ class OpenPage:
         return [entry for message in self.messages if message["type"] == "events" for entry in message["entries"]]
 
     def lost(self) -> int:
-        """How many were told to be lost."""
+        """Return the number of entries that were reported lost."""
         return sum(message["lost"] for message in self.messages if message["type"] == "events")
 
 

@@ -14,7 +14,7 @@ from typing import Self
 from robosc_bridge.simulated.virtual_host import VirtualHost
 
 Answers = Iterable[bytes | float]
-"""What to send, in order; a number is a pause in seconds."""
+"""Data to send, in order; a number is a pause in seconds."""
 
 
 def _obey(peer: "VirtualPeer | Peer", heard: bytes, sleep: Callable[[float], object]) -> bytes:
@@ -31,15 +31,17 @@ def _obey(peer: "VirtualPeer | Peer", heard: bytes, sleep: Callable[[float], obj
 
 
 class VirtualPeer:
-    """The far end of a line on a virtual host, served by one of its threads until it is closed; the host ends with it.
+    """The far end of a line on a virtual host, served by one of its threads until it is closed.
+
+    The host ends with it.
 
     Args:
-        answer: Called with every whole request of protocol 2.0.
+        answer: Function called with every whole request of protocol 2.0.
 
     Attributes:
         time: The virtual host.
-        path: Of the near end.
-        requests: That have come.
+        path: Path of the near end.
+        requests: Requests that have come.
     """
 
     def __init__(self, answer: Callable[[bytes], Answers]) -> None:
@@ -78,11 +80,11 @@ class Peer:
     """The far end of a real line, served by a thread until it is closed.
 
     Args:
-        answer: Called with every whole request of protocol 2.0.
+        answer: Function called with every whole request of protocol 2.0.
 
     Attributes:
-        path: Of the near end.
-        requests: That have come.
+        path: Path of the near end.
+        requests: Requests that have come.
     """
 
     def __init__(self, answer: Callable[[bytes], Answers]) -> None:

@@ -179,7 +179,7 @@ class Porter:
         )
 
     def is_blocked(self, identifier: str) -> bool:
-        """Whether something was told as held back."""
+        """Return True if something was reported as held back."""
         return any(item.data == identifier for item in self.blocked)
 
     def send(self, speed: float, **others: float) -> None:
@@ -231,11 +231,11 @@ class Porter:
 
 @contextmanager
 def porter_robot(workspace: Path, folder: Path) -> Iterator[Porter]:
-    """A robot on a domain of its own; its layer is ended at the latest at the end.
+    """Yield a robot on a domain of its own; its layer is ended at the latest at the end.
 
     Args:
-        workspace: Where the generated package is.
-        folder: For what processes write.
+        workspace: Workspace that has the generated package.
+        folder: Folder for what processes write.
     """
     with own_domain() as domain:
         variables = environment(domain, folder)

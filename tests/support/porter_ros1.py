@@ -72,8 +72,8 @@ class Porter:
         package: The generated package.
         master: The ROS master.
         peer: Robot, observer and existing controller in one process; it has the servers.
-        folder: For what processes write.
-        has_servers: Whether it has servers at all.
+        folder: Folder for what processes write.
+        has_servers: True if it has servers at all.
     """
 
     def __init__(self, package: Path, master: Master, peer: Peer, folder: Path, has_servers: bool) -> None:
@@ -183,7 +183,7 @@ class Porter:
 
     @property
     def speed(self) -> float:
-        """How fast the robot drives: as the last command says."""
+        """Speed of the robot, as in the last command."""
         return float(self.commands[-1]["linear"]["x"]) if self.commands else 0.0
 
     @property

@@ -26,7 +26,7 @@ _USER = "postgres"
 
 @cache
 def _programs() -> Path | None:
-    """Where the newest server's programs are."""
+    """Return the folder of the newest server's programs."""
     found = sorted(Path("/usr/lib/postgresql").glob("*/bin/postgres"), key=lambda path: int(path.parts[-3]))
     return found[-1].parent if found else None
 

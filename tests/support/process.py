@@ -16,10 +16,10 @@ class Process:
     """A program; it and its children are ended at the latest when the `with` block ends.
 
     Args:
-        command: What to run.
+        command: Command to run.
         variables: Its environment.
         folder: Folder for its output, in which it runs.
-        stdin: What it reads: a file descriptor, or one of the constants of `subprocess`.
+        stdin: Its standard input: a file descriptor, or one of the constants of `subprocess`.
     """
 
     def __init__(
@@ -41,17 +41,17 @@ class Process:
 
     @property
     def stderr(self) -> str:
-        """What it has written to standard error so far."""
+        """Text that it has written to standard error so far."""
         return self._error_file.read_text(errors="replace")
 
     @property
     def stdout(self) -> str:
-        """What it has written to standard output so far."""
+        """Text that it has written to standard output so far."""
         return self._output_file.read_text(errors="replace")
 
     @property
     def is_running(self) -> bool:
-        """Whether it has not ended."""
+        """True if it has not ended."""
         return self.popen.poll() is None
 
     def resident_kb(self) -> int:

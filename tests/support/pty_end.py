@@ -31,7 +31,7 @@ class PtyEnd:
             data = data[os.write(self.master, data) :]
 
     def receive(self, length: int) -> bytes:
-        """So many bytes that were written to the port."""
+        """Read `length` bytes that were written to the port."""
         found = b""
         while len(found) < length:
             assert self._is_readable(LIMIT_S), f"only {found.hex(' ')} came"
@@ -39,7 +39,7 @@ class PtyEnd:
         return found
 
     def is_silent(self) -> bool:
-        """Whether nothing that was written to the port waits."""
+        """Return True if nothing that was written to the port waits."""
         return not self._is_readable(0.0)
 
     def baud_constant(self) -> int:

@@ -94,11 +94,11 @@ class _Part:
 def random_controller(
     seed: int, *, is_plain: bool = False, enums: tuple[EnumDefinition, ...] = ENUMS
 ) -> Supervisor | None:
-    """The supervisor of a random robot, the same for the same seed; None if there is none.
+    """Return the supervisor of a random robot, the same for the same seed; None if there is none.
 
     Args:
-        seed: Decides everything else.
-        is_plain: Whether the robot has no taus and no actions.
+        seed: Seed that decides everything else.
+        is_plain: True if the robot has no taus and no actions.
         enums: The rules of its two enums.
     """
     model = msgspec.structs.replace(_model(Random(seed), is_plain), enums=enums)

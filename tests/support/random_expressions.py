@@ -113,7 +113,7 @@ conditions: st.SearchStrategy[Expression] = st.recursive(_atoms, _conditions, ma
 
 
 def _is_of_the_language(expression: Expression) -> bool:
-    """Whether RoboSC has words for all of it: only automata divide whole numbers."""
+    """Return True if RoboSC has words for all of it: only automata divide whole numbers."""
     if isinstance(expression, Binary) and expression.operator in ("div", "mod"):
         return False
     return all(_is_of_the_language(item) for item in children(expression))

@@ -50,7 +50,7 @@ def relaid(text: str, dice: Random) -> str:
 
 @dataclass
 class _Component:
-    """What other parts of a model may say of a component."""
+    """Facts of a component that other parts of a model may refer to."""
 
     name: str
     states: list[str] = field(default_factory=list)
@@ -59,11 +59,11 @@ class _Component:
 
 
 class _Author:
-    """Writes one bundle.
+    """Author of one bundle.
 
     Args:
-        dice: Decides everything.
-        part_b: Whether to use the language's extensions.
+        dice: Source of chance that decides everything.
+        part_b: True if the language's extensions are used.
     """
 
     def __init__(self, dice: Random, part_b: bool) -> None:
@@ -77,7 +77,7 @@ class _Author:
         return self._dice.random() < share
 
     def _extra(self, share: float) -> bool:
-        """Whether to write something of part B."""
+        """Return True if something of part B is to be written."""
         return self._part_b and self._chance(share)
 
     def _new(self, stem: str) -> str:

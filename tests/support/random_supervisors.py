@@ -158,7 +158,7 @@ MESSAGE_NAMES = ("import", "step", "m", "m_request", "_", "print", "read", "asyn
 
 @dataclass(frozen=True, slots=True)
 class _World:
-    """What expressions may speak of."""
+    """Subjects that expressions may refer to."""
 
     variables: tuple[tuple[str, Variable], ...]
     states: tuple[tuple[str, str], ...]
@@ -166,7 +166,7 @@ class _World:
     is_finite: bool = False
 
     def finite(self) -> "_World":
-        """What takes part in synthesis: only its own variables and finite data."""
+        """Return the subjects that take part in synthesis: only its own variables and finite data."""
         return replace(self, variables=tuple(item for item in self.variables if item[1].is_synthesis), is_finite=True)
 
 

@@ -115,7 +115,7 @@ def _of_seed(seed: int, *, is_wide: bool) -> System:
 
 @lru_cache(maxsize=1024)
 def explicit_supervisor(system: System) -> ExplicitSupervisor | None:
-    """What the slow, obvious synthesizer finds, worked out once; None beyond `MAXIMUM_STATES`."""
+    """Return the supervisor of the slow, obvious synthesizer, worked out once; None beyond `MAXIMUM_STATES`."""
     return synthesize_explicit(system, limit=MAXIMUM_STATES)
 
 
@@ -132,7 +132,7 @@ def _chosen(random: Random, *, is_wide: bool) -> System:
 
 
 def disables_something(system: System, supervisor: ExplicitSupervisor) -> bool:
-    """Whether the supervisor forbids, in a reachable state, what plants and requirements would allow."""
+    """Return True if the supervisor forbids, in a reachable state, what plants and requirements would allow."""
     semantics = Semantics(system)
     return any(
         semantics.enabled(state, event.name)
@@ -328,7 +328,7 @@ class _Builder:
         return EnumValue(COLOUR.name, str(value)) if isinstance(type_, EnumType) else Constant(value)
 
     def _condition_on(self, inputs: list[InputVariable]) -> Expression:
-        """Whether one or two received data have some values; unknown where such a datum is."""
+        """Return the condition that one or two received data have some values; unknown where such a datum is."""
         parts = [
             Binary("=", Received(item.path), self._constant(item.type))
             for item in self.random.sample(inputs, min(len(inputs), self.random.choice((1, 2))))

@@ -25,7 +25,7 @@ PROGRAM = "controller"
 
 
 def missing(*packages: str) -> str | None:
-    """What is missing to compile such nodes with the messages of some packages, as a reason to skip."""
+    """Name the parts missing to compile such nodes with the messages of some packages, as a reason to skip."""
     lacking = [name for name in ("gcc", "g++") if shutil.which(name) is None]
     include = Path(sys.prefix) / "include"
     lacking += [
@@ -84,7 +84,7 @@ def run(program: Path, lines: Sequence[str], *parameters: str) -> subprocess.Com
 
 
 def sent(output: str, but: str = "/diagnostics") -> list[tuple[str, str, str]]:
-    """What a node did: word (publish, call, goal, cancel), name, and the data, of each but one topic."""
+    """Return the outputs of a node, except those of one topic: word (publish, call, goal, cancel), name, and data."""
     found = [re.fullmatch(r"(\w+) (\S+) (.*)", line) for line in output.splitlines()]
     assert all(found), output
     return [(match[1], match[2], match[3]) for match in found if match and match[2] != but]

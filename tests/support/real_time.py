@@ -17,10 +17,10 @@ class MachineLateError(Exception):
 
 
 class Lateness:
-    """How late a thread of this process is at its worst: a busy machine's share in what a test measures.
+    """Worst lateness of a thread of this process: a busy machine's share in what a test measures.
 
     Attributes:
-        worst_s: So far.
+        worst_s: Worst lateness so far, in seconds.
     """
 
     def __init__(self) -> None:

@@ -13,11 +13,11 @@ from support.generated import example_supervisor
 
 
 def recorded(folder: Path, faults: tuple[str, ...] = ()) -> Outcome:
-    """A maze solver that has turned and driven, as its processes would have left it.
+    """Record a maze solver that has turned and driven, as its processes would have left it.
 
     Args:
-        folder: Where to; made anew.
-        faults: What was wrong with its motion.
+        folder: Folder for the record; made anew.
+        faults: Faults of its motion.
     """
     folder.mkdir(parents=True, exist_ok=True)
     supervisor = example_supervisor("maze_solver/maze_solver")

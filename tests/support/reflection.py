@@ -11,7 +11,7 @@ from google.protobuf.message_factory import GetMessageClass
 from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
 
 PATIENCE_S = 60.0
-"""How long a call may take."""
+"""Maximum duration of a call, in seconds."""
 
 
 class ReflectionClient:

@@ -1,4 +1,4 @@
-"""What a server says of a call that it refuses."""
+"""Details that a server reports of a call that it refuses."""
 
 from typing import Any
 

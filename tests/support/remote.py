@@ -113,12 +113,14 @@ def scan(first_m: float) -> Scan:
 
 
 class FakeDaemon:
-    """What a face talks to; a thread takes what is posted and shows a new snapshot, as the loop does in each turn.
+    """Daemon that a face talks to.
+
+    A thread takes what is posted and shows a new snapshot, as the loop does in each turn.
 
     Attributes:
-        seen: How often the operator was seen.
-        refusal: What orders are answered with; None: they are not answered.
-        handle: Called in the loop's thread with each thing that programs tell.
+        seen: Number of times that the operator was seen.
+        refusal: Answer to orders; None: they are not answered.
+        handle: Function called in the loop's thread with each thing that programs report.
     """
 
     def __init__(self, *, is_layer: bool = False) -> None:
@@ -156,11 +158,11 @@ class FakeDaemon:
 
     @property
     def waiting(self) -> int:
-        """How much is posted and not handled."""
+        """Number of items that are posted and not handled."""
         return self._inbox.qsize()
 
     def commands(self) -> list[Command]:
-        """What was ordered."""
+        """Return the commands that were ordered."""
         return [order.command for order in self.orders]
 
     def program(self) -> Program:
@@ -168,7 +170,7 @@ class FakeDaemon:
         return wait_until(lambda: self.told[0].program if self.told else None)
 
     def of(self, kind: type[Any]) -> list[Any]:
-        """What was told of a kind."""
+        """Return the reported items of a kind."""
         return [item for item in self.told if isinstance(item, kind)]
 
     def _post(self, item: Order | FromProgram) -> None:
@@ -235,7 +237,7 @@ class Attachment:
         return next(self.call)
 
     def failure(self) -> tuple[grpc.StatusCode, str]:
-        """How the stream was ended."""
+        """Return the status code and the details with which the stream was ended."""
         try:
             for _ in self.call:
                 pass

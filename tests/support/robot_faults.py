@@ -23,11 +23,11 @@ class Fault:
     """Something that goes wrong with a robot that moves.
 
     Attributes:
-        row: Of the table on the page.
-        cause: Lets it happen.
-        problem: What the run ends with.
-        bases: Where it can happen.
-        is_line: Whether the base itself is lost with it, which the model is told.
+        row: Row of the table on the page.
+        cause: Function that lets it happen.
+        problem: Problem that the run ends with.
+        bases: Bases where it can happen.
+        is_line: True if the base itself is lost with it, which is reported to the model.
     """
 
     row: str

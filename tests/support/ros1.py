@@ -31,7 +31,7 @@ _MODULES = (
 
 @cache
 def missing() -> str | None:
-    """Why tests that need ROS 1 cannot run here; None if they can."""
+    """Return the reason why tests that need ROS 1 cannot run here; None if they can."""
     if not Path(PYTHON).exists() or shutil.which("rosmaster", path="/usr/bin") is None:
         return "ROS 1 (rosmaster) is not installed"
     command = [PYTHON, "-c", f"import {_MODULES}"]
@@ -87,7 +87,7 @@ class Master:
         return Process(["/usr/bin/rosmaster", "--core", "-p", str(self.port)], self.variables, folder / "master")
 
     def is_up(self) -> bool:
-        """Whether it answers."""
+        """Return True if the master answers."""
         try:
             with xmlrpc.client.ServerProxy(self.variables["ROS_MASTER_URI"]) as master:
                 master.getPid("/test")
@@ -122,18 +122,18 @@ class Peer:
     """The other side of a node: a process of `ros1_peer`, told what to do.
 
     Args:
-        master: Whom it talks to.
+        master: Master that it talks to.
         folder: Folder for its output.
         name: Name of its node.
 
     Attributes:
         received: Messages by topic, with the time of each.
-        requests: What services were asked, by name.
-        goals: What actions were asked, by name.
-        cancels: How often an action was cancelled, by name.
+        requests: Requests to services, by name.
+        goals: Goals of actions, by name.
+        cancels: Number of cancels of an action, by name.
         called: The numbers of calls that it made; may be emptied.
-        replies: What became of calls that it made, by number.
-        sent: What was heard of goals that it sent, by number.
+        replies: Outcomes of calls that it made, by number.
+        sent: Everything heard of goals that it sent, by number.
     """
 
     def __init__(self, master: Master, folder: Path, name: str = "test_peer") -> None:
@@ -236,7 +236,7 @@ class Peer:
         return [*reply["publishers"], *reply["subscribers"]]
 
     def names(self) -> Any:
-        """What the master knows: nodes by topic and service."""
+        """Return the names that the master knows: nodes by topic and service."""
         self.do("names")
         return self._reply("names")["names"]
 

@@ -37,7 +37,7 @@ _NEEDED = (
 
 
 def missing() -> str | None:
-    """What is missing to build and run roscpp nodes, as a reason to skip; None if nothing is."""
+    """Name the parts missing to build and run roscpp nodes, as a reason to skip; None if nothing is."""
     tools = [name for name in ("cmake", "g++", "rosmaster") if shutil.which(name, path="/usr/bin:/bin") is None]
     files = [str(path) for path in _NEEDED if not path.exists()]
     lacking = [*tools, *files]
@@ -179,6 +179,6 @@ class Peer:
 
 
 def node_command(workspace: Path, *parameters: str) -> list[str]:
-    """How to start the one node of a built package, with private parameters such as `period:=0.02`."""
+    """Return the command that starts the one node of a built package, with private parameters like `period:=0.02`."""
     (program,) = (workspace / "build" / "devel" / "lib").glob("*/controller")
     return [str(program), *(f"_{parameter}" for parameter in parameters)]

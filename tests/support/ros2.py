@@ -52,11 +52,11 @@ class RosProcess(Process):
     """A program on ROS 2.
 
     Args:
-        command: What to run, after the interpreter.
+        command: Command to run, after the interpreter.
         variables: Environment on top of this process's.
         folder: Folder for its output.
         python_path: Folders to import from.
-        stdin: What it reads: a file descriptor, or one of the constants of `subprocess`.
+        stdin: Its standard input: a file descriptor, or one of the constants of `subprocess`.
         program: The interpreter, or another program.
     """
 
@@ -161,12 +161,12 @@ class Peer:
         """Handle messages until a condition is true.
 
         Args:
-            condition: What is waited for.
-            limit_s: After which it is a failure.
-            what: In words, for the failure.
-            process: One whose early end is a failure, too.
-            repeat: Called now and again: the first messages of a new connection may be lost.
-            repeat_every_s: How often.
+            condition: Condition to wait for.
+            limit_s: Time after which it is a failure, in seconds.
+            what: Description of the condition in words, for the failure.
+            process: Process whose early end is a failure, too.
+            repeat: Function called now and again: the first messages of a new connection may be lost.
+            repeat_every_s: Time between two calls of it, in seconds.
 
         Raises:
             AssertionError: It did not become true in time.

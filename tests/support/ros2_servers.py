@@ -64,10 +64,10 @@ class ServerHost:
 
 
 class Gate:
-    """Waits until a value is there; the first one counts.
+    """Gate that waits until a value is there; the first one counts.
 
     Attributes:
-        is_over: Whether what waited for it has done what it does then.
+        is_over: True if what waited for it has done what it does then.
     """
 
     def __init__(self) -> None:
@@ -83,7 +83,7 @@ class Gate:
 
     @property
     def is_open(self) -> bool:
-        """Whether it is there."""
+        """True if the value is there."""
         return self._event.is_set()
 
     def pause(self, limit_s: float) -> None:
@@ -100,7 +100,7 @@ class HeldService:
     """A service that answers a call when it is told to.
 
     Args:
-        host: Where it runs.
+        host: Host that it runs on.
         service_class: Its type.
         name: Its name.
     """
@@ -127,7 +127,7 @@ class HeldService:
 
 
 class End(Enum):
-    """How a server ends a goal."""
+    """Way in which a server ends a goal."""
 
     SUCCEED = "succeed"
     ABORT = "abort"
@@ -138,12 +138,12 @@ class HeldAction:
     """An action whose goals end when it is told to, or when they are cancelled.
 
     Args:
-        host: Where it runs.
+        host: Host that it runs on.
         action_class: Its type.
         name: Its name.
-        accepts: Whether it accepts goals.
-        cancels: Whether it accepts cancels.
-        ends_on_cancel: Whether a cancelled goal ends by itself.
+        accepts: True if it accepts goals.
+        cancels: True if it accepts cancels.
+        ends_on_cancel: True if a cancelled goal ends by itself.
     """
 
     def __init__(
@@ -209,7 +209,7 @@ class HeldAction:
         self.handles[-1].publish_feedback(self.action_class.Feedback(**fields))
 
     def is_last_over(self) -> bool:
-        """Whether the last goal has ended."""
+        """Return True if the last goal has ended."""
         return bool(self._gates) and self._gates[-1].is_over
 
     def end(self, how: End, **fields: Any) -> None:

@@ -1,4 +1,4 @@
-"""What tests of the generated ROS packages of supervision layers share."""
+"""Parts that tests of the generated ROS packages of supervision layers share."""
 
 import ast
 import xml.etree.ElementTree as ElementTree

@@ -76,7 +76,7 @@ class Bench:
 
     @property
     def speed_m_s(self) -> float:
-        """That its motors are told."""
+        """Speed that its motors are ordered to have, in m/s."""
         wheels = (self.world.left, self.world.right)
         return sum(wheel.goal_rad_s * 0.033 / 2 for wheel in wheels if wheel.is_driven)
 

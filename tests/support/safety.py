@@ -33,16 +33,16 @@ def near(linear_m_s: float, angular_rad_s: float = 0.0) -> Any:
 
 
 class Bench:
-    """Does what the threads of a bridge do, once for each cycle.
+    """Bench that does what the threads of a bridge do, once for each cycle.
 
     Attributes:
-        layer: Under test.
-        now_s: Of the last cycle.
-        last: What it put out.
-        silent: What is not reported: "scan", "drive", "loop", "operator", "command".
-        wheels_m_s: What the wheels do; None: as they are told.
-        holds: Whether the motors hold; None: as they are told.
-        ranges_m: What a full scan shows.
+        layer: Safety layer under test.
+        now_s: Time of the last cycle, in seconds.
+        last: Output of the last cycle.
+        silent: Names of reports that are left out: "scan", "drive", "loop", "operator", "command".
+        wheels_m_s: Speeds of the wheels, in m/s; None: as ordered.
+        holds: True if the motors hold; None: as ordered.
+        ranges_m: Ranges of a full scan, in metres.
     """
 
     def __init__(self, **changes: Any) -> None:
@@ -58,7 +58,7 @@ class Bench:
         self.last = Output(STANDSTILL, False, (), ())
 
     def report(self) -> None:
-        """What the other threads report at this time."""
+        """Make the reports of the other threads at this time."""
         facts: dict[str, Callable[[float], None]] = {
             "scan": lambda now_s: self.layer.saw_scan(now_s, self.ranges_m),
             "loop": self.layer.loop_turned,
@@ -101,7 +101,7 @@ class Bench:
         return self.last.velocity
 
     def until_still(self, limit_s: float) -> tuple[float, Reason]:
-        """How long it takes until standstill is put out, and for which reason."""
+        """Run until standstill is put out; return the time that it takes, in seconds, and the reason."""
         begin_s = self.now_s
         while self.cycle().velocity != STANDSTILL:
             assert self.now_s - begin_s <= limit_s, "still moving"

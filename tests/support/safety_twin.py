@@ -42,7 +42,7 @@ class SafetyTwin:
         self.past.append(Past(name, value, time_s))
 
     def _since_last(self, *names: str) -> list[Past]:
-        """What has happened after the last of these, and it first; all if there was none."""
+        """Return everything that has happened from the last of these on, that one included; all if there was none."""
         for index in reversed(range(len(self.past))):
             if self.past[index].name in names:
                 return self.past[index:]
@@ -82,7 +82,7 @@ class SafetyTwin:
         return mean_v
 
     def _torque_story(self) -> tuple[bool, bool, float | None]:
-        """Whether the motors told that they hold, whether they let go since, and for how long a wheel is off."""
+        """Tell whether the motors reported that they hold, whether they let go since, and how long a wheel is off."""
         began = [each for each in self.past if each.name in ("output", "drive")]
         for index in reversed(range(len(began))):
             if began[index].name == "output" and began[index].torque_since_s is None:
@@ -113,7 +113,7 @@ class SafetyTwin:
         return is_seen, is_lost, longest_s
 
     def latched(self) -> set[Reason]:
-        """What has happened since the last reset that was allowed, and holds until the next."""
+        """Return the reasons that have arisen since the last reset that was allowed, and that hold until the next."""
         found = set[Reason]()
         begin = 0
         for index, each in enumerate(self.past):
@@ -146,7 +146,7 @@ class SafetyTwin:
         return found | ({Reason.OPERATOR_STOP} if self.limits.is_torque_off_on_operator_stop else set())
 
     def reset(self) -> tuple[Reason, ...]:
-        """What forbids it."""
+        """Return the reasons that forbid a reset."""
         last, readings = self._last("output"), self._readings()
         remaining = set[Reason]()
         for reason in self.latched():
@@ -185,7 +185,7 @@ class SafetyTwin:
         return STANDSTILL
 
     def _is_held(self) -> bool:
-        """Whether there was a change or a reason since, or at, the last output."""
+        """Return True if there was a change or a reason since, or at, the last output."""
         since = self._since_last("output")
         if not since or since[0].name != "output" or since[0].reasons - {Reason.COMMAND_SILENT}:
             return True
@@ -210,7 +210,7 @@ class SafetyTwin:
         return aim if abs(aim - present) <= most else present + math.copysign(most, aim - present)
 
     def output(self, now_s: float) -> Output:
-        """What the layer should put out; its warnings are not told."""
+        """Return the output that the layer should give; its warnings are left out."""
         limits = self.limits
         last = self._last("output") or Past("output")
         is_clock_wrong = not (math.isfinite(now_s) and now_s >= last.now_s)
@@ -271,7 +271,7 @@ class SafetyTwin:
         return Output(velocity, since_s is not None, tuple(reason for reason in Reason if reason in reasons), ())
 
     def _is_blind(self) -> bool:
-        """Whether the last scan that tells of ranges shows nothing where the last command leads to."""
+        """Return True if the last scan that reports ranges shows nothing where the last command leads to."""
         asked_m_s, scan = 0.0, list[float]()
         for each in self.past:
             if each.name == "disable" or (each.name == "reset" and each.value):

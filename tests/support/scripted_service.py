@@ -73,10 +73,10 @@ def held(context: grpc.ServicerContext) -> Iterator[Any]:
 
 @dataclass
 class Script:
-    """What a server answers.
+    """Answers of a server.
 
     Attributes:
-        answers: For each method the answers to its first call, its second, and so on; the last is repeated.
+        answers: Answers by method: to its first call, its second, and so on; the last is repeated.
         requests: Method and request of each call that came.
     """
 
@@ -123,11 +123,11 @@ def kept_port() -> Iterator[int]:
 
 @contextmanager
 def scripted(script: Script | None = None, /, *, port: Any = 0, **answers: Any) -> Iterator[Any]:
-    """A server that answers as written; yields its address and its script.
+    """Run a server that answers as written; yield its address and its script.
 
     Args:
-        script: What it answers.
-        port: Where it listens, one of `kept_port`; 0: anywhere.
+        script: Script of its answers.
+        port: Port that it listens on, one of `kept_port`; 0: any.
         answers: The same in short, for a new script.
     """
     chosen = script or Script(answers)

@@ -32,14 +32,14 @@ def served(
     loop: asyncio.AbstractEventLoop | None = None,
     **settings: Any,
 ) -> Iterator[str]:
-    """A server in a thread of this process; yields its address.
+    """Run a server in a thread of this process; yield its address.
 
     Args:
-        task_function: What does the tasks, such as `fake_tasks.TASK_FUNCTION`.
-        given_workers: Who does the tasks instead, not started yet; None: processes of this machine, which take most of
-            the time until it serves.
-        loop: What it runs on, such as a `HeldLoop`; None: a new one.
-        **settings: Those that are not as usual.
+        task_function: Function that does the tasks, such as `fake_tasks.TASK_FUNCTION`.
+        given_workers: Workers that do the tasks instead, not started yet; None: processes of this machine, which take
+            most of the time until it serves.
+        loop: Event loop that it runs on, such as a `HeldLoop`; None: a new one.
+        **settings: Settings that are not as usual.
     """
     # Its log goes where pytest hears it, and not to whatever was standard output when the first line was written.
     structlog.configure(logger_factory=structlog.stdlib.LoggerFactory(), cache_logger_on_first_use=False)

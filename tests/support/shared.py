@@ -1,4 +1,4 @@
-"""What takes long to build, once for all workers of a run."""
+"""Folders that take long to build, made once for all workers of a run."""
 
 import os
 from collections.abc import Callable
@@ -10,12 +10,12 @@ from support.colcon import locked
 
 
 def shared(factory: pytest.TempPathFactory, name: str, build: Callable[[Path], object]) -> Path:
-    """A folder that all workers of a run share; whoever comes first builds in it, the others wait for it.
+    """Return a folder that all workers of a run share; whoever comes first builds in it, the others wait for it.
 
     Args:
-        factory: That of the run.
-        name: For the folder.
-        build: Is given the folder, which is empty.
+        factory: Factory of the run.
+        name: Name for the folder.
+        build: Function that is given the folder, which is empty.
     """
     own = factory.getbasetemp()
     base = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own

@@ -85,7 +85,7 @@ class Ended:
 
 
 class ReadLog:
-    """What was logged."""
+    """Log that was written."""
 
     def __init__(self, stream: io.StringIO) -> None:
         self._stream = stream

@@ -13,12 +13,12 @@ DEPTH = 20_000
 
 @dataclass(frozen=True)
 class Answer:
-    """What spin found.
+    """Findings of spin.
 
     Attributes:
-        errors: Whether it found fault with the model without a property: an assertion.
+        errors: True if it found fault with the model without a property: an assertion.
         states: States that it stored, without a property.
-        verdicts: Whether each property holds, by name.
+        verdicts: Verdict on each property, by name: True if it holds.
     """
 
     errors: bool

@@ -47,15 +47,15 @@ class SteppedTwin:
 
     Args:
         model: Name of an example, such as `maze_solver/maze_solver`.
-        scene: Around it.
-        folder: Where its event log and its motion are written.
-        deployment: Where its supervisor stands.
-        seed: Of what the scene leaves to chance.
+        scene: Scene around it.
+        folder: Folder for its event log and its motion.
+        deployment: Deployment of its supervisor.
+        seed: Seed of what the scene leaves to chance.
 
     Attributes:
-        world: In which it is.
-        executor: What decides.
-        held_back: How many velocities of the existing controller were not let through.
+        world: World that it is in.
+        executor: Executor or layer that decides.
+        held_back: Number of velocities of the existing controller that were not let through.
         called: Services that were called.
     """
 
@@ -112,7 +112,7 @@ class SteppedTwin:
 
     @property
     def is_standing(self) -> bool:
-        """Whether its wheels stand still."""
+        """True if its wheels stand still."""
         return abs(self.world.speed_m_s) < STILL_M_S and abs(self.world.turn_rad_s) < STILL_RAD_S
 
     @property

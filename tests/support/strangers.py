@@ -21,11 +21,11 @@ class Stranger:
     Args:
         address: `HOST:PORT`.
         source: Address of this machine that it comes from; empty: any.
-        settings: Of HTTP/2, by number.
+        settings: Settings of HTTP/2, by number.
 
     Attributes:
-        is_open: Whether the server has not ended it.
-        frames: Kind, flags and content of those that came.
+        is_open: True if the server has not ended it.
+        frames: Kind, flags and content of the frames that came.
     """
 
     def __init__(self, address: str, source: str = "", settings: Mapping[int, int] | None = None) -> None:
@@ -63,12 +63,12 @@ class Stranger:
             self.send(DATA, 0, stream, data[place : place + _FRAME_BYTES])
 
     def was_told(self, words: bytes) -> bool:
-        """Whether headers or trailers that came hold some words."""
+        """Return True if headers or trailers that came hold some words."""
         return any(kind == HEADERS and words in content for kind, _, content in self.frames)
 
     @property
     def ended(self) -> int:
-        """How many calls the server has ended."""
+        """Number of calls that the server has ended."""
         return sum(kind == HEADERS and bool(flags & END_OF_STREAM) for kind, flags, _ in self.frames)
 
     def close(self) -> None:
@@ -94,12 +94,12 @@ class Stranger:
 
 @contextmanager
 def strangers(address: str, count: int, **how: Any) -> Iterator[list[Stranger]]:
-    """So many of them.
+    """Open `count` connections of this kind; yield them.
 
     Args:
         address: `HOST:PORT`.
-        count: How many.
-        **how: As for each of them.
+        count: Number of connections.
+        **how: Arguments of each of them.
     """
     with ExitStack() as stack:
         made = []

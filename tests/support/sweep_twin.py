@@ -30,7 +30,10 @@ class Done:
 
 
 def twin_of_sweep(results: list[Kept], jobs: list[Done], bound: int) -> tuple[list[Kept], list[Done]]:
-    """What is left, of jobs in the order of their ends: one thing goes at a time, and everything is counted anew."""
+    """Return the results and jobs that are left, of jobs in the order of their ends.
+
+    One thing goes at a time, and everything is counted anew.
+    """
 
     def referred(owner: str, among: list[Done]) -> int:
         keys = {job.key for job in among if job.owner == owner}

@@ -18,11 +18,11 @@ class Terminal:
     """The command on a pseudo-terminal.
 
     Args:
-        address: Of the bridge.
+        address: Address of the bridge.
 
     Attributes:
-        answers: Whether it tells that it is there when it is asked (DSR 5), as real ones do.
-        asked: How often it was asked.
+        answers: True if it reports that it is there when it is asked (DSR 5), as real ones do.
+        asked: Number of times that it was asked.
     """
 
     def __init__(self, address: str) -> None:
@@ -57,7 +57,7 @@ class Terminal:
 
     @property
     def is_raw(self) -> bool:
-        """Whether keys are given one by one and not shown."""
+        """True if keys are given one by one and not shown."""
         return not termios.tcgetattr(self._number)[3] & (termios.ICANON | termios.ECHO)
 
     def close(self) -> None:

@@ -27,7 +27,7 @@ _RECURSION = 50_000
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What is wrong with a text: a code of the language's diagnostics, and where."""
+    """Fault of a text: a code of the language's diagnostics, and its place."""
 
     code: str
     line: int
@@ -36,12 +36,12 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Parsed:
-    """What became of a text.
+    """Outcome of parsing a text.
 
     Attributes:
         tree: The syntax tree, or None where something is wrong.
-        findings: All that is wrong with a text that the grammar reads, by place; else the one place where it stops.
-        stopped: Whether the grammar does not read the text.
+        findings: All faults of a text that the grammar reads, by place; else the one place where it stops.
+        stopped: True if the grammar does not read the text.
     """
 
     tree: syntax.File | None

@@ -31,7 +31,7 @@ _FENCE = re.compile(r"^```(?P<info>.*)$")
 
 
 class Mode(Enum):
-    """What a block does to its file."""
+    """Effect of a block on its file."""
 
     WHOLE = "whole"
     ADD = "add"
@@ -45,7 +45,7 @@ class FileBlock:
     Attributes:
         line: Line of the document that the block begins in.
         path: Path from the current folder.
-        mode: What the text does to the file.
+        mode: Effect of the text on the file.
         text: The text, with its last line break.
     """
 
@@ -61,10 +61,10 @@ class Command:
 
     Attributes:
         line: Line of the document that it stands in.
-        text: What is typed.
+        text: Text that is typed.
         expected: Expected output, in which `...` is elided text.
         status: Expected exit status.
-        numbers_vary: Whether numbers of the output may differ.
+        numbers_vary: True if numbers of the output may differ.
     """
 
     line: int
@@ -86,7 +86,7 @@ class Chapter:
 
 
 class TutorialError(Exception):
-    """What is wrong with the document, or where it does not say what happens."""
+    """Fault of the document, or place where it does not say what happens."""
 
 
 def read_chapters(document: str) -> tuple[Chapter, ...]:
@@ -159,7 +159,10 @@ def _commands(body: list[str], line: int, status: int, *, numbers_vary: bool) ->
 
 
 def matches(expected: str, output: str, *, numbers_vary: bool = False) -> bool:
-    """Whether output is as expected, blanks at line ends apart; a line of `...` is any lines, `...` any text in one."""
+    """Return True if output is as expected, blanks at line ends apart.
+
+    A line of `...` is any lines, `...` any text in one.
+    """
     # Stretches of lines between elided lines. Each is as long as its expected lines, so the first fit is good enough.
     stretches: list[list[re.Pattern[str]]] = [[]]
     for line in map(str.rstrip, expected.splitlines()):
@@ -184,7 +187,7 @@ def matches(expected: str, output: str, *, numbers_vary: bool = False) -> bool:
 
 
 def _fits(stretch: list[re.Pattern[str]], lines: list[str], place: int) -> bool:
-    """Whether lines from a place on are those of a stretch."""
+    """Return True if lines from a place on are those of a stretch."""
     there = lines[place : place + len(stretch)] if place >= 0 else []
     return len(there) == len(stretch) and all(
         pattern.fullmatch(line) for pattern, line in zip(stretch, there, strict=True)
@@ -227,7 +230,7 @@ class Shell:
 
     Args:
         home: Home folder, made if it is not there.
-        folder: Where it starts.
+        folder: Folder that it starts in.
         variables: All variables of its environment but `HOME`.
     """
 

@@ -1,4 +1,4 @@
-"""What stands in a unit of systemd."""
+"""Content of a unit of systemd."""
 
 import shlex
 from collections.abc import Mapping
@@ -30,7 +30,7 @@ class Unit:
         return shlex.split(_filled(self.one(key), specifiers))
 
     def environment(self, specifiers: Mapping[str, str]) -> dict[str, str]:
-        """What its program is given."""
+        """Return the environment that its program is given."""
         pairs = (_filled(text, specifiers).partition("=") for text in self.all("Environment"))
         return {name: value for name, _, value in pairs}
 

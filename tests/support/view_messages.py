@@ -1,4 +1,4 @@
-"""What a live view's server says of robots that were made up for tests."""
+"""Messages of a live view's server about robots that were made up for tests."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

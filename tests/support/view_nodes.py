@@ -35,7 +35,7 @@ class Node:
         return self.system.step(event, reading) is not None
 
     def places(self) -> dict[str, str]:
-        """Where services and actions are."""
+        """Return the locations of services and actions."""
         called = [item for item in self._model.communications if item.kind in PLANT_LOCATIONS]
         return {item.name: self.system.location(item.name) for item in called}
 

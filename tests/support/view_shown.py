@@ -1,4 +1,4 @@
-"""What the page of the live view shows of a robot's state, and what it is to be."""
+"""State of a robot as the page of the live view shows it, and as it is to show it."""
 
 import json
 from typing import Any
@@ -38,7 +38,7 @@ def _in_words(value: Any) -> str:
 
 
 def wanted(components: Any, places: Any, enabled: list[str]) -> str:
-    """What `SHOWN` is to be, as the browser writes it."""
+    """Return the value that `SHOWN` is to have, as the browser writes it."""
     told = {
         name: {
             "state": part["state"],

@@ -67,8 +67,8 @@ class VsCode:
 
     Attributes:
         page: Its window.
-        folder: What is open in it.
-        pid: Of its server.
+        folder: Folder that is open in it.
+        pid: Process id of its server.
     """
 
     def __init__(self, page: Page, folder: Path, orders: Path, pid: int) -> None:
@@ -79,7 +79,7 @@ class VsCode:
         self._count = 0
 
     def do(self, step: str, **given: Any) -> Any:
-        """What a step of `driver.js` returns; paths are given as texts.
+        """Do a step of `driver.js` and return its result; paths are given as texts.
 
         Raises:
             AssertionError: It went wrong.
@@ -98,7 +98,7 @@ class VsCode:
         return self.do("command", name=f"robosc.{name}", given=[_revivable(each) for each in given])
 
     def message(self, text: str) -> Locator:
-        """What tells the user a text, in the list of all that the user has been told and has not closed.
+        """Return the message with a text, in the list of all that the user has received and has not closed.
 
         Of many messages within a second the editor shows the first three only, but it lists them all.
         """
@@ -106,7 +106,7 @@ class VsCode:
         return self.page.locator(".notifications-center .notification-list-item", has_text=text)
 
     def until(self, condition: Any, complaint: str) -> Any:
-        """What a condition is, once it is true; the page lives meanwhile."""
+        """Return the value of a condition, once it is true; the page lives meanwhile."""
         end_s = time.monotonic() + LIMIT_S
         while not (found := condition()):
             assert time.monotonic() < end_s, f"{complaint}; there is:\n{self.seen()}"
@@ -114,7 +114,7 @@ class VsCode:
         return found
 
     def seen(self) -> str:
-        """What the window's pages show and the processes of `robosc view`."""
+        """Return the text that the window's pages show, and the processes of `robosc view`."""
         told = []
         for frame in self.page.frames:
             with contextlib.suppress(Error):  # It is gone.
@@ -183,14 +183,14 @@ def _revivable(value: Any) -> Any:
 
 @contextlib.contextmanager
 def vscode(browser: Browser, extension: Path, folder: Path, place: Path, *, is_trusted: bool) -> Iterator[VsCode]:
-    """An editor with an extension; it and all that it has started is gone at the end.
+    """Run an editor with an extension; it and all that it has started is gone at the end.
 
     Args:
-        browser: Where its window is.
+        browser: Browser that has its window.
         extension: The package.
-        folder: What is open in it.
-        place: Where it keeps what it needs.
-        is_trusted: What its user answers when it is asked whether the folder is trusted.
+        folder: Folder that is open in it.
+        place: Folder for what it needs.
+        is_trusted: Answer of its user when it is asked whether the folder is trusted.
     """
     program = VSCODE_FOLDER / _PROGRAM
     if not (program / "node_modules").is_dir():

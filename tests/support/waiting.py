@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 PATIENCE_S = 60.0
-"""How long a test waits for what must happen; only a failing test waits so long."""
+"""Maximum waiting time of a test for what must happen, in seconds; only a failing test waits so long."""
 
 _PAUSE_S = 0.005
 
@@ -19,7 +19,7 @@ _REPEAT_S = 0.1
 
 
 def eventually(condition: Callable[[], bool]) -> bool:
-    """Whether a condition becomes true."""
+    """Return True if a condition becomes true."""
     end_s = time.monotonic() + PATIENCE_S
     while not condition():
         if time.monotonic() > end_s:
@@ -40,12 +40,12 @@ def wait_until[Found](
     """Return what a look finds, as soon as it is true.
 
     Args:
-        look: What is asked for.
-        what: It is, in words.
-        limit_s: After which it is taken for lost.
-        repeat: Done now and again meanwhile: the first messages of a new connection may be lost.
-        fault: Says why it cannot come any more; an empty text while it can.
-        told: What others said, for the failure.
+        look: Function that looks for it.
+        what: Description of it in words.
+        limit_s: Time after which it is taken for lost, in seconds.
+        repeat: Function called now and again meanwhile: the first messages of a new connection may be lost.
+        fault: Function that says why it cannot come any more; an empty text while it can.
+        told: Function that returns what others said, for the failure.
 
     Raises:
         AssertionError: It was not found.
@@ -83,7 +83,7 @@ def _is_held() -> bool:
 
 
 def limited[T](test: Coroutine[Any, Any, T]) -> T:
-    """What a test gives that is run on an event loop of its own, which ends."""
+    """Run a test on an event loop of its own, which ends, and return its result."""
 
     async def run() -> T:
         async with asyncio.timeout(PATIENCE_S):

@@ -16,11 +16,11 @@ class VirtualSerial:
 
     Args:
         time: The virtual host.
-        path: Of the port.
+        path: Path of the port.
         baud: Its speed.
 
     Attributes:
-        timeout: How long a read waits for all that it wants.
+        timeout: Maximum time that a read waits for all that it wants, in seconds.
     """
 
     def __init__(self, time: VirtualHost, path: str, baud: int) -> None:

@@ -1,4 +1,4 @@
-"""What every decoder of the bridge owes for any bytes, as functions that a fuzzer calls: they raise where it does not.
+"""Duties of every decoder of the bridge for any bytes, as functions for a fuzzer: they raise where one is broken.
 
 No bytes raise; what is held is bounded, and so is all that is allocated; and at most two frames after any bytes, a
 device is understood as from a fresh start.
@@ -20,7 +20,7 @@ from support import peer
 from support.lidar_frames import lds01_frame, lds02_frame, lds03_frame
 
 MOST_BYTES = 200_000
-"""That a decoder may allocate beside what it is fed and returns, at any moment."""
+"""Bytes that a decoder may allocate beside what it is fed and returns, at any moment."""
 
 _FRAMES = 8
 _LOST = 2
@@ -45,7 +45,7 @@ def _require(holds: bool, what: str) -> None:
 
 
 def _fed(decoder: FrameDecoder[Any], data: bytes, longest: int) -> list[Any]:
-    """What a decoder finds, whole or in pieces; it holds no more than a frame."""
+    """Return the frames that a decoder finds in data, whole or in pieces; it holds no more than a frame."""
     found = []
     for piece in pieces(data):
         found += decoder.feed(piece)

@@ -21,7 +21,7 @@ MODEL = EXAMPLES / "line_follower" / "line_follower.rscd"
 START_LIMIT_S, LIMIT_S = 90.0, 30.0
 FAR_M = 3.0
 ASIDE_M = 0.03
-"""How far the middle between the wheels may be off the line: half of its width and a little more."""
+"""Distance that the middle between the wheels may be off the line, in metres: half of its width and a little more."""
 
 
 def configuration(folder: Path, robot: SimulatedTurtleBot3) -> Path:
@@ -48,8 +48,8 @@ class Follower:
     """The bridge on a simulated robot, with a terminal of its own.
 
     Attributes:
-        driven_m: How far the robot went since it was last set to 0.
-        aside_m: How far it was off the line at most.
+        driven_m: Distance that the robot went since it was last set to 0, in metres.
+        aside_m: Greatest distance of the robot from the line, in metres.
     """
 
     def __init__(self, robot: SimulatedTurtleBot3, track: Track, folder: Path) -> None:

@@ -92,7 +92,7 @@ class Running:
             self.written += line
 
     def address(self) -> str:
-        """Where its face listens."""
+        """Return the address that its face listens on."""
 
         def look() -> re.Match[str] | None:
             assert self.process.poll() is None, self.written

@@ -1,4 +1,4 @@
-"""What goes wrong while a simulator serves: it is told, and nothing goes on mute."""
+"""Mishaps while a simulator serves: each is reported, and nothing goes on silently."""
 
 import signal
 import subprocess

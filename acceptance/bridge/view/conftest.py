@@ -1,4 +1,4 @@
-"""What the tests of the live view's page share."""
+"""Fixtures that the tests of the live view's page share."""
 
 from collections.abc import Iterator
 

@@ -51,7 +51,7 @@ class Bridge:
 
     Args:
         configuration: Its file.
-        errors: Where it writes.
+        errors: File that it writes to.
     """
 
     def __init__(self, configuration: Path, errors: Path) -> None:
@@ -62,7 +62,7 @@ class Bridge:
             self.process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=file)
 
     def said(self, pattern: str) -> str:
-        """What it says of itself."""
+        """Return the words of the program about itself that a pattern finds."""
 
         def look() -> re.Match[str] | None:
             assert self.process.poll() is None, self._errors.read_text()
@@ -129,7 +129,10 @@ def moves(robot: SimulatedTurtleBot3) -> bool:
 
 
 def equals_status(seen: Visit, bridge: Bridge) -> bool:
-    """Whether the page shows what the terminal is told; the robot stands still, and soon nothing changes any more."""
+    """Return True if the page shows what is reported to the terminal.
+
+    The robot stands still, and soon nothing changes any more.
+    """
     told = bridge.status()
     components = {item["name"]: item for item in told["components"]}
     assert set(components) == {"LidarSensor", "Rotator", "Platform"}

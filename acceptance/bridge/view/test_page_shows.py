@@ -1,4 +1,4 @@
-"""What the page shows is what the server has told, in a real browser."""
+"""Page in a real browser: it shows what the server has reported."""
 
 from collections.abc import Iterator
 from typing import Any

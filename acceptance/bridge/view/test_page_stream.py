@@ -35,7 +35,7 @@ def counted(seen: Visit, words: str) -> None:
 
 
 def saved(seen: Visit) -> list[Any]:
-    """What the page has kept, as it saves it."""
+    """Return the entries that the page has kept, as it saves them."""
     with seen.page.expect_download() as download:
         seen.page.get_by_role("button", name="Save").click()
     return [json.loads(line) for line in download.value.path().read_text(encoding="utf-8").splitlines()]

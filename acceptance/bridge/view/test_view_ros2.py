@@ -1,4 +1,4 @@
-"""What generated nodes publish on `/state`, as they write it, read and shown; the way there is real DDS."""
+"""Messages that generated nodes publish on `/state`, as they write them, read and shown, over real DDS."""
 
 import asyncio
 import time
@@ -35,7 +35,10 @@ def test_a_node_is_shown_over_dds(peer: Peer, tmp_path: Path) -> None:
     publisher = peer.publisher(String, "/robot1/state")
 
     async def told(page: OpenPage, fits: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
-        """What fits, while the node publishes now and then: never so much that the topic would let go of something."""
+        """Return the message that fits, while the node publishes now and then.
+
+        It never publishes so much that the topic would let go of something.
+        """
         waiting = asyncio.create_task(page.until(fits))
         while not waiting.done():
             publisher.publish(String(data=node.system.report()))

@@ -1,4 +1,4 @@
-"""What is done around every call, over a real server."""
+"""Work that is done around every call, over a real server."""
 
 import asyncio
 from typing import Any

@@ -1,4 +1,4 @@
-"""What lines of the log look like, and what never stands in them."""
+"""Form of lines of the log, and content that never stands in them."""
 
 import time
 

@@ -68,7 +68,7 @@ def check(address: str) -> pb.CheckResponse:
 
 
 def config_checked(spec: str, environment: dict[str, str]) -> tuple[str, str]:
-    """What `check-config` says of the workers."""
+    """Return the grade and the message of `check-config` about the workers."""
     command = [sys.executable, "-m", "robosc_server.main", "check-config", "--json", "--port", "0", "--workers", spec]
     variables = {"PYTHONPATH": ":".join(filter(None, sys.path)), "PATH": "/usr/bin:/bin", "HOME": "/nowhere"}
     told = subprocess.run(command, env=variables | environment, check=False, capture_output=True, text=True)

@@ -20,7 +20,7 @@ KILLED_WITHIN_S = 0.2
 
 
 class TestSpending:
-    """What a task takes of processors is told, however it ends."""
+    """Processor time of a task, which is reported however the task ends."""
 
     @staticmethod
     def spent(running: Running, count: int = 1) -> list[float]:

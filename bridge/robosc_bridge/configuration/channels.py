@@ -19,7 +19,7 @@ _Word = Annotated[str, Meta(min_length=1, max_length=40)]
 
 
 class _Channel(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="channel"):
-    """What all channels have."""
+    """Common part of all channels."""
 
 
 class DriveChannel(_Channel, frozen=True, tag="drive"):
@@ -146,9 +146,9 @@ class Use:
     """Shapes of data where a channel serves one kind of communication.
 
     Attributes:
-        request: What it takes from the model.
-        response: What it tells the model.
-        feedback: What it tells while an action is under way.
+        request: Shape of the data that the channel takes from the model.
+        response: Shape of the data that the channel reports to the model.
+        feedback: Shape of the data that the channel reports while an action is under way.
     """
 
     request: Shape = Leaf.NOTHING
@@ -158,11 +158,11 @@ class Use:
 
 @dataclass(frozen=True, slots=True)
 class ChannelInfo:
-    """What a channel is for.
+    """Purpose of a channel.
 
     Attributes:
         uses: The kinds of communication that can be tied to it, and the data of each.
-        heeded: Parts of a request that it goes by, where it must not be given others but 0; empty: all.
+        heeded: Parts of a request that the channel uses, where all other parts must be 0; empty: all.
     """
 
     uses: Mapping[CommunicationKind, Use]
@@ -243,5 +243,5 @@ CHANNELS: dict[type[Channel], ChannelInfo] = {
 
 
 def channel_name(channel: Channel | type[Channel]) -> str:
-    """What a channel is called in a configuration."""
+    """Return the name of a channel in a configuration."""
     return str(channel.__struct_config__.tag)

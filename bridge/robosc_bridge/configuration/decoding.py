@@ -17,10 +17,10 @@ _WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: 
 
 
 def decode[Value](document: Document, target: type[Value]) -> Value:
-    """The value of a type that a document holds.
+    """Return the value of a type that a document holds.
 
     Args:
-        document: What was read.
+        document: Document as it was read.
         target: A msgspec structure.
 
     Raises:
@@ -114,7 +114,7 @@ class _Decoder:
 
 
 def expected(annotation: Any) -> str:
-    """What a value of an annotation is, in words: `a number from 0 to 10`."""
+    """Describe a value of an annotation in words: `a number from 0 to 10`."""
     plain, bounds = _plain(annotation), list(_bounds(annotation))
     options = members(plain)
     if len(options) > 1:
@@ -148,7 +148,7 @@ def _bounds(annotation: Any) -> Iterator[str]:
 
 
 def is_struct(annotation: Any) -> bool:
-    """Whether an annotation is a msgspec structure."""
+    """Return True if an annotation is a msgspec structure."""
     return isinstance(annotation, type) and issubclass(annotation, msgspec.Struct)
 
 

@@ -12,11 +12,11 @@ from robosc_bridge.configuration.structure import Configuration, Remote, Safety
 
 @dataclass(frozen=True, slots=True)
 class Loaded:
-    """A configuration and the text that it was read from.
+    """Configuration and the text that it was read from.
 
     Attributes:
-        configuration: What it says.
-        document: Where each key stands, for messages.
+        configuration: Content of the text.
+        document: Document with the place of each key, for messages.
     """
 
     configuration: Configuration

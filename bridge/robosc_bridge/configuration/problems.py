@@ -1,4 +1,4 @@
-"""What is wrong with a configuration: every problem with its place, told at once."""
+"""Problems of a configuration: every problem with its place, all reported at once."""
 
 import json
 import re
@@ -21,9 +21,9 @@ class Problem:
     """One thing that is wrong.
 
     Attributes:
-        message: What, and what would be right.
-        path: Where in the document.
-        line: Of the file, counted from 1; None: nowhere in particular.
+        message: Description of what is wrong, and of what would be right.
+        path: Place in the document.
+        line: Line of the file, counted from 1; None: nowhere in particular.
     """
 
     message: str
@@ -77,7 +77,7 @@ def shown(value: object) -> str:
 
 
 def hint(name: str, known: Iterable[str]) -> str:
-    """What to say after a name that is none: the nearest of those that there are, or all of them."""
+    """Return a hint for a name that does not exist: the nearest of the existing names, or all of them."""
     there = sorted(set(known))
     close = get_close_matches(name, there, n=1)
     if close:

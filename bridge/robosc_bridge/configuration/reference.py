@@ -1,4 +1,4 @@
-"""What every key means, from the structures themselves: for the template and the documentation."""
+"""Meaning of every key, from the structures themselves: for the template and the documentation."""
 
 from collections.abc import Iterator
 from types import NoneType
@@ -60,7 +60,7 @@ def _keys(target: type[msgspec.Struct], before: str) -> Iterator[str]:
 
 
 def _others(annotation: Any) -> list[str]:
-    """What a field may hold instead of a section."""
+    """Return descriptions of the values that a field may hold instead of a section."""
     plain = get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
     return [expected(item) for item in members(plain) if item is not NoneType and not is_struct(item)]
 

@@ -54,20 +54,22 @@ Shape = Leaf | Fields | Array | OneOf
 
 
 class Way(StrEnum):
-    """Which way data goes."""
+    """Direction in which data goes."""
 
     TO_MODEL = "to the model"
     TO_ROBOT = "to the robot"
 
 
 def misfits(model: Model, type_: Type, shape: Shape, way: Way) -> tuple[str, ...]:
-    """Why a type does not fit a shape, part by part; empty: it fits.
+    """Return the reasons why a type does not fit a shape, part by part; empty: it fits.
 
     Args:
-        model: That the type is of.
-        type_: What the model reads or gives. A message without data can be told by any data, but not the reverse.
-        shape: What the channel has or takes.
-        way: Numbers of the model may be whole ones for the robot; the reverse would cut them.
+        model: Model that the type belongs to.
+        type_: Type that the model reads or gives. A message without data can be reported by any data, but not the
+            reverse.
+        shape: Shape of the data that the channel has or takes.
+        way: Direction of the data. Numbers of the model may be integers on the way to the robot; the reverse would
+            cut them.
     """
     if way is Way.TO_MODEL and isinstance(type_, NoneType):
         return ()

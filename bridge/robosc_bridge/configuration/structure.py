@@ -1,4 +1,4 @@
-"""What a configuration says: frozen structures that checks, JSON schema and documentation are made from."""
+"""Content of a configuration: frozen structures that checks, JSON schema and documentation are made from."""
 
 import json
 from typing import Annotated, Any, Literal, get_args
@@ -20,7 +20,7 @@ _Option = bool | int | float | str
 
 
 class _Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What all sections have."""
+    """Common part of all sections."""
 
 
 TurtleBot = Literal["burger", "waffle", "waffle_pi"]
@@ -59,7 +59,7 @@ class Scanner(_Section, frozen=True):
 
 
 class Execution(_Section, frozen=True):
-    """How the supervisor is executed."""
+    """Execution of the supervisor."""
 
     period_s: Annotated[float, Meta(ge=0.001, le=10, description="Time between decisions, in seconds.")] = 0.02
     every: Annotated[
@@ -170,7 +170,7 @@ class Skills(_Section, frozen=True):
 
 
 class Remote(_Section, frozen=True):
-    """How the bridge is reached and watched."""
+    """Access to the bridge, for reaching and watching it."""
 
     grpc_address: Annotated[
         _Address | None,
@@ -234,7 +234,7 @@ class View(_Section, frozen=True):
 
 
 class SupervisorSource(_Section, frozen=True):
-    """Where the supervisor comes from, besides the file on the command line."""
+    """Source of the supervisor, besides the file on the command line."""
 
     server: Annotated[
         _Address | None,
@@ -260,7 +260,7 @@ class SupervisorSource(_Section, frozen=True):
 
 
 class Log(_Section, frozen=True):
-    """What is written down."""
+    """Recording of logs."""
 
     folder: Annotated[_Text | None, Meta(description="Folder for logs; null: only the terminal.")] = None
 

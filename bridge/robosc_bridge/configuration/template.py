@@ -26,7 +26,7 @@ PORTS: dict[str, str] = {
     "lds02": "/dev/ttyUSB0",
     "lds03": "/dev/ttyUSB0",
 }
-"""Where a device most often is; the LiDAR's adapter is the first of its kind."""
+"""Usual port of each device; the LiDAR's adapter is the first of its kind."""
 
 SCAN_TIMEOUTS_S: dict[str, float] = {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
 """Three turns of each LiDAR."""
@@ -37,15 +37,15 @@ _SKILLS = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 
 
 def init(robot: TurtleBot, drive: DriveDriver, scanner: ScannerDriver, model: Model) -> str:
-    """The text of a configuration, with every setting and what it means.
+    """Return the text of a configuration, with every setting and its meaning.
 
-    What cannot be guessed stands there without a value: such a file cannot be loaded, and the error lists it.
+    An entry that cannot be guessed has no value there: such a file cannot be loaded, and the error lists the entry.
 
     Args:
         robot: The TurtleBot3.
-        drive: How its wheels are reached.
-        scanner: Its LiDAR.
-        model: Whose communications are to be tied.
+        drive: Driver that reaches its wheels.
+        scanner: Driver of its LiDAR.
+        model: Model whose communications are to be tied.
     """
     lines = [
         f"# Configuration of the RoboSC bridge for {model.name}. All settings are shown.",
@@ -62,7 +62,7 @@ def init(robot: TurtleBot, drive: DriveDriver, scanner: ScannerDriver, model: Mo
 
 
 def obvious_channel(model: Model, communication: Communication, drive: str) -> Channel | None:
-    """What a communication is meant for, by its identifier and the data that it has; None: it is not plain."""
+    """Return the channel that a communication is meant for, by its identifier and its data; None: it is not clear."""
     for words, used, channel in _guesses(communication):
         is_meant = communication.kind in used and _last_words(communication.identifier) in words
         if is_meant and not why_not(model, communication, type(channel)):
@@ -71,7 +71,7 @@ def obvious_channel(model: Model, communication: Communication, drive: str) -> C
 
 
 def _has(facts: Facts, channel: Channel) -> bool:
-    """Whether a drive has what a channel is about."""
+    """Return True if a drive has the hardware that a channel is about."""
     match channel:
         case kinds.ButtonChannel(name=name):
             return name in facts.buttons

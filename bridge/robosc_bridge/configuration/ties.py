@@ -1,4 +1,4 @@
-"""Which channel each communication of a model is tied to, checked as a whole before anything starts."""
+"""Ties of a model's communications to channels, checked as a whole before anything starts."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -29,10 +29,10 @@ from robosc_bridge.drivers import facts_of
 
 @dataclass(frozen=True, slots=True)
 class Ties:
-    """What each communication of a model is tied to.
+    """Channel that each communication of a model is tied to.
 
     Attributes:
-        channels: By name of communication, all of the model, in its order.
+        channels: Channels by name of communication, for all communications of the model, in its order.
         communications: The same communications.
     """
 
@@ -64,8 +64,8 @@ def tie(model: Model, configuration: Configuration, document: Document | None = 
 
     Args:
         model: A checked model.
-        configuration: Its `channels` name identifiers, or single communications.
-        document: That the configuration was read from, for the lines in messages.
+        configuration: Configuration whose `channels` name identifiers, or single communications.
+        document: Document that the configuration was read from, for the lines in messages.
 
     Raises:
         ConfigurationError: A communication is not tied, or twice, or to a channel that cannot serve it or that the
@@ -81,7 +81,7 @@ def tie(model: Model, configuration: Configuration, document: Document | None = 
 
 
 def why_not(model: Model, communication: Communication, channel: type[Channel]) -> tuple[str, ...]:
-    """Why a communication cannot be tied to channels of a kind; empty: it can."""
+    """Return the reasons why a communication cannot be tied to channels of a kind; empty: it can."""
     info = CHANNELS[channel]
     use = info.uses.get(communication.kind)
     if use is None:

@@ -1,7 +1,7 @@
-"""What programs may ask a supervision layer for, and whether what they ask makes sense.
+"""Requests that programs may make of a supervision layer, and the check that they make sense.
 
-All of it follows from the model and the configuration alone, so it is looked at in the thread of who asks: large data
-takes its time, which the loop does not have.
+All of it follows from the model and the configuration alone, so it is checked in the thread of the caller: large data
+takes time that the loop does not have.
 """
 
 import math
@@ -22,23 +22,23 @@ MAXIMUM_ID = 255
 """Characters of an id of a program's own."""
 
 Asked = Requested | Called | GoalSent | CancelWanted
-"""What a program asks for."""
+"""Request of a program."""
 
 
 class UnfitError(ValueError):
-    """What a program asks for makes no sense; one sentence for it."""
+    """Request of a program that makes no sense; the message is one sentence."""
 
 
 class Asking:
-    """What may be asked for; used by all threads.
+    """Requests that programs may make; used by all threads.
 
     Args:
-        model: Of the supervisor.
-        ties: What each communication is tied to.
-        is_layer: Whether programs may ask for anything.
+        model: Model of the supervisor.
+        ties: Channel that each communication is tied to.
+        is_layer: True if programs may ask for anything.
 
     Attributes:
-        messages: By identifier, the messages that programs may send to the robot.
+        messages: Messages that programs may send to the robot, by identifier.
     """
 
     def __init__(self, model: Model, ties: Ties, *, is_layer: bool) -> None:
@@ -63,10 +63,10 @@ class Asking:
         return self._others[kind, name].identifier
 
     def look(self, item: FromProgram) -> FromProgram:
-        """What the layer gets of what a program sends: what the data leaves out is zero, false, empty.
+        """Return an item of a program as the layer receives it: data that is left out is zero, false or empty.
 
         Raises:
-            UnfitError: It asks for something, and that makes no sense whatever the layer does.
+            UnfitError: The item asks for something that makes no sense, whatever the layer does.
         """
         if not isinstance(item, Asked):
             return item

@@ -102,16 +102,16 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
 
 
 def check_settings(configuration: Configuration, ties: Ties, deployment: Deployment) -> Settings:
-    """The executor's settings; whatever else `assemble` would refuse is found as well, and nothing is opened.
+    """Return the executor's settings; find whatever else `assemble` would refuse as well, and open nothing.
 
     Args:
-        configuration: Of the robot.
-        ties: What the model's communications are tied to.
-        deployment: Where the supervisor stands.
+        configuration: Configuration of the robot.
+        ties: Channels that the model's communications are tied to.
+        deployment: Deployment of the supervisor.
 
     Raises:
         AssemblyError: Something does not fit, or a file is missing or wrong; says what.
-        GroundSettingsError: The ground station cannot be reached as it is said.
+        GroundSettingsError: The ground station cannot be reached as configured.
         UnknownDriverError: There is no such driver.
     """
     _require_faces(configuration, ties)
@@ -193,15 +193,15 @@ def range_scanner(scanner: Scanner, host: Host = SYSTEM_HOST) -> RangeScanner:
 
 @dataclass(frozen=True)
 class Machine:
-    """A daemon and the threads of its devices.
+    """Daemon and the threads of its devices.
 
     Attributes:
         daemon: The loop, run by whoever calls `run`.
         drive: The drive base's thread.
-        scanner: The LiDAR's; None: there is none.
-        camera: The camera's; None: nothing is tied to what it shows.
+        scanner: The LiDAR's thread; None: there is none.
+        camera: The camera's thread; None: nothing is tied to what it shows.
         operations: The daemon as remote faces see it.
-        living: What must not end by itself.
+        living: Threads and faces that must not end by themselves.
     """
 
     daemon: Daemon
@@ -243,7 +243,7 @@ class Machine:
 
 
 def _require_faces(configuration: Configuration, ties: Ties) -> None:
-    """What is reached from elsewhere needs a remote face that may listen where it is to."""
+    """Require a remote face that may listen at its address, for everything that is reached from elsewhere."""
     needing = [f"'{item.name}' ('{item.identifier}')" for item, _ in ties.tied_to(GrpcChannel)]
     if needing and configuration.remote.grpc_address is None:
         raise AssemblyError(f"tied to 'grpc', which needs 'remote.grpc_address': {', '.join(needing)}")
@@ -284,16 +284,16 @@ def assemble(
     """Make everything; nothing is opened yet.
 
     Args:
-        configuration: Of the robot.
-        ties: What the model's communications are tied to.
-        supervisor: What is executed.
-        log: Where its events are written.
-        deployment: Where it stands: it decides itself, or lets requests of programs through.
-        starts_itself: Whether it starts as soon as the devices are there.
-        host: Where it runs.
+        configuration: Configuration of the robot.
+        ties: Channels that the model's communications are tied to.
+        supervisor: Supervisor that is executed.
+        log: Log that its events are written to.
+        deployment: Deployment of the supervisor: it decides itself, or lets requests of programs through.
+        starts_itself: True if it starts as soon as the devices are there.
+        host: Host that it runs on.
 
     Raises:
-        AssemblyError: A device or number does not fit, or the supervisor stands elsewhere.
+        AssemblyError: A device or number does not fit, or the supervisor has another deployment.
         UnknownDriverError: There is no such driver.
     """
     settings = check_settings(configuration, ties, deployment)

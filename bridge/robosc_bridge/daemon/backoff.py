@@ -1,4 +1,4 @@
-"""How long to wait before something that failed is tried again: twice as long each time, up to a limit."""
+"""Waiting time before something that failed is tried again: twice as long each time, up to a limit."""
 
 
 class Backoff:
@@ -16,7 +16,7 @@ class Backoff:
 
     @property
     def is_fresh(self) -> bool:
-        """Whether nothing has failed since the last success."""
+        """True if nothing has failed since the last success."""
         return self._failures == 0
 
     def failed(self) -> float:

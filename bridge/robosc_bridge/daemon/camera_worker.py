@@ -12,28 +12,28 @@ from robosc_bridge.skills.line import LOST, LineDetector
 from robosc_bridge.skills.settings import LineSettings
 
 FIRST_PICTURE_S = 10.0
-"""How long a camera may take for its first picture, with all that must be started before."""
+"""Time that a camera may take for its first picture, in seconds, with all that must be started before."""
 
 REOPEN_S = 3.0
 """After so long without a picture, or twice the time after which the line is lost, it is closed and opened anew."""
 
 LISTEN_S = 0.05
-"""How long a picture is waited for at once."""
+"""Duration of one wait for a picture, in seconds."""
 
 _log = logging.getLogger(__name__)
 
 
 class CameraWorker:
-    """Keeps a camera open, and tells where the line is.
+    """Worker that keeps a camera open and reports where the line is.
 
-    The line is told as lost again and again, once in `timeout_s`, for as long as no picture comes: also while there is
-    no camera.
+    The line is reported as lost again and again, once in `timeout_s`, for as long as no picture comes: also while
+    there is no camera.
 
     Args:
         camera: The camera.
-        settings: What counts as a line, and after how long without a picture it is lost.
-        report: Takes what is told; must not wait.
-        clock: What the time is, in seconds.
+        settings: Definition of a line, and the time without a picture after which it is lost.
+        report: Function that takes the reports; must not wait.
+        clock: Clock that returns the time, in seconds.
         backoff: Pauses between attempts to open it.
     """
 

@@ -1,6 +1,6 @@
-"""What the bridge is doing, and what changes that: operators' commands, devices, the safety layer, the supervisor.
+"""State of the bridge, and what changes it: operators' commands, devices, the safety layer, the supervisor.
 
-What each command does in each state stands in docs/bridge-daemon.md.
+The effect of each command in each state is described in docs/bridge-daemon.md.
 """
 
 import logging
@@ -23,10 +23,10 @@ from robosc_bridge.safety import Reason, SafetyLayer
 _log = logging.getLogger(__name__)
 
 STOP_LIMIT_S = 3.0
-"""How long the motors may take to let go."""
+"""Time that the motors may take to let go, in seconds."""
 
 RESET_LIMIT_S = 15.0
-"""How long a reset of the motors may take."""
+"""Time that a reset of the motors may take, in seconds."""
 
 OVER = "the bridge has ended"
 
@@ -38,14 +38,14 @@ class Conductor:
     """The state of the bridge; used by the loop's thread.
 
     Args:
-        job: What is executed.
-        safety: Through which all motion passes.
-        readiness: What is known of the devices.
+        job: Job that is executed.
+        safety: Safety layer through which all motion passes.
+        readiness: Knowledge about the devices.
         orders: Orders without an answer.
         clock: The only source of time.
 
     Attributes:
-        state: What the bridge is doing.
+        state: State of the bridge.
         problem: The fault that has stopped it; empty: none.
     """
 
@@ -70,7 +70,7 @@ class Conductor:
     def lead(
         self, execution: Execution, robot: Robot, motion: Motion, switch: StopSwitch, note: Callable[[str, str], None]
     ) -> None:
-        """What it brings to work and to rest, and where it notes what watchers want to see."""
+        """Set the parts that it brings to work and to rest, and the function that notes what watchers want to see."""
         self._execution = execution
         self._robot = robot
         self._motion = motion
@@ -79,7 +79,7 @@ class Conductor:
 
     @property
     def notice(self) -> SafetyNotice:
-        """What the safety layer says."""
+        """Notice of the safety layer."""
         return self._latches.notice
 
     def connect(
@@ -335,7 +335,7 @@ class Conductor:
         return are_there
 
     def _come_to_rest(self) -> None:
-        """What was executed is at rest, or will not come to rest."""
+        """Finish a stop: what was executed is at rest, or will not come to rest."""
         has_let_go = not self._readiness.has_torque
         if not has_let_go:
             self.problem = self.problem or f"the motors have not let go within {STOP_LIMIT_S:g} s"

@@ -5,11 +5,11 @@ from robosc_bridge.host import Host
 
 
 class DeviceThread:
-    """Takes a worker's steps when they are due, or at once when told to hurry.
+    """Thread that takes a worker's steps when they are due, or at once when told to hurry.
 
     Args:
-        worker: What steps.
-        host: Whose thread it is.
+        worker: Worker whose steps are taken.
+        host: Host that the thread belongs to.
     """
 
     def __init__(self, worker: Worker, host: Host) -> None:
@@ -23,7 +23,7 @@ class DeviceThread:
 
     @property
     def is_alive(self) -> bool:
-        """Whether it still steps."""
+        """True if the thread still takes steps."""
         return self._thread.is_alive()
 
     def start(self) -> None:

@@ -30,24 +30,24 @@ from robosc_bridge.daemon.supervised import Listeners, Supervised
 _log = logging.getLogger(__name__)
 
 OUTCOMES = ("succeeded", "aborted", "cancelled", "rejected")
-"""How a program may say that a goal has ended."""
+"""Outcomes that a program may report for a goal."""
 
 _SERVED = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 
 Answer = Replied | CallFailed | GoalAccepted | FeedbackGiven | GoalEnded
-"""What a program says about a call or goal of the model."""
+"""Report of a program about a call or goal of the model."""
 
 
 @dataclass
 class _Open:
-    """A call or goal that a program has been told of, and whose end it has not told.
+    """Call or goal that a program has been told of, and whose end the program has not reported.
 
     Attributes:
-        program: That serves it.
-        name: Of the service or action.
-        number: Of the executor.
-        is_goal: Whether it is a goal.
-        is_cancelled: Whether the program was told to end it.
+        program: Program that serves it.
+        name: Name of the service or action.
+        number: Number that the executor uses.
+        is_goal: True if it is a goal.
+        is_cancelled: True if the program was told to end it.
     """
 
     program: Program
@@ -58,12 +58,12 @@ class _Open:
 
 
 class Exchange:
-    """What the model and programs tell each other.
+    """Exchange between the model and programs.
 
     Args:
-        ties: What each communication of the model is tied to.
-        listeners: Who is told what.
-        roster: Programs that are there.
+        ties: Channel that each communication is tied to.
+        listeners: Identifiers that each kind of channel reports to.
+        roster: Connected programs.
     """
 
     def __init__(self, ties: Ties, listeners: Listeners, roster: Roster) -> None:

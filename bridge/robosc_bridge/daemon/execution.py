@@ -21,9 +21,9 @@ class Execution:
     """One executor at a time.
 
     Args:
-        job: What is executed.
-        robot: What it makes move.
-        requesters: Who asks for it, where it is a supervision layer.
+        job: Job that is executed.
+        robot: Robot that the job moves.
+        requesters: Programs that ask for motion, where the job is a supervision layer.
         clock: The only source of time.
         log: The event log.
 
@@ -32,9 +32,9 @@ class Execution:
         SettingsError: A setting is wrong, or names what the model does not have.
 
     Attributes:
-        executor: At work; None: nothing is executed.
-        due_s: When it decides next.
-        overruns: How many decisions were left out because the one before took too long.
+        executor: Executor at work; None: nothing is executed.
+        due_s: Time of the next decision, in seconds.
+        overruns: Number of decisions that were left out because the one before took too long.
     """
 
     def __init__(self, job: Job, robot: Robot, requesters: Requesters, clock: Clock, log: EventLog) -> None:
@@ -104,7 +104,7 @@ class Execution:
 
     @property
     def stops(self) -> tuple[str, ...]:
-        """Why the executor requests nothing; empty: it may, or nothing is executed."""
+        """Reasons why the executor requests nothing; empty: it may, or nothing is executed."""
         return () if self.executor is None else self.executor.reasons
 
     @property

@@ -1,4 +1,4 @@
-"""How the daemon is reached from elsewhere: its remote faces, as the program starts and stops them."""
+"""Access to the daemon from elsewhere: its remote faces, as the program starts and stops them."""
 
 import logging
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ class Face(Protocol):
 
     @property
     def is_alive(self) -> bool:
-        """Whether it serves: from `start` until `stop`, unless it has failed."""
+        """True if the face serves: from `start` until `stop`, unless it has failed."""
 
     def start(self) -> None:
         """Begin to serve; nothing moves yet.
@@ -40,10 +40,10 @@ class Face(Protocol):
 
 
 class Living:
-    """What must not end by itself while the robot runs.
+    """Threads and faces that must not end by themselves while the robot runs.
 
     Args:
-        threads: Of devices; what becomes of them is the drivers' to tell.
+        threads: Threads of devices; reporting what becomes of them is up to the drivers.
     """
 
     def __init__(self, threads: Sequence[DeviceThread]) -> None:
@@ -56,7 +56,7 @@ class Living:
         self._faces = (*self._faces, face)
 
     def are_alive(self) -> bool:
-        """Whether none has ended; tells once of each face that has."""
+        """Return True if none has ended; report each face that has, once."""
         ended = [face.name for face in self._faces if not face.is_alive]
         for name in ended:
             if name not in self._told:
@@ -66,12 +66,12 @@ class Living:
 
 
 def is_remote(configuration: Configuration) -> bool:
-    """Whether a remote face is configured, through which programs and operators reach the robot all the time."""
+    """Return True if a remote face is configured, by which programs and operators reach the robot all the time."""
     return configuration.remote.grpc_address is not None or configuration.remote.mavlink_url is not None
 
 
 def is_startable(configuration: Configuration) -> bool:
-    """Whether somebody can start the robot through a face, and start it again."""
+    """Return True if somebody can start the robot through a face, and start it again."""
     return is_remote(configuration) or configuration.view.address is not None
 
 

@@ -1,7 +1,7 @@
-"""What the daemon shows to whoever watches it: the latest snapshot, and entries of the event log since the last look.
+"""Feed for watchers of the daemon: the latest snapshot, and entries of the event log since the last look.
 
-The loop writes, any number of watchers read, each from a thread of its own; nobody waits for anybody. Who reads too
-slowly loses entries and is told how many, never the latest snapshot.
+The loop writes, any number of watchers read, each from a thread of its own; nobody waits for anybody. A watcher that
+reads too slowly loses entries and is told how many, but never loses the latest snapshot.
 """
 
 import threading
@@ -22,23 +22,23 @@ MAXIMUM_WAITING = 1000
 
 @dataclass(frozen=True)
 class Snapshot:
-    """What the daemon is doing, as the loop saw it at the end of a turn. Nobody changes any part of it.
+    """State of the daemon, as the loop saw it at the end of a turn. Nobody changes any part of it.
 
     Attributes:
-        number: Grows with each snapshot.
-        time_s: When, in seconds since 1970-01-01 UTC.
-        state: What it is doing.
+        number: Number that grows with each snapshot.
+        time_s: Time of the snapshot, in seconds since 1970-01-01 UTC.
+        state: State of the daemon.
         problem: The fault that has stopped it; empty: none.
-        reasons: Why the safety layer lets nothing move.
-        warnings: What a person should know though it does.
-        stops: Why the executor requests nothing; empty: it may, or nothing is executed.
-        devices: Whether each device that belongs to the robot works.
+        reasons: Reasons why the safety layer lets nothing move.
+        warnings: Warnings for a person although the safety layer lets things move.
+        stops: Reasons why the executor requests nothing; empty: it may, or nothing is executed.
+        devices: For each device that belongs to the robot, True if it works.
         components: State and variables of each component with a behaviour, `{name: {"state": s, "variables": {v:
             value}}}`; empty: nothing is executed.
         enabled: Names of the requests that are allowed now, in the model's order.
-        reading: What the drive base told last; None: nothing yet, or it is lost.
+        reading: Last reading of the drive base; None: nothing yet, or it is lost.
         scan: The LiDAR's last full turn; None: the same.
-        overruns: How many decisions were left out because the one before took too long.
+        overruns: Number of decisions that were left out because the one before took too long.
         communications: Location of each service and action, by name; empty: nothing is executed.
     """
 
@@ -60,12 +60,12 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Update:
-    """What a watcher has not seen yet.
+    """News that a watcher has not seen yet.
 
     Attributes:
-        snapshot: The latest; None: there was none yet.
-        entries: Of the event log, in their order, since the last look.
-        lost: How many entries before these were dropped because nobody looked.
+        snapshot: The latest snapshot; None: there was none yet.
+        entries: Entries of the event log since the last look, in their order.
+        lost: Number of entries before these that were dropped because nobody looked.
     """
 
     snapshot: Snapshot | None
@@ -84,7 +84,7 @@ class Subscription:
         self._lost = 0
 
     def take(self) -> Update:
-        """What came since the last look; never waits."""
+        """Return the news since the last look; never waits."""
         with self._lock:
             entries, lost = tuple(self._entries), self._lost
             self._entries.clear()
@@ -120,7 +120,7 @@ class Feed:
 
     @property
     def is_watched(self) -> bool:
-        """Whether anybody wants entries."""
+        """True if anybody wants entries."""
         return bool(self._subscriptions)
 
     def show(self, snapshot: Snapshot) -> None:
@@ -153,11 +153,11 @@ class Feed:
 
 
 class WatchedLog:
-    """An event log whose entries are shown as well.
+    """Event log whose entries are shown as well.
 
     Args:
-        log: Where they are written.
-        feed: Where they are shown.
+        log: Log that the entries are written to.
+        feed: Feed that shows the entries.
     """
 
     def __init__(self, log: EventLog, feed: Feed) -> None:
@@ -166,7 +166,7 @@ class WatchedLog:
 
     @property
     def is_active(self) -> bool:
-        """Whether anybody wants entries."""
+        """True if anybody wants entries."""
         return self._log.is_active or self._feed.is_watched
 
     @property

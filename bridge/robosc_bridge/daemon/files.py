@@ -16,14 +16,14 @@ from robosc_bridge.remote import settings_of
 
 
 def file_problems(configuration: Configuration, fastest: Velocity) -> list[str]:
-    """What is wrong with them; empty: nothing.
+    """Return the problems of the files; empty: none.
 
     Args:
-        configuration: Names them.
+        configuration: Configuration that names the files.
         fastest: Limits of speed and turn rate.
 
     Raises:
-        GroundSettingsError: The ground station cannot be reached as it is said.
+        GroundSettingsError: The ground station cannot be reached as configured.
     """
     found = []
     for section, look in _looks(configuration, fastest):

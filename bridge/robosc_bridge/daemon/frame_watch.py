@@ -1,4 +1,4 @@
-"""How many of a scanner's frames are damaged, second by second."""
+"""Number of damaged frames of a scanner, second by second."""
 
 from dataclasses import dataclass
 
@@ -12,11 +12,11 @@ _SOUND_SHARE = 0.5
 
 @dataclass(frozen=True)
 class FrameNews:
-    """The line of a scanner has become noisy, or is sound again.
+    """News that the line of a scanner has become noisy, or is sound again.
 
     Attributes:
-        is_noisy: Which of the two.
-        text: With its numbers, for a person.
+        is_noisy: True if it has become noisy; False if it is sound again.
+        text: Text with the numbers, for a person.
     """
 
     is_noisy: bool
@@ -39,7 +39,7 @@ class FrameWatch:
         self._frames = self._bad = 0
 
     def look(self, now_s: float) -> FrameNews | None:
-        """What has changed with the frames up to now; None: nothing."""
+        """Return the change of the frames up to now; None: nothing has changed."""
         if self._begin_s is None:
             self._begin(now_s)
             return None

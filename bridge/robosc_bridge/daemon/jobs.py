@@ -1,4 +1,4 @@
-"""What the daemon executes."""
+"""Job that the daemon executes."""
 
 from dataclasses import dataclass
 
@@ -9,17 +9,17 @@ from robosc_bridge.configuration.ties import Ties
 
 @dataclass(frozen=True)
 class Job:
-    """What is executed.
+    """Job that is executed.
 
     Attributes:
-        supervisor: What is executed.
-        ties: What its communications are tied to.
-        settings: Of the executor.
-        needs_scanner: Whether a LiDAR must be there before it starts.
-        starts_itself: Whether it starts as soon as the devices are there; else it stays in standby.
-        stays_after_fault: Whether it waits for somebody to start it again after a fault; else it ends.
-        is_layer: Whether it is a supervision layer, so that programs ask for what it lets through; else a controller.
-        needs_camera: Whether a camera must be there before it starts.
+        supervisor: Supervisor that is executed.
+        ties: Channels that its communications are tied to.
+        settings: Settings of the executor.
+        needs_scanner: True if a LiDAR must be there before it starts.
+        starts_itself: True if it starts as soon as the devices are there; else it stays in standby.
+        stays_after_fault: True if it waits for somebody to start it again after a fault; else it ends.
+        is_layer: True for a supervision layer, where programs ask for what it lets through; False for a controller.
+        needs_camera: True if a camera must be there before it starts.
     """
 
     supervisor: Supervisor

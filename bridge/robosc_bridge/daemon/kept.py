@@ -1,4 +1,4 @@
-"""Where what a synthesis server made last is kept, so that the robot starts without a network, too."""
+"""Storage of what a synthesis server made last, so that the robot starts without a network, too."""
 
 import contextlib
 import logging
@@ -27,7 +27,7 @@ def state_folder(environment: Mapping[str, str] = os.environ) -> Path | None:
 
 
 def is_kept(file: Path) -> bool:
-    """Whether there is such a file, as far as this user may know."""
+    """Return True if there is such a file, as far as this user may know."""
     try:
         return file.is_file()
     except OSError:

@@ -34,7 +34,7 @@ class Keyboard:
 
     @property
     def is_there(self) -> bool:
-        """Whether there is a terminal."""
+        """True if there is a terminal."""
         return os.isatty(self._number)
 
     def __enter__(self) -> Self:

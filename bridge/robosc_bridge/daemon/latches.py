@@ -1,4 +1,4 @@
-"""What holds in the safety layer until somebody says otherwise, as the loop knows it."""
+"""Conditions that hold in the safety layer until somebody says otherwise, as the loop knows them."""
 
 from robosc_bridge.daemon.orders import Orders
 from robosc_bridge.daemon.reports import SafetyNotice
@@ -13,10 +13,10 @@ class Latches:
 
     Args:
         safety: The safety layer.
-        orders: Tells whether a stop is on its way.
+        orders: Orders, which know whether a stop is on its way.
 
     Attributes:
-        notice: What the safety layer has told last.
+        notice: Last notice of the safety layer.
     """
 
     def __init__(self, safety: SafetyLayer, orders: Orders) -> None:
@@ -30,10 +30,10 @@ class Latches:
         return tuple(reason for reason in self.notice.reasons if reason in _GRAVE)
 
     def held(self, *, is_stopped: bool) -> str:
-        """All of them, as sentences; empty: there is none.
+        """Return all latched reasons, as sentences; empty: there is none.
 
         Args:
-            is_stopped: Whether the operator has stopped the robot, which may not have been told yet.
+            is_stopped: True if the operator has stopped the robot, which may not have been reported yet.
         """
         reasons = [reason for reason in self.notice.reasons if reason in LATCHING]
         if is_stopped and Reason.OPERATOR_STOP not in reasons:

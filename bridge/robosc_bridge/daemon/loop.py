@@ -40,7 +40,7 @@ from robosc_bridge.skills import EmergencyStop, Rotate
 _log = logging.getLogger(__name__)
 
 PROGRAM_SHARE = 50
-"""How much of what programs have sent is taken up in one turn, at most."""
+"""Maximum number of items from programs that are taken up in one turn."""
 
 PROGRAM_SHARE_S = 0.002
 """After how long in one turn no more of it is taken up; one of it is in any case."""
@@ -65,14 +65,14 @@ class Daemon:
     """The loop.
 
     Args:
-        job: What is executed.
-        safety: Through which all motion passes.
+        job: Job that is executed.
+        safety: Safety layer through which all motion passes.
         rotate: The skill that turns.
         emergency_stop: The operator's stop.
         clock: The only source of time.
         log: The executor's event log.
-        feed: Where everything is shown; None: nobody looks.
-        inbox: What the loop waits at; None: one of this computer.
+        feed: Feed that shows everything; None: nobody looks.
+        inbox: Queue that the loop waits at; None: one of this computer.
     """
 
     def __init__(
@@ -127,7 +127,7 @@ class Daemon:
 
     @property
     def state(self) -> State:
-        """What it is doing."""
+        """State of the daemon."""
         return self._conductor.state
 
     @property
@@ -137,7 +137,7 @@ class Daemon:
 
     @property
     def overruns(self) -> int:
-        """How many decisions came too late by a whole period, and were left out."""
+        """Number of decisions that came too late by a whole period, and were left out."""
         return self._execution.overruns
 
     def connect(

@@ -1,8 +1,8 @@
-"""What the robot is wanted to do with its wheels: keep a velocity, turn by an angle, or stand still.
+"""Wanted motion of the wheels: keep a velocity, turn by an angle, or stand still.
 
-A velocity that the supervisor asked for holds until it asks for something else, as on any drive base; whether it still
-may, its releases decide (semantics 3.6). It is told to the safety layer anew at every turn of the loop, so that it ends
-with the loop.
+A velocity that the supervisor asked for holds until it asks for something else, as on any drive base; its releases
+decide whether it still may (semantics 3.6). It is passed to the safety layer anew at every turn of the loop, so that
+it ends with the loop.
 """
 
 from collections.abc import Callable
@@ -27,17 +27,17 @@ class Motion:
 
     @property
     def is_turning(self) -> bool:
-        """Whether a turn by an angle is under way."""
+        """True if a turn by an angle is under way."""
         return self._rotate.is_turning
 
     @property
     def remaining_rad(self) -> float:
-        """What is left of a turn, counter-clockwise above zero."""
+        """Remaining angle of a turn, in radians, counter-clockwise above zero."""
         return self._rotate.remaining_rad
 
     @property
     def reason(self) -> str:
-        """Why the last turn failed; empty: it did not."""
+        """Reason why the last turn failed; empty: it did not."""
         return self._rotate.reason
 
     def drive(self, velocity: Velocity, now_s: float) -> None:
@@ -81,7 +81,7 @@ class Motion:
 
     @property
     def has_arrived(self) -> bool:
-        """Whether the last turn has come to its end."""
+        """True if the last turn has come to its end."""
         return self._rotate.state is RotateState.DONE
 
     def _pass(self, velocity: Velocity, now_s: float) -> None:

@@ -1,4 +1,4 @@
-"""What a remote face may do with the daemon, from any thread, without waiting for it."""
+"""Operations that a remote face may perform on the daemon, from any thread, without waiting for it."""
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
@@ -11,11 +11,14 @@ from robosc_bridge.daemon.programs import FromProgram
 from robosc_bridge.daemon.states import Command, Order
 
 UNDONE_BY: Mapping[Command, Command] = {Command.START: Command.STANDBY, Command.RESUME: Command.STOP}
-"""What lets the robot move, and what takes it back: what a person was told has failed does not happen later."""
+"""Commands that let the robot move, each with the command that takes it back.
+
+A command that was reported to a person as failed does not take effect later.
+"""
 
 
 class Inbox(Protocol):
-    """Where the loop is told things."""
+    """Function that tells the loop something."""
 
     def __call__(self, item: Order | FromProgram, /) -> None:
         """Tell it something; never waits."""
@@ -25,19 +28,19 @@ class Operations:
     """The daemon as remote faces see it.
 
     Args:
-        supervisor: What is executed.
-        ties: What its communications are tied to.
-        is_layer: Whether the supervisor is a supervision layer.
-        feed: What the daemon shows.
-        post: Tells the loop something.
-        operator_seen: Tells the safety layer that the operator is there.
+        supervisor: Supervisor that is executed.
+        ties: Channels that its communications are tied to.
+        is_layer: True if the supervisor is a supervision layer.
+        feed: Feed that the daemon shows.
+        post: Function that tells the loop something.
+        operator_seen: Function that tells the safety layer that the operator is there.
 
     Attributes:
-        supervisor: What is executed.
+        supervisor: Supervisor that is executed.
         model: Its model.
-        ties: What its communications are tied to.
-        is_layer: Whether the supervisor is a supervision layer.
-        feed: What the daemon shows.
+        ties: Channels that its communications are tied to.
+        is_layer: True if the supervisor is a supervision layer.
+        feed: Feed that the daemon shows.
     """
 
     def __init__(

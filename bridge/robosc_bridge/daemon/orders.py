@@ -13,7 +13,7 @@ HALTS = frozenset({Command.STOP, Command.STANDBY, Command.QUIT})
 
 
 class Until(StrEnum):
-    """What an order waits for."""
+    """Condition that an order waits for."""
 
     STARTED = "started"
     RESTING = "resting"
@@ -43,12 +43,12 @@ class Orders:
 
     @property
     def is_halt_coming(self) -> bool:
-        """Whether an order that stops is not taken up by the loop yet: it wins over what came before it."""
+        """True if an order that stops has not been taken up by the loop yet: it wins over what came before it."""
         return bool(self._halting)
 
     @property
     def is_stop_coming(self) -> bool:
-        """Whether one of these is an operator's stop, which holds until an operator ends it."""
+        """True if one of these orders is an operator's stop, which holds until an operator ends it."""
         # Another thread may append meanwhile.
         return any(order.command is Command.STOP for order in tuple(self._halting))
 
@@ -57,11 +57,11 @@ class Orders:
         self._open.append((until, order))
 
     def is_waiting(self, until: Until) -> bool:
-        """Whether an order waits for something."""
+        """Return True if an order waits for a condition."""
         return any(item is until for item, _ in self._open)
 
     def settle(self, until: Until, why: str = "") -> None:
-        """What orders have waited for is there, or why it never will be."""
+        """Answer the orders that wait for a condition: it is there, or a reason says why it never will be."""
         settled = [order for item, order in self._open if item is until]
         self._open = [(item, order) for item, order in self._open if item is not until]
         for order in settled:

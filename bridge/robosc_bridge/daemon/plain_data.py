@@ -33,7 +33,10 @@ _MAXIMUM_BITS = 64
 
 
 def why_not_plain(data: Any) -> str:
-    """Why data of a program is not taken at all, one sentence; empty: it is plain and of a reasonable size."""
+    """Return the reason why data of a program is not taken at all.
+
+    One sentence; empty: the data is plain and of a reasonable size.
+    """
     waiting, parts = [(data, 0)], 0
     while waiting:
         value, depth = waiting.pop()
@@ -60,7 +63,7 @@ def why_not_plain(data: Any) -> str:
 
 
 def weight_bytes(data: Any) -> int:
-    """How much memory plain data takes, in bytes; parts that are the same object count each time."""
+    """Return the memory that plain data takes, in bytes; parts that are the same object count each time."""
     waiting, found = [data], 0
     while waiting:
         value = waiting.pop()
@@ -74,32 +77,36 @@ def weight_bytes(data: Any) -> int:
 
 
 def why_not_shaped(shape: Shape, data: Any) -> str:
-    """Why data is not what a channel takes, one sentence; empty: it is. What is left out, or None, is the default.
+    """Return the reason why data is not what a channel takes, one sentence; empty: it is.
+
+    A part that is left out, or None, is the default.
 
     Args:
-        shape: Of the channel.
+        shape: Shape of the channel.
         data: Plain data.
     """
     return next(_misshaped(shape, data, ""), "")
 
 
 def why_not_typed(model: Model, type_: Type | None, data: Any) -> str:
-    """Why data is not what a model expects, one sentence; empty: it is. What it does not name is not judged.
+    """Return the reason why data is not what a model expects, one sentence; empty: it is.
+
+    Parts that the model does not name are not judged.
 
     Args:
-        model: That the type is of.
-        type_: What is expected; None: nothing, so that no data is wrong.
+        model: Model that the type belongs to.
+        type_: Type that is expected; None: nothing, so that no data is wrong.
         data: Plain data.
     """
     return next(_mistyped(model, type_, data, ""), "")
 
 
 def completed(model: Model, type_: Type | None, data: Any) -> Any:
-    """The same data with what a model names and the data leaves out: zero, false, empty.
+    """Return the same data with the parts that a model names and the data leaves out: zero, false, empty.
 
     Args:
-        model: That the type is of.
-        type_: What is expected.
+        model: Model that the type belongs to.
+        type_: Type that is expected.
         data: Plain data of that type.
     """
     match type_:
@@ -117,12 +124,14 @@ def completed(model: Model, type_: Type | None, data: Any) -> Any:
 
 
 def accepted(model: Model, type_: Type | None, shape: Shape) -> Shape:
-    """Of the shapes that a channel takes, that in which a model sees the data: what it reads is what is done.
+    """Return, of the shapes that a channel takes, the one in which a model sees the data.
+
+    The data that the model reads is the data that is acted on.
 
     Args:
-        model: That the type is of.
-        type_: What the model reads.
-        shape: Of the channel.
+        model: Model that the type belongs to.
+        type_: Type that the model reads.
+        shape: Shape of the channel.
     """
     if isinstance(shape, OneOf) and type_ is not None:
         return OneOf(tuple(item for item in shape.shapes if not misfits(model, type_, item, Way.TO_ROBOT)))
@@ -203,7 +212,7 @@ def _words(model: Model, type_: Type | None) -> str:
 
 
 def is_number(data: Any) -> bool:
-    """Whether data is a number: true and false are none."""
+    """Return True if data is a number: true and false are none."""
     return isinstance(data, int | float) and not isinstance(data, bool)
 
 

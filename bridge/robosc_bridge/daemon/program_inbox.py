@@ -1,8 +1,8 @@
-"""What programs tell the loop on its way there: bounded for each of them, so that none can hold up the others.
+"""Items of programs on their way to the loop: bounded for each program, so that none can hold up the others.
 
-The loop takes some at each of its turns, from each program in turn. Who sends faster than they are taken loses what is
-beyond the limits, and all that follows until it is told so, in its place in the order. Whatever it asked for ends then:
-what was lost may have been the message that ends it.
+The loop takes some at each of its turns, from each program in turn. A program that sends faster than they are taken
+loses what is beyond the limits, and all that follows until it is told so, in its place in the order. Whatever it
+asked for ends then: what was lost may have been the message that ends it.
 """
 
 import threading
@@ -23,11 +23,11 @@ MAXIMUM_WAITING_BYTES = 2_000_000
 
 @dataclass(frozen=True)
 class Unreadable:
-    """What a program sent is no plain data of a reasonable size, or asks for what makes no sense.
+    """Item of a program that is no plain data of a reasonable size, or that asks for what makes no sense.
 
     Attributes:
-        program: That sent it.
-        why: One sentence.
+        program: Program that sent it.
+        why: Reason, in one sentence.
     """
 
     program: Program
@@ -36,11 +36,11 @@ class Unreadable:
 
 @dataclass
 class Overflowed:
-    """A program has sent more than is taken.
+    """Record that a program has sent more than is taken.
 
     Attributes:
-        program: That sent it.
-        lost: How much was lost.
+        program: Program that sent it.
+        lost: Number of lost items.
     """
 
     program: Program
@@ -69,11 +69,12 @@ class _Waiting:
 
 
 class ProgramInbox:
-    """Filled by the faces' threads, emptied by the loop's.
+    """Inbox that is filled by the faces' threads and emptied by the loop's.
 
     Args:
-        wake: Called when something waits where nothing did.
-        look: What the loop gets of what was sent; raises `UnfitError` if it makes no sense. From any thread.
+        wake: Function that is called when something waits where nothing did.
+        look: Function that returns what the loop gets of what was sent; raises `UnfitError` if it makes no sense.
+            Called from any thread.
     """
 
     def __init__(self, wake: Callable[[], None], look: Callable[[FromProgram], FromProgram]) -> None:
@@ -102,7 +103,7 @@ class ProgramInbox:
             self._wake()
 
     def _looked_through(self, item: FromProgram) -> tuple[Arrived, int]:
-        """What the loop gets, and the memory that its data takes."""
+        """Return the item that the loop gets, and the memory that its data takes, in bytes."""
         why = why_not_plain(getattr(item, "data", None))
         if why:
             return Unreadable(item.program, why), 0
@@ -114,7 +115,7 @@ class ProgramInbox:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing waits."""
+        """True if nothing waits."""
         return not self._waiting
 
     def take(self) -> Arrived | None:

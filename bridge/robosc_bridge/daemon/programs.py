@@ -1,4 +1,4 @@
-"""What programs and operators on the other side of a remote face tell the loop, and what the loop tells them.
+"""Items that programs and operators beyond a remote face send to the loop, and items that the loop sends to them.
 
 A program is whatever is connected: it may answer services and actions of the model that are tied to `grpc`, take and
 give messages there, and, where the supervisor is a supervision layer, be the existing controller or operator whose
@@ -15,13 +15,13 @@ from robosc_bridge.daemon.plain_data import weight_bytes
 
 
 class _Weighed:
-    """What a program is told with data: the same for all that are told it."""
+    """Item with data that is sent to programs: the same for all that receive it."""
 
     data: Any
 
     @cached_property
     def weight_bytes(self) -> int:
-        """How much memory its data takes, in bytes."""
+        """Memory that its data takes, in bytes."""
         return weight_bytes(self.data)
 
 
@@ -106,7 +106,7 @@ class GoalRejected:
 
 @dataclass(frozen=True)
 class FeedbackPassed(_Weighed):
-    """How far a goal of this program is."""
+    """Progress of a goal of this program."""
 
     goal_id: str
     data: Any
@@ -123,7 +123,7 @@ class GoalOver(_Weighed):
 
 @dataclass(frozen=True)
 class Refused:
-    """What this program sent makes no sense, one sentence; it changed nothing."""
+    """Refusal of what this program sent, which makes no sense, in one sentence; it changed nothing."""
 
     why: str
 
@@ -149,10 +149,10 @@ class Program:
     """One connected program.
 
     Attributes:
-        name: Who it is, for the log.
-        tell: Called by the loop's thread with each thing it is told; neither waits nor raises.
+        name: Name of the program, for the log.
+        tell: Function that the loop's thread calls with each thing the program is told; neither waits nor raises.
         serves: Names of the model's services and actions, tied to `grpc`, that it answers.
-        may_request: Whether it may be the caller of a supervision layer.
+        may_request: True if it may be the caller of a supervision layer.
     """
 
     name: str
@@ -215,7 +215,7 @@ class GoalAccepted:
 
 @dataclass(frozen=True)
 class FeedbackGiven:
-    """How far a `GoalMade` is."""
+    """Progress of a `GoalMade`."""
 
     program: Program
     number: int

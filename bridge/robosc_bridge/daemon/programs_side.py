@@ -1,4 +1,4 @@
-"""What programs send, brought to where it is meant: the model's other side, or the caller's side of a layer."""
+"""Dispatch of what programs send: to the model's other side, or to the caller's side of a layer."""
 
 from typing import assert_never
 

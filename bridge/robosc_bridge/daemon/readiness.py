@@ -1,4 +1,4 @@
-"""What the loop knows of the devices: whether each is there, and what it told last."""
+"""Knowledge of the loop about the devices: whether each is there, and what it reported last."""
 
 from robosc_bridge.daemon.reports import Device
 from robosc_bridge.devices.interface import DriveReading, Scan
@@ -7,15 +7,15 @@ _NAMES = {Device.DRIVE: "drive base"}
 
 
 class Readiness:
-    """Whether the devices that belong to the robot work.
+    """State of the devices that belong to the robot: whether they work.
 
     Args:
-        needs_scanner: Whether a LiDAR belongs to it.
-        needs_camera: Whether a camera does.
+        needs_scanner: True if a LiDAR belongs to it.
+        needs_camera: True if a camera does.
 
     Attributes:
-        devices: Whether each device that belongs to the robot works; replaced at each change, never changed.
-        reading: What the drive base told last; None: nothing yet, or it is lost.
+        devices: For each device that belongs to the robot, True if it works; replaced at each change, never changed.
+        reading: Last reading of the drive base; None: nothing yet, or it is lost.
         scan: The LiDAR's last full turn; None: the same.
     """
 
@@ -27,12 +27,12 @@ class Readiness:
 
     @property
     def is_drive_there(self) -> bool:
-        """Whether the drive base works."""
+        """True if the drive base works."""
         return self.devices[Device.DRIVE]
 
     @property
     def has_torque(self) -> bool:
-        """Whether the motors hold, as far as anybody can tell."""
+        """True if the motors hold, as far as anybody can tell."""
         return self.is_drive_there and self.reading is not None and self.reading.is_torque_on
 
     def came(self, device: Device) -> bool:
@@ -52,7 +52,7 @@ class Readiness:
         return was_there
 
     def missing(self) -> str:
-        """What must be there before anything can start, one sentence; empty: nothing."""
+        """Return what must be there before anything can start, in one sentence; empty: nothing."""
         for device, is_there in self.devices.items():
             if not is_there:
                 return f"the {_NAMES.get(device, device)} is not there"

@@ -1,4 +1,4 @@
-"""What the devices tell, as the data of the channels: what a ROS message of the same meaning would hold."""
+"""Data of the devices, as the data of the channels: the content of a ROS message of the same meaning."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""What the threads of the devices tell the loop."""
+"""Reports of the devices' threads to the loop."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -8,7 +8,7 @@ from robosc_bridge.safety import Caution, Reason
 
 
 class Device(StrEnum):
-    """Which device a report is about."""
+    """Device that a report is about."""
 
     DRIVE = "drive"
     SCANNER = "scanner"
@@ -17,10 +17,12 @@ class Device(StrEnum):
 
 @dataclass(frozen=True)
 class DeviceUp:
-    """A device works: the drive base was opened, the scanner has made a full turn, or the camera has sent a picture.
+    """Report that a device works.
+
+    The drive base was opened, the scanner has made a full turn, or the camera has sent a picture.
 
     Attributes:
-        device: Which one.
+        device: Device that works.
     """
 
     device: Device
@@ -28,13 +30,13 @@ class DeviceUp:
 
 @dataclass(frozen=True)
 class DeviceDown:
-    """A device cannot be opened, failed and was closed, or is silent; it will be tried again.
+    """Report that a device cannot be opened, failed and was closed, or is silent; it will be tried again.
 
     Attributes:
-        device: Which one.
-        problem: What is wrong, one line for a person.
-        retry_s: In how many seconds it is tried again; 0: it is still being listened to.
-        is_first: Whether it was up before, or was never tried: what follows only repeats it.
+        device: Device that the report is about.
+        problem: Description of what is wrong, one line for a person.
+        retry_s: Time until it is tried again, in seconds; 0: it is still being listened to.
+        is_first: True if it was up before, or was never tried: what follows only repeats it.
     """
 
     device: Device
@@ -45,10 +47,10 @@ class DeviceDown:
 
 @dataclass(frozen=True)
 class ResetDone:
-    """The drive base was reset, as a person wanted.
+    """Report that the drive base was reset, as a person wanted.
 
     Attributes:
-        problem: What is still wrong, one line; empty: nothing.
+        problem: Description of what is still wrong, one line; empty: nothing.
     """
 
     problem: str = ""
@@ -56,11 +58,11 @@ class ResetDone:
 
 @dataclass(frozen=True)
 class SafetyNotice:
-    """Why the safety layer lets nothing through, or something else about it, has changed.
+    """Report that the reasons why the safety layer lets nothing through, or something else about it, have changed.
 
     Attributes:
-        reasons: Why nothing may move; empty: it may.
-        warnings: What a person should know.
+        reasons: Reasons why nothing may move; empty: it may.
+        warnings: Warnings that a person should know.
     """
 
     reasons: tuple[Reason, ...]
@@ -69,11 +71,12 @@ class SafetyNotice:
 
 @dataclass(frozen=True)
 class Sighting:
-    """What the camera shows of the line, or that it shows nothing at all.
+    """Report of what the camera shows of the line, or that it shows nothing at all.
 
     Attributes:
-        time_s: When the picture had come, or was missed.
-        correction_rad_s: How to turn to keep on the line, counter-clockwise above zero; None: no line is in sight.
+        time_s: Time when the picture had come, or was missed, in seconds.
+        correction_rad_s: Turn rate to keep on the line, in rad/s, counter-clockwise above zero; None: no line is in
+            sight.
     """
 
     time_s: float

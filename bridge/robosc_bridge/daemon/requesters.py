@@ -40,11 +40,11 @@ _TOO_MUCH = "the program that asked for it sends too much at once"
 
 @dataclass
 class _Sender:
-    """Whose message went through last on an identifier.
+    """Program whose message went through last on an identifier.
 
     Attributes:
-        program: That sent it.
-        heard_s: When something came last from it there, whether it went through or not.
+        program: Program that sent it.
+        heard_s: Time of the last message from the program there, in seconds, whether it went through or not.
     """
 
     program: Program
@@ -52,15 +52,15 @@ class _Sender:
 
 
 class Requesters:
-    """What programs ask a supervision layer for, and what they are told of it.
+    """Requests of programs to a supervision layer, and the answers that the programs get.
 
     Args:
-        asking: What may be asked for.
-        roster: Programs that are there.
-        abandon: Ends a turn that a communication asked for, with the reason.
-        command_timeout_s: After how long without a message of it a program's last one on an identifier is released;
-            0: never.
-        clock: What the time is, in seconds.
+        asking: Requests that programs may make.
+        roster: Connected programs.
+        abandon: Function that ends a turn that a communication asked for, with the reason.
+        command_timeout_s: Time without a message of a program after which its last one on an identifier is released,
+            in seconds; 0: never.
+        clock: Clock that returns the time, in seconds.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class Requesters:
         self._end(program, layer, _TOO_MUCH)
 
     def _end(self, program: Program, layer: Layer, reason: str) -> None:
-        """What a program's messages keep moving stands still, its goals are cancelled, its turns end."""
+        """Stop what a program's messages keep moving, cancel its goals and end its turns."""
         for identifier, sender in tuple(self._senders.items()):
             if sender.program is program:
                 del self._senders[identifier]
@@ -172,7 +172,7 @@ class Requesters:
                 self._roster.tell(program, Blocked(self._asking.identifier(CommunicationKind.ACTION, action)))
 
     def _why_refused(self, item: Asked) -> str:
-        """Why what a program asks for makes no sense now, one sentence; empty: it does."""
+        """Return the reason why a program's request makes no sense now, one sentence; empty: it does."""
         match item:
             case Called(program=program, call_id=own_id) | GoalSent(program=program, goal_id=own_id):
                 own = program, own_id

@@ -30,14 +30,14 @@ class Robot:
     """The executor's middleware.
 
     Args:
-        ties: What each communication of the model is tied to.
-        listeners: Who is told what.
-        motion: What moves the wheels.
+        ties: Channel that each communication of the model is tied to.
+        listeners: Identifiers that each kind of channel reports to.
+        motion: Motion of the wheels.
         switch: The operator's stop.
-        exchange: Programs on the other side of a remote face.
+        exchange: Exchange with programs on the other side of a remote face.
         on_failed_turn: Called with the reason when a turn has failed of which the model hears nothing.
-        service_timeout_s: When the executor takes a call for failed; None: never.
-        clock: What the time is, in seconds.
+        service_timeout_s: Time after which the executor takes a call for failed, in seconds; None: never.
+        clock: Clock that returns the time, in seconds.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class Robot:
         return finite(communication, data)
 
     def is_default(self, communication: str, message: Any) -> bool:
-        """Whether every part is zero, empty or left out."""
+        """Return True if every part is zero, empty or left out."""
         return is_default(message)
 
     def publish(self, communication: str, message: Any) -> None:
@@ -159,7 +159,7 @@ class Robot:
         self._motion.stop(self._clock(), reason)
 
     def abandon(self, communication: str, reason: str) -> None:
-        """Who asked for a motion is gone: it ends."""
+        """End a motion because whoever asked for it is gone."""
         if self._turns.asked_by == communication:
             self._turns.end(reason, is_own=True)
 

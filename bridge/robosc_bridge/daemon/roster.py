@@ -39,6 +39,6 @@ class Roster:
             self.tell(program, item)
 
     def refuse(self, program: Program, why: str) -> None:
-        """What a program sent makes no sense."""
+        """Tell a program that what it sent makes no sense."""
         _log.debug("%s: %s", program.name, why)
         self.tell(program, Refused(why))

@@ -13,13 +13,13 @@ _START_LIMIT_S, _STOP_LIMIT_S = 20.0, 5.0
 
 
 class ServedFace(ABC):
-    """A `Face` of the daemon; how it serves is its subclass's.
+    """`Face` of the daemon; its subclass defines how it serves.
 
     Args:
-        name: Of the thread, and for the log.
-        label: Stands before why it cannot serve.
-        error: Raised with that.
-        expected: What may come of how it is configured: told in a sentence, without the way through the program.
+        name: Name of the thread, and for the log.
+        label: Text before the reason why it cannot serve.
+        error: Exception type that is raised with that text.
+        expected: Exceptions that may come of its configuration: reported in a sentence, without a traceback.
 
     Attributes:
         address: `HOST:PORT` that it listens on; empty: it does not yet.
@@ -45,7 +45,7 @@ class ServedFace(ABC):
 
     @property
     def is_alive(self) -> bool:
-        """Whether it serves."""
+        """True if the face serves."""
         return self._thread.is_alive() and self._failure is None
 
     def start(self) -> None:
@@ -79,7 +79,7 @@ class ServedFace(ABC):
         """Listen, set `address`, call `_is_listening`, and serve until `_end` is set."""
 
     def _is_listening(self) -> None:
-        """Whoever waits in `start` may go on."""
+        """Let whoever waits in `start` go on."""
         self._is_ready.set()
 
     def _run(self) -> None:

@@ -1,4 +1,4 @@
-"""Whether a model needs the camera, and the worker that looks through it."""
+"""Need of a model for the camera, and the worker that looks through it."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,10 @@ from robosc_bridge.skills.settings import LineSettings
 
 
 def needs_camera(ties: Ties) -> bool:
-    """Whether a communication is tied to what the camera shows, or to its faults; `any` device alone needs none."""
+    """Return True if a communication is tied to what the camera shows, or to its faults.
+
+    A fault of `any` device alone needs no camera.
+    """
     faults = (tied for _, tied in ties.tied_to(FaultChannel))
     return bool(
         ties.tied_to(LineChannel)
@@ -21,7 +24,7 @@ def needs_camera(ties: Ties) -> bool:
 
 
 def sight_problems(line: LineSettings, ties: Ties, settings: Settings) -> list[str]:
-    """What is wrong with how the line is to be seen; nobody may follow one that no one tells is lost."""
+    """Return the problems with how the line is to be seen; nobody may follow a line whose loss nobody reports."""
     found = []
     if needs_camera(ties) and line.camera == "simulated":
         found.append("skills.line.camera: tell where the simulator serves its pictures, as simulated:PATH")
@@ -36,7 +39,7 @@ def sight_problems(line: LineSettings, ties: Ties, settings: Settings) -> list[s
 
 
 def camera_worker(settings: LineSettings, report: Callable[[Report], None], clock: Callable[[], float]) -> Worker:
-    """What keeps the camera open, which is not opened yet."""
+    """Return the worker that keeps the camera open; the camera is not opened yet."""
     # OpenCV and numpy are for those who look.
     from robosc_bridge.daemon.camera_worker import CameraWorker
     from robosc_bridge.devices.camera import make_camera

@@ -1,4 +1,4 @@
-"""What the loop shows: a snapshot whenever something changes that a person would want to see at once."""
+"""Snapshots that the loop shows: one whenever something changes that a person would want to see at once."""
 
 from collections.abc import Mapping
 from typing import Any, Protocol
@@ -20,7 +20,7 @@ class Shown(Protocol):
 
     @property
     def stops(self) -> tuple[str, ...]:
-        """Why the executor requests nothing."""
+        """Reasons why the executor requests nothing."""
 
     @property
     def changes(self) -> int:
@@ -37,12 +37,12 @@ class Shown(Protocol):
 
 
 class Snapshots:
-    """Makes snapshots, and only those that are worth it.
+    """Maker of snapshots, and only of those that are worth it.
 
     Args:
-        feed: Where they are shown.
+        feed: Feed that shows the snapshots.
         execution: The supervisor at work.
-        readiness: What is known of the devices.
+        readiness: Knowledge about the devices.
         clock: The time.
     """
 

@@ -1,4 +1,4 @@
-"""What the daemon is doing, and what an operator may want of it."""
+"""State of the daemon, and commands that an operator may give it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class State(StrEnum):
-    """What the daemon is doing."""
+    """State of the daemon."""
 
     STARTING = "starting"
     STANDBY = "standby"
@@ -17,7 +17,7 @@ class State(StrEnum):
 
 
 class Command(StrEnum):
-    """What an operator may want."""
+    """Command that an operator may give."""
 
     START = "start"
     STANDBY = "standby"
@@ -29,13 +29,14 @@ class Command(StrEnum):
 
 @dataclass(frozen=True)
 class Order:
-    """A command of an operator who wants to know what became of it.
+    """Command of an operator who wants to know what became of it.
 
     Attributes:
-        command: What is wanted.
-        by: Who wants it, for the log.
-        answer: Called once, by the loop's thread, or after its end by that of who orders: with why it cannot be, one
-            sentence, or with nothing ("") once it is done. It neither waits nor raises.
+        command: Command that is wanted.
+        by: Name of the operator, for the log.
+        answer: Function that is called once, by the loop's thread, or after its end by that of the operator: with the
+            reason why the command cannot be, one sentence, or with nothing ("") once it is done. It neither waits nor
+            raises.
     """
 
     command: Command

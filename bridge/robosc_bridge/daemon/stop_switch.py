@@ -7,17 +7,17 @@ from robosc_bridge.daemon.supervised import Listeners, Supervised
 from robosc_bridge.skills import EmergencyStop, StopEvent
 
 STOP_HELD = "a button that stops the robot is pressed"
-"""Why nothing can go on."""
+"""Reason why nothing can go on."""
 
 
 class StopSwitch:
-    """What the operator wants, wherever it comes from.
+    """Stop switch of the operator, wherever the operator's wish comes from.
 
     Args:
-        skill: What buttons, keys and calls mean.
-        listeners: Who is told.
+        skill: Skill that interprets buttons, keys and calls.
+        listeners: Identifiers that each kind of channel reports to.
         on_stop: Called when the operator stops the robot, before the model hears of it.
-        on_resume: Called when the operator lets it go on; why it cannot, or nothing.
+        on_resume: Called when the operator lets it go on; returns the reason why it cannot, or nothing.
     """
 
     def __init__(
@@ -30,16 +30,16 @@ class StopSwitch:
 
     @property
     def is_stopped(self) -> bool:
-        """Whether the operator has stopped the robot, and not let it go on since."""
+        """True if the operator has stopped the robot, and not let it go on since."""
         return self._skill.is_stopped
 
     @property
     def is_held(self) -> bool:
-        """Whether a button that stops the robot is pressed."""
+        """True if a button that stops the robot is pressed."""
         return self._skill.is_held
 
     def saw_buttons(self, held: Collection[str], executor: Supervised | None) -> None:
-        """Which buttons are pressed now."""
+        """Take the buttons that are pressed now."""
         self._take(self._skill.update(held_buttons=held), executor)
 
     def saw_key(self, key: str, executor: Supervised | None) -> None:

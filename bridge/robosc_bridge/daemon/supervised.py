@@ -1,4 +1,4 @@
-"""What the robot and programs tell an executor, and on which identifiers it hears what."""
+"""Input of an executor from the robot and programs, and the identifiers on which it hears what."""
 
 from typing import Any, Protocol
 
@@ -8,7 +8,7 @@ from robosc_bridge.configuration.ties import Ties
 
 
 class Supervised(Protocol):
-    """What an executor of either deployment is told."""
+    """Input of an executor of either deployment."""
 
     def receive(self, identifier: str, data: Any) -> None:
         """A message came."""
@@ -23,17 +23,17 @@ class Supervised(Protocol):
         """A goal is under way."""
 
     def on_feedback(self, goal_id: int, data: Any) -> None:
-        """How far a goal is."""
+        """Take the progress of a goal."""
 
     def on_goal_ended(self, goal_id: int, outcome: str, data: Any = None) -> None:
         """A goal has ended."""
 
 
 class Listeners:
-    """Which identifiers are told what, by kind of channel; each identifier once.
+    """Identifiers that each kind of channel reports to; each identifier once.
 
     Args:
-        ties: What each communication is tied to.
+        ties: Channel that each communication is tied to.
     """
 
     def __init__(self, ties: Ties) -> None:

@@ -1,4 +1,4 @@
-"""Where the supervisor comes from, and why it is trusted.
+"""Source of the supervisor, and the reason why it is trusted.
 
 It is made here, by this machine's synthesizer, or it is foreign: a file, or what a synthesis server sends. A foreign
 one is untrusted input, whatever digest it carries: it is validated, and executed only if a key that this bridge was
@@ -50,16 +50,16 @@ class NoSupervisorError(BridgeError):
 
 @dataclass(frozen=True)
 class Source:
-    """What to execute.
+    """Source of the supervisor to execute.
 
     Attributes:
         file: The model (`.rscd`), or a supervisor (`.rsup`); that has its signature or its model's text beside it.
-        deployment: Where the supervisor is to stand.
+        deployment: Deployment that the supervisor is to have.
         server: HOST:PORT of a synthesis server that makes it of the model; None: it is made here.
         kept: Folder for what a server made last; None: nothing is kept.
         trusted: Keys whose signatures of supervisor files are believed.
-        credentials: How the server is reached; None: without TLS, certificate and token.
-        allow_livelock: Whether silent steps may go on for ever.
+        credentials: Credentials for reaching the server; None: without TLS, certificate and token.
+        allow_livelock: True if silent steps may go on for ever.
     """
 
     file: Path
@@ -93,7 +93,7 @@ def trusted_keys(entries: Iterable[str]) -> tuple[PublicKey, ...]:
 
 
 def credentials_of(chosen: SupervisorSource) -> Credentials:
-    """How the synthesis server is reached, as a configuration says."""
+    """Return the credentials for reaching the synthesis server, as a configuration says."""
     return Credentials(
         ca=_path(chosen.ca),
         certificate=_path(chosen.certificate),
@@ -103,7 +103,10 @@ def credentials_of(chosen: SupervisorSource) -> Credentials:
 
 
 def kept_folder(argument: Path | None, chosen: SupervisorSource) -> Path | None:
-    """Where what a server made last is kept: as the command line says, else the configuration, else below the home."""
+    """Return the folder for what a server made last.
+
+    As the command line says, else the configuration, else below the home.
+    """
     folder = argument or _path(chosen.keep) or state_folder()
     if folder is None:
         _log.warning("there is no home: what a synthesis server makes is not kept for a start without network")
@@ -115,11 +118,11 @@ def _path(text: str | None) -> Path | None:
 
 
 def obtain(source: Source, tell: Callable[[str], None] = lambda text: None) -> Supervisor:
-    """The supervisor, verified or vouched for.
+    """Return the supervisor, verified or vouched for.
 
     Args:
-        source: Where it comes from.
-        tell: Told where the work is and what is worth knowing, one line each.
+        source: Source of the supervisor.
+        tell: Function that takes messages about where the work is and what is worth knowing, one line each.
 
     Raises:
         NoSupervisorError: There is none that can be trusted, or its silent steps never end.
@@ -137,7 +140,9 @@ def obtain(source: Source, tell: Callable[[str], None] = lambda text: None) -> S
 
 
 def deployment_of(file: Path) -> Deployment:
-    """Where a file's supervisor says that it is to stand; a model may stand anywhere, and is taken for a controller.
+    """Return the deployment that a file's supervisor says that it is for.
+
+    A model may have any deployment, and is taken for a controller.
 
     Raises:
         NoSupervisorError: A supervisor's file cannot be read.
@@ -216,7 +221,7 @@ def _require_deployment(supervisor: Supervisor, deployment: Deployment, place: s
 
 
 def _response(supervisor: Supervisor, place: str) -> PropertyResult:
-    """Whether silent steps end, found out here."""
+    """Check here whether silent steps end, and return the result."""
     certificate = supervisor.certificate
     try:
         found = check_controller(
@@ -299,7 +304,7 @@ def _checked(data: bytes, place: str, bundle: Bundle, source: Source, tell: Call
 
 
 def _served(bundle: Bundle, server: str, source: Source, tell: Callable[[str], None]) -> Supervisor:
-    """What the server makes, or else what it made last."""
+    """Return the supervisor that the server makes, or else the one that it made last."""
     kept = source.kept / f"{bundle.digest}-{source.deployment}{SUPERVISOR_SUFFIX}" if source.kept else None
     tell(f"{bundle.main.name}: synthesis at {server}")
     try:

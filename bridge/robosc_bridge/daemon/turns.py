@@ -14,7 +14,7 @@ from robosc_bridge.daemon.wheel_messages import angle_of
 _log = logging.getLogger(__name__)
 
 _SERVICE_SHARE = 0.9
-"""How much of a call's time a turn may take."""
+"""Share of a call's time that a turn may take."""
 
 
 class _Turn:
@@ -31,12 +31,12 @@ class Turns:
     """The turn under way.
 
     Args:
-        motion: What moves the wheels.
-        listeners: Who is told of the end of a turn that a message asked for.
-        owe: Takes what the executor is to be told, once it is not at work.
+        motion: Motion of the wheels.
+        listeners: Identifiers that receive the end of a turn that a message asked for.
+        owe: Function that takes what the executor is to be told, once it is not at work.
         on_failed: Called with the reason when a turn has failed of which the model hears nothing.
-        service_timeout_s: When the executor takes a call for failed; None: never.
-        clock: What the time is, in seconds.
+        service_timeout_s: Time after which the executor takes a call for failed, in seconds; None: never.
+        clock: Clock that returns the time, in seconds.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class Turns:
 
     @property
     def is_under_way(self) -> bool:
-        """Whether somebody waits for the end of a turn."""
+        """True if somebody waits for the end of a turn."""
         return self._turn is not None
 
     @property
@@ -74,10 +74,10 @@ class Turns:
         """Begin a turn; none is under way.
 
         Args:
-            asked: What asked for it.
-            channel: That it is tied to.
-            number: Of the call or goal; None: a message asked for it.
-            message: With the angle.
+            asked: Communication that asked for it.
+            channel: Channel that the communication is tied to.
+            number: Number of the call or goal; None: a message asked for it.
+            message: Message with the angle.
         """
         # Before the executor believes that a call failed, it must have.
         is_call = asked.kind is CommunicationKind.SERVICE
@@ -101,7 +101,7 @@ class Turns:
             self._owe(lambda executor: executor.on_goal_ended(number, "cancelled"))
 
     def look(self, *, is_own: bool = False) -> None:
-        """Whether a turn has ended: who asked for it is told so, later."""
+        """Check whether a turn has ended; if so, whoever asked for it is told later."""
         turn = self._turn
         if turn is not None and self._motion.is_turning and self._clock() >= turn.end_s:
             self._motion.stop(self._clock(), "the turn takes longer than a call may")

@@ -1,4 +1,4 @@
-"""What messages of a model ask of the wheels, read from their plain data."""
+"""Wheel commands in messages of a model, read from their plain data."""
 
 import math
 from collections.abc import Iterator
@@ -47,7 +47,7 @@ def _numbers(data: Any) -> Iterator[float]:
 
 
 def is_default(data: Any) -> bool:
-    """Whether every part is zero, empty or left out."""
+    """Return True if every part is zero, empty or left out."""
     if isinstance(data, dict):
         return all(is_default(part) for part in data.values())
     return not data

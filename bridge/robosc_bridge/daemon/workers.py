@@ -18,26 +18,32 @@ from robosc_bridge.errors import BridgeError, DeviceSilentError
 from robosc_bridge.safety import Caution, Reason
 
 _LISTEN_S = 0.2
-"""How long a scanner is listened to at once."""
+"""Time that a scanner is listened to at once, in seconds."""
 
 SILENT_LIMIT = 3
-"""So many exchanges in a row without an answer, and the drive base counts as lost; fewer are noise on the line."""
+"""Exchanges in a row without an answer after which the drive base counts as lost.
+
+Fewer are noise on the line.
+"""
 
 _log = logging.getLogger(__name__)
 
 
 _CLOSED_S = 0.1
-"""How often the safety layer is asked while there is no drive base: it must notice that nothing holds any more."""
+"""Time between queries of the safety layer while there is no drive base, in seconds.
+
+The safety layer must notice that nothing holds any more.
+"""
 
 RESTART_LIMIT = 3
-"""So many restarts of a scanner's motor without a full turn, and the scanner is closed and opened anew."""
+"""Restarts of a scanner's motor without a full turn after which the scanner is closed and opened anew."""
 
 VALID_LIMIT = 8
 """A turn with fewer valid ranges shows nothing: the LiDAR is covered, or something is too near."""
 
 
 class Command(Protocol):
-    """What the drive base is to do."""
+    """Command for the drive base."""
 
     @property
     def velocity(self) -> Velocity:
@@ -45,22 +51,22 @@ class Command(Protocol):
 
     @property
     def is_torque_wanted(self) -> bool:
-        """Whether the motors are to hold."""
+        """True if the motors are to hold."""
 
     @property
     def reasons(self) -> tuple[Reason, ...]:
-        """Why it may not move."""
+        """Reasons why it may not move."""
 
     @property
     def warnings(self) -> tuple[Caution, ...]:
-        """What a person should know."""
+        """Warnings that a person should know."""
 
 
 class Gate(Protocol):
-    """What a worker needs of the safety layer; its methods neither raise nor wait."""
+    """Part of the safety layer that a worker needs; its methods neither raise nor wait."""
 
     def output(self, now_s: float) -> Command:
-        """What the drive base is to do now."""
+        """Return the command for the drive base now."""
 
     def saw_drive(self, reading: DriveReading) -> None:
         """The drive base told something."""
@@ -72,7 +78,7 @@ class Gate(Protocol):
         """A full turn came, with a range for each degree."""
 
     def saw_noise(self, is_noisy: bool) -> None:
-        """Whether many frames of the scanner are damaged."""
+        """Take the report whether many frames of the scanner are damaged."""
 
 
 class Worker(Protocol):
@@ -91,14 +97,16 @@ class Worker(Protocol):
 
 
 class DriveWorker:
-    """Keeps a drive base in its cycle: what the safety layer lets through goes out, what comes back is reported.
+    """Worker that keeps a drive base in its cycle.
+
+    It sends out what the safety layer lets through, and reports what comes back.
 
     Args:
         base: The drive base.
         gate: The safety layer.
-        report: Takes what is told; must not wait.
-        period_s: Time between exchanges.
-        clock: What the time is, in seconds.
+        report: Function that takes the reports; must not wait.
+        period_s: Time between exchanges, in seconds.
+        clock: Clock that returns the time, in seconds.
         backoff: Pauses between attempts to open it.
     """
 
@@ -193,7 +201,7 @@ class DriveWorker:
             self._due_s = now_s + self._period_s
 
     def _ask(self, now_s: float) -> Command:
-        """What the safety layer says; what it says anew about why is reported."""
+        """Return the command of the safety layer; new reasons and warnings in it are reported."""
         command = self._gate.output(now_s)
         notice = SafetyNotice(command.reasons, command.warnings)
         if notice != self._notice:
@@ -230,17 +238,18 @@ class DriveWorker:
 
 
 class ScannerWorker:
-    """Keeps a range scanner turning: each full turn is reported.
+    """Worker that keeps a range scanner turning: each full turn is reported.
 
     Args:
         scanner: The scanner.
         gate: The safety layer.
-        report: Takes what is told; must not wait.
-        silent_after_s: After so long without a full turn it counts as lost.
-        restart_after_s: After so long without any turn its motor is restarted, `RESTART_LIMIT` times; then it is lost.
-        clock: What the time is, in seconds.
+        report: Function that takes the reports; must not wait.
+        silent_after_s: Time without a full turn after which it counts as lost, in seconds.
+        restart_after_s: Time without any turn after which its motor is restarted, in seconds, `RESTART_LIMIT` times;
+            then it is lost.
+        clock: Clock that returns the time, in seconds.
         backoff: Pauses between attempts to open it.
-        bad_frames_share: Of a second's frames, above which its line is told to be noisy.
+        bad_frames_share: Share of damaged frames in a second above which its line is reported to be noisy.
     """
 
     name = "scanner"

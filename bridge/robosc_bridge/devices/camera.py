@@ -46,11 +46,11 @@ class Camera(Protocol):
         """
 
     def receive(self, limit_s: float) -> GreyRows | None:
-        """The newest picture that has come, waiting for one; None: none was complete within the limit.
+        """Return the newest picture that has come, waiting for one; None: none was complete within the limit.
 
         Raises:
             LineError: It is gone, or could not be opened.
-            WrongDeviceError: What it sends are no pictures.
+            WrongDeviceError: It sends something else than pictures.
         """
 
     def close(self) -> None:
@@ -127,7 +127,7 @@ class _StreamCamera(ABC):
 
     @abstractmethod
     def _why_it_ended(self) -> str:
-        """What is wrong, when no more bytes come."""
+        """Describe what is wrong, when no more bytes come."""
 
     @abstractmethod
     def close(self) -> None:

@@ -25,10 +25,10 @@ from robosc_bridge.protocol.servo import Measurement
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 FACTORY_BAUD = 57_600
-"""What a servo fresh from the factory speaks; a robot's are set to 1 000 000."""
+"""Baud rate of a servo fresh from the factory; a robot's servos are set to 1 000 000."""
 
 CHECK_PERIOD_S = 0.1
-"""How often it is looked whether the motors have torque and their watchdogs have tripped, beside every exchange."""
+"""Time between checks of the motors' torque and of tripped watchdogs, in seconds, beside every exchange."""
 
 _FOLLOWING_S = 0.7
 
@@ -39,14 +39,15 @@ class DynamixelBase:
     """A `DriveBase`. Used from one thread.
 
     Args:
-        path: Of the adapter's port.
-        robot: Whose wheels they are.
+        path: Path of the adapter's port.
+        robot: Robot that the wheels belong to.
         motors: Ids of the left and the right one; the right one is mounted the other way round.
         bauds: Speeds to look for them at, in this order.
-        acceleration_rad_s2: Of a wheel; None: as fast as it can.
-        watchdog_s: After how long without a request the motors stop by themselves, at least three exchanges.
+        acceleration_rad_s2: Acceleration of a wheel; None: as fast as it can.
+        watchdog_s: Time without a request after which the motors stop by themselves, in seconds, at least three
+            exchanges.
         answer_limit_s: Longest wait for one answer.
-        host: What it has of its computer.
+        host: Parts of its computer that it uses.
 
     Raises:
         ValueError: An argument is out of its range.
@@ -96,7 +97,7 @@ class DynamixelBase:
 
     @property
     def limits(self) -> DriveLimits:
-        """What the wheels can do; known after `open`."""
+        """Limits of the wheels; known after `open`."""
         return self._limits
 
     def open(self) -> None:

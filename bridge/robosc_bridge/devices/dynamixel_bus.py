@@ -26,7 +26,10 @@ ANSWER_LIMIT_S = 0.034
 
 
 def exchange_limit_s(answer_limit_s: float) -> float:
-    """How long an exchange of a driver may take: three answers just in time, with what they take on the wire."""
+    """Return the time that an exchange of a driver may take, in seconds.
+
+    Three answers just in time, with the time that they take on the wire.
+    """
     return 3 * answer_limit_s + 0.02
 
 
@@ -45,10 +48,10 @@ _turns = itertools.cycle(_SETTLING)  # Shared: a port that is opened anew may st
 
 
 class RefusedError(DeviceError):
-    """A device has refused a request.
+    """Error that a device has refused a request.
 
     Args:
-        problem: What was asked of which device.
+        problem: Description of what was asked of which device.
         status: Its answer.
     """
 
@@ -59,11 +62,11 @@ class RefusedError(DeviceError):
 
 @dataclass
 class BusCounters:
-    """How healthy a line is.
+    """Health of a line.
 
     Attributes:
-        requests: That wanted an answer.
-        unanswered: Of these, without a sound answer in time.
+        requests: Requests that wanted an answer.
+        unanswered: Those of the requests without a sound answer in time.
         damaged: Answers with a wrong checksum or cut short.
         foreign: Sound packets that were no answer to the request.
         repeated: Requests that were made again.
@@ -80,13 +83,13 @@ class DynamixelBus:
     """One or several devices on a line. Used from one thread.
 
     Args:
-        line: Open; stays its owner's.
-        name_of: What to call a device in messages, with the line.
+        line: Open line; stays its owner's.
+        name_of: Function that returns the name of a device in messages, with the line.
         answer_limit_s: Longest wait for one answer.
-        host: Whose time it lives by.
+        host: Host whose time it uses.
 
     Attributes:
-        counters: How healthy the line is.
+        counters: Health of the line.
         stranger: Device that has answered to requests for others since the last `begin`; None: none has.
     """
 
@@ -108,15 +111,15 @@ class DynamixelBus:
 
     @property
     def received_s(self) -> float:
-        """When the last byte came."""
+        """Time when the last byte came, in seconds."""
         return self._port.received_s
 
     def begin(self, limit_s: float, repeats: int = 1) -> None:
         """Begin a cycle.
 
         Args:
-            limit_s: What the requests that follow may take together.
-            repeats: How many of them may be made again.
+            limit_s: Time that the requests that follow may take together, in seconds.
+            repeats: Number of these requests that may be made again.
         """
         self._port.end_s = self._host.monotonic() + limit_s
         self._repeats = repeats
@@ -157,7 +160,7 @@ class DynamixelBus:
         return int.from_bytes(status.data[:2], "little"), status.data[2]
 
     def read(self, device: int, address: int, length: int) -> Status:
-        """What is at an address.
+        """Read the data at an address.
 
         Raises:
             LineError: The line is gone.
@@ -173,9 +176,9 @@ class DynamixelBus:
         """Write to an address.
 
         Args:
-            device: Whose.
-            address: Of the first byte.
-            data: What.
+            device: Id of the device.
+            address: Address of the first byte.
+            data: Data to write.
             limit_s: Longest wait for the answer, where it is not the usual one.
 
         Raises:
@@ -225,10 +228,11 @@ class DynamixelBus:
         self._sent(self._handler.syncWriteTxOnly(self._port, address, length, parameters, len(parameters)))
 
     def sync_read(self, address: int, length: int, devices: Collection[int]) -> dict[int, Status]:
-        """What is at the same address of several devices.
+        """Read the data at the same address of several devices.
 
         Returns:
-            By device; those are missing that have not answered, also when asked again. Answers may be refusals.
+            Answers by device; devices that have not answered, also when asked again, are missing. Answers may be
+            refusals.
 
         Raises:
             LineError: The line is gone.
@@ -357,5 +361,5 @@ class DynamixelBus:
 
 
 def _fits(status: Status, length: int) -> bool:
-    """Whether an answer can be one to a request for so many bytes: these, or an error and none."""
+    """Return True if an answer can be one to a request for so many bytes: these, or an error and none."""
     return len(status.data) == length or (status.number != 0 and not status.data)

@@ -14,18 +14,18 @@ _BITS_PER_BYTE = 10  # With a start and a stop bit.
 
 
 class DynamixelPort:
-    """What `PacketHandler` takes for a port.
+    """Port for `PacketHandler`.
 
     Args:
-        line: That it sends and receives over.
+        line: Line that it sends and receives over.
         answer_limit_s: Longest wait for an answer, beside the time that its bytes take on the wire.
-        host: Whose time it lives by.
+        host: Host whose time it uses.
 
     Attributes:
         line: The same.
         answer_limit_s: The same.
         end_s: Latest time of any wait, so that several requests together stay within a limit.
-        received_s: When the last byte came.
+        received_s: Time when the last byte came, in seconds.
     """
 
     def __init__(self, line: Port, answer_limit_s: float, host: Host) -> None:
@@ -40,7 +40,7 @@ class DynamixelPort:
 
     @property
     def is_using(self) -> bool:
-        """Whether another request is under way: never, with one thread."""
+        """True if another request is under way: never, with one thread."""
         return False
 
     @is_using.setter
@@ -49,7 +49,7 @@ class DynamixelPort:
 
     @property
     def is_late(self) -> bool:
-        """Whether the time for requests is over."""
+        """True if the time for requests is over."""
         return self._host.monotonic() >= self.end_s
 
     # The names below are the SDK's.
@@ -88,5 +88,5 @@ class DynamixelPort:
         return taken
 
     def isPacketTimeout(self) -> bool:  # noqa: N802
-        """Whether the wait is over and everything that came is read."""
+        """Return True if the wait is over and everything that came is read."""
         return self._is_over and not self._found

@@ -1,4 +1,4 @@
-"""Whether the wheels turn as they are told."""
+"""Watch over the wheels: whether they turn as they are told."""
 
 from collections.abc import Sequence
 
@@ -23,14 +23,14 @@ class FollowingWatch:
         self._since_s = []
 
     def is_blocked(self, goals_raw: Sequence[int], velocities_raw: Sequence[int], time_s: float) -> bool:
-        """Whether any wheel has been far from its goal in all readings of longer than the limit.
+        """Return True if any wheel has been far from its goal in all readings of longer than the limit.
 
         After a pause it begins anew: what the wheels did meanwhile is not known.
 
         Args:
-            goals_raw: Of each wheel.
-            velocities_raw: That each has.
-            time_s: When they were read.
+            goals_raw: Goal of each wheel.
+            velocities_raw: Velocity that each wheel has.
+            time_s: Time when they were read, in seconds.
         """
         if not self._since_s or time_s - self._time_s > self._limit_s / 2:
             self._since_s = [None] * len(goals_raw)

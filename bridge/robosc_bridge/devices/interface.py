@@ -1,7 +1,7 @@
-"""What a drive base and a range scanner are to the rest of the bridge, whatever device is behind them.
+"""Interface of a drive base and a range scanner to the rest of the bridge, whatever device is behind them.
 
-Both are used from one thread each, that of their line; none of their methods waits longer than its line's limit. Times
-are those of `time.monotonic`, in seconds. Axes are those of REP 103: x forward, angles counter-clockwise.
+Both are used from one thread each, that of their line; none of their methods waits longer than its line's limit.
+Times are those of `time.monotonic`, in seconds. Axes are those of REP 103: x forward, angles counter-clockwise.
 """
 
 from collections.abc import Mapping
@@ -28,12 +28,12 @@ STANDSTILL = Velocity()
 
 @dataclass(frozen=True)
 class Pose:
-    """Where the body is since the odometry began.
+    """Position and heading of the body since the odometry began.
 
     Attributes:
-        x_m: Along the first heading.
-        y_m: To its left.
-        heading_rad: Within (-pi, pi].
+        x_m: Distance along the first heading, in metres.
+        y_m: Distance to its left, in metres.
+        heading_rad: Heading within (-pi, pi], in radians.
     """
 
     x_m: float = 0.0
@@ -42,7 +42,7 @@ class Pose:
 
 
 class MotorFault(StrEnum):
-    """What a wheel's motor or the base tells of itself; those from `OVERHEATING` to `TORQUE_LOST` end its torque."""
+    """Fault that a wheel's motor or the base reports; those from `OVERHEATING` to `TORQUE_LOST` end its torque."""
 
     VOLTAGE = "input voltage"
     OVERHEATING = "overheating"
@@ -56,19 +56,19 @@ class MotorFault(StrEnum):
 
 @dataclass(frozen=True)
 class DriveReading:
-    """What a drive base told in one exchange.
+    """Reading of a drive base in one exchange.
 
     Attributes:
-        time_s: When its last byte had come.
+        time_s: Time when its last byte had come, in seconds.
         pose: Odometry.
-        velocity: As the wheels measure it.
+        velocity: Velocity as the wheels measure it.
         wheels_m_s: Speed of the left and the right wheel.
-        is_torque_on: Whether the motors hold and obey.
-        faults: Of any motor.
-        battery_v: None: it does not tell.
-        battery_share: 0 to 1; None: it does not tell.
-        temperature_c: Of the hottest motor; None: it does not tell.
-        buttons: Whether each is pressed, by name: `button_1`, `bumper_1` and so on.
+        is_torque_on: True if the motors hold and obey.
+        faults: Faults of any motor.
+        battery_v: Voltage of the battery, in volts; None: it is not reported.
+        battery_share: Charge of the battery, 0 to 1; None: it is not reported.
+        temperature_c: Temperature of the hottest motor, in degrees Celsius; None: it is not reported.
+        buttons: True for each button that is pressed, by name: `button_1`, `bumper_1` and so on.
         imu: Further measurements by name, such as `angular_velocity_z`; empty: there are none.
     """
 
@@ -87,10 +87,10 @@ class DriveReading:
 
 @dataclass(frozen=True)
 class DriveLimits:
-    """What a drive base can do.
+    """Limits of a drive base.
 
     Attributes:
-        linear_m_s: Fastest forward and backward.
+        linear_m_s: Fastest speed forward and backward.
         angular_rad_s: Fastest turn.
         wheel_m_s: Fastest wheel.
     """
@@ -112,7 +112,7 @@ class DriveBase(Protocol):
 
         Raises:
             LineError: The line cannot be used.
-            DeviceError: What answers there cannot be driven.
+            DeviceError: The device that answers there cannot be driven.
         """
 
     def set_torque(self, is_on: bool) -> None:
@@ -168,11 +168,11 @@ class Scan:
     """One full turn.
 
     Attributes:
-        time_s: When its last byte had come.
-        ranges_m: `BINS` bins of one degree, counter-clockwise, the first straight ahead and half a degree to both sides
-            of it; the smallest valid range of each, NaN if none.
-        raw: As it was measured.
-        turns_per_s: Speed of the motor as the device tells it.
+        time_s: Time when its last byte had come, in seconds.
+        ranges_m: `BINS` bins of one degree, counter-clockwise, the first straight ahead and half a degree to both
+            sides of it; the smallest valid range of each, NaN if none.
+        raw: The scan as it was measured.
+        turns_per_s: Speed of the motor as the device reports it.
     """
 
     time_s: float
@@ -183,7 +183,7 @@ class Scan:
 
 @dataclass
 class ScannerCounters:
-    """How healthy a scanner's line is.
+    """Health of a scanner's line.
 
     Attributes:
         scans: Full turns.

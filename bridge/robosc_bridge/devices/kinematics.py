@@ -1,7 +1,8 @@
-"""What two wheels are told so that the body moves as it should, within what they can do.
+"""Commands for two wheels so that the body moves as it should, within the limits of the wheels.
 
 The limits are applied in this order: the body's velocity is clamped; the wheels' speeds are made of it; where one is
-too fast, both are slowed by the same factor, which keeps the curvature; then they are rounded to what the wire carries.
+too fast, both are slowed by the same factor, which keeps the curvature; then they are rounded to what the wire
+carries.
 """
 
 import math
@@ -12,11 +13,11 @@ _CM = 100  # OpenCR takes centimetres and hundredths of a radian per second.
 
 
 def clamped(velocity: Velocity, limits: DriveLimits) -> Velocity:
-    """The velocity, each part within its limit; what is not a number is none.
+    """Return the velocity with each part within its limit; a part that is not a number becomes zero.
 
     Args:
-        velocity: Of the body.
-        limits: What it can do.
+        velocity: Velocity of the body.
+        limits: Limits of the body.
     """
     return Velocity(
         _clamped(velocity.linear_m_s, limits.linear_m_s), _clamped(velocity.angular_rad_s, limits.angular_rad_s)
@@ -49,16 +50,16 @@ def within_limits(velocity: Velocity, limits: DriveLimits, separation_m: float) 
 
 
 def wheel_goals(velocity: Velocity, limits: DriveLimits, separation_m: float, raw_m_s: float) -> tuple[int, int]:
-    """Goal velocities of the left and the right servo.
+    """Return the goal velocities of the left and the right servo.
 
     Args:
-        velocity: That the body should have.
-        limits: What it can do.
-        separation_m: Between the wheels.
+        velocity: Velocity that the body should have.
+        limits: Limits of the body.
+        separation_m: Distance between the wheels, in metres.
         raw_m_s: Speed of a wheel in one unit of its servo's velocity.
 
     Returns:
-        In units of the servos' velocity, never beyond `limits.wheel_m_s`.
+        Goals in units of the servos' velocity, never beyond `limits.wheel_m_s`.
     """
     most = int(limits.wheel_m_s / raw_m_s + 1e-9)
     speeds = wheel_speeds(within_limits(velocity, limits, separation_m), separation_m)
@@ -67,15 +68,15 @@ def wheel_goals(velocity: Velocity, limits: DriveLimits, separation_m: float, ra
 
 
 def opencr_words(velocity: Velocity, limits: DriveLimits, separation_m: float) -> tuple[int, int]:
-    """The words that OpenCR is commanded with, such that none of its own limits ever acts.
+    """Return the words that command OpenCR, such that none of its own limits ever acts.
 
-    Its firmware clamps both parts on their own and then each wheel, which changes the curvature; and what it tells the
-    servos may be beyond their velocity limit, which they ignore altogether and keep their last speed.
+    Its firmware clamps both parts on their own and then each wheel, which changes the curvature; and its commands to
+    the servos may be beyond their velocity limit, which they ignore altogether and keep their last speed.
 
     Args:
-        velocity: That the body should have.
-        limits: What it can do.
-        separation_m: Between the wheels.
+        velocity: Velocity that the body should have.
+        limits: Limits of the body.
+        separation_m: Distance between the wheels, in metres.
 
     Returns:
         Hundredths of a metre per second and of a radian per second.

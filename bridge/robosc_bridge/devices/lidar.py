@@ -21,18 +21,18 @@ BAUD_TRIAL_S = 1.0
 
 @dataclass(frozen=True)
 class Model[Frame]:
-    """What is particular to a LiDAR.
+    """Particulars of a LiDAR.
 
     Attributes:
-        name: As in the registry.
+        name: Name in the registry.
         bauds: Speeds of its line; the first is the likeliest.
-        make_decoder: Finds its frames.
-        points: Where the points of a frame are.
+        make_decoder: Function that makes a decoder of its frames.
+        points: Function that returns the points of a frame.
         start: Command that starts its motor; empty: it turns by itself.
         stop: Command that stops its motor; empty: it cannot be stopped.
-        restart_pause_s: Between stop and start; None: a restart is the start alone.
+        restart_pause_s: Pause between stop and start, in seconds; None: a restart is the start alone.
         stale_after_s: Three turns: after so long a silence, what came before says nothing about now.
-        is_dtr_off: Whether its official driver drops this modem line, which opening a port raises.
+        is_dtr_off: True if its official driver drops this modem line, which opening a port raises.
     """
 
     name: str
@@ -58,15 +58,15 @@ class Lidar[Frame]:
     """A LiDAR on a serial line: a `RangeScanner`.
 
     Args:
-        model: Which one.
-        path: Of its port.
+        model: Model of the LiDAR.
+        path: Path of its port.
         baud: Speed of its line; None: found out among those of the model.
-        front_rad: Where its front points to, counter-clockwise from that of the robot.
-        is_upside_down: Whether it hangs, so that it turns the other way round.
-        host: What it has of its computer.
+        front_rad: Direction of its front, in radians, counter-clockwise from that of the robot.
+        is_upside_down: True if it hangs, so that it turns the other way round.
+        host: Parts of its computer that it uses.
 
     Attributes:
-        counters: Since it was made, across being opened anew.
+        counters: Counters since it was made, across being opened anew.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class Lidar[Frame]:
 
     @property
     def model(self) -> Model[Frame]:
-        """Which one it is."""
+        """Model of the LiDAR."""
         return self._model
 
     @property

@@ -25,20 +25,20 @@ def make_rover(
     telemetry_s: float = 0.05,
     host: Host = SYSTEM_HOST,
 ) -> MavlinkRover:
-    """A drive base.
+    """Return a drive base.
 
     Args:
-        path: As of `MavlinkRover`, and so are the others that are not told here.
-        robot: What it can do.
-        baud: Of a serial port.
-        system: Of the vehicle; None: the first rover that is heard.
-        own_system: Ours.
-        own_component: Ours.
+        path: Path as of `MavlinkRover`, and so are the others that are not described here.
+        robot: Abilities of the robot.
+        baud: Speed of a serial port.
+        system: System number of the vehicle; None: the first rover that is heard.
+        own_system: Our system number.
+        own_component: Our component number.
         signing_key: File with the key of signing; None: nothing is signed.
         signing_link: Number of the signed stream.
-        motion_limit_s: For how long the vehicle's last estimate of its motion holds.
-        telemetry_s: How often it is asked to tell its motion.
-        host: What it has of its computer.
+        motion_limit_s: Time for which the vehicle's last estimate of its motion holds, in seconds.
+        telemetry_s: Period at which it is asked to report its motion, in seconds.
+        host: Parts of its computer that it uses.
 
     Raises:
         SigningError: There is no key in that file.

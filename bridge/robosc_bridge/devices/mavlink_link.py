@@ -40,15 +40,15 @@ type Obstacle = ObstacleRing | SectorDistance
 
 @dataclass(frozen=True, slots=True)
 class LinkSettings:
-    """How a vehicle is reached, the same for all who share its line.
+    """Settings for reaching a vehicle, the same for all who share its line.
 
     Attributes:
-        path: Of a serial port, or an address of `transport.network_line`.
-        baud: Of a serial port.
-        system: Of the vehicle; None: the first rover that is heard.
-        own_system: Ours; ArduPilot's failsafe counts the heartbeats of 255 alone, unless set otherwise.
-        own_component: Ours.
-        signing: How packets are signed; None: not, and signatures are not asked for.
+        path: Path of a serial port, or an address of `transport.network_line`.
+        baud: Speed of a serial port.
+        system: System number of the vehicle; None: the first rover that is heard.
+        own_system: Our system number; ArduPilot's failsafe counts the heartbeats of 255 alone, unless set otherwise.
+        own_component: Our component number.
+        signing: Signing of packets; None: none, and signatures are not asked for.
     """
 
     path: str
@@ -63,8 +63,8 @@ class VehicleLink:
     """An open line to a vehicle; made by `acquire`.
 
     Args:
-        settings: How it is reached.
-        host: What it has of its computer.
+        settings: Settings for reaching it.
+        host: Parts of its computer that it uses.
 
     Raises:
         LineError: The line cannot be used.
@@ -97,7 +97,7 @@ class VehicleLink:
 
     @property
     def state(self) -> VehicleState:
-        """What the vehicle has told so far.
+        """State of the vehicle, as reported so far.
 
         Raises:
             LineLostError: The line is gone.
@@ -108,13 +108,13 @@ class VehicleLink:
 
     @property
     def counts(self) -> FrameCounts:
-        """What the line has brought."""
+        """Counts of the frames that the line has brought."""
         with self._changed:
             return replace(self._decoder.counts)
 
     @property
     def is_lost(self) -> bool:
-        """Whether the line is gone."""
+        """True if the line is gone."""
         return self._lost is not None
 
     def wait(self, is_so: Callable[[VehicleState], bool], limit_s: float) -> bool:
@@ -129,7 +129,7 @@ class VehicleLink:
             return found
 
     def take_obstacles(self, limit_s: float, is_woken: Callable[[], bool]) -> list[Told[Obstacle]]:
-        """What was told of obstacles since it was taken last; waits for the first.
+        """Return the reports of obstacles since they were taken last; wait for the first.
 
         Raises:
             LineLostError: The line is gone.
@@ -240,12 +240,12 @@ _guard = threading.Lock()
 
 
 def acquire(settings: LinkSettings, *, as_driver: bool, host: Host = SYSTEM_HOST) -> VehicleLink:
-    """The link on that line, opened if nobody uses it yet; to be given back by `release`.
+    """Return the link on that line, opened if nobody uses it yet; to be given back by `release`.
 
     Args:
-        settings: How it is reached.
-        as_driver: Whether it is to be driven; one user at a time may do that.
-        host: What it has of its computer.
+        settings: Settings for reaching the vehicle.
+        as_driver: True if it is to be driven; one user at a time may do that.
+        host: Parts of its computer that it uses.
 
     Raises:
         LineBusyError: It is driven already, or used with other settings.

@@ -1,7 +1,7 @@
-"""What a MAVLink rover knows of obstacles around it, as a range scanner.
+"""Obstacles around a MAVLink rover, as far as it knows them, as a range scanner.
 
-It has no laser of its own: the vehicle, or a companion computer in it, tells a ring of distances (OBSTACLE_DISTANCE) or
-those of single sensors (DISTANCE_SENSOR). Where rings come, single sensors are not looked at.
+It has no laser of its own: the vehicle, or a companion computer in it, reports a ring of distances
+(OBSTACLE_DISTANCE) or those of single sensors (DISTANCE_SENSOR). Where rings come, single sensors are not looked at.
 """
 
 import math
@@ -27,16 +27,16 @@ class MavlinkObstacles:
     """A `RangeScanner`. It may share its line with a `MavlinkRover` of the same settings.
 
     Args:
-        path: As of `MavlinkRover`.
-        baud: Of a serial port.
-        system: Of the vehicle; None: the first rover that is heard.
-        own_system: Ours.
-        own_component: Ours.
-        signing: How packets are signed; None: not.
-        host: What it has of its computer.
+        path: Path as of `MavlinkRover`.
+        baud: Speed of a serial port.
+        system: System number of the vehicle; None: the first rover that is heard.
+        own_system: Our system number.
+        own_component: Our component number.
+        signing: Signing of packets; None: none.
+        host: Parts of its computer that it uses.
 
     Attributes:
-        counters: Of the line since it was opened, and scans since this was made.
+        counters: Counters of the line since it was opened, and scans since this was made.
     """
 
     def __init__(

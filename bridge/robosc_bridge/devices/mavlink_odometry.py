@@ -1,7 +1,7 @@
-"""Where a vehicle is since it was first seen, from the estimate that its autopilot tells.
+"""Pose of a vehicle since it was first seen, from the estimate that its autopilot reports.
 
-An autopilot counts from where its estimator began, and the estimate may jump: when it is reset, when the vehicle starts
-anew, when another message is what tells it. A jump is no motion.
+An autopilot counts from where its estimator began, and the estimate may jump: when it is reset, when the vehicle
+starts anew, when another message is the one that reports it. A jump is no motion.
 """
 
 import math
@@ -48,10 +48,10 @@ class VehicleOdometry:
     """An odometry after some estimates; `advanced` gives the one after the next.
 
     Attributes:
-        pose: Where the body is.
-        velocity: Of the body.
+        pose: Pose of the body.
+        velocity: Velocity of the body.
         last: The last estimate; None: the next one is no motion.
-        rebases: How often the estimate has jumped.
+        rebases: Number of jumps of the estimate.
     """
 
     pose: Pose = field(default_factory=Pose)

@@ -72,19 +72,19 @@ class MavlinkRover:
     """A `DriveBase`. Used from one thread.
 
     Args:
-        path: Of a serial port; or `udpin:HOST:PORT`, `udpout:HOST:PORT`, `tcp:HOST:PORT`.
-        robot: What it can do.
-        baud: Of a serial port.
-        system: Of the vehicle; None: the first rover that is heard.
-        own_system: Ours.
-        own_component: Ours.
-        signing: How packets are signed; None: not.
-        host: What it has of its computer.
-        motion_limit_s: For how long the vehicle's last estimate of its motion holds.
-        telemetry_s: How often it is asked to tell its motion.
+        path: Path of a serial port; or `udpin:HOST:PORT`, `udpout:HOST:PORT`, `tcp:HOST:PORT`.
+        robot: Abilities of the robot.
+        baud: Speed of a serial port.
+        system: System number of the vehicle; None: the first rover that is heard.
+        own_system: Our system number.
+        own_component: Our component number.
+        signing: Signing of packets; None: none.
+        host: Parts of its computer that it uses.
+        motion_limit_s: Time for which the vehicle's last estimate of its motion holds, in seconds.
+        telemetry_s: Period at which it is asked to report its motion, in seconds.
 
     Attributes:
-        limits: What it can do.
+        limits: Limits of the drive base.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What a vehicle has told so far."""
+"""State of a vehicle, as reported so far."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -26,11 +26,11 @@ _AUTOPILOT = 1  # Component.
 
 @dataclass(frozen=True, slots=True)
 class Told[Content]:
-    """Something that was told.
+    """Something that was reported.
 
     Attributes:
-        time_s: When it came, by `time.monotonic`.
-        content: What.
+        time_s: Time when it came, by `time.monotonic`, in seconds.
+        content: Content of the report.
     """
 
     time_s: float
@@ -42,19 +42,19 @@ class VehicleState:
     """A vehicle after some messages; `after` gives the one after the next.
 
     Attributes:
-        system: Of the vehicle; None: any, the first rover is taken.
-        component: Of its autopilot; None: it has not been heard.
+        system: System number of the vehicle; None: any, the first rover is taken.
+        component: Component number of its autopilot; None: it has not been heard.
         heartbeat: The last one.
         stranger: The last heartbeat of something else that is neither a ground station nor without autopilot.
         attitude: The last one.
         position: The last one.
-        motion: The last one; some vehicles tell only the two before.
-        battery: Of the summary that every vehicle sends.
-        pack: Of the battery's own message.
-        answers: To commands, by command.
+        motion: The last one; some vehicles report only the two before.
+        battery: Battery in the summary that every vehicle sends.
+        pack: Battery in the battery's own message.
+        answers: Answers to commands, by command.
         texts: The last ones that were complete.
-        boot_s: Of the vehicle's clock.
-        restarts: How often that clock went back.
+        boot_s: Time of the vehicle's clock, in seconds.
+        restarts: Number of times that this clock went back.
     """
 
     system: int | None = None
@@ -73,15 +73,15 @@ class VehicleState:
     _chunks: tuple[Text, ...] = ()
 
     def is_vehicle(self, message: Message) -> bool:
-        """Whether a message is of the vehicle's autopilot."""
+        """Return True if a message is of the vehicle's autopilot."""
         return self.component is not None and (message.system, message.component) == (self.system, self.component)
 
     def after(self, message: Message, time_s: float, own: tuple[int, int]) -> "VehicleState":
-        """What is known after another message.
+        """Return the state after another message.
 
         Args:
-            message: That came.
-            time_s: When.
+            message: Message that came.
+            time_s: Time when it came, in seconds.
             own: Our system and component, to which answers are addressed.
         """
         if isinstance(message.content, Heartbeat) and not self.is_vehicle(message):

@@ -1,4 +1,4 @@
-"""Where a body is, from the encoders of its wheels.
+"""Pose of a body, from the encoders of its wheels.
 
 The equations are those of turtlebot3_node 2.3.6 (`odometry.cpp`): the way of the middle between the wheels, along the
 heading halfway through the step.
@@ -18,14 +18,14 @@ _HALF_TURN = 2048
 class Odometry:
     """An odometry after some readings; `advanced` gives the one after the next.
 
-    The encoders wrap around at 2**32, which is seen to, and fall back into one turn when their motor restarts. Whether
-    one has is not for the odometry to know: a jump is a reason to look, and `rebased` what follows from it.
+    The encoders wrap around at 2**32, which is handled, and fall back into one turn when their motor restarts. The
+    odometry cannot know whether one has: a jump is a reason to look, and `rebased` what follows from it.
 
     Attributes:
         tick_m: Way of a wheel in one tick.
-        separation_m: Between the wheels.
-        pose: Where the body is.
-        ticks: Of the left and the right wheel in the last reading; None: the next one begins anew.
+        separation_m: Distance between the wheels, in metres.
+        pose: Pose of the body.
+        ticks: Ticks of the left and the right wheel in the last reading; None: the next one begins anew.
     """
 
     tick_m: float
@@ -44,7 +44,10 @@ class Odometry:
         return replace(self, pose=_moved(self.pose, left_m, right_m, self.separation_m), ticks=(left, right))
 
     def jumps(self, left: int, right: int) -> tuple[bool, bool]:
-        """Whether each wheel has gone so far since the last reading that its motor may have restarted instead."""
+        """Return, for each wheel, True if it has gone so far that its motor may have restarted instead.
+
+        Its way is counted since the last reading.
+        """
         is_left, is_right = (abs(step) > _HALF_TURN for step in self._steps(left, right))
         return is_left, is_right
 

@@ -37,14 +37,14 @@ class OpenCrBase:
     """A `DriveBase`. Used from one thread.
 
     Args:
-        path: Of its port.
-        robot: Which it is.
-        calibrates_gyro: Whether to calibrate the gyroscope when it is opened, at rest; takes up to 5 s.
+        path: Path of its port.
+        robot: Robot that it belongs to.
+        calibrates_gyro: True to calibrate the gyroscope when it is opened, at rest; takes up to 5 s.
         answer_limit_s: Longest wait for one answer.
-        host: What it has of its computer.
+        host: Parts of its computer that it uses.
 
     Attributes:
-        limits: What it can do.
+        limits: Limits of the drive base.
     """
 
     def __init__(

@@ -23,9 +23,9 @@ class Motor:
     """A kind of wheel servo.
 
     Attributes:
-        name: As on its label.
-        model_number: That it tells.
-        velocity_limit_raw: Of its goal velocity, as it left the factory; what is beyond, it ignores.
+        name: Name as on its label.
+        model_number: Number that it reports.
+        velocity_limit_raw: Limit of its goal velocity, as it left the factory; what is beyond, it ignores.
     """
 
     name: str
@@ -40,12 +40,13 @@ MOTORS = {motor.model_number: motor for motor in (XL430_W250, XM430_W210)}
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """When the battery is low.
+    """Voltages at which the battery is low.
 
     Attributes:
-        warning_v: Tell a person.
-        stop_v: Stop safely. Below 11.0 V for 5 s, OpenCR cuts the motors' power by itself.
-        empty_v: What counts as nothing left.
+        warning_v: Voltage at which a person is told.
+        stop_v: Voltage at which the robot stops safely. Below 11.0 V for 5 s, OpenCR cuts the motors' power by
+            itself.
+        empty_v: Voltage that counts as nothing left.
     """
 
     warning_v: float = 11.5
@@ -55,12 +56,12 @@ class Battery:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """What a robot can do, as its owner knows it: all that a drive needs that sees to its motors itself.
+    """Abilities of a robot, as its owner knows them: all that a drive needs that sees to its motors itself.
 
     Attributes:
-        linear_m_s: Fastest forward and backward; of a MAVLink rover, not more than its parameter CRUISE_SPEED.
+        linear_m_s: Fastest speed forward and backward; of a MAVLink rover, not more than its parameter CRUISE_SPEED.
         angular_rad_s: Fastest turn.
-        wheel_separation_m: Between its left and its right wheels.
+        wheel_separation_m: Distance between its left and its right wheels, in metres.
     """
 
     linear_m_s: float
@@ -85,16 +86,16 @@ class Robot:
     """A differential-drive robot.
 
     Attributes:
-        name: What it is asked for by.
-        radius_m: Of the circle around it, as the firmware has it.
-        wheel_radius_m: Of both wheels.
-        wheel_separation_m: Between the wheels' middles.
+        name: Name that it is asked for by.
+        radius_m: Radius of the circle around it, as the firmware has it.
+        wheel_radius_m: Radius of both wheels.
+        wheel_separation_m: Distance between the wheels' middles, in metres.
         linear_m_s: Fastest as published; also what the teleoperation of the stock robot clamps to.
         angular_rad_s: The same of a turn.
-        motor: Of both wheels.
-        firmware_rpm: Where OpenCR's firmware limits what it is told.
-        opencr_information: Numbers that an OpenCR for this robot tells as its model information.
-        battery: When it is low.
+        motor: Motor of both wheels.
+        firmware_rpm: Limit that OpenCR's firmware puts on its commands, in rpm.
+        opencr_information: Numbers that an OpenCR for this robot reports as its model information.
+        battery: Voltages at which its battery is low.
     """
 
     name: str
@@ -120,11 +121,11 @@ class Robot:
 
     @property
     def body(self) -> Body:
-        """What it is to a drive that sees to its motors itself."""
+        """Body of the robot, for a drive that sees to its motors itself."""
         return Body(self.linear_m_s, self.angular_rad_s, self.wheel_separation_m)
 
     def limits(self, velocity_limit_raw: int) -> DriveLimits:
-        """What the robot can do with servos that take goal velocities up to a limit."""
+        """Return the limits of the robot with servos that take goal velocities up to a limit."""
         firmware_m_s = self.firmware_rpm * 2 * math.pi / 60 * self.wheel_radius_m
         wheel_m_s = min(velocity_limit_raw * self.raw_m_s, firmware_m_s)
         turning_rad_s = wheel_m_s / (self.wheel_separation_m / 2)

@@ -32,15 +32,15 @@ class ServoPair:
     """Two servos, read and set up. Used from one thread.
 
     Args:
-        bus: That they are on.
-        names: What to call each in messages, by id: the left one, then the right one.
+        bus: Bus that they are on.
+        names: Name of each in messages, by id: the left one, then the right one.
         exchange_limit_s: Longest time for a few requests.
-        host: Whose time it lives by.
+        host: Host whose time it uses.
 
     Attributes:
         motors: Ids of the left and the right one.
-        settings: Of each, once they are read.
-        hardware: Errors of each, as it told them last.
+        settings: Settings of each, once they are read.
+        hardware: Hardware errors of each, as it reported them last.
 
     Raises:
         LineError: The line is gone.
@@ -139,7 +139,7 @@ class ServoPair:
         self._bus.sync_write(servo.GOAL_VELOCITY, data)
 
     def comes_to_rest(self) -> bool:
-        """Whether both stand still in time."""
+        """Return True if both stand still in time."""
         end_s = self._host.monotonic() + _REST_LIMIT_S
         while True:
             self._bus.begin(self._limit_s)
@@ -150,7 +150,7 @@ class ServoPair:
             self._host.sleep(_POLL_S)
 
     def measure(self) -> list[tuple[Measurement, bool]]:
-        """What each measures, positive forward, and whether it tells of a hardware error.
+        """Return the measurement of each, positive forward, and True if it reports a hardware error.
 
         Raises:
             LineError: The line is gone.
@@ -163,7 +163,7 @@ class ServoPair:
         ]
 
     def read_torque(self) -> tuple[bool, list[bool]]:
-        """Whether both have torque, and whether each has restarted since this was asked last.
+        """Return True if both have torque, and for each True if it has restarted since this was asked last.
 
         Raises:
             LineError: The line is gone.
@@ -176,7 +176,7 @@ class ServoPair:
         return all(status.data[0] for status in found.values()), have_restarted
 
     def has_tripped(self) -> bool:
-        """Whether the bus watchdog of one has stopped it.
+        """Return True if the bus watchdog of one has stopped it.
 
         Raises:
             LineError: The line is gone.

@@ -1,4 +1,4 @@
-"""What a wheel servo is set to, and whether it can be driven so."""
+"""Settings of a wheel servo, and the check that it can be driven with them."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,14 @@ _SHUTDOWN = servo.OVERHEATING | servo.SHOCK | servo.OVERLOAD
 
 @dataclass(frozen=True, slots=True)
 class ServoSettings:
-    """What a servo told of itself.
+    """Settings that a servo reported.
 
     Attributes:
         model_number: A key of `MOTORS`.
-        sign: Of the robot's forward direction, in what the servo calls positive.
+        sign: Sign of the robot's forward direction, in what the servo calls positive.
         operating_mode: `VELOCITY_MODE` or another, which must be changed.
-        velocity_limit_raw: Of its goal velocity.
-        temperature_limit_c: Where it shuts down.
+        velocity_limit_raw: Limit of its goal velocity.
+        temperature_limit_c: Temperature at which it shuts down, in degrees Celsius.
     """
 
     model_number: int
@@ -30,13 +30,13 @@ class ServoSettings:
 
 
 def read_settings(bus: DynamixelBus, device: int, name: str, is_mirrored: bool, limit_s: float) -> ServoSettings:
-    """What a servo is set to.
+    """Return the settings of a servo.
 
     Args:
-        bus: That it is on.
+        bus: Bus that it is on.
         device: Its id.
-        name: What to call it in messages.
-        is_mirrored: Whether it is mounted the other way round, so that the factory has set it to reverse.
+        name: Name of it in messages.
+        is_mirrored: True if it is mounted the other way round, so that the factory has set it to reverse.
         limit_s: Longest time for each half of it.
 
     Raises:

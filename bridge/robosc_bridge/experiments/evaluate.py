@@ -51,11 +51,11 @@ class Experiment:
 
     Attributes:
         name: `maze` or `line`.
-        function: Of the connections' modules; runs it.
-        serial_module: The one for serial lines.
+        function: Function of the connections' modules that runs it.
+        serial_module: Module for serial lines.
         scenes: The worlds, one after the other, if no other is wanted.
-        speed: How many times as fast as the clock, if nothing else is wanted.
-        deployment: Of its supervisor.
+        speed: Speed of the world, as a multiple of the clock's, if nothing else is wanted.
+        deployment: Deployment of its supervisor.
     """
 
     name: str
@@ -198,17 +198,17 @@ def evaluated(
     has_cycles: bool,
     say: Callable[[str], None],
 ) -> "Report":
-    """Run experiments, and gather what a report of them tells.
+    """Run experiments, and gather the contents of a report of them.
 
     Args:
-        experiments: Which.
-        connections: Over what.
-        folder: Of the report; every run gets a new folder in it.
+        experiments: Experiments to run.
+        connections: Connections to run them over.
+        folder: Folder of the report; every run gets a new folder in it.
         scene: The world; None: each experiment's own ones.
-        speed: How many times as fast as the clock; None: each experiment's own.
-        seed: Of what a scene leaves to chance.
-        has_cycles: Whether control cycles are measured.
-        say: Takes lines of progress.
+        speed: Speed of the world, as a multiple of the clock's; None: each experiment's own.
+        seed: Seed of what a scene leaves to chance.
+        has_cycles: True if control cycles are measured.
+        say: Function that takes lines of progress.
     """
     from robosc_bridge.experiments.report import Report, machine_facts
 
@@ -285,14 +285,14 @@ def _new_folder(folder: Path, name: str) -> Path:
 
 
 def reported(outcome: "Outcome", folder: Path) -> "ReportedRun":
-    """What a report tells of a run: its log is read and checked, its pictures are drawn into its folder.
+    """Return the report of a run: its log is read and checked, its pictures are drawn into its folder.
 
     Args:
         outcome: The run.
-        folder: Of the report.
+        folder: Folder of the report.
 
     Raises:
-        ScenarioError: What the run has left behind cannot be read.
+        ScenarioError: The files that the run has left behind cannot be read.
     """
     from robosc.errors import InvalidSupervisorError
     from robosc.event_logs import LogError, PlotError, check_log, draw_sequence, read_log
@@ -336,7 +336,7 @@ def _map(outcome: "Outcome") -> Path:
 
 
 def _relative(path: Path, folder: Path) -> str:
-    """How a page in a folder names a file below it."""
+    """Return the name that a page in a folder uses for a file below it."""
     return path.resolve().relative_to(folder.resolve()).as_posix()
 
 

@@ -26,15 +26,15 @@ CORRECTION, COMMAND = "/line/correction", "/cmd_vel"
 
 
 class Follower:
-    """Asks for velocities along the last correction that it heard.
+    """Follower that asks for velocities along the last correction that it heard.
 
     Args:
-        speed_m_s: Forward.
+        speed_m_s: Speed forward, in m/s.
         period_s: Time between two requests, while no correction comes.
 
     Attributes:
-        asked: How many velocities it has asked for.
-        blocked: How many of them were held back.
+        asked: Number of velocities that it has asked for.
+        blocked: Number of them that were held back.
     """
 
     def __init__(self, speed_m_s: float, period_s: float) -> None:
@@ -45,7 +45,7 @@ class Follower:
         self._corrections: queue.SimpleQueue[float | None] = queue.SimpleQueue()
 
     def requests(self) -> Iterator[pb.AttachRequest]:
-        """What it sends: who it is, then velocities until `end`."""
+        """Yield the messages that it sends: who it is, then velocities until `end`."""
         yield pb.AttachRequest(hello=pb.Hello(name="line follower", is_operator=True))
         correction = 0.0
         while True:
@@ -58,7 +58,7 @@ class Follower:
                 correction = heard
 
     def take(self, response: pb.AttachResponse) -> None:
-        """What the bridge tells it."""
+        """Take a message of the bridge."""
         match response.WhichOneof("message"):
             case "passed_on" if response.passed_on.identifier == CORRECTION:
                 self._corrections.put(response.passed_on.data.number_value)

@@ -37,7 +37,7 @@ SKILLS = {"emergency_stop": "stop_buttons: [button_1], resume_buttons: [button_2
 
 BOX = "box"
 FREE_M = 0.6
-"""How far it drives along the line before anything happens, and in between."""
+"""Distance that it drives along the line before anything happens, and in between, in metres."""
 
 HELD_S = 2.0
 """Of the world, for which it must stand still then."""
@@ -52,16 +52,16 @@ def run_line(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
     """Let a robot follow a line behind a supervision layer, over serial lines.
 
     Args:
-        folder: Where everything is written; empty, or not there yet.
+        folder: Folder that everything is written to; empty, or not there yet.
         scene: Name or file of a scene with a line and an obstacle called `box`.
-        speed: How many times as fast as the clock the world passes. The camera shows 20 pictures a second of the clock.
-        say: Takes lines of progress.
-        seed: Of what the scene leaves to chance.
+        speed: Speed of the world, as a multiple of the clock's. The camera shows 20 pictures a second of the clock.
+        say: Function that takes lines of progress.
+        seed: Seed of what the scene leaves to chance.
         model: Another one, with the communications of `line_follower_layer.rscd`.
 
     Raises:
-        ScenarioError: It could not be run to its end. A robot that moves when it must not is no such error, but a fault
-            of the outcome.
+        ScenarioError: It could not be run to its end. A robot that moves when it must not is no such error, but a
+            fault of the outcome.
     """
     place = scene_of(scene, seed)
     if place.line is None or BOX not in {each.name for each in place.obstacles}:
@@ -88,11 +88,11 @@ def run_line(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
 
 
 class _Play:
-    """What happens to the robot, one after the other.
+    """Events that happen to the robot, one after the other.
 
     Attributes:
-        halts: When it had to stand still.
-        faults: What it should have done, and did not within the time that it had.
+        halts: Times when it had to stand still.
+        faults: Things that it should have done, and did not within the time that it had.
     """
 
     def __init__(self, rig: Rig, follower: Program, say: Say) -> None:
@@ -132,12 +132,12 @@ class _Play:
                 return
 
     def _stand(self, what: str, let_go: Callable[[], object], *, is_at_once: bool = True) -> None:
-        """Until it has stood still for a while; then it may go on.
+        """Wait until it has stood still for a while; then it may go on.
 
         Args:
-            what: Why it stands.
-            let_go: Lets it go on.
-            is_at_once: Whether it has to from now on; else from when it does.
+            what: Reason why it stands.
+            let_go: Function that lets it go on.
+            is_at_once: True if it has to stand from now on; else from when it does.
         """
         told_s = latest(self._rig.setting.motion).world_s
         begin_s: float | None = None
@@ -152,7 +152,7 @@ class _Play:
                 return
 
     def _looks(self, fault: str, what: str) -> Iterator[Now]:
-        """Where the robot is, again and again; too late, it is a fault."""
+        """Yield the state of the robot again and again; if that takes too long, it is a fault."""
         end_s = time.monotonic() + LIMIT_S
         while time.monotonic() < end_s:
             self._rig.require()
@@ -169,11 +169,11 @@ class _Play:
 
 
 class _TooLateError(Exception):
-    """What was to happen did not."""
+    """Error that an expected event did not happen."""
 
 
 def line_figures(scene: Scene, motion: Motion) -> dict[str, float]:
-    """How far off the line the middle between the wheels was, and for how long of the world."""
+    """Return how far off the line the middle between the wheels was, and for how long of the world."""
     if scene.line is None or not motion.samples:
         return {}
     aside_m = [scene.line.distance_m(sample.x_m, sample.y_m) for sample in motion.samples if sample.linear_m_s]

@@ -27,13 +27,13 @@ _LAYOUT = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tok
 
 @dataclass(frozen=True, slots=True)
 class CodeSize:
-    """How large something is.
+    """Size of something.
 
     Attributes:
         name: `model`, or a target.
         lines: Its lines of code; None: it does not exist.
-        files: How many source files they stand in.
-        why: Why it does not exist.
+        files: Number of source files that they stand in.
+        why: Reason why it does not exist.
     """
 
     name: str
@@ -43,11 +43,11 @@ class CodeSize:
 
 
 def count_lines(name: str, text: str) -> int | None:
-    """Lines of code of a file; None if it is no source file, by its name.
+    """Return the lines of code of a file; None if it is no source file, by its name.
 
     Args:
         name: Its name or path.
-        text: What stands in it.
+        text: Content of the file.
     """
     suffix = PurePosixPath(name).suffix
     is_script = not suffix and text.startswith("#!") and "python" in text.split("\n", 1)[0]
@@ -65,7 +65,10 @@ def model_size(bundle: Bundle) -> CodeSize:
 
 
 def target_sizes(supervisor: Supervisor) -> tuple[CodeSize, ...]:
-    """What every target generates of a supervisor; of CIF the synthesis problem alone, as the paper counts it."""
+    """Return the size of the code that every target generates of a supervisor.
+
+    Of CIF, it is the synthesis problem alone, as the paper counts it.
+    """
     found = []
     for target in available_targets():
         try:
@@ -117,7 +120,7 @@ def _without_comments(text: str) -> str:
 
 
 def _literal_end(text: str, begin: int) -> int:
-    """Where a literal ends that begins with a quotation mark; one that is not closed ends with its line."""
+    """Return the end of a literal that begins with a quotation mark; one that is not closed ends with its line."""
     place = begin + 1
     while place < len(text) and text[place] != "\n":
         if text[place] == "\\":

@@ -33,11 +33,11 @@ def run_maze(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
     """Let a robot out of a maze, over serial lines.
 
     Args:
-        folder: Where everything is written; empty, or not there yet.
+        folder: Folder that everything is written to; empty, or not there yet.
         scene: Name or file of the maze.
-        speed: How many times as fast as the clock the world passes.
-        say: Takes lines of progress.
-        seed: Of what the scene leaves to chance.
+        speed: Speed of the world, as a multiple of the clock's.
+        say: Function that takes lines of progress.
+        seed: Seed of what the scene leaves to chance.
         model: Another one, with the communications of `narrow_maze.rscd`.
 
     Raises:

@@ -33,7 +33,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class _Interrupts:
-    """Whether a signal may interrupt now: not between the start of a process and the note that it is there."""
+    """Hold on signals: none may interrupt between the start of a process and the note that it is there."""
 
     def __init__(self) -> None:
         self._is_held = False
@@ -41,7 +41,7 @@ class _Interrupts:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """What comes meanwhile interrupts at the end of the block."""
+        """Hold back signals in the block: those that come meanwhile interrupt at its end."""
         self._is_held = True
         try:
             yield
@@ -79,7 +79,7 @@ def interruptible() -> Iterator[None]:
 
 
 def environment() -> dict[str, str]:
-    """That of this process; modules are found where this process finds them."""
+    """Return the environment of this process; modules are found where this process finds them."""
     paths = os.pathsep.join(path for path in sys.path if path)
     return {**os.environ, "PYTHONPATH": paths, "PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": "1"}
 
@@ -98,20 +98,21 @@ class Program:
     """A Python program that runs as long as the `with` block, and no longer than the thread that has entered it.
 
     Args:
-        name: In messages, and of its log file.
-        arguments: `-m`, the module, and what it is told.
-        folder: Where its log is written, and its working folder.
-        is_preferred: Whether it goes before other programs, where that is permitted: it lives by the computer's clock.
-        is_asked: Whether it takes commands; its output is answers then, and no part of its log.
-        interpreter: Of the program; None: that of this process.
+        name: Name in messages, and of its log file.
+        arguments: `-m`, the module, and its arguments.
+        folder: Folder of its log, and its working folder.
+        is_preferred: True if it goes before other programs, where that is permitted: it lives by the computer's
+            clock.
+        is_asked: True if it takes commands; its output is answers then, and no part of its log.
+        interpreter: Interpreter of the program; None: that of this process.
         variables: Its environment; None: that of this process, as `environment` has it.
 
     Raises:
         ScenarioError: It cannot be started.
 
     Attributes:
-        name: In messages.
-        log: What it tells; of one that is asked, its errors alone.
+        name: Name in messages.
+        log: Log of its output; of one that is asked, its errors alone.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What a run of a scenario records, and what is wrong with it, however the supervisor and the robot were connected."""
+"""Records of a run of a scenario, and the faults in them, however the supervisor and the robot were connected."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ from robosc_bridge.simulated.scene import Scene
 
 @dataclass(frozen=True)
 class Recorded:
-    """What is run, as far as records depend on it.
+    """Run, as far as records depend on it.
 
     Attributes:
-        folder: Where everything is written.
-        model: That the supervisor is made of.
-        deployment: Where it stands.
+        folder: Folder that everything is written to.
+        model: Model that the supervisor is made of.
+        deployment: Deployment of the supervisor.
         scene: The robot's world.
     """
 
@@ -41,7 +41,7 @@ class Recorded:
 
     @property
     def events(self) -> Path:
-        """Where the event log goes."""
+        """Folder of the event log."""
         return self.folder / "events"
 
     @property
@@ -53,7 +53,7 @@ class Recorded:
         return found[0]
 
     def read_motion(self) -> Motion:
-        """How the robot has moved; raises ScenarioError if nobody can tell."""
+        """Return the motion of the robot; raises ScenarioError if nobody can tell."""
         try:
             return read_motion(self.motion)
         except MotionError as error:
@@ -62,13 +62,13 @@ class Recorded:
     def outcome(
         self, name: str, connection: Connection, faults: Sequence[str], figures: Mapping[str, float]
     ) -> Outcome:
-        """What has come of it.
+        """Return the outcome of the run.
 
         Args:
-            name: Of the scenario.
-            connection: How the supervisor reached the robot.
-            faults: What was wrong with the motion; what is wrong with the event log is added.
-            figures: What was measured.
+            name: Name of the scenario.
+            connection: Connection by which the supervisor reached the robot.
+            faults: Faults of the motion; those of the event log are added.
+            figures: Measured figures.
 
         Raises:
             ScenarioError: There is no event log.
@@ -86,7 +86,7 @@ class Recorded:
         )
 
     def _log_faults(self) -> tuple[str, ...]:
-        """What is wrong with the event log, replayed on the supervisor: each request must have been allowed then."""
+        """Return faults of the event log, replayed on the supervisor: each request must have been allowed then."""
         try:
             found = check_log(read_log(self.event_log), decode(self.supervisor.read_bytes()), self.deployment)
         except (RoboscError, OSError) as error:

@@ -31,11 +31,11 @@ class ReportedRun:
 
     Attributes:
         experiment: `maze` or `line`.
-        connection: How the supervisor reached the robot.
+        connection: Connection by which the supervisor reached the robot.
         scene: Name of its world.
-        check: Its log against its supervisor.
-        faults: What was wrong, with the motion or anything else, in sentences.
-        figures: What was measured, by name.
+        check: Check of its log against its supervisor.
+        faults: Faults of the motion or anything else, in sentences.
+        figures: Measured figures, by name.
         sequence: Picture of the sequence of events, from the report's folder.
         page: The same as a page.
         map: Picture of the robot's way; empty: there is none.
@@ -58,7 +58,7 @@ class ReportedRun:
 
     @property
     def has_passed(self) -> bool:
-        """Whether nothing was wrong."""
+        """True if nothing was wrong."""
         return self.check.has_passed and not self.faults
 
     @property
@@ -78,8 +78,8 @@ class FailedRun:
 
     Attributes:
         experiment: `maze` or `line`.
-        connection: How the supervisor was to reach the robot.
-        why: Why not, in one sentence.
+        connection: Connection by which the supervisor was to reach the robot.
+        why: Reason why not, in one sentence.
     """
 
     experiment: str
@@ -94,14 +94,14 @@ class FailedRun:
 
 @dataclass(frozen=True)
 class Report:
-    """What is reported.
+    """Contents of a report.
 
     Attributes:
         runs: Scenarios that were run.
         failures: Those that could not be.
         cycles: Times of control cycles.
         sizes: Lines of code by experiment, the model first.
-        machine: What it was run on, by name.
+        machine: Machine that it was run on: facts by name.
     """
 
     runs: tuple[ReportedRun, ...]
@@ -112,7 +112,7 @@ class Report:
 
     @property
     def has_passed(self) -> bool:
-        """Whether every scenario was run, and nothing was wrong in any."""
+        """True if every scenario was run, and nothing was wrong in any."""
         return not self.failures and all(run.has_passed for run in self.runs)
 
     @property
@@ -126,11 +126,11 @@ class Report:
 
 
 def write_report(report: Report, folder: Path) -> tuple[Path, ...]:
-    """Write a report; pictures of its runs must be in its folder already. The files, the page first.
+    """Write a report; pictures of its runs must be in its folder already. Return the files, the page first.
 
     Args:
-        report: What is reported.
-        folder: Where to; files of an earlier report there are replaced.
+        report: Report to write.
+        folder: Folder to write to; files of an earlier report there are replaced.
 
     Raises:
         OSError: A file cannot be written.
@@ -181,7 +181,7 @@ def write_report(report: Report, folder: Path) -> tuple[Path, ...]:
 
 
 def machine_facts(date: str) -> dict[str, str]:
-    """What the evaluation runs on.
+    """Return the facts about the machine that the evaluation runs on.
 
     Args:
         date: The day.
@@ -214,7 +214,7 @@ def _processor() -> str:
 
 
 def _values(report: Report) -> dict[str, Any]:
-    """What the templates show."""
+    """Return the values that the templates show."""
     counts = {times.count for times in report.cycles if times.count}
     return {
         "runs": report.runs,

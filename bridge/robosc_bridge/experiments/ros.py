@@ -35,7 +35,7 @@ MAZE_MODEL = EXAMPLES / "maze_solver" / "maze_solver.rscd"
 """For the ways of 1 m that the mazes of the package have."""
 
 FASTEST, SLOWEST = 25.0, 0.5
-"""How many times as fast as the clock the world may pass."""
+"""Fastest and slowest speed of the world, as a multiple of the clock's."""
 
 MAZE_PATIENCE_S, LINE_PATIENCE_S = 0.15, 0.06
 """Of the world, for which a robot in motion goes on without a new velocity. A controller decides every 0.1 s, a camera
@@ -57,10 +57,10 @@ class Middleware(ABC):
     """A ROS, as programs on it are started.
 
     Attributes:
-        connection: What it is called in an outcome.
+        connection: Name of it in an outcome.
         helpers: The package of the helper nodes.
         twin: The module of the twin.
-        interpreter: Of the nodes; None: that of this process.
+        interpreter: Interpreter of the nodes; None: that of this process.
     """
 
     connection: Connection
@@ -70,10 +70,10 @@ class Middleware(ABC):
 
     @abstractmethod
     def running(self, folder: Path) -> AbstractContextManager[Mapping[str, str]]:
-        """Have it ready within the block: the environment of those that talk on it.
+        """Have it ready within the block, and give the environment of the programs that talk on it.
 
         Args:
-            folder: Where whatever it writes goes.
+            folder: Folder for whatever it writes.
 
         Raises:
             ScenarioError: It is not installed, or does not start.
@@ -90,14 +90,14 @@ class Middleware(ABC):
 
 @dataclass(frozen=True)
 class Setting(Recorded):
-    """What is run.
+    """Setting of a run.
 
     Attributes:
-        middleware: On which.
+        middleware: ROS to run on.
         source: Name or file of the scene.
-        seed: Of what the scene leaves to chance.
-        speed: How many times as fast as the clock the world passes.
-        patience_s: Of the world, for which a robot in motion goes on without a new velocity.
+        seed: Seed of what the scene leaves to chance.
+        speed: Speed of the world, as a multiple of the clock's.
+        patience_s: Time of the world, in seconds, for which a robot in motion goes on without a new velocity.
     """
 
     middleware: Middleware
@@ -116,12 +116,12 @@ class Stage:
     """The programs of a run; use it as a context manager.
 
     Args:
-        setting: What is run.
+        setting: Setting of the run.
         variables: Environment of the programs.
         package: Folder of the generated package.
 
     Attributes:
-        setting: What is run.
+        setting: Setting of the run.
         simulator: The twin.
     """
 
@@ -271,12 +271,12 @@ def run_maze(
     """Let a robot out of a maze, with a generated controller and the rotator of the example robots.
 
     Args:
-        middleware: On which ROS.
-        folder: Where everything is written; empty, or not there yet.
+        middleware: ROS to run on.
+        folder: Folder that everything is written to; empty, or not there yet.
         scene: Name or file of the maze.
-        speed: How many times as fast as the clock the world passes.
-        say: Takes lines of progress.
-        seed: Of what the scene leaves to chance.
+        speed: Speed of the world, as a multiple of the clock's.
+        say: Function that takes lines of progress.
+        seed: Seed of what the scene leaves to chance.
         model: Another one, with the communications of `maze_solver.rscd`.
 
     Raises:
@@ -313,21 +313,21 @@ def run_line(
 ) -> Outcome:
     """Let a robot follow a line behind a generated supervision layer around a follower that heeds nothing.
 
-    A box is put on the line and taken away again, and the stop button is pressed: each time the robot must stand still,
-    while its follower goes on asking.
+    A box is put on the line and taken away again, and the stop button is pressed: each time the robot must stand
+    still, while its follower goes on asking.
 
     Args:
-        middleware: On which ROS.
-        folder: Where everything is written; empty, or not there yet.
+        middleware: ROS to run on.
+        folder: Folder that everything is written to; empty, or not there yet.
         scene: Name or file of a scene with a line and an obstacle called `box`.
-        speed: How many times as fast as the clock the world passes.
-        say: Takes lines of progress.
-        seed: Of what the scene leaves to chance.
+        speed: Speed of the world, as a multiple of the clock's.
+        say: Function that takes lines of progress.
+        seed: Seed of what the scene leaves to chance.
         model: Another one, with the communications of `line_follower_layer.rscd`.
 
     Raises:
-        ScenarioError: It could not be run to its end. A robot that moves when it must not is no such error, but a fault
-            of the outcome.
+        ScenarioError: It could not be run to its end. A robot that moves when it must not is no such error, but a
+            fault of the outcome.
     """
     setting = _setting(middleware, folder, model, Deployment.LAYER, scene, seed, speed, LINE_PATIENCE_S)
     place = setting.scene
@@ -355,11 +355,11 @@ def run_line(
 
 
 class _Watch:
-    """Sees what the robot does.
+    """Watch over what the robot does.
 
     Attributes:
-        halts: When it had to stand still.
-        faults: What it did not do in time; nothing is waited for after the first.
+        halts: Times when it had to stand still.
+        faults: Things that it did not do in time; nothing is waited for after the first.
     """
 
     def __init__(self, stage: Stage, say: Say) -> None:
@@ -372,7 +372,7 @@ class _Watch:
         self._begin_s = time.monotonic()
 
     def looks(self, what: str, limit_s: float) -> Iterator[Now]:
-        """Where the robot is, again and again, until the limit."""
+        """Yield the state of the robot again and again, until the limit."""
         end_s = time.monotonic() + limit_s
         while time.monotonic() < end_s:
             self._stage.require()
@@ -410,9 +410,9 @@ class _Watch:
         """Wait until it has stood still for a while; then it may go on.
 
         Args:
-            why: For a person.
-            let_go: Lets it go on.
-            is_told: Whether it has just been told to stand still; else it is to see for itself.
+            why: Reason, for a person.
+            let_go: Function that lets it go on.
+            is_told: True if it has just been told to stand still; else it is to see for itself.
         """
         if self.faults:
             return

@@ -26,7 +26,7 @@ _MODULES = "rospy, geometry_msgs.msg, nav_msgs.msg, sensor_msgs.msg, std_msgs.ms
 
 @cache
 def missing() -> str | None:
-    """Why nothing can be run on ROS 1 here; None: it can."""
+    """Return the reason why nothing can be run on ROS 1 here; None: it can."""
     if _master() is None:
         return "ROS 1 is not installed: there is no rosmaster"
     try:

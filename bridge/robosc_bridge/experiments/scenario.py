@@ -1,4 +1,4 @@
-"""What a scenario leaves behind, however the supervisor and the robot were connected."""
+"""Results of a scenario, however the supervisor and the robot were connected."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -23,15 +23,15 @@ class Outcome:
     """A scenario that was run.
 
     Attributes:
-        name: Of the scenario, such as `maze` or `line`.
-        connection: How the supervisor reached the robot.
-        folder: Where everything lies that was written.
-        event_log: Of the supervisor's execution (JSON Lines).
-        motion: Of the robot (JSON Lines), as `robosc_bridge.simulated.motion` reads it.
-        supervisor: That was executed (`.rsup`).
+        name: Name of the scenario, such as `maze` or `line`.
+        connection: Connection by which the supervisor reached the robot.
+        folder: Folder of everything that was written.
+        event_log: Log of the supervisor's execution (JSON Lines).
+        motion: Motion of the robot (JSON Lines), as `robosc_bridge.simulated.motion` reads it.
+        supervisor: Supervisor that was executed (`.rsup`).
         scene: The world.
-        faults: What was wrong: with the log against the supervisor, and with the motion against the requirements.
-        figures: What was measured, by name with its unit, such as `world_s`, `wall_s`, `collisions`.
+        faults: Faults of the log against the supervisor, and of the motion against the requirements.
+        figures: Measured figures, by name with the unit, such as `world_s`, `wall_s`, `collisions`.
     """
 
     name: str
@@ -46,5 +46,5 @@ class Outcome:
 
     @property
     def has_passed(self) -> bool:
-        """Whether nothing was wrong."""
+        """True if nothing was wrong."""
         return not self.faults

@@ -25,7 +25,7 @@ PATIENCE_S = 0.5
 """Of the world, for which it does not wait for the bridge: a robot at 0.1 m/s goes 5 cm meanwhile."""
 
 FASTEST, SLOWEST = 25.0, 0.5
-"""How many times as fast as the clock the world may pass."""
+"""Fastest and slowest speed of the world, as a multiple of the clock's."""
 
 _BRIDGE_LIMIT_S = 60.0
 _SYNTHESIS_LIMIT_S = 120.0
@@ -34,14 +34,14 @@ _MOST_SUPERVISOR_BYTES = 64 * 1024 * 1024
 
 @dataclass(frozen=True)
 class Setting(Recorded):
-    """What is run.
+    """Setting of a run.
 
     Attributes:
         source: Name or file of the scene.
-        seed: Of what the scene leaves to chance.
-        speed: How many times as fast as the clock the world passes.
-        lidar: Which the robot has. LDS-01 measures up to 3.5 m, LDS-02 up to 8 m.
-        channels: What the communications of the model are tied to, as lines of the configuration.
+        seed: Seed of what the scene leaves to chance.
+        speed: Speed of the world, as a multiple of the clock's.
+        lidar: LiDAR of the robot. LDS-01 measures up to 3.5 m, LDS-02 up to 8 m.
+        channels: Channels that the communications of the model are tied to, as lines of the configuration.
         skills: Further lines of its section `skills`, by skill.
     """
 
@@ -55,14 +55,14 @@ class Setting(Recorded):
 
 @dataclass(frozen=True)
 class Rig:
-    """The processes of a run, and where they write.
+    """The processes of a run, and the places where they write.
 
     Attributes:
-        setting: What is run.
+        setting: Setting of the run.
         simulator: The robot and its world.
-        bridge: What executes the supervisor.
-        address: Of the bridge's gRPC service.
-        used_s: What processors had worked for bridge and simulator until then.
+        bridge: Bridge that executes the supervisor.
+        address: Address of the bridge's gRPC service.
+        used_s: Time that processors had worked for bridge and simulator until then, in seconds.
     """
 
     setting: Setting
@@ -106,15 +106,16 @@ def require_speed(speed: float) -> None:
 
 
 def configuration(setting: Setting, base: str, scanner: str, camera: str | None) -> str:
-    """The bridge's file (YAML).
+    """Return the bridge's file (YAML).
 
-    What must be soon in the world is N times as soon by the clock where the world passes N times as fast: the wheels
-    stop without the LiDAR or the loop after some second of the world at most, the acceleration that the safety layer
-    allows is N times as large by the clock, and a turn slows down earlier, since an exchange with the drive base every
-    20 ms is one of 20 N ms in the world. What it waits for without any motion stays as patient as a busy machine needs.
+    Reactions that must be soon in the world are N times as soon by the clock where the world passes N times as fast:
+    the wheels stop without the LiDAR or the loop after some second of the world at most, the acceleration that the
+    safety layer allows is N times as large by the clock, and a turn slows down earlier, since an exchange with the
+    drive base every 20 ms is one of 20 N ms in the world. Waits without any motion stay as patient as a busy machine
+    needs.
 
     Args:
-        setting: What is run.
+        setting: Setting of the run.
         base: Port of the drive base.
         scanner: Port of the LiDAR.
         camera: Socket of the camera; None: there is none.

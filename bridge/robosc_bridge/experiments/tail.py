@@ -11,15 +11,15 @@ _END_BYTES = 4096
 
 @dataclass(frozen=True)
 class Now:
-    """Where the robot is.
+    """Position and motion of the robot.
 
     Attributes:
-        world_s: Since the simulation began.
-        x_m: Of the middle between its wheels.
-        y_m: Of the same.
-        linear_m_s: Forward.
-        angular_rad_s: Counter-clockwise.
-        collisions: How often it has come to something.
+        world_s: Time since the simulation began, in seconds.
+        x_m: Position of the middle between its wheels, in metres.
+        y_m: Position of the same, in metres.
+        linear_m_s: Speed forward.
+        angular_rad_s: Turn rate, counter-clockwise.
+        collisions: Number of times that it has come to something.
     """
 
     world_s: float = 0.0
@@ -31,7 +31,7 @@ class Now:
 
     @property
     def is_standing(self) -> bool:
-        """Whether it does not move at all."""
+        """True if the robot does not move at all."""
         return abs(self.linear_m_s) < 1e-3 and abs(self.angular_rad_s) < 1e-2
 
 
@@ -64,7 +64,7 @@ class LineCount:
         self._count = 0
 
     def look(self) -> int:
-        """How many lines there are by now."""
+        """Return the number of lines by now."""
         with contextlib.suppress(OSError), self._path.open("rb") as file:
             file.seek(self._read)
             while data := file.read(1 << 16):

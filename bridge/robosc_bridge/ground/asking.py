@@ -23,7 +23,7 @@ from robosc_bridge.protocol.mavlink_messages import Result
 
 ANSWER_LIMIT_S = 5.0
 RESET_LIMIT_S = 20.0
-"""How long the daemon may take for an answer."""
+"""Time that the daemon may take for an answer, in seconds."""
 
 LOOP_HANGS = "The bridge's loop does not turn."
 
@@ -49,7 +49,7 @@ class Asked:
         sender: System and component.
         number: MAV_CMD.
         parameters: Its seven.
-        is_repeated: Whether its sender says that it was sent before.
+        is_repeated: True if its sender says that it was sent before.
     """
 
     sender: Sender
@@ -59,7 +59,7 @@ class Asked:
 
     @property
     def key(self) -> _Key:
-        """What makes it the same command; parameters may be no numbers."""
+        """Key that makes it the same command; parameters may be no numbers."""
         return self.sender, self.number, struct.pack("<7d", *self.parameters)
 
 
@@ -83,8 +83,8 @@ class Asking:
 
     Args:
         operations: The daemon.
-        stream: What is told of it.
-        say: Tells a person something.
+        stream: Messages about the daemon.
+        say: Function that tells a person something.
     """
 
     def __init__(self, operations: Operations, stream: Stream, say: Say) -> None:
@@ -99,7 +99,7 @@ class Asking:
         self._ordered: set[Stop] = set()
 
     def begin(self) -> None:
-        """What comes from here on has not come yet when anything before it was ordered, by whomever."""
+        """Begin anew: commands from here on have not come yet when anything before was ordered, by whomever."""
         self._ordered.clear()
 
     def _stop(self, stop: Stop, by: Sender, now_s: float) -> None:
@@ -115,11 +115,11 @@ class Asking:
             self._operations.order(stop.wish, _name(by))
 
     def take(self, asked: Asked, wanted: Meaning, now_s: float) -> list[Make]:
-        """Obey a command; what goes to its sender at once.
+        """Obey a command; return the messages for its sender that go out at once.
 
         Args:
-            asked: As it came.
-            wanted: What it means.
+            asked: Command as it came.
+            wanted: Meaning of the command.
             now_s: The time.
         """
         if isinstance(wanted, Stop):
@@ -165,7 +165,7 @@ class Asking:
         return found
 
     def _again(self, asked: Asked, change: Change, now_s: float) -> Result | None:
-        """What a repetition is answered without being done; None: it is done, since its first sending was lost."""
+        """Return the answer to a repetition that is not done; None: it is done, since its first sending was lost."""
         result, told_s = self._remembered.get(asked.key, (None, -math.inf))
         if result is not None and now_s - told_s <= REPEATED_S:
             is_shown = now_s - told_s > _SHOWN_S

@@ -1,4 +1,4 @@
-"""What a ground station wants with a command: pure functions from numbers to meanings.
+"""Meaning of a ground station's commands: pure functions from numbers to meanings.
 
 Sources: mavlink.io (command protocol, MAV_CMD, MAV_RESULT) and what stations send in practice. Stopping is never
 refused, whatever else stands in the command.
@@ -26,16 +26,16 @@ class Stop(StrEnum):
 
     @property
     def wish(self) -> Wish:
-        """What the daemon is told."""
+        """Wish for the daemon."""
         return Wish.STANDBY if self is Stop.STANDBY else Wish.STOP
 
 
 @dataclass(frozen=True)
 class Change:
-    """Something is to change.
+    """Wish that something is to change.
 
     Attributes:
-        wish: What the daemon is told.
+        wish: Wish for the daemon.
         mode: The mode that was asked for by its number; None: no mode was.
     """
 
@@ -69,7 +69,7 @@ class Once:
 
 @dataclass(frozen=True)
 class Checks:
-    """What stands against a start is to be told."""
+    """Request to report what stands against a start."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ _CAPABILITIES = 148
 
 
 def meaning(number: int, parameters: Parameters) -> Meaning:
-    """What a command means.
+    """Return the meaning of a command.
 
     Args:
         number: MAV_CMD.
@@ -124,11 +124,11 @@ def meaning(number: int, parameters: Parameters) -> Meaning:
 
 
 def mode_meaning(base_mode: float, custom_mode: float) -> Meaning:
-    """What a change of mode means.
+    """Return the meaning of a change of mode.
 
     Args:
         base_mode: MAV_MODE_FLAG; without the bit for own modes, its other bits say what is meant.
-        custom_mode: Of ArduPilot Rover.
+        custom_mode: Mode of ArduPilot Rover.
     """
     if custom_mode == Mode.HOLD:
         return Stop.OPERATOR
@@ -179,7 +179,7 @@ def _choice(value: float, meanings: dict[float, Meaning]) -> Meaning:
 
 
 def _is_number(value: float) -> bool:
-    """Whether it is a whole one that a message or mode could have."""
+    """Return True if it is a whole number that a message or mode could have."""
     return 0.0 <= value < 2**24 and value == int(value)
 
 

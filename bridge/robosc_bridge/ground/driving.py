@@ -52,11 +52,13 @@ def from_position_target(told: Any) -> Velocity:
 
 
 def from_manual_control(told: Any, fastest: Velocity) -> Velocity:
-    """The velocity of a stick: x ahead, r to the right, as ground stations send it; y, z and buttons are not heeded.
+    """Return the velocity of a stick: x ahead, r to the right, as ground stations send it.
+
+    The axes y and z and the buttons are not heeded.
 
     Args:
         told: MANUAL_CONTROL.
-        fastest: What a full stick means.
+        fastest: Velocity of a full stick.
 
     Raises:
         Unusable: An axis that is needed is not there.
@@ -97,10 +99,10 @@ class Driving:
     """A person at the ground station who drives: attached to the layer while set-points come.
 
     Args:
-        model: That the layer is for.
+        model: Model that the layer is for.
         message: Its message that is tied to the drive.
         tell: The daemon's inbox.
-        heed: Is told what the layer says; from the loop's thread, neither waits nor raises.
+        heed: Function that takes the reports of the layer; from the loop's thread, neither waits nor raises.
     """
 
     def __init__(

@@ -22,10 +22,10 @@ class Heard:
 
     Attributes:
         sender: System and component.
-        number: Of the message.
+        number: Number of the message.
         told: The library's message.
-        is_signed: Whether it has a valid signature.
-        is_old: Whether it came as MAVLink 1.
+        is_signed: True if it has a valid signature.
+        is_old: True if it came as MAVLink 1.
     """
 
     sender: tuple[int, int]
@@ -35,13 +35,13 @@ class Heard:
     is_old: bool
 
     def is_for(self, settings: GroundSettings) -> bool:
-        """Whether it is for the bridge, or for everybody."""
+        """Return True if the message is for the bridge, or for everybody."""
         system, component = getattr(self.told, "target_system", 0), getattr(self.told, "target_component", 0)
         return system in (0, settings.system) and component in (0, settings.component)
 
 
 def heard_of(told: Any) -> Heard:
-    """What a message of the library is."""
+    """Return the message as it was heard, from a message of the library."""
     sender = (told.get_srcSystem(), told.get_srcComponent())
     return Heard(sender, told.get_msgId(), told, is_signed(told), is_old(told))
 
@@ -61,7 +61,7 @@ def asked_in(heard: Heard, settings: GroundSettings) -> Asked | None:
 
 
 def wanted_by(asked: Asked) -> Meaning:
-    """What a command means."""
+    """Return the meaning of a command."""
     # The old message for modes is answered as a command of its number, as ArduPilot does.
     if asked.number == Incoming.SET_MODE:
         return mode_meaning(asked.parameters[0], asked.parameters[1])

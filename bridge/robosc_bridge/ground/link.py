@@ -22,8 +22,10 @@ LONGEST_DATAGRAM = 2048
 """Bytes of a datagram that are looked at."""
 
 REST = 2.0
-"""Where bytes wait already, a pause so many times as long as the work on those before leaves the processor to the
-robot."""
+"""Factor of the pause that leaves the processor to the robot where bytes wait already.
+
+The pause is so many times as long as the work on the bytes before.
+"""
 
 LASTING_S = 5.0
 """A line that has been open for so long works."""
@@ -37,8 +39,8 @@ class GroundLink:
 
     Args:
         operations: The daemon.
-        settings: How the station is reached.
-        host: What it has of its computer; readings and scans have their times from its clock, too.
+        settings: Settings for reaching the station.
+        host: Parts of its computer that it uses; readings and scans have their times from its clock, too.
 
     Raises:
         SigningError: There is no key, or its time cannot be kept.
@@ -68,7 +70,7 @@ class GroundLink:
 
     @property
     def is_alive(self) -> bool:
-        """Whether its thread runs; it ends with `stop` alone, whatever happens to the line."""
+        """True if its thread runs; it ends with `stop` alone, whatever happens to the line."""
         return self._thread.is_alive()
 
     def start(self) -> None:

@@ -1,4 +1,4 @@
-"""What a person at the ground station is told in words: what has happened, and what stands in the way."""
+"""Notices for a person at the ground station, in words: what has happened, and what stands in the way."""
 
 from collections.abc import Iterator
 
@@ -23,7 +23,7 @@ _STATES = {
 
 
 def happened(before: Snapshot | None, after: Snapshot) -> Iterator[Notice]:
-    """What differs between two snapshots and is told once."""
+    """Yield the notices of differences between two snapshots that are told once."""
     if before is None or before.state is not after.state:
         severity = Severity.ERROR if after.state is State.FAULT else Severity.NOTICE
         yield severity, _STATES[after.state]
@@ -39,7 +39,7 @@ def happened(before: Snapshot | None, after: Snapshot) -> Iterator[Notice]:
 
 
 def standing(snapshot: Snapshot) -> Iterator[Notice]:
-    """What stands in the way, or should be known, as long as it does."""
+    """Yield the notices of what stands in the way, or should be known, as long as it does."""
     if snapshot.problem:
         yield Severity.CRITICAL, snapshot.problem
     is_running = snapshot.state is State.RUNNING
@@ -62,7 +62,7 @@ def standing(snapshot: Snapshot) -> Iterator[Notice]:
 
 
 def written(entry: Entry) -> Notice | None:
-    """What an entry of the event log tells a person; None: nothing."""
+    """Return the notice of an entry of the event log for a person; None: there is none."""
     match entry:
         case {"kind": "blocked", "identifier": identifier, "why": why}:
             return Severity.WARNING, f"Held back: {identifier}: {why}"

@@ -1,4 +1,4 @@
-"""What stations ask when they connect, so that they need not ask again and again.
+"""Answers to what stations ask when they connect, so that they need not ask again and again.
 
 Sources: mavlink.io (parameter, mission, FTP, PING and TIMESYNC microservices). There are two parameters, which can be
 read and not changed; no missions; no files.
@@ -20,13 +20,13 @@ _FILE_PAYLOAD = 251
 
 
 def answers(number: int, told: Any, sender: tuple[int, int], settings: GroundSettings, now_s: float) -> list[Make]:
-    """What a request is answered with; empty: it is none.
+    """Return the answers to a request; empty: it is none.
 
     Args:
-        number: Of the message.
+        number: Number of the message.
         told: The library's message, addressed to us.
-        sender: Of it.
-        settings: Of the link.
+        sender: Sender of the message.
+        settings: Settings of the link.
         now_s: The time.
     """
     match number:

@@ -1,4 +1,4 @@
-"""Which message is due when, and how much may be sent."""
+"""Schedule of messages: when each is due, and how much may be sent."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ class Schedule:
         self._due_s = dict.fromkeys(defaults, -math.inf)
 
     def interval_s(self, message: int) -> float:
-        """How often a message comes."""
+        """Return the interval at which a message comes, in seconds."""
         return self._intervals_s[message]
 
     def change(self, message: int, interval_s: float | None) -> bool:
@@ -62,7 +62,7 @@ class Bucket:
 
     @property
     def has_some(self) -> bool:
-        """Whether at least one is left."""
+        """True if at least one is left."""
         return self._left >= 1.0
 
     def take(self, amount: float = 1.0) -> None:

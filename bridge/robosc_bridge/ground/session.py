@@ -43,16 +43,16 @@ _NOT_SIGNED = "Only stopping is obeyed here without a valid signature."
 
 
 class Session:
-    """What is said to a ground station and what it says.
+    """Conversation with a ground station.
 
     Args:
         operations: The daemon.
-        settings: Of the link.
+        settings: Settings of the link.
         now_s: The time, by the clock that readings and scans have theirs from.
 
     Attributes:
-        accepted: How many messages of stations have come that count.
-        claims: How many of these let their sender be the station in use: its sign of life, or a command.
+        accepted: Number of messages of stations that have come and count.
+        claims: Number of these that let their sender be the station in use: its sign of life, or a command.
 
     Raises:
         SigningError: There is no key, or its time cannot be kept.
@@ -95,11 +95,11 @@ class Session:
 
         Args:
             now_s: The time.
-            data: What has come.
-            is_datagram: Whether that is one whole datagram.
+            data: Bytes that have come.
+            is_datagram: True if that is one whole datagram.
 
         Returns:
-            What is to be sent: whole packets.
+            Bytes to send: whole packets.
 
         Raises:
             SigningError: The time of signed packets cannot be kept.
@@ -221,7 +221,7 @@ class Session:
     # What the ground station says.
 
     def _is_own(self, heard: Heard) -> bool:
-        """Whether it was sent by us, and sent back: our own signature says nothing of who did that."""
+        """Return True if it was sent by us, and sent back: our own signature says nothing of who did that."""
         return heard.sender == (self._settings.system, self._settings.component)
 
     def _count(self, heard: Heard) -> None:
@@ -233,7 +233,7 @@ class Session:
         self.claims += is_station or asked_in(heard, self._settings) is not None
 
     def _is_trusted(self, heard: Heard) -> bool:
-        """Whether it may ask and be heard; not whether it may change anything."""
+        """Return True if it may ask and be heard; not whether it may change anything."""
         return heard.is_signed or self._signing is None
 
     def _may_change(self, heard: Heard) -> bool:

@@ -1,4 +1,4 @@
-"""How a ground station is reached, and what it may do; checked before anything starts."""
+"""Settings for reaching a ground station, and for what it may do; checked before anything starts."""
 
 import ipaddress
 from dataclasses import dataclass
@@ -30,17 +30,17 @@ class GroundSettingsError(BridgeError):
 
 @dataclass(frozen=True)
 class GroundSettings:
-    """How a ground station is reached.
+    """Settings for reaching a ground station.
 
     Attributes:
-        address: Of `transport.network_line`, or a serial port's path.
-        fastest: What a full stick means.
-        baud: Of a serial port.
+        address: Address of `transport.network_line`, or a serial port's path.
+        fastest: Velocity of a full stick.
+        baud: Speed of a serial port.
         system: Number of the vehicle.
-        component: Of the bridge in it.
+        component: Number of the bridge in it.
         signing: The key; None: nothing is signed.
-        obeys_unsigned: Whether, without a key, more than stopping and asking is allowed.
-        interval_s: Between two messages of pose, and of obstacles.
+        obeys_unsigned: True if, without a key, more than stopping and asking is allowed.
+        interval_s: Time between two messages of pose, and of obstacles, in seconds.
         range_m: Shortest and longest that the LiDAR measures.
     """
 
@@ -92,7 +92,7 @@ def ground_settings(configuration: Configuration, fastest: Velocity) -> GroundSe
 
 
 def is_loopback(address: str) -> bool:
-    """Whether only programs on this computer are reached there, and can reach it."""
+    """Return True if only programs on this computer are reached there, and can reach it."""
     if not is_network_address(address):
         return False
     host = address.split(":")[1]

@@ -1,4 +1,4 @@
-"""What the daemon is doing, in the words of a heartbeat: mode, whether it is armed, how it is.
+"""State of the daemon, in the words of a heartbeat: mode, whether it is armed, how it is.
 
 Sources: mavlink.io (HEARTBEAT, MAV_MODE_FLAG, MAV_STATE); the numbers of modes are those of ArduPilot Rover, which
 ground stations know by name for a ground rover.
@@ -34,13 +34,13 @@ class SystemStatus(IntEnum):
 
 @dataclass(frozen=True)
 class Status:
-    """What a heartbeat tells.
+    """Content of a heartbeat.
 
     Attributes:
-        is_armed: Whether the wheels may move, or their motors hold.
+        is_armed: True if the wheels may move, or their motors hold.
         mode: `HOLD` while an operator's stop holds.
         base_mode: MAV_MODE_FLAG.
-        system_status: How it is.
+        system_status: State of the system (MAV_STATE).
     """
 
     is_armed: bool
@@ -50,17 +50,17 @@ class Status:
 
 
 def is_held(snapshot: Snapshot) -> bool:
-    """Whether an operator has stopped it."""
+    """Return True if an operator has stopped it."""
     return Reason.OPERATOR_STOP in snapshot.reasons
 
 
 def status_of(snapshot: Snapshot | None, *, is_layer: bool, is_stale: bool) -> Status:
-    """What the heartbeat tells.
+    """Return the content of the heartbeat.
 
     Args:
         snapshot: The latest; None: there was none yet.
-        is_layer: Whether the supervisor is a supervision layer.
-        is_stale: Whether it is so old that the loop must be taken for hung.
+        is_layer: True if the supervisor is a supervision layer.
+        is_stale: True if it is so old that the loop must be taken for hung.
     """
     if snapshot is None:
         state = SystemStatus.EMERGENCY if is_stale else SystemStatus.BOOT

@@ -27,31 +27,31 @@ GONE_S = 5.0
 
 SCAN_LIMIT_S = 0.5
 READING_LIMIT_S = 1.0
-"""What is older is not told."""
+"""Age above which a scan or a reading is not reported, in seconds."""
 
 CHANGE_S = 0.1
 """A named value that changes is told at most that often."""
 
 VALUES_FIRST = 3
-"""So many named values go before other telemetry."""
+"""Number of named values that go before other telemetry."""
 
 _VALUES = (Telemetry.NAMED_VALUE_INT, Telemetry.NAMED_VALUE_FLOAT)
 _MAVLINK_2, _COMMAND_INT, _TERMINATION, _SET_POINTS = 0x2000, 0x8, 0x800, 0x80
 
 
 class Stream:
-    """What is told of the daemon.
+    """Messages about the daemon.
 
     Args:
         operations: The daemon.
-        settings: Of the link.
-        now_s: When it begins.
+        settings: Settings of the link.
+        now_s: Time when it begins.
 
     Attributes:
         snapshot: The latest; None: there was none yet.
-        bad_packets: That have come and were not heeded.
+        bad_packets: Packets that have come and were not heeded.
         held_back: Requests that a supervision layer has held back.
-        schedule: How often each message comes.
+        schedule: Schedule of each message.
     """
 
     def __init__(self, operations: Operations, settings: GroundSettings, now_s: float) -> None:
@@ -85,11 +85,11 @@ class Stream:
         return is_new
 
     def is_stale(self, now_s: float) -> bool:
-        """Whether the loop seems to hang."""
+        """Return True if the loop seems to hang."""
         return now_s - self._fresh_s > STALE_S
 
     def status(self, now_s: float) -> Status:
-        """What a heartbeat tells now."""
+        """Return the content of a heartbeat now."""
         return status_of(self.snapshot, is_layer=self._is_layer, is_stale=self.is_stale(now_s))
 
     def pulse(self, now_s: float) -> list[Make]:
@@ -100,7 +100,7 @@ class Stream:
         return self._heartbeat(now_s)
 
     def due(self, now_s: float) -> Iterator[Make]:
-        """What is to be sent now; made while it is taken, so that whoever takes may stop."""
+        """Yield the messages that are to be sent now; made while they are taken, so that whoever takes may stop."""
         values = self._changed_values(now_s)
         # On a slow line, neither leaves the other nothing.
         yield from itertools.islice(values, VALUES_FIRST)
@@ -192,7 +192,7 @@ class Stream:
 
     @property
     def is_running(self) -> bool:
-        """Whether the supervisor is executed."""
+        """True if the supervisor is executed."""
         return self.snapshot is not None and self.snapshot.state is State.RUNNING
 
 

@@ -1,4 +1,4 @@
-"""What the daemon shows, as messages that are sent again and again.
+"""State of the daemon, as messages that are sent again and again.
 
 Each function gives what makes a message with the library's codec, or None where there is nothing to tell. Axes: the
 robot's are x forward, y left, z up and turns counter-clockwise (REP 103); MAVLink's are forward, right, down and
@@ -32,7 +32,7 @@ _LASER = 0
 
 
 def heartbeat(status: Status) -> Make:
-    """That it is there, and how."""
+    """Make the message that reports that it is there, and its status."""
     return lambda codec: codec.heartbeat_encode(
         GROUND_ROVER, _GENERIC, status.base_mode, int(status.mode), int(status.system_status)
     )
@@ -49,11 +49,11 @@ def _millivolts(reading: DriveReading | None) -> int:
 
 
 def sys_status(snapshot: Snapshot, bad_packets: int) -> Make:
-    """Which parts there are and whether they work, and the battery.
+    """Make the message that reports which parts there are, whether they work, and the battery.
 
     Args:
         snapshot: The latest.
-        bad_packets: That have come and were not heeded.
+        bad_packets: Packets that have come and were not heeded.
     """
     devices, reading = snapshot.devices, snapshot.reading
     present = _MOTORS | (_PROXIMITY if Device.SCANNER in devices else 0)

@@ -27,10 +27,13 @@ BURST = 12.0
 """Messages at once."""
 
 REPEAT_S = 20.0
-"""What still holds is told again after so long; the same news is not told again sooner."""
+"""Time after which a text that still holds is told again, in seconds; the same news is not told again sooner."""
 
 FLAPPING_S = 2.0
-"""What comes and goes is told when it comes, but not sooner than this after it was told last."""
+"""Shortest time between two reports of something that comes and goes, in seconds.
+
+It is reported when it comes, but not sooner than this after it was reported last.
+"""
 
 MOST_WAITING = 30
 """Chunks that wait; the last text of them may go beyond it."""
@@ -70,11 +73,11 @@ def plain_text(text: str) -> str:
 
 
 def chunks(text: str, number: int) -> tuple[Chunk, ...]:
-    """A text as it is sent.
+    """Return a text as it is sent.
 
     Args:
-        text: Without the character 0.
-        number: That tells it from other long ones, 1 to 65535.
+        text: Text without the character 0.
+        number: Number that distinguishes it from other long ones, 1 to 65535.
     """
     data = text.encode("utf-8")
     if len(data) <= CHUNK:
@@ -109,7 +112,7 @@ class _Waiting:
 
 
 class Texts:
-    """What is to be told, and when."""
+    """Texts that are to be told, and their times."""
 
     def __init__(self) -> None:
         self._waiting: list[_Waiting] = []
@@ -155,7 +158,7 @@ class Texts:
             self._note(text, now_s)
 
     def _find_room(self, item: _Waiting) -> bool:
-        """Whether it may wait; what is less grave makes room for it, the latest first."""
+        """Return True if it may wait; what is less grave makes room for it, the latest first."""
         while sum(len(waiting.pieces) for waiting in self._waiting) >= MOST_WAITING:
             last = max(reversed(self._waiting), key=lambda waiting: waiting.rank)
             if last.rank <= item.rank:
@@ -173,7 +176,7 @@ class Texts:
         self._recent[text] = now_s
 
     def stand(self, now_s: float, holding: Iterable[tuple[Severity, str]]) -> None:
-        """What holds now: told when it begins, and again every `REPEAT_S`."""
+        """Tell what holds now: when it begins, and again every `REPEAT_S`."""
         standing = {plain_text(text): severity for severity, text in holding}
         for text, severity in standing.items():
             self.say(now_s, severity, text, again_s=REPEAT_S if text in self._standing else FLAPPING_S)
@@ -184,7 +187,7 @@ class Texts:
         self._recent.clear()
 
     def take(self, now_s: float) -> list[Make]:
-        """What goes out now."""
+        """Return the messages that go out now."""
         self._bucket.pass_time(now_s)
         found = []
         while self._bucket.has_some and (item := self._next()) is not None:

@@ -35,15 +35,15 @@ type Number = int | float
 
 @dataclass(frozen=True)
 class NamedValue:
-    """Where a named value comes from.
+    """Source of a named value.
 
     Attributes:
-        name: As it is sent; at most `NAME_BYTES` ASCII characters.
+        name: Name as it is sent; at most `NAME_BYTES` ASCII characters.
         meaning: `Component` for its state, `Component.variable`.
-        component: In the snapshot.
-        variable: In the component; None: its state is meant.
-        words: What is told as its place here: states, or values of an enum; empty: a number or truth value.
-        is_float: Whether NAMED_VALUE_FLOAT tells it, else NAMED_VALUE_INT.
+        component: Name of it in the snapshot.
+        variable: Variable in the component; None: its state is meant.
+        words: Words whose place here is sent: states, or values of an enum; empty: a number or truth value.
+        is_float: True if NAMED_VALUE_FLOAT sends it, else NAMED_VALUE_INT.
     """
 
     name: str

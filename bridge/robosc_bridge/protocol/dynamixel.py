@@ -46,9 +46,9 @@ class Status:
 
     Attributes:
         device: Its id.
-        number: What it refused the request for; 0: it did not.
-        is_alert: Whether its hardware error status is not zero.
-        data: What was asked for; empty for a write and where the request was refused.
+        number: Number of the error with which it refused the request; 0: it did not.
+        is_alert: True if its hardware error status is not zero.
+        data: Data that was asked for; empty for a write and where the request was refused.
     """
 
     device: int
@@ -63,10 +63,10 @@ class Status:
 
 
 def status_of(packet: Sequence[int]) -> Status | None:
-    """What a well-formed packet without stuffing says, or None where it is no status packet.
+    """Return the status in a well-formed packet without stuffing, or None where it is no status packet.
 
     Args:
-        packet: From its header to its checksum, as `PacketHandler.rxPacket` gives it.
+        packet: Packet from its header to its checksum, as `PacketHandler.rxPacket` gives it.
     """
     if len(packet) < _BODY + 4 or packet[_BODY] != INST_STATUS or packet[4] > MAX_DEVICE:
         return None

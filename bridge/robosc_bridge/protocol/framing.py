@@ -13,7 +13,7 @@ from typing import ClassVar
 
 @dataclass
 class FrameCounts:
-    """What a decoder has met; every byte that was fed is in a frame, skipped, or still waiting for others.
+    """Counts of a decoder; every byte that was fed is in a frame, skipped, or still waiting for others.
 
     Attributes:
         frames: Well-formed frames.
@@ -27,15 +27,15 @@ class FrameCounts:
 
 
 class FrameDecoder[Frame](ABC):
-    """Finds the frames of one format.
+    """Decoder that finds the frames of one format.
 
     Holds fewer bytes than the longest frame and `look_ahead` have, whatever comes in.
 
     Attributes:
-        first_byte: What every header begins with, unless `_begin` says else.
+        first_byte: Byte that every header begins with, unless `_begin` says else.
         header_length: Bytes from which the length of a frame is known.
         look_ahead: Bytes behind a frame that `_frame` wants to see.
-        counts: What was met so far.
+        counts: Counts so far.
     """
 
     first_byte: ClassVar[int]
@@ -48,7 +48,7 @@ class FrameDecoder[Frame](ABC):
         self._is_aligned = False
 
     def _begin(self, data: bytes, at: int) -> int:
-        """Where the next header may begin; -1: nowhere."""
+        """Return the place where the next header may begin; -1: nowhere."""
         return data.find(self.first_byte, at)
 
     @abstractmethod
@@ -57,7 +57,7 @@ class FrameDecoder[Frame](ABC):
 
     @abstractmethod
     def _frame(self, data: bytes, at: int, length: int) -> Frame | None:
-        """What a complete frame says; None: its check fails or it says what cannot be."""
+        """Return the content of a complete frame; None: its check fails or it says what cannot be."""
 
     def _align(self, is_aligned: bool) -> None:
         """Told whether the next bytes follow a well-formed frame without a gap."""

@@ -111,7 +111,7 @@ def turns_per_s(speed: int) -> float:
 
 
 def points(frame: Frame) -> Points:
-    """Where the points of a frame are; index 0 of the device is 359 degrees, its last one is straight ahead."""
+    """Return the points of a frame; index 0 of the device is 359 degrees, its last one is straight ahead."""
     return Points(
         _COUNTED_DEG[frame.index],
         _ANGLES_DEG[frame.index],

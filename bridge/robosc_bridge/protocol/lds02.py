@@ -90,7 +90,10 @@ class Decoder(FrameDecoder[Frame]):
 
 
 def _is_plausible(speed_deg_s: int, start_cdeg: int, end_cdeg: int) -> bool:
-    """Whether there are such angles, and the motor can have turned so far in a frame: the official driver's rule."""
+    """Return True if there are such angles, and the motor can have turned so far in a frame.
+
+    This is the official driver's rule.
+    """
     if max(start_cdeg, end_cdeg) > _TURN_CDEG or speed_deg_s > WIDEST_STEP_DEG * POINTS_PER_S:
         return False
     span_deg = (end_cdeg // 100 - start_cdeg // 100 + 360) % 360
@@ -98,7 +101,7 @@ def _is_plausible(speed_deg_s: int, start_cdeg: int, end_cdeg: int) -> bool:
 
 
 def points(frame: Frame) -> Points:
-    """Where the points of a frame are, as seen from the axis of the motor instead of the optical centre.
+    """Return the points of a frame, as seen from the axis of the motor instead of the optical centre.
 
     The official driver publishes every range that is not 0: nothing near is dropped. Beyond what the sensor is made
     for, a range promises free space that nobody measured.

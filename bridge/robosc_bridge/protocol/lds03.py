@@ -47,11 +47,11 @@ class Frame:
     """Some points.
 
     Attributes:
-        is_ring_start: Whether it is the first of a turn.
-        frequency_hz: Turns a second; None: only the first frame of a turn tells.
+        is_ring_start: True if it is the first of a turn.
+        frequency_hz: Turns a second; None: only the first frame of a turn reports it.
         first_ticks: Angle of the first point, clockwise, in 64ths of a degree.
         last_ticks: Angle of the last point.
-        distances_mm: 0: nothing measured.
+        distances_mm: Distances in millimetres; 0: nothing measured.
         intensities: Up to 254; 255: over-exposed.
     """
 
@@ -101,7 +101,7 @@ class Decoder(FrameDecoder[Frame]):
 
 
 def _span_ticks(first_ticks: int, last_ticks: int) -> int:
-    """How far it is from the first point to the last one; negative: backward, which cannot be."""
+    """Return the angle from the first point to the last one, in ticks; negative: backward, which cannot be."""
     if first_ticks > 3 * _HALF_TURN_TICKS // 2 and last_ticks < _HALF_TURN_TICKS // 2:
         last_ticks += _TURN_TICKS
     return last_ticks - first_ticks
@@ -114,7 +114,7 @@ def _is_plausible(first_ticks: int, last_ticks: int, samples: int) -> bool:
 
 
 def points(frame: Frame) -> Points:
-    """Where the points of a frame are."""
+    """Return the points of a frame."""
     samples = len(frame.distances_mm)
     step_deg = _span_ticks(frame.first_ticks, frame.last_ticks) / 64 / max(samples - 1, 1)
     first_deg = frame.first_ticks / 64

@@ -62,7 +62,7 @@ class Codec:
 
     @property
     def is_signing(self) -> bool:
-        """Whether it has a key."""
+        """True if it has a key."""
         return self._codec.signing.secret_key is not None
 
     @property
@@ -100,21 +100,24 @@ class Codec:
 
 
 def is_signed(found: Any) -> bool:
-    """Whether a message of the library came with a valid signature; False where signatures are not asked for."""
+    """Return True if a message of the library came with a valid signature.
+
+    False where signatures are not asked for.
+    """
     return bool(found.get_signed())
 
 
 def is_old(found: Any) -> bool:
-    """Whether a message of the library came as MAVLink 1."""
+    """Return True if a message of the library came as MAVLink 1."""
     return bytes(found.get_msgbuf()[:1]) == bytes((_OLD_MAGIC,))
 
 
 class Decoder[Content](FrameDecoder[Content]):
-    """Finds packets of MAVLink 2; those of messages that the dialect does not know are skipped.
+    """Decoder of MAVLink 2 packets; those of messages that the dialect does not know are skipped.
 
     Args:
-        codec: That checks and unpacks them.
-        read: What a message of the library says; a `ValueError`: what cannot be.
+        codec: Codec that checks and unpacks them.
+        read: Function that returns the content of a message of the library; a `ValueError` means that it cannot be.
         old: Numbers of the messages, without extensions, that are also heard as MAVLink 1; its others are skipped.
     """
 

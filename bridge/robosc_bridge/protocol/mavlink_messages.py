@@ -1,7 +1,7 @@
-"""What a vehicle tells, as values in the axes of REP 103, and what it is told.
+"""Reports of a vehicle, as values in the axes of REP 103, and messages to it.
 
-MAVLink counts yaw clockwise, y to the right and z down; here it is counter-clockwise, left and up. Sources: mavlink.io
-(common messages) and ArduPilot Rover (`GCS_MAVLink_Rover.cpp`, `mode_guided.cpp`).
+MAVLink counts yaw clockwise, y to the right and z down; here it is counter-clockwise, left and up. Sources:
+mavlink.io (common messages) and ArduPilot Rover (`GCS_MAVLink_Rover.cpp`, `mode_guided.cpp`).
 """
 
 import math
@@ -48,7 +48,7 @@ class Mode(IntEnum):
 
 
 class Command(IntEnum):
-    """What a vehicle can be asked for, with its number."""
+    """Command that a vehicle can be given, with its number."""
 
     SET_MODE = 176
     FLIGHT_TERMINATION = 185
@@ -80,7 +80,7 @@ class Incoming(IntEnum):
 
 
 class Result(IntEnum):
-    """How a command was answered."""
+    """Answer to a command."""
 
     ACCEPTED = 0
     TEMPORARILY_REJECTED = 1
@@ -106,7 +106,7 @@ class Telemetry(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
-    """That somebody is there, and how."""
+    """Sign that somebody is there, and their state."""
 
     kind: int
     autopilot: int
@@ -163,12 +163,12 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class BatteryState:
-    """Of the first battery; None: not told.
+    """State of the first battery; None: not reported.
 
     Attributes:
-        is_main: Whether it is the summary that every vehicle sends.
-        voltage_v: Of the whole pack.
-        share: 0 to 1.
+        is_main: True if it is the summary that every vehicle sends.
+        voltage_v: Voltage of the whole pack.
+        share: Charge, 0 to 1.
     """
 
     is_main: bool
@@ -181,10 +181,10 @@ class Text:
     """A text, or a piece of a long one.
 
     Attributes:
-        severity: 0 emergency to 7 debug.
-        data: As it came, without the zeros at its end; a piece may end within a character.
-        number: Of the long text; 0: it is a whole one.
-        chunk: Which piece.
+        severity: Severity, 0 emergency to 7 debug.
+        data: Data as it came, without the zeros at its end; a piece may end within a character.
+        number: Number of the long text; 0: it is a whole one.
+        chunk: Number of the piece.
     """
 
     severity: int
@@ -199,7 +199,7 @@ class Text:
 
     @property
     def is_last(self) -> bool:
-        """Whether no piece follows."""
+        """True if no piece follows."""
         return self.number == 0 or len(self.data) < CHUNK
 
 
@@ -218,12 +218,12 @@ class ObstacleRing:
     """Distances around, clockwise.
 
     Attributes:
-        distances_cm: Of each sector: `most_cm` + 1: nothing there; 65535: unknown.
-        increment_deg: Between sectors; negative: counter-clockwise.
-        offset_deg: Of the middle of the first one, clockwise.
+        distances_cm: Distance of each sector: `most_cm` + 1: nothing there; 65535: unknown.
+        increment_deg: Angle between sectors; negative: counter-clockwise.
+        offset_deg: Angle of the middle of the first one, clockwise.
         least_cm: Shortest that is valid.
         most_cm: Longest.
-        is_body_fixed: Whether counted from the front; else from north.
+        is_body_fixed: True if counted from the front; else from north.
     """
 
     distances_cm: tuple[int, ...]
@@ -239,11 +239,12 @@ class SectorDistance:
     """One distance.
 
     Attributes:
-        orientation: 0 ahead, and on clockwise in eighths of a turn, as ArduPilot has it; others are no such direction.
-        distance_cm: What was measured.
+        orientation: Direction: 0 ahead, and on clockwise in eighths of a turn, as ArduPilot has it; others are no
+            such direction.
+        distance_cm: Measured distance.
         least_cm: Shortest that is valid.
         most_cm: Longest.
-        width_deg: Of what it sees; 0: unknown.
+        width_deg: Width of what it sees; 0: unknown.
     """
 
     orientation: int
@@ -260,7 +261,7 @@ type Content = (
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """What was said by whom; content None: nothing that is used here."""
+    """Message with its sender; content None: nothing that is used here."""
 
     system: int
     component: int
@@ -348,24 +349,24 @@ READERS: Mapping[int, Callable[[Any], Content]] = {
     Telemetry.OBSTACLE_DISTANCE: _obstacle_ring,
     Telemetry.ODOMETRY: _odometry,
 }
-"""How the contents of a message are read, by its number; a `ValueError` says that they cannot be."""
+"""Readers of the contents of a message, by its number; a `ValueError` says that they cannot be."""
 
 
 def own_heartbeat(codec: Any) -> Any:
-    """That a companion computer is there."""
+    """Return the heartbeat of a companion computer."""
     return codec.heartbeat_encode(_ONBOARD_CONTROLLER, NO_AUTOPILOT, 0, 0, _ACTIVE)
 
 
 def command(
     system: int, component: int, number: Command, confirmation: int, *parameters: float
 ) -> Callable[[Any], Any]:
-    """A command.
+    """Make a command.
 
     Args:
-        system: Of the vehicle.
-        component: Of it.
-        number: Which command.
-        confirmation: How often it was sent before.
+        system: System number of the vehicle.
+        component: Its component number.
+        number: Number of the command.
+        confirmation: Number of times that it was sent before.
         parameters: Its first ones; the others are 0.
     """
     values = (*parameters, *(0.0,) * (7 - len(parameters)))
@@ -385,14 +386,14 @@ def entering(mode: Mode) -> tuple[float, ...]:
 def velocity_target(
     system: int, component: int, boot_ms: int, linear_m_s: float, angular_rad_s: float
 ) -> Callable[[Any], Any]:
-    """What a rover in GUIDED follows until another comes or 3 s have passed.
+    """Make the velocity target that a rover in GUIDED follows until another comes or 3 s have passed.
 
     Args:
-        system: Of the vehicle.
-        component: Of it.
-        boot_ms: Since the sender started.
-        linear_m_s: Forward.
-        angular_rad_s: Counter-clockwise.
+        system: System number of the vehicle.
+        component: Its component number.
+        boot_ms: Time since the sender started, in milliseconds.
+        linear_m_s: Speed forward.
+        angular_rad_s: Turn rate, counter-clockwise.
     """
     # Adding zero makes the negative zero, whose bytes are not all zero, a positive one.
     speeds = (linear_m_s + 0.0, 0.0, 0.0)
@@ -404,10 +405,10 @@ def velocity_target(
 
 
 def vehicle_message(told: Any) -> Message:
-    """What a vehicle says with a message of the library.
+    """Return the content of a vehicle's message of the library.
 
     Raises:
-        ValueError: What cannot be.
+        ValueError: It says what cannot be.
     """
     number = told.get_msgId()
     return Message(told.get_srcSystem(), told.get_srcComponent(), READERS[number](told) if number in READERS else None)

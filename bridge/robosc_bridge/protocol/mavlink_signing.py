@@ -28,10 +28,11 @@ class SigningError(DeviceError):
 
 @dataclass(frozen=True, slots=True)
 class Signing:
-    """How packets are signed.
+    """Signing of packets.
 
     Attributes:
-        key_file: 32 bytes, or 64 hexadecimal digits. Beside it, with the ending `.timestamp`, the time is kept.
+        key_file: File with 32 bytes, or 64 hexadecimal digits. Beside it, with the ending `.timestamp`, the time is
+            kept.
         link: Number of the signed stream, 0 to 255: another one for every line to the same vehicle.
     """
 
@@ -62,8 +63,8 @@ class SigningTime:
     killed has used nothing beyond what its successor begins with.
 
     Args:
-        key: Of signing.
-        path: Where the time is kept.
+        key: Key of signing.
+        path: File that the time is kept in.
 
     Raises:
         SigningError: It cannot be kept there.

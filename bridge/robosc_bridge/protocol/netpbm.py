@@ -16,7 +16,7 @@ _LONGEST_HEADER = 2 + 8 + 5 + 8 + 5 + 8 + 3 + 1
 
 
 class NotPicturesError(ValueError):
-    """What comes is no such stream; nothing of what follows can be understood."""
+    """Error that the data is no such stream; nothing of what follows can be understood."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +46,10 @@ class Decoder:
         self._held = bytearray()
 
     def feed(self, data: bytes) -> GreyPicture | None:
-        """The newest picture that is complete with these bytes; None: none is.
+        """Return the newest picture that is complete with these bytes; None: none is.
 
         Args:
-            data: What came next.
+            data: Bytes that came next.
 
         Raises:
             NotPicturesError: This is no stream of pictures, or one is empty or too large.

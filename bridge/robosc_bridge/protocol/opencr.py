@@ -53,20 +53,20 @@ class Block:
     """The registers from 10 to 181.
 
     Attributes:
-        uptime_ms: Since the board started, modulo 2**32; it and all that is measured is refreshed every 20 ms.
-        device_status: 0: it runs; -1: it found no motors when it started.
-        heartbeat: That it was given last.
-        buttons: Whether each is pressed.
-        illumination: Raw.
-        infrared: Raw.
+        uptime_ms: Time since the board started, modulo 2**32; it and all that is measured is refreshed every 20 ms.
+        device_status: Status, 0: it runs; -1: it found no motors when it started.
+        heartbeat: Heartbeat that it was given last.
+        buttons: True for each button that is pressed.
+        illumination: Raw value.
+        infrared: Raw value.
         sonar_m: 0 in the stock firmware.
-        battery_v: Of the battery.
-        battery_share: 0 to 1; no longer refreshed below 10.5 V.
+        battery_v: Voltage of the battery.
+        battery_share: Charge, 0 to 1; no longer refreshed below 10.5 V.
         motion: Measurements of the inertial sensor, by name; those that are no numbers are left out.
-        velocities_raw: Of the left and the right wheel.
-        ticks: Of the left and the right wheel.
-        has_motors: Whether it found them when it started.
-        is_torque_on: Of both motors.
+        velocities_raw: Velocities of the left and the right wheel.
+        ticks: Ticks of the left and the right wheel.
+        has_motors: True if it found them when it started.
+        is_torque_on: True if both motors have torque.
         command: Linear and angular velocity, as they were written.
     """
 
@@ -88,7 +88,7 @@ class Block:
 
 
 def decode_block(data: bytes) -> Block:
-    """What `BLOCK_LENGTH` bytes from `BLOCK_ADDRESS` on say."""
+    """Return the block in `BLOCK_LENGTH` bytes from `BLOCK_ADDRESS` on."""
     (
         uptime_ms, device_status, heartbeat, button_1, button_2, bumper_1, bumper_2, illumination, infrared, sonar_cm,
         battery_cv, battery_bp, *rest,
@@ -115,10 +115,10 @@ def decode_block(data: bytes) -> Block:
 
 
 def encode_command(linear: int, angular: int) -> bytes:
-    """What is written at `COMMAND`.
+    """Return the bytes that are written at `COMMAND`.
 
     Args:
-        linear: Hundredths of a metre per second.
-        angular: Hundredths of a radian per second, counter-clockwise.
+        linear: Linear velocity, in hundredths of a metre per second.
+        angular: Turn rate, in hundredths of a radian per second, counter-clockwise.
     """
     return _COMMAND.pack(linear, angular)

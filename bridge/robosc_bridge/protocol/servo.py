@@ -62,11 +62,11 @@ class Measurement:
 
 
 def decode_measurement(data: bytes) -> Measurement:
-    """What `MEASUREMENT_LENGTH` bytes from `MEASUREMENT_ADDRESS` on say."""
+    """Return the measurement in `MEASUREMENT_LENGTH` bytes from `MEASUREMENT_ADDRESS` on."""
     load, velocity_raw, ticks, voltage, temperature_c = _MEASUREMENT.unpack(data)
     return Measurement(load, velocity_raw, ticks, voltage / 10, temperature_c)
 
 
 def encode_velocity(raw: int) -> bytes:
-    """What is written at `GOAL_VELOCITY`."""
+    """Return the bytes that are written at `GOAL_VELOCITY`."""
     return raw.to_bytes(4, "little", signed=True)

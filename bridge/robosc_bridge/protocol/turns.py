@@ -26,15 +26,15 @@ MOST_POINTS = 2048
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """What one frame measured, in the order in which it was.
+    """Measurements of one frame, in the order in which they were made.
 
     Attributes:
         counted_deg: Angles as the device counts them: clockwise, growing, within [0, 360), passing 0 at most once.
-        angles_deg: Where the points are: counter-clockwise from the front, within [0, 360).
-        ranges_m: NaN where nothing valid was measured.
-        intensities: As the device gives them.
-        turns_per_s: Speed of the motor; None: this frame does not tell.
-        is_last: It is known without the next frame that the turn ends here.
+        angles_deg: Angles of the points: counter-clockwise from the front, within [0, 360).
+        ranges_m: Ranges; NaN where nothing valid was measured.
+        intensities: Intensities as the device gives them.
+        turns_per_s: Speed of the motor; None: this frame does not report it.
+        is_last: True if it is known without the next frame that the turn ends here.
     """
 
     counted_deg: tuple[float, ...]

@@ -22,10 +22,10 @@ Context = grpc.aio.ServicerContext[Any, Any]
 
 
 class Condition(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # generated, without types
-    """Answers by what the loop shows.
+    """Health service that answers by what the loop shows.
 
     Args:
-        feed: What the daemon shows.
+        feed: Feed that the daemon shows.
     """
 
     def __init__(self, feed: Feed) -> None:
@@ -33,7 +33,7 @@ class Condition(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # genera
 
     @property
     def is_serving(self) -> bool:
-        """Whether the loop turns, and no fault has stopped the robot."""
+        """True if the loop turns, and no fault has stopped the robot."""
         snapshot = self._feed.snapshot
         if snapshot is None or time.time() - snapshot.time_s > STALE_S:
             return False
@@ -42,7 +42,7 @@ class Condition(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # genera
     async def Check(  # noqa: N802  # named by the .proto file
         self, request: health_pb2.HealthCheckRequest, context: Context
     ) -> health_pb2.HealthCheckResponse:
-        """Whether the bridge is well."""
+        """Answer whether the bridge is well."""
         if request.service not in ("", convert.SERVICE_NAME):
             await context.abort(grpc.StatusCode.NOT_FOUND, "there is no such service")
         answer = health_pb2.HealthCheckResponse

@@ -1,4 +1,4 @@
-"""Whether all places for connections are taken: gRPC turns callers away then and tells nobody."""
+"""Watch over the places for connections: if all are taken, gRPC turns callers away and tells nobody."""
 
 import logging
 from pathlib import Path
@@ -12,11 +12,11 @@ _ESTABLISHED = "01"
 
 
 class Places:
-    """Tells it once, and again only after half of them were free.
+    """Watch that reports once that all places are taken, and again only after half of them were free.
 
     Args:
-        port: On which callers come.
-        most: How many there are.
+        port: Port on which callers come.
+        most: Number of places.
     """
 
     def __init__(self, port: int, most: int) -> None:

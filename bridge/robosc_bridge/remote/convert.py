@@ -1,4 +1,7 @@
-"""What the daemon shows and tells as protobuf messages, and back: the one module of the face with generated names."""
+"""Protobuf messages for what the daemon shows and tells, and back.
+
+This is the one module of the face with generated names.
+"""
 
 import json
 import time
@@ -73,7 +76,7 @@ class RequestError(Exception):
 
 
 def definition(operations: Operations) -> pb.GetDefinitionResponse:
-    """What does not change while the bridge runs."""
+    """Return the definition: everything that does not change while the bridge runs."""
     model, topic = operations.model, state_topic(operations.model)
     return pb.GetDefinitionResponse(
         robot=model.name,
@@ -115,10 +118,10 @@ def _fields(model: Model, item: Communication) -> list[str]:
 
 
 def command_of(request: pb.CommandRequest) -> Command:
-    """What is wanted.
+    """Return the wanted command.
 
     Raises:
-        RequestError: Nothing that there is.
+        RequestError: It is none that there is.
     """
     command = _COMMANDS.get(request.command)
     if command is None:
@@ -216,12 +219,12 @@ def event_of(entry: Entry) -> Struct:
 
 
 def program_of(hello: pb.Hello, name: str, tell: Callable[[programs.ToProgram], None], operations: Operations) -> Any:
-    """A program that says who it is.
+    """Return the program that says who it is.
 
     Args:
-        hello: What it says.
-        name: For the log.
-        tell: Tells it something.
+        hello: Message in which it says who it is.
+        name: Name for the log.
+        tell: Function that tells it something.
         operations: The daemon.
 
     Raises:
@@ -244,7 +247,7 @@ def program_of(hello: pb.Hello, name: str, tell: Callable[[programs.ToProgram], 
 
 
 def told(request: pb.AttachRequest, program: programs.Program) -> programs.FromProgram | None:
-    """What a program tells the loop; None: only that it is there.
+    """Return the item that a program tells the loop; None: only that it is there.
 
     Raises:
         RequestError: It makes no sense.
@@ -297,12 +300,12 @@ def welcome(operator_timeout_s: float | None) -> pb.AttachResponse:
 
 
 def refused(why: str) -> pb.AttachResponse:
-    """What it sent makes no sense."""
+    """Return the response that what a program sent makes no sense."""
     return pb.AttachResponse(refused=pb.Refusal(why=text_of(why)))
 
 
 def telling(item: programs.ToProgram) -> pb.AttachResponse:
-    """What the loop tells a program."""
+    """Return the response for an item that the loop tells a program."""
     match item:
         case programs.MessageSent(name, identifier, data):
             message = pb.ModelMessage(name=name, identifier=text_of(identifier), data=value_of(data))

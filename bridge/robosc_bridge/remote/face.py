@@ -61,12 +61,12 @@ class RemoteError(BridgeError):
 
 @dataclass(frozen=True, slots=True)
 class RemoteSettings:
-    """Where and how the face listens.
+    """Settings for listening of the face.
 
     Attributes:
         address: `HOST:PORT`; port 0 picks a free one.
         security: Certificates and tokens.
-        operator_timeout_s: After how long without the operator the robot stops; None: it needs none.
+        operator_timeout_s: Time without the operator after which the robot stops, in seconds; None: it needs none.
     """
 
     address: str
@@ -75,7 +75,7 @@ class RemoteSettings:
 
 
 def settings_of(configuration: Configuration) -> RemoteSettings | None:
-    """What a configuration says; None: there is to be no such face."""
+    """Return the settings of a configuration; None: there is to be no such face."""
     remote = configuration.remote
     if remote.grpc_address is None:
         return None
@@ -98,7 +98,7 @@ class RemoteFace(ServedFace):
 
     Args:
         operations: The daemon.
-        settings: Where and how it listens.
+        settings: Settings for listening.
     """
 
     def __init__(self, operations: Operations, settings: RemoteSettings) -> None:
@@ -173,11 +173,11 @@ def _options() -> list[tuple[str, int]]:
 
 
 def serve(operations: Operations, settings: RemoteSettings) -> RemoteFace:
-    """A face that listens.
+    """Return a face that listens.
 
     Args:
         operations: The daemon.
-        settings: Where and how.
+        settings: Settings for listening.
 
     Raises:
         RemoteError: It cannot.

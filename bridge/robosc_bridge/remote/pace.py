@@ -1,6 +1,7 @@
-"""Whether what an operator sends tells that it is there now: what waited in buffers may be older than the operator.
+"""Proof from an operator's messages that the operator is there now.
 
-A machine that sends as fast as it can fills every buffer on the way; once it hangs, its messages go on arriving.
+Messages that waited in buffers may be older than the operator. A machine that sends as fast as it can fills every
+buffer on the way; once it hangs, its messages go on arriving.
 """
 
 from collections.abc import Callable

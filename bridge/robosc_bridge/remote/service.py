@@ -56,7 +56,7 @@ _RULES = {
     "Attach": _OPERATE,
 }
 RULES = {f"/{convert.SERVICE_NAME}/{name}": _RULES[name] for name in convert.METHODS}
-"""Who may call what."""
+"""Rules for who may call what."""
 
 Context = grpc.aio.ServicerContext[Any, Any]
 
@@ -86,13 +86,13 @@ class BridgeService(convert.BridgeServiceServicer):
     async def GetDefinition(  # noqa: N802  # named by the .proto file
         self, request: convert.GetDefinitionRequest, context: Context
     ) -> convert.GetDefinitionResponse:
-        """What does not change while the bridge runs."""
+        """Return everything that does not change while the bridge runs."""
         return self._definition
 
     async def GetStatus(  # noqa: N802
         self, request: convert.GetStatusRequest, context: Context
     ) -> convert.GetStatusResponse:
-        """What the bridge is doing."""
+        """Return the state of the bridge."""
         response = convert.GetStatusResponse()
         snapshot = self._operations.feed.snapshot
         if snapshot is not None:
@@ -120,7 +120,9 @@ class BridgeService(convert.BridgeServiceServicer):
         raise AssertionError("unreachable: a failed call is aborted")
 
     async def _order(self, command: states.Command, by: str) -> str:
-        """Why it cannot be; empty: it is done. Without an answer, or with nobody to hear it, it is taken back.
+        """Return the reason why the command cannot be; empty: it is done.
+
+        Without an answer, or with nobody to hear it, it is taken back.
 
         Raises:
             TimeoutError: The loop does not answer.
@@ -159,7 +161,7 @@ class BridgeService(convert.BridgeServiceServicer):
     async def Watch(  # noqa: N802
         self, request: convert.WatchRequest, context: Context
     ) -> None:
-        """What the bridge is doing and what happens."""
+        """Stream the state of the bridge and what happens."""
         async with self._translated(context), self._counted("watchers", MAXIMUM_WATCHERS, context):
             rate_hz = convert.rate_hz_of(request, DEFAULT_RATE_HZ, LEAST_RATE_HZ, MOST_RATE_HZ)
             watcher = self._watchers.join(with_events=not request.without_events)
@@ -211,7 +213,7 @@ class BridgeService(convert.BridgeServiceServicer):
                 await asyncio.gather(running, return_exceptions=True)
 
     async def _hello(self, requests: AsyncIterator[convert.AttachRequest]) -> convert.Hello:
-        """Who a program is.
+        """Return the message in which a program says who it is.
 
         Raises:
             RequestError: It does not say so.
@@ -265,6 +267,6 @@ class _ClosingError(Exception):
 
 
 def _caller(context: Context) -> str:
-    """Who calls, for the log."""
+    """Return the caller's name, for the log."""
     name = CALLER.get()
     return f"'{name}' at {context.peer()}" if name else str(context.peer())

@@ -21,7 +21,10 @@ MAXIMUM_WAITING_BYTES = 4_000_000
 """Of memory, for their data; one message may wait whatever its size."""
 
 MESSAGES_A_TURN = 64
-"""That a program may tell the loop before that has shown its next snapshot; the rest waits at the program's end."""
+"""Number of messages that a program may send to the loop before the loop has shown its next snapshot.
+
+The rest waits at the program's end.
+"""
 
 BYTES_A_TURN = 128 * 1024
 """Of these messages as they arrive; what goes beyond is the last one."""
@@ -38,12 +41,12 @@ class Session:
 
     Args:
         operations: The daemon.
-        hello: Who the program says it is.
-        name: For the log.
-        operator_timeout_s: After how long without the operator the robot stops; None: it needs none.
+        hello: Message in which the program says who it is.
+        name: Name for the log.
+        operator_timeout_s: Time without the operator after which the robot stops, in seconds; None: it needs none.
 
     Raises:
-        RequestError: What it says makes no sense.
+        RequestError: It says what makes no sense.
     """
 
     def __init__(

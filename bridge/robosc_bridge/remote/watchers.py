@@ -1,6 +1,7 @@
-"""Who watches: each with the latest snapshot and the events it has not seen, however slowly it reads.
+"""Watchers: each with the latest snapshot and the events it has not seen, however slowly it reads.
 
-One subscription of the feed serves all of them, so that what a watcher costs the loop does not grow with their number.
+One subscription of the feed serves all of them, so that what a watcher costs the loop does not grow with their
+number.
 """
 
 import asyncio
@@ -20,10 +21,10 @@ MAXIMUM_BYTES = 1024 * 1024
 
 
 class Watcher:
-    """What one of them has not seen.
+    """Watcher, with the events that it has not seen.
 
     Args:
-        with_events: Whether it wants events.
+        with_events: True if it wants events.
     """
 
     def __init__(self, *, with_events: bool) -> None:
@@ -68,10 +69,10 @@ class Watcher:
 
 
 class Watchers:
-    """All of them; lives in the face's event loop.
+    """All watchers; lives in the face's event loop.
 
     Args:
-        feed: What the daemon shows.
+        feed: Feed that the daemon shows.
     """
 
     def __init__(self, feed: Feed) -> None:

@@ -17,13 +17,13 @@ _HARMLESS = frozenset({MotorFault.VOLTAGE})
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """What the drive base is to do in its next exchange.
+    """Command for the drive base in its next exchange.
 
     Attributes:
         velocity: Standstill whenever there is a reason.
-        is_torque_wanted: Whether the motors are to hold.
-        reasons: Why it may not move, in the order of `Reason`.
-        warnings: What a person should know, in the order of `Caution`.
+        is_torque_wanted: True if the motors are to hold.
+        reasons: Reasons why it may not move, in the order of `Reason`.
+        warnings: Warnings that a person should know, in the order of `Caution`.
     """
 
     velocity: Velocity
@@ -33,7 +33,7 @@ class Output:
 
 
 class SafetyLayer:
-    """Lets velocities pass that are safe, and zero otherwise; in standby until it is enabled.
+    """Safety layer that lets velocities pass that are safe, and zero otherwise; in standby until it is enabled.
 
     The thread of the drive base calls `output`, switches torque as it says, exchanges the velocity, and reports with
     `saw_drive` or `drive_failed`; the others may be called from any thread, also from a signal handler. All times are
@@ -44,7 +44,7 @@ class SafetyLayer:
     said before or during a stop never moves the robot afterwards. Motion begins with the ramp from standstill.
 
     Args:
-        limits: What may pass, and for how long.
+        limits: Limits of what may pass, and for how long.
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
@@ -99,8 +99,9 @@ class SafetyLayer:
         """Ask for a velocity.
 
         Args:
-            velocity: What is beyond a limit is brought into it; what is not finite is refused and counts as a stop.
-            now_s: When it was asked for; a time that is not finite refuses it, too.
+            velocity: Requested velocity; what is beyond a limit is brought within it; a velocity that is not finite
+                is refused and counts as a stop.
+            now_s: Time of the request, in seconds; a time that is not finite refuses it, too.
         """
         numbers = (velocity.linear_m_s, velocity.angular_rad_s, now_s)
         with self._lock:
@@ -115,11 +116,11 @@ class SafetyLayer:
                 self._commands.hear(now_s)
 
     def saw_scan(self, now_s: float, ranges_m: Sequence[float] = ()) -> None:
-        """A full scan was complete then.
+        """Record that a full scan was complete.
 
         Args:
-            now_s: When.
-            ranges_m: What was measured (`SightWatch.hear`); none: nothing is known about that.
+            now_s: Time at which it was complete, in seconds.
+            ranges_m: Measured ranges (`SightWatch.hear`); none: nothing is known about them.
         """
         with self._lock:
             self._scans.hear(now_s)
@@ -127,7 +128,7 @@ class SafetyLayer:
                 self._sight.hear(ranges_m)
 
     def saw_noise(self, is_noisy: bool) -> None:
-        """Whether many frames of the scanner are damaged."""
+        """Record whether many frames of the scanner are damaged."""
         with self._lock:
             self._is_noisy = is_noisy
 
@@ -199,7 +200,7 @@ class SafetyLayer:
             return remaining
 
     def _holds(self, reason: Reason) -> bool:
-        """Whether a latched reason has not had its effect yet, or its cause still holds."""
+        """Return True if a latched reason has not had its effect yet, or its cause still holds."""
         if reason not in self._reasons:
             return True
         if reason is Reason.MOTOR_FAULT and self._faults - _HARMLESS:
@@ -209,10 +210,11 @@ class SafetyLayer:
         return reason in self._torque_off and self._torque_since_s is not None
 
     def output(self, now_s: float) -> Output:
-        """What the drive base is to do now.
+        """Return the output that the drive base is to carry out now.
 
         Args:
-            now_s: Not before that of the last call; where it is, or is no time, this call gives standstill.
+            now_s: Current time, in seconds, not before that of the last call; if it is before, or not finite, this
+                call gives standstill.
         """
         with self._lock:
             is_clock_wrong = not self._now_s <= now_s < math.inf

@@ -29,39 +29,40 @@ _NOT_BELOW = (
 
 @dataclass(frozen=True, kw_only=True)
 class SafetyLimits:
-    """What the safety layer lets pass, and after how long it stops the robot.
+    """Limits of what the safety layer lets pass, and times after which it stops the robot.
 
     Attributes:
-        linear_m_s: Fastest forward and backward.
+        linear_m_s: Fastest speed forward and backward.
         angular_rad_s: Fastest turn.
         wheel_m_s: Fastest wheel; where one would be faster, both are slowed alike, so that the curvature stays.
-        separation_m: Between the wheels' middles.
+        separation_m: Distance between the wheels' middles.
         scan_timeout_s: Longest time without a full scan (`SCAN_TIMEOUTS_S`); None: no scanner is needed. It has no
             default, so that nobody forgets the scanner.
-        linear_acceleration_m_s2: Away from standstill.
-        linear_deceleration_m_s2: Towards standstill. A command of zero passes at once.
-        angular_acceleration_rad_s2: Away from standstill.
-        angular_deceleration_rad_s2: Towards standstill.
-        command_timeout_s: How long a command to move holds.
+        linear_acceleration_m_s2: Acceleration away from standstill.
+        linear_deceleration_m_s2: Deceleration towards standstill. A command of zero passes at once.
+        angular_acceleration_rad_s2: Acceleration away from standstill.
+        angular_deceleration_rad_s2: Deceleration towards standstill.
+        command_timeout_s: Time for which a command to move holds.
         motor_timeout_s: Longest time without a reading of the drive base.
-        motor_failures: So many failed exchanges in a row count as silence, too.
+        motor_failures: Number of failed exchanges in a row that count as silence, too.
         loop_timeout_s: Longest time between two turns of the supervisor's loop.
         operator_timeout_s: Longest time without a sign of the operator; None: none is needed.
-        battery_warn_v: Warn at this mean voltage and below.
-        battery_stop_v: Stop at this mean voltage and below.
+        battery_warn_v: Mean voltage at and below which the safety layer warns.
+        battery_stop_v: Mean voltage at and below which it stops the robot.
         battery_mean_s: Time that a mean is made of, so that a dip stops nothing.
-        astray_m_s: A wheel is astray if it is off its goal by more than this and by more than half of the goal.
-        astray_s: How long a wheel may be astray.
+        astray_m_s: Difference from its goal above which a wheel is astray, if it is also more than half of the goal.
+        astray_s: Longest time that a wheel may be astray.
         torque_on_s: Longest time that the motors take to hold.
         torque_off_s: Longest wait for the wheels to stand still before torque goes off.
-        standstill_m_s: A wheel that is not faster stands still.
-        min_valid_share: The scanner sees nothing where the robot goes if a smaller share of its ranges there is valid,
-            in a full scan; at most 1.
-        is_torque_off_on_operator_stop: Whether an operator's stop wants torque off, too.
-        is_stopped_when_blind: Whether the robot may not go where the scanner sees nothing; else a person is told.
+        standstill_m_s: Fastest speed of a wheel that counts as standstill.
+        min_valid_share: Smallest share of the scanner's ranges where the robot goes that must be valid in a full
+            scan; with a smaller one, the scanner sees nothing there; at most 1.
+        is_torque_off_on_operator_stop: True if an operator's stop wants torque off, too.
+        is_stopped_when_blind: True if the robot may not go where the scanner sees nothing; else a person is informed.
 
     Raises:
-        ValueError: A number is not finite, not above 0, too large or inconsistent with another; all of them are listed.
+        ValueError: A number is not finite, not above 0, too large or inconsistent with another; all of them are
+            listed.
     """
 
     linear_m_s: float

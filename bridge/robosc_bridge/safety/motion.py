@@ -9,11 +9,11 @@ from robosc_bridge.safety.limits import SafetyLimits
 
 
 def within(velocity: Velocity, limits: SafetyLimits) -> Velocity:
-    """The velocity, no part and no wheel of it beyond its limit.
+    """Return the velocity, with no part and no wheel of it beyond its limit.
 
     Args:
-        velocity: Of numbers, however large.
-        limits: That it is brought into.
+        velocity: Velocity of numbers, however large.
+        limits: Limits that it is brought within.
     """
     linear_m_s = _clamped(velocity.linear_m_s, limits.linear_m_s)
     angular_rad_s = _clamped(velocity.angular_rad_s, limits.angular_rad_s)

@@ -1,10 +1,10 @@
-"""Why the robot may not move, and what a person should know though it may."""
+"""Reasons why the robot may not move, and cautions that a person should know though it may."""
 
 from enum import StrEnum
 
 
 class Reason(StrEnum):
-    """Why the wheels are told to stand still, as a sentence for a person.
+    """Reason why the wheels are commanded to stand still, as a sentence for a person.
 
     Most end by themselves when their cause ends; those in `LATCHING` hold until an operator resets them.
     """
@@ -44,7 +44,7 @@ TORQUE_OFF = (Reason.MOTOR_FAULT, Reason.TORQUE_LOST, Reason.WHEEL_ASTRAY)
 
 
 class Caution(StrEnum):
-    """What does not stop the robot, as a sentence for a person."""
+    """Caution that does not stop the robot, as a sentence for a person."""
 
     BATTERY = "The battery will soon be empty."
     MOTOR_VOLTAGE = "A motor tells that its supply is out of range."

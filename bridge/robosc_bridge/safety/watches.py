@@ -1,7 +1,8 @@
-"""What the safety layer remembers of what was reported to it.
+"""Watches that remember what was reported to the safety layer.
 
-Times come from outside and are believed in one direction only: a time in the future counts as the moment in which it is
-first looked at, and one that is no time is not heard.
+Times come from outside and are believed in one direction only: a time in the future counts as the moment in which it
+is
+first looked at, and one that is no time is ignored.
 """
 
 import math
@@ -14,10 +15,10 @@ SECTOR_DEG = 30
 
 
 class Freshness:
-    """How long ago something was heard of.
+    """Age of the last report of something.
 
     Args:
-        timeout_s: After how long it is stale; None: it never is.
+        timeout_s: Age after which it is stale, in seconds; None: it never is.
     """
 
     def __init__(self, timeout_s: float | None) -> None:
@@ -30,7 +31,7 @@ class Freshness:
             self._heard_s = time_s
 
     def is_stale(self, now_s: float) -> bool:
-        """Whether that is too long ago, or never was."""
+        """Return True if the last report is too long ago, or there never was one."""
         if self._timeout_s is None:
             return False
         if self._heard_s is None:
@@ -66,7 +67,7 @@ class SightWatch:
         return sum(map(math.isfinite, ranges_m)) < self._min_share * len(ranges_m)
 
     def is_blind(self, linear_m_s: float) -> bool:
-        """Whether nothing is seen in the direction of a speed; to a turn on the spot, no direction belongs."""
+        """Return True if nothing is seen in the direction of a speed; a turn on the spot has no direction."""
         return (linear_m_s > 0 and self._is_blind_ahead) or (linear_m_s < 0 and self._is_blind_behind)
 
 
@@ -98,20 +99,20 @@ class BatteryWatch:
 
     @property
     def is_near_empty(self) -> bool:
-        """Whether a person should be told."""
+        """True if a person should be warned."""
         return self._mean_v <= self._limits.battery_warn_v
 
     @property
     def is_empty(self) -> bool:
-        """Whether the robot must stop."""
+        """True if the robot must stop."""
         return self._mean_v <= self._limits.battery_stop_v
 
 
 class WheelWatch:
-    """Finds wheels that are held, turn by themselves, or do not stop.
+    """Watch that finds wheels that are held, turn by themselves, or do not stop.
 
     Args:
-        limits: How far off a wheel may be, and for how long.
+        limits: Limits of how far off a wheel may be, and for how long.
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
@@ -123,12 +124,12 @@ class WheelWatch:
         self._since_s = None
 
     def is_astray(self, goals_m_s: tuple[float, float], wheels_m_s: tuple[float, float], time_s: float) -> bool:
-        """Whether some wheel has been off its goal for too long.
+        """Return True if some wheel has been off its goal for too long.
 
         Args:
-            goals_m_s: Of the left and the right wheel.
-            wheels_m_s: What they do.
-            time_s: When that was measured.
+            goals_m_s: Goals of the left and the right wheel.
+            wheels_m_s: Actual speeds of the left and the right wheel.
+            time_s: Time at which the speeds were measured, in seconds.
         """
         if self._follows(goals_m_s[0], wheels_m_s[0]) and self._follows(goals_m_s[1], wheels_m_s[1]):
             self._since_s = None

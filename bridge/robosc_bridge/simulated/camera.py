@@ -25,15 +25,15 @@ class SimulatedCamera:
     Whoever connects gets every picture from then on; one who does not read misses pictures, never parts of them.
 
     Args:
-        world: In which the robot is.
-        link: Where its socket is to be; None: in a folder of its own.
+        world: World in which the robot is.
+        link: Place of its socket; None: in a folder of its own.
         mount: The camera and where it sits; None: the usual one.
-        seed: Of the noise that the world's scene tells of.
+        seed: Seed of the noise that the world's scene describes.
 
     Attributes:
-        path: Of the socket.
-        is_covered: Whether something covers it: its pictures are black.
-        is_frozen: Whether it has stopped to send pictures.
+        path: Path of the socket.
+        is_covered: True if something covers it: its pictures are black.
+        is_frozen: True if it has stopped sending pictures.
         sent: Pictures that have gone to somebody.
 
     Raises:
@@ -72,7 +72,7 @@ class SimulatedCamera:
 
     @property
     def is_connected(self) -> bool:
-        """Whether it is plugged in."""
+        """True if it is plugged in."""
         return self._listener is not None
 
     def disconnect(self) -> None:
@@ -184,7 +184,7 @@ class SimulatedCamera:
 
     @staticmethod
     def _passed(client: socket.socket, data: bytes) -> int:
-        """How much of it went into the buffer of a client; raises OSError if that is gone."""
+        """Send data and return how much of it went into the client's buffer; raise OSError if the client is gone."""
         with contextlib.suppress(BlockingIOError):
             return client.send(data)
         return 0

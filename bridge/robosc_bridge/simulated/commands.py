@@ -1,4 +1,4 @@
-"""What can be done to a simulated robot by a line of text, for a simulator in a process of its own."""
+"""Commands to a simulated robot as lines of text, for a simulator in a process of its own."""
 
 from collections.abc import Callable
 from dataclasses import fields

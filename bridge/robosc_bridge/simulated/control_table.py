@@ -18,15 +18,15 @@ class Item:
     """A register.
 
     Attributes:
-        name: As in the e-Manual, lower case.
-        address: Of its first byte.
-        size: In bytes.
-        default: When it left the factory (EEPROM) or after a start (RAM).
+        name: Name as in the e-Manual, lower case.
+        address: Address of its first byte.
+        size: Size in bytes.
+        default: Value when it left the factory (EEPROM) or after a start (RAM).
         lowest: Smallest value that a host may write; None: it may write none.
         highest: Largest one.
-        is_signed: Whether it is a two's complement number.
+        is_signed: True if it is a two's complement number.
         limit: The item whose value limits its magnitude.
-        is_goal: Whether a tripped bus watchdog locks it.
+        is_goal: True if a tripped bus watchdog locks it.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Item:
 
     @property
     def is_eeprom(self) -> bool:
-        """Whether it outlives a restart, and is locked while torque is on."""
+        """True if it outlives a restart, and is locked while torque is on."""
         return self.address < EEPROM_SIZE
 
 
@@ -125,10 +125,10 @@ class Model:
     """A kind of servo.
 
     Attributes:
-        items: In order of address.
-        operating_modes: That it has.
-        no_load_rpm: At 12 V.
-        strongest_load: What item 126 tells of a motor that cannot turn.
+        items: Items in order of address.
+        operating_modes: Operating modes that it has.
+        no_load_rpm: No-load speed at 12 V, in rpm.
+        strongest_load: Value that item 126 reports for a motor that cannot turn.
     """
 
     items: tuple[Item, ...]
@@ -190,7 +190,7 @@ class ControlTable:
                 self[item.name] = item.default
 
     def read(self, address: int, length: int) -> tuple[int, bytes]:
-        """What a host reads: the error's number, and the data if it is 0; bytes between items are 0."""
+        """Return what a host reads: the error's number, and the data if it is 0; bytes between items are 0."""
         if length < 1:
             return Error.DATA_LENGTH, b""
         if address + length > TABLE_SIZE:
@@ -198,7 +198,7 @@ class ControlTable:
         return Error.NONE, bytes(self._bytes[address : address + length])
 
     def check(self, address: int, data: bytes) -> tuple[int, list[tuple[Item, int]]]:
-        """Whether a host may write it: the error's number, and what is written if it is 0; all of it or nothing."""
+        """Check a host's write: return the error's number, and what is written if it is 0; all of it or nothing."""
         found: list[tuple[Item, int]] = []
         if not data:
             return Error.DATA_LENGTH, []

@@ -20,12 +20,12 @@ _DATAGRAM = 65535
 
 @dataclass
 class DatagramFaults:
-    """What is wrong on the way; may be changed at any time.
+    """Faults on the way; may be changed at any time.
 
     Attributes:
         drop_share: Share of datagrams to the host that are lost.
         corrupt_share: Share that have a wrong byte.
-        is_deaf: Whether nothing of the host reaches the device.
+        is_deaf: True if nothing from the host reaches the device.
     """
 
     drop_share: float = 0.0
@@ -34,17 +34,19 @@ class DatagramFaults:
 
 
 class DatagramLine:
-    """Serves a device on a UDP port of this computer until it is closed; for devices whose answers take no time.
+    """Line that serves a device on a UDP port of this computer until it is closed.
+
+    It is for devices whose answers take no time.
 
     Args:
-        device: That answers.
-        time: That it lives by.
-        host_port: Of the host, where it sends to at first; None: to whoever was heard last.
-        seed: Of the faults that come by chance.
+        device: Device that answers.
+        time: Time that it lives by.
+        host_port: Port of the host, to which it sends at first; None: it sends to whoever was heard last.
+        seed: Seed of the faults that come by chance.
 
     Attributes:
-        port: Its own.
-        faults: On the way.
+        port: Its own port.
+        faults: Faults on the way.
     """
 
     def __init__(self, device: Device, time: Timebase, host_port: int | None = None, seed: int = 0) -> None:

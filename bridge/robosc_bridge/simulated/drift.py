@@ -1,23 +1,23 @@
-"""What makes a robot's way on the floor differ from what its wheels turn, and what its encoders count from both."""
+"""Causes of differences between a robot's way on the floor, what its wheels turn, and what its encoders count."""
 
 import random
 
 from robosc_bridge.simulated.scene import Noise
 
 EVERY_STEPS = 20
-"""How many steps of the world one draw holds."""
+"""Number of steps of the world for which one draw holds."""
 
 
 class Drift:
     """Slip and errors of encoders by chance, the same for the same seed.
 
     Args:
-        noise: How much.
-        seed: Of the chance.
+        noise: Amount of slip and errors.
+        seed: Seed of the chance.
 
     Attributes:
         slips: Share of its way that the left and the right wheel lose now; 1 at most.
-        errors: What the left and the right encoder count too much now, as a share.
+        errors: Share that the left and the right encoder count too much now.
     """
 
     def __init__(self, noise: Noise, seed: int) -> None:

@@ -1,6 +1,7 @@
-"""What a camera on the robot sees: a pinhole without distortion or shadows.
+"""View of a camera on the robot: a pinhole without distortion or shadows.
 
-Central projection (R. Hartley, A. Zisserman, "Multiple View Geometry in Computer Vision", 2nd ed., Cambridge University
+Central projection (R. Hartley, A. Zisserman, "Multiple View Geometry in Computer Vision", 2nd ed., Cambridge
+University
 Press 2004, section 6.1), of the floor, and of what stands on it and hides it (`standing`).
 """
 
@@ -64,11 +65,11 @@ class Eye:
         self._floor: Floats = points[self._has_floor]
 
     def picture(self, pose: tuple[float, float, float], obstacles: Iterable[Obstacle] | None = None) -> Shades:
-        """What is seen from a place.
+        """Return the picture that is seen from a place.
 
         Args:
-            pose: Of the robot: x, y in metres, heading in rad.
-            obstacles: As they are now; None: as at the start.
+            pose: Pose of the robot: x, y in metres, heading in rad.
+            obstacles: Obstacles as they are now; None: as at the start.
 
         Returns:
             Shape (height, width).
@@ -103,7 +104,7 @@ class Eye:
 
 
 def rays(mount: Mount) -> Rays:
-    """Where the middle of each pixel looks, in the robot's axes (x forward, y left)."""
+    """Return the rays along which the middle of each pixel looks, in the robot's axes (x forward, y left)."""
     focal = mount.width / 2 / math.tan(mount.field_of_view_rad / 2)
     right: Floats = (np.arange(mount.width, dtype=np.float64) + 0.5 - mount.width / 2) / focal
     down: Floats = (np.arange(mount.height, dtype=np.float64) + 0.5 - mount.height / 2) / focal
@@ -112,7 +113,7 @@ def rays(mount: Mount) -> Rays:
 
 
 def ground_points(mount: Mount) -> Floats:
-    """Where the floor is that each pixel shows, in the robot's axes.
+    """Return the point of the floor that each pixel shows, in the robot's axes.
 
     Returns:
         Shape (height * width, 2), row by row from above; NaN above the horizon.

@@ -35,9 +35,9 @@ class Track:
     It is looked up in a grid of 5 mm cells, since each picture asks for thousands of points.
 
     Args:
-        points: Where it goes, in metres; at least two.
-        width_m: Of the line.
-        shade: Of the line, from 0 (black) to 255 (white).
+        points: Points along the line, in metres; at least two.
+        width_m: Width of the line.
+        shade: Shade of the line, from 0 (black) to 255 (white).
 
     Raises:
         ValueError: There are too few points, a number is not finite, the width is not above 0, the track lies in more
@@ -67,11 +67,12 @@ class Track:
         self._is_line = self._drawn(table, np.ceil(span_m / _CELL_M).astype(int) + 1)
 
     def _drawn(self, table: Floats, shape: npt.NDArray[np.int_]) -> npt.NDArray[np.bool_]:
-        """Which cells have their middle on a piece.
+        """Return for each cell whether its middle is on a piece.
 
-        In each column of the grid, a piece with its two round ends covers one interval, because it is convex. Where
-        intervals begin and end is counted, and the sum along the columns tells where there is one (the "difference
-        array" of competitive programming): the work grows with the columns that pieces cross, not with their area.
+        In each column of the grid, a piece with its two round ends covers one interval, because it is convex. The
+        beginnings and ends of intervals are counted, and the sum along the columns shows where there is one (the
+        "difference array" of competitive programming): the work grows with the columns that pieces cross, not with
+        their area.
         """
         reach_m = self.width_m / 2
         # From left to right, so that the upper tangent's normal is upwards; in cells from here on.
@@ -101,7 +102,7 @@ class Track:
         return drawn
 
     def is_line(self, points: Floats) -> npt.NDArray[np.bool_]:
-        """Whether each point is on the line.
+        """Return for each point whether it is on the line.
 
         Args:
             points: Shape (n, 2), in metres; one that is not finite is on no line.

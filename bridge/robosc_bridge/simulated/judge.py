@@ -1,6 +1,7 @@
-"""Whether a robot has moved as its scenario asks: what its record tells against its scene, in sentences.
+"""Judges of whether a robot has moved as its scenario asks: its record against its scene, in sentences.
 
-The judges trust nothing but the scene and where the robot was: whether it has touched something is measured again from
+The judges trust nothing but the scene and where the robot was: whether it has touched something is measured again
+from
 its places, beside what the simulator has counted.
 """
 
@@ -13,11 +14,11 @@ from robosc_bridge.simulated.robots import BODIES
 from robosc_bridge.simulated.scene import Scene
 
 LATERAL_M = 0.08
-"""How far the robot's middle may be from that of the line while it follows it."""
+"""Largest distance of the robot's middle from that of the line while it follows it, in metres."""
 
 STILL_M_S = 0.005
 STILL_RAD_S = 0.02
-"""What is slower stands still."""
+"""Largest turn rate that counts as standing still, in rad/s."""
 
 SETTLE_S = 1.0
 """Of the world: how long a robot may take to stand still when it has to."""
@@ -32,12 +33,12 @@ _JUMP_M = 0.1
 
 @dataclass(frozen=True)
 class Halt:
-    """When the robot has to stand still.
+    """Time in which the robot has to stand still.
 
     Attributes:
         begin_s: World time from which it was told so, or had a reason to.
         end_s: World time until which that holds.
-        why: For a person, such as `the stop button`.
+        why: Reason for a person, such as `the stop button`.
     """
 
     begin_s: float
@@ -46,11 +47,11 @@ class Halt:
 
 
 def judge_maze(scene: Scene, motion: Motion, robot: str = "burger") -> tuple[str, ...]:
-    """What is wrong with a way out of a maze.
+    """Return the faults of a way out of a maze.
 
     Args:
-        scene: With a goal.
-        motion: Of the robot.
+        scene: Scene with a goal.
+        motion: Motion of the robot.
         robot: Key of `BODIES`.
 
     Returns:
@@ -79,15 +80,15 @@ def judge_line(
     least_m: float = 0.0,
     robot: str = "burger",
 ) -> tuple[str, ...]:
-    """What is wrong with how a line was followed.
+    """Return the faults in how a line was followed.
 
     Args:
-        scene: With a line.
-        motion: Of the robot.
-        halts: When it has to stand still.
-        lateral_m: How far its middle may be from the line.
+        scene: Scene with a line.
+        motion: Motion of the robot.
+        halts: Times in which it has to stand still.
+        lateral_m: Largest distance that its middle may have from the line.
         settle_s: World time that it has to come to rest in each halt.
-        least_m: How far it has to drive in all, so that standing still for ever is no success.
+        least_m: Shortest distance that it has to drive in all, so that standing still for ever is no success.
         robot: Key of `BODIES`.
 
     Returns:
@@ -113,7 +114,7 @@ def judge_line(
 
 
 def lateral_errors_m(scene: Scene, motion: Motion) -> tuple[float, ...]:
-    """How far the robot's middle was from that of the line, for each sample.
+    """Return the distance of the robot's middle from that of the line, for each sample.
 
     Raises:
         ValueError: The scene has no line.
@@ -124,13 +125,13 @@ def lateral_errors_m(scene: Scene, motion: Motion) -> tuple[float, ...]:
 
 
 def way_m(motion: Motion) -> float:
-    """How far the robot has driven, forward and backward."""
+    """Return the distance that the robot has driven, forward and backward."""
     pairs = zip(motion.samples, motion.samples[1:], strict=False)
     return math.fsum(math.hypot(after.x_m - before.x_m, after.y_m - before.y_m) for before, after in pairs)
 
 
 def _record_faults(motion: Motion) -> Iterator[str]:
-    """What no robot does: then nothing else that the record tells can be relied on."""
+    """Yield faults that no robot causes: with one of them, nothing else in the record can be relied on."""
     if not motion.samples:
         yield "nothing was recorded"
     if not motion.has_ended:

@@ -31,8 +31,8 @@ class _Frame:
     """A frame before it is measured.
 
     Attributes:
-        degrees: Where it looks, clockwise from the front.
-        encoded: Makes its bytes of the distances there, in mm; 0: nothing.
+        degrees: Angles at which it looks, clockwise from the front.
+        encoded: Function that makes its bytes of the distances there, in mm; 0: nothing.
     """
 
     degrees: Sequence[float]
@@ -43,19 +43,19 @@ class Lidar(ABC):
     """A LiDAR on the robot.
 
     Args:
-        world: That it sees.
-        seed: Of the angle at which it begins, and of the noise.
+        world: World that it sees.
+        seed: Seed of the angle at which it begins, and of the noise.
         noise_m: Standard deviation of what it measures.
-        starts_mid_frame: Whether the first frame after a start is cut, as when a host begins to listen at any time.
+        starts_mid_frame: True if the first frame after a start is cut, as when a host begins to listen at any time.
 
     Attributes:
-        is_covered: Whether something covers it: it measures nothing.
-        is_stalled: Whether it has fallen silent.
-        baud: Of its line; None: any.
+        is_covered: True if something covers it: it measures nothing.
+        is_stalled: True if it has fallen silent.
+        baud: Baud rate of its line; None: any.
         nominal_hz: Turns a second.
-        nearest_m: That it measures.
-        farthest_m: That it measures.
-        beams: Of a turn at the nominal speed.
+        nearest_m: Shortest distance that it measures.
+        farthest_m: Longest distance that it measures.
+        beams: Beams of a turn at the nominal speed.
     """
 
     baud: int | None
@@ -80,7 +80,7 @@ class Lidar(ABC):
 
     @property
     def is_spinning(self) -> bool:
-        """Whether its motor is on."""
+        """True if its motor is on."""
         return self._is_spinning
 
     @property
@@ -104,7 +104,7 @@ class Lidar(ABC):
         self._spin()
 
     def due_s(self) -> float:
-        """When the next frame is complete."""
+        """Return the time at which the next frame is complete."""
         if not self._is_spinning:
             return math.inf
         return self._time.now_s() + (self._frame_world_s - self._time.world_s()) / self._time.factor
@@ -155,14 +155,14 @@ class Lidar(ABC):
 
     @abstractmethod
     def _frame_s(self) -> float:
-        """How long the frame takes that is being measured."""
+        """Return the duration of the frame that is being measured, in seconds."""
 
     @abstractmethod
     def _frame(self) -> _Frame:
         """The frame that is complete now."""
 
     def _distances_mm(self, device_degrees: Sequence[float]) -> list[int]:
-        """What is measured at clockwise angles from the front; 0: nothing."""
+        """Return the distances measured at clockwise angles from the front, in mm; 0: nothing."""
         angles = -np.radians(np.asarray(device_degrees))
         directions = np.stack((np.cos(angles), np.sin(angles)), axis=1)
         return self._measured(self._world.cast(None, directions))
@@ -248,7 +248,7 @@ class Lds02(Lidar):
         return lds02_frame(speed, start, end, stamp_ms, [(each, 200 * bool(each)) for each in distances_mm])
 
     def _distances_mm(self, device_degrees: Sequence[float]) -> list[int]:
-        """What it measures from its optical centre, along the rays on which the corrected points lie."""
+        """Return the distances from its optical centre, along the rays on which the corrected points lie."""
         angles = -np.radians(np.asarray(device_degrees))
         cosines, sines = np.cos(angles), np.sin(angles)
 

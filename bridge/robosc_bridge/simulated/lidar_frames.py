@@ -64,7 +64,7 @@ def _lds03_sample(distance_mm: int, intensity: int) -> bytes:
 
 
 def lds03_identity() -> bytes:
-    """What LDS-03 tells of itself when it is started."""
+    """Return the bytes with which LDS-03 identifies itself when it is started."""
     name = b"COIN-D4".ljust(19, b"\0") + b"\x01"
     length = _word(len(name))
     total = sum(b"\xa5\x5a") + sum(length) + 0x01 + sum(name)

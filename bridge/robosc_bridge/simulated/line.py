@@ -34,7 +34,7 @@ class Sending:
 
     Attributes:
         data: One packet or frame.
-        after_s: How long the device itself takes before it sends them.
+        after_s: Time that the device itself takes before it sends them, in seconds.
     """
 
     data: bytes
@@ -42,7 +42,7 @@ class Sending:
 
 
 class Device(Protocol):
-    """What hangs on a line. All is called under the lock of its time."""
+    """Device on a line. All is called under the lock of its time."""
 
     @property
     def baud(self) -> int | None:
@@ -55,7 +55,7 @@ class Device(Protocol):
         """Live until now, and send what is due by itself."""
 
     def due_s(self) -> float:
-        """When, by the clock, `live` is needed next; infinity: not until something comes."""
+        """Return the time, by the clock, when `live` is needed next; infinity: not until something comes."""
 
     def plug_in(self) -> None:
         """Begin after its line was plugged in again."""
@@ -63,20 +63,20 @@ class Device(Protocol):
 
 @dataclass
 class Faults:
-    """What is wrong with a wire; may be changed at any time, and acts on what is sent from then on.
+    """Faults of a wire; may be changed at any time, and act on what is sent from then on.
 
     Attributes:
-        delay_s: By which every packet to the host is late, in real seconds.
-        drop_next: How many of the next packets to the host are lost.
+        delay_s: Delay of every packet to the host, in real seconds.
+        drop_next: Number of the next packets to the host that are lost.
         drop_share: Share of packets to the host that are lost.
-        corrupt_next: How many of the next packets have a wrong byte.
+        corrupt_next: Number of the next packets that have a wrong byte.
         corrupt_share: Share of packets that have a wrong byte.
         lose_bytes_share: Share of single bytes that are lost.
-        cut_next: How many of the next packets end in their middle.
-        garbage: Sent before every packet.
+        cut_next: Number of the next packets that end in their middle.
+        garbage: Bytes sent before every packet.
         split_s: Seconds between single bytes; 0: each is written alone, at once; None: packets are whole.
-        echo: Whether the adapter sends back what the host sends.
-        is_deaf: Whether nothing of the host reaches the device.
+        echo: True if the adapter sends back what the host sends.
+        is_deaf: True if nothing from the host reaches the device.
     """
 
     delay_s: float = 0.0
@@ -97,19 +97,21 @@ class Faults:
 
 
 class SimulatedLine:
-    """Serves a device until it is closed: on a pseudo-terminal, or on a port of the `VirtualHost` that it lives by.
+    """Line that serves a device until it is closed.
+
+    It is on a pseudo-terminal, or on a port of the `VirtualHost` that it lives by.
 
     Args:
-        device: That answers.
-        time: That it lives by.
-        link: Where the port's stable name, a symbolic link, is to be; None: in a folder of its own.
-        seed: Of the faults that come by chance.
-        tap: Takes all bytes that pass here; None: nothing does.
+        device: Device that answers.
+        time: Time that it lives by.
+        link: Place of the port's stable name, a symbolic link; None: in a folder of its own.
+        seed: Seed of the faults that come by chance.
+        tap: Function that takes all bytes that pass here; None: nothing does.
 
     Attributes:
-        path: Of the port: stable over `disconnect` and `reconnect`, as a udev rule makes it.
-        faults: Of the wire.
-        lost_bytes: That the host has not read in time, as with a full buffer of a serial driver.
+        path: Path of the port: stable over `disconnect` and `reconnect`, as a udev rule makes it.
+        faults: Faults of the wire.
+        lost_bytes: Bytes that the host has not read in time, as with a full buffer of a serial driver.
         received: Bytes that the host has sent.
         sent: Bytes that have been sent to it.
 
@@ -142,7 +144,7 @@ class SimulatedLine:
 
     @property
     def is_connected(self) -> bool:
-        """Whether the port is there."""
+        """True if the port is there."""
         return self._end.is_connected
 
     def has_answered(self, received: int) -> bool:
@@ -229,7 +231,10 @@ class SimulatedLine:
                 self._waiting = self._end.unread()
 
     def _look_at_the_host(self) -> None:
-        """Whether the host is behind; nobody waits for one that has no use for this line, and reads nothing of it."""
+        """Report whether the host is behind.
+
+        Nobody waits for a host that has no use for this line, and reads nothing of it.
+        """
         unread = self._end.unread()
         self._is_used = self._is_used or unread < self._waiting
         self._time.read(self, is_behind=self._is_used and unread > _MOST_UNREAD)
@@ -275,7 +280,7 @@ class SimulatedLine:
         return self._heard_through(faults.garbage + data)
 
     def _heard_through(self, data: bytes) -> bytes:
-        """What arrives of it: noise, if the two ends do not agree on the speed."""
+        """Return the data that arrives: noise, if the two ends do not agree on the speed."""
         is_right = self.device.baud is None or self.device.baud == self._end.host_baud()
         return data if is_right else self._chance.randbytes(len(data))
 

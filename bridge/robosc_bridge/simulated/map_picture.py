@@ -17,9 +17,9 @@ def draw_map(scene: Scene, motion: Motion | None, path: Path) -> None:
     """Draw walls, line, goal and obstacles, the way of the robot, and where it has touched something.
 
     Args:
-        scene: That is drawn; its obstacles as they were at the start.
-        motion: Of the robot; None: the scene alone.
-        path: Of the picture; its suffix, one of `SUFFIXES`, says of which kind.
+        scene: Scene that is drawn; its obstacles as they were at the start.
+        motion: Motion of the robot; None: the scene alone.
+        path: Path of the picture; its suffix, one of `SUFFIXES`, determines its kind.
 
     Raises:
         ValueError: The suffix is unknown, or matplotlib is not installed.

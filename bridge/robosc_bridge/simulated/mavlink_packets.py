@@ -20,14 +20,14 @@ _HASH_LENGTH = 6
 
 @dataclass(frozen=True)
 class Layout:
-    """How a message lies in its payload.
+    """Layout of a message in its payload.
 
     Attributes:
-        name: Of the message.
-        number: Of the message.
-        extra: What its checksum also covers.
-        format: Of the payload.
-        fields: `name`, or `name*count` for an array, in their order there.
+        name: Name of the message.
+        number: Number of the message.
+        extra: Value that its checksum also covers.
+        format: Format of the payload.
+        fields: Fields in their order there: `name`, or `name*count` for an array.
     """
 
     name: str
@@ -101,14 +101,14 @@ BY_NUMBER = {layout.number: layout for layout in LAYOUTS}
 
 @dataclass(frozen=True)
 class Packet:
-    """What was said by whom.
+    """Message and its sender.
 
     Attributes:
-        system: Of the sender.
-        component: Of the sender.
-        name: Of the message.
-        values: Of its fields.
-        is_signed: Whether it has a signature.
+        system: System of the sender.
+        component: Component of the sender.
+        name: Name of the message.
+        values: Values of its fields.
+        is_signed: True if it has a signature.
     """
 
     system: int

@@ -1,4 +1,4 @@
-"""What goes wrong while a simulator serves, as its user is told of it: at once, and by the exit status at the end."""
+"""Mishaps while a simulator serves, as they are reported to its user: at once, and by the exit status at the end."""
 
 import contextlib
 import sys
@@ -8,13 +8,13 @@ from typing import Self
 
 
 class Mishaps:
-    """Takes note of what goes wrong; use it as a context manager around all that has threads.
+    """Record of what goes wrong; use it as a context manager around all that has threads.
 
-    A thread that ends by an error that nobody expected would leave its device mute: as the last line of defence, it is
-    told, with its trace, and the program is to end.
+    A thread that ends by an error that nobody expected would leave its device mute: as the last line of defence, the
+    error is reported, with its trace, and the program is to end.
 
     Attributes:
-        has_crashed: Whether a thread has ended so.
+        has_crashed: True if a thread has ended so.
     """
 
     def __init__(self) -> None:

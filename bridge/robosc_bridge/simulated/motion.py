@@ -40,17 +40,17 @@ class MotionError(ValueError):
 
 
 class Sample(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Where the robot was and how fast, as the world has it.
+    """Place and speed of the robot, as the world has them.
 
     Attributes:
         time: Seconds since 1970.
-        world_s: Of the world, since the simulation began.
-        x_m: Of the middle between the wheels.
-        y_m: Of the same.
-        heading_rad: Counter-clockwise from x, unbounded.
-        linear_m_s: Forward, as it moved on the floor since the last sample.
-        angular_rad_s: Counter-clockwise, likewise.
-        collisions: How often it has come to a wall or an obstacle.
+        world_s: Seconds of the world, since the simulation began.
+        x_m: x of the middle between the wheels.
+        y_m: y of the same.
+        heading_rad: Heading counter-clockwise from x, unbounded.
+        linear_m_s: Forward speed, as it moved on the floor since the last sample.
+        angular_rad_s: Turn rate, counter-clockwise, likewise.
+        collisions: Number of times that it has come to a wall or an obstacle.
     """
 
     time: _Number
@@ -64,17 +64,17 @@ class Sample(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What happened.
+    """Something that happened.
 
     Attributes:
         time: Seconds since 1970.
-        world_s: Of the world, since the simulation began.
+        world_s: Seconds of the world, since the simulation began.
         happening: A collision, the goal reached for the first time, an obstacle moved, put away or put back; the end.
-        x_m: Where the robot was; of an obstacle, where that is now.
-        y_m: The same.
-        name: Of the obstacle that was met or moved; nothing for walls and the goal.
-        radius_m: Of the obstacle that was moved; 0: of something else.
-        is_there: Whether that is there now.
+        x_m: x of the robot; for an obstacle, x of the place where that is now.
+        y_m: y of the same.
+        name: Name of the obstacle that was met or moved; nothing for walls and the goal.
+        radius_m: Radius of the obstacle that was moved; 0: of something else.
+        is_there: True if that obstacle is there now.
     """
 
     time: _Number
@@ -92,9 +92,9 @@ class Motion:
     """All of a record.
 
     Attributes:
-        samples: In the order of time.
-        happenings: In the order of time, but the end.
-        has_ended: Whether the recorder has written its end: one that was killed, or whose disk was full, has not.
+        samples: Samples in the order of time.
+        happenings: Events in the order of time, except the end.
+        has_ended: True if the recorder has written its end: one that was killed, or whose disk was full, has not.
     """
 
     samples: tuple[Sample, ...]
@@ -103,11 +103,11 @@ class Motion:
 
 
 class MotionRecorder:
-    """Writes down how a world's robot moves, until it is closed.
+    """Recorder that writes down how a world's robot moves, until it is closed.
 
     Args:
-        world: That is watched from now on.
-        stream: Where to, such as an `Output`; is closed by whoever opened it.
+        world: World that is watched from now on.
+        stream: Destination, such as an `Output`; is closed by whoever opened it.
     """
 
     def __init__(self, world: World, stream: Sink) -> None:
@@ -171,7 +171,7 @@ class MotionRecorder:
         )
 
     def _time(self, world_s: float) -> float:
-        """When it was by the computer's clock: a step is often lived some time after it was due."""
+        """Return the time of a step by the computer's clock: it is often lived some time after it was due."""
         time = self._world.time
         return round(time.clock.wall() - (time.world_s() - world_s) / time.factor, _DIGITS)
 
@@ -181,10 +181,11 @@ class MotionRecorder:
 
 
 def read_motion(path: Path) -> Motion:
-    """What a recorder wrote.
+    """Read what a recorder wrote.
 
     Raises:
-        MotionError: It cannot be read, is too large, or a line of it is none of a record; one sentence with the place.
+        MotionError: It cannot be read, is too large, or a line of it is none of a record; one sentence with the
+            place.
     """
     samples: list[Sample] = []
     happenings: list[Event] = []

@@ -49,11 +49,11 @@ _SIZES = {address: struct.calcsize("<" + code) for address, code in _FORMATS.ite
 
 @dataclass
 class Panel:
-    """What a person or a test does to the board.
+    """Actions of a person or a test on the board.
 
     Attributes:
-        battery_v: Of the battery.
-        button_1: Whether it is pressed.
+        battery_v: Voltage of the battery.
+        button_1: True if it is pressed.
         button_2: The same.
         bumper_1: The one in front.
         bumper_2: The one behind.
@@ -74,11 +74,11 @@ class OpenCr:
     """The board, its two servos and its sensors.
 
     Args:
-        world: That it drives in.
+        world: World that it drives in.
         left: The left servo.
         right: The right one.
-        has_motors: Whether the servos answered when it started.
-        calibration_s: How long a recalibration of the gyroscope keeps it busy; 5 s at most.
+        has_motors: True if the servos answered when it started.
+        calibration_s: Time for which a recalibration of the gyroscope keeps it busy; 5 s at most.
 
     Attributes:
         panel: Buttons, bumpers, battery.
@@ -128,7 +128,7 @@ class OpenCr:
 
     @property
     def is_connected(self) -> bool:
-        """Whether it hears its host's heartbeat."""
+        """True if it hears its host's heartbeat."""
         return self._is_connected
 
     def press(self, **changes: bool) -> None:
@@ -358,7 +358,7 @@ class OpenCr:
         self._put(_TORQUE, len(servos) == 2 and all(servo.table["torque enable"] for servo in servos))
 
     def _sense_motion(self) -> None:
-        """What the inertial sensors feel: the body on the floor, whatever the wheels do."""
+        """Update the readings of the inertial sensors: they feel the body on the floor, whatever the wheels do."""
         world = self._world
         speed_m_s, turn_rad_s = world.floor_speed_m_s, world.floor_turn_rad_s
         yaw_rad = world.heading_rad - self._start_heading_rad

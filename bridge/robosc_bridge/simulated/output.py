@@ -6,7 +6,7 @@ from typing import Protocol
 
 
 class Sink(Protocol):
-    """Where a recorder writes to; what it raises would reach the robot."""
+    """Destination to which a recorder writes; what it raises would reach the robot."""
 
     def write(self, text: str, /) -> object:
         """Take more of the text."""

@@ -17,7 +17,7 @@ _PATIENCE_S = 0.1
 
 
 class Instruction(IntEnum):
-    """What a host can ask."""
+    """Instruction that a host can give."""
 
     PING = 0x01
     READ = 0x02
@@ -55,10 +55,10 @@ class Request:
     """An instruction packet.
 
     Attributes:
-        device_id: It is addressed to.
+        device_id: ID to which it is addressed.
         instruction: Any byte; see `Instruction`.
-        parameters: Without stuffing.
-        is_intact: Whether its CRC was right.
+        parameters: Parameters without stuffing.
+        is_intact: True if its CRC was right.
     """
 
     device_id: int
@@ -99,11 +99,11 @@ class RequestParser:
         self._heard_s = 0.0
 
     def feed(self, data: bytes, now_s: float) -> list[Request]:
-        """All packets that are complete now.
+        """Return all packets that are complete now.
 
         Args:
-            data: What has come.
-            now_s: When.
+            data: Bytes that have come.
+            now_s: Time at which they came, in seconds.
         """
         if self._held and now_s - self._heard_s > _PATIENCE_S:
             self._held.clear()

@@ -21,9 +21,9 @@ class Record:
     """Bytes that passed at once.
 
     Attributes:
-        time_s: To the host: before they were written; from the host: once they were read.
-        line: Such as `base`.
-        is_from_host: Whether the host has sent them.
+        time_s: Time in seconds; to the host: before they were written; from the host: once they were read.
+        line: Name of the line, such as `base`.
+        is_from_host: True if the host has sent them.
         data: The bytes.
     """
 
@@ -34,17 +34,17 @@ class Record:
 
 
 class Recorder:
-    """Writes records.
+    """Writer of records.
 
     Args:
-        stream: Where to, such as an `Output`; is closed by whoever opened it.
+        stream: Destination, such as an `Output`; is closed by whoever opened it.
     """
 
     def __init__(self, stream: Sink) -> None:
         self._stream = stream
 
     def tap(self, line: str) -> Tap:
-        """What records the bytes of a line."""
+        """Return the function that records the bytes of a line."""
 
         def record(is_from_host: bool, time_s: float, data: bytes) -> None:
             self._stream.write(f"{time_s:.6f} {line} {'>' if is_from_host else '<'} {data.hex()}\n")
@@ -53,7 +53,7 @@ class Recorder:
 
 
 def read_records(lines: Iterable[str]) -> Iterator[Record]:
-    """What a recorder wrote.
+    """Yield the records that a recorder wrote.
 
     Raises:
         ValueError: It is no record.

@@ -8,14 +8,14 @@ class Body:
     """A differential-drive robot.
 
     Attributes:
-        name: As on the command line.
-        wheel_radius_m: Of both wheels.
-        wheel_separation_m: Between the wheels' middles.
-        radius_m: Of the round body that collides.
+        name: Name as on the command line.
+        wheel_radius_m: Radius of both wheels.
+        wheel_separation_m: Distance between the wheels' middles.
+        radius_m: Radius of the round body that collides.
         scanner_x_m: The laser's place on the body, forward of the wheels' axis.
         servo_model: Key of `control_table.MODELS`.
-        fastest_rpm: Where OpenCR's firmware clamps a wheel's speed.
-        opencr_information: What OpenCR tells at address 2.
+        fastest_rpm: Speed to which OpenCR's firmware clamps a wheel.
+        opencr_information: Value that OpenCR reports at address 2.
     """
 
     name: str

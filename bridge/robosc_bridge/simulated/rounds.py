@@ -19,7 +19,7 @@ class Rounds:
         self.discs = tuple(discs)
 
     def cast(self, origins: Floats, directions: Floats) -> Floats:
-        """How far rays go until the edge of a disc; who stands in one sees it from within.
+        """Return the lengths of rays up to the edge of a disc; an origin in a disc sees it from within.
 
         Args:
             origins: Shape (n, 2), or (1, 2) where all rays begin at one point, in metres.

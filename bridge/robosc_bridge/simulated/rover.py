@@ -38,32 +38,32 @@ class Rover:
     """The vehicle's end of a line: a `Device`.
 
     Args:
-        world: That it drives in.
+        world: World that it drives in.
         system: Its number.
-        key: Of signing; None: it neither signs nor asks for signatures.
-        cruise_m_s: At which it caps what it is told.
-        heartbeat_s: How often it tells that it is there.
+        key: Key of signing; None: it neither signs nor asks for signatures.
+        cruise_m_s: Speed at which it caps commanded speeds.
+        heartbeat_s: Period of its heartbeats, in seconds.
 
     Attributes:
-        kind: Of vehicle, as its heartbeat tells.
-        autopilot: The same.
-        mode: In which it is.
-        is_armed: Whether its motors have power.
-        has_origin: Whether its estimator knows where it is; without, it tells no place and follows no target.
-        tells_motion: Whether it knows the message ODOMETRY, or only place and attitude.
+        kind: Kind of vehicle, as its heartbeat reports.
+        autopilot: Autopilot, as its heartbeat reports.
+        mode: Mode in which it is.
+        is_armed: True if its motors have power.
+        has_origin: True if its estimator knows where it is; without, it reports no place and follows no target.
+        tells_motion: True if it knows the message ODOMETRY; else only place and attitude.
         obstacles: `ring`, `north ring`, `sensors`, or nothing.
-        battery_v: Of its battery.
-        refusal: Why it does not arm; empty: it does.
-        refused_modes: Those that it does not enter.
-        refuses_disarming: Until it is forced.
-        answers_commands: Whether it acknowledges.
-        obeys_commands: Whether it does what it acknowledges.
-        is_silent: Whether it tells nothing at all.
-        resets: How often its estimator has begun anew.
-        shift_m: By which its estimate is off since: north, west.
-        commands: That it has heard: number and parameters.
-        targets: That it has followed or ignored: their fields.
-        heartbeats: Of others that it has heard: system and component.
+        battery_v: Voltage of its battery.
+        refusal: Reason why it does not arm; empty: it does.
+        refused_modes: Modes that it does not enter.
+        refuses_disarming: True if it refuses to disarm until it is forced.
+        answers_commands: True if it acknowledges commands.
+        obeys_commands: True if it does what it acknowledges.
+        is_silent: True if it reports nothing at all.
+        resets: Number of times that its estimator has begun anew.
+        shift_m: Shift by which its estimate is off since: north, west.
+        commands: Commands that it has heard: number and parameters.
+        targets: Targets that it has followed or ignored: their fields.
+        heartbeats: Heartbeats of others that it has heard: system and component.
     """
 
     baud: int | None = None
@@ -175,7 +175,7 @@ class Rover:
         return [] if self.is_silent else [Sending(packet) for packet in told]
 
     def due_s(self) -> float:
-        """When the next of it is due."""
+        """Return the time when its next message or the expiry of its target is due."""
         expiry_s = math.inf if self._target is None else self._target_s + TARGET_LIMIT_S
         return min(expiry_s, *self._due_s.values())
 

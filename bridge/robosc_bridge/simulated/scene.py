@@ -41,12 +41,12 @@ class SceneError(ValueError):
 
 @dataclass(frozen=True)
 class Goal:
-    """Where the robot is to come: it is there when its middle is inside.
+    """Place to which the robot is to come: it is there when its middle is inside.
 
     Attributes:
-        x_m: Of the middle.
-        y_m: Of the middle.
-        radius_m: Of the round place.
+        x_m: x of the middle.
+        y_m: y of the middle.
+        radius_m: Radius of the round place.
     """
 
     x_m: float
@@ -54,7 +54,7 @@ class Goal:
     radius_m: float
 
     def is_reached(self, x_m: float, y_m: float) -> bool:
-        """Whether a robot is there whose middle is at a point."""
+        """Return True if a robot whose middle is at a point is there."""
         return math.hypot(x_m - self.x_m, y_m - self.y_m) <= self.radius_m
 
 
@@ -63,11 +63,11 @@ class Obstacle:
     """A round thing that can be moved, put away and put back while the simulation runs.
 
     Attributes:
-        name: By which it is told.
-        x_m: Of its middle.
-        y_m: Of its middle.
-        radius_m: Of it.
-        is_there: Whether the robot meets and sees it.
+        name: Name by which it is known.
+        x_m: x of its middle.
+        y_m: y of its middle.
+        radius_m: Its radius.
+        is_there: True if the robot meets and sees it.
     """
 
     name: str
@@ -79,10 +79,10 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Noise:
-    """What makes motion and sensors less than ideal.
+    """Noise that makes motion and sensors less than ideal.
 
     Attributes:
-        slip_share: How much of each wheel's way is lost on the floor, on average.
+        slip_share: Share of each wheel's way that is lost on the floor, on average.
         slip_deviation: Standard deviation of that, drawn for each wheel every 0.1 s.
         encoder_deviation: Standard deviation of what encoders count, as a share, drawn likewise.
         lidar_m: Standard deviation of what the LiDAR measures.
@@ -105,16 +105,16 @@ class Scene:
     """Everything around a robot.
 
     Attributes:
-        name: For a person.
-        walls: That stand where they are.
-        start: Of the robot: x, y in metres, heading in rad.
-        goal: Where it is to come; None: nowhere in particular.
-        line: On the floor; None: there is none.
+        name: Name for a person.
+        walls: Walls that stand where they are.
+        start: Start pose of the robot: x, y in metres, heading in rad.
+        goal: Place to which it is to come; None: nowhere in particular.
+        line: Line on the floor; None: there is none.
         obstacles: Round things that can be moved.
-        floor: What the floor looks like.
-        noise: What makes motion and sensors less than ideal.
-        wall_height_m: Of walls and obstacles, as a camera sees them; a LiDAR sees them at any height.
-        wall_shade: Of the same, from 0 (black) to 255 (white).
+        floor: Look of the floor.
+        noise: Noise that makes motion and sensors less than ideal.
+        wall_height_m: Height of walls and obstacles, as a camera sees them; a LiDAR sees them at any height.
+        wall_shade: Shade of the same, from 0 (black) to 255 (white).
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""What a scene file says: frozen structures that its checks and its documentation are made from.
+"""Content of a scene file: frozen structures that its checks and its documentation are made from.
 
 They are read with the same decoder as the bridge's configuration; `scene` makes a `Scene` of them.
 """
@@ -27,7 +27,7 @@ Name = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]{0,39}(?![\s\S])", title="b
 
 
 class _Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What all sections have."""
+    """Base of all sections."""
 
 
 class WallsPart(_Section, frozen=True):
@@ -66,7 +66,7 @@ class MazePart(_Section, frozen=True):
 
 
 class PosePart(_Section, frozen=True):
-    """Where the robot starts."""
+    """Place where the robot starts."""
 
     x_m: Annotated[float, Meta(ge=-1000, le=1000, description="Of the middle between its wheels.")] = 0.0
     y_m: Annotated[float, Meta(ge=-1000, le=1000, description="Of the same.")] = 0.0
@@ -76,7 +76,7 @@ class PosePart(_Section, frozen=True):
 
 
 class GoalPart(_Section, frozen=True):
-    """Where the robot is to come; a maze brings its own."""
+    """Place to which the robot is to come; a maze brings its own."""
 
     x_m: Annotated[float, Meta(ge=-1000, le=1000, description="Of its middle.")]
     y_m: Annotated[float, Meta(ge=-1000, le=1000, description="Of its middle.")]
@@ -97,7 +97,7 @@ class LinePart(_Section, frozen=True):
 
 
 class FloorPart(_Section, frozen=True):
-    """What the floor looks like."""
+    """Look of the floor."""
 
     texture: Annotated[
         Literal["plain", "tiles", "checkerboard", "speckle"],
@@ -123,7 +123,7 @@ class ObstaclePart(_Section, frozen=True):
 
 
 class NoisePart(_Section, frozen=True):
-    """What makes motion and sensors less than ideal; all of it by the seed of the run."""
+    """Noise that makes motion and sensors less than ideal; all of it by the seed of the run."""
 
     slip_share: Annotated[
         float, Meta(ge=0, le=0.9, description="How much of each wheel's way is lost on the floor, on average.")

@@ -52,17 +52,17 @@ class Servo:
 
     Args:
         model: Key of `MODELS`.
-        world: That the wheel moves in.
-        wheel: That it drives.
+        world: World that the wheel moves in.
+        wheel: Wheel that it drives.
         device_id: Its ID.
-        is_mirrored: Whether it is mounted so that its own positive direction is backward.
+        is_mirrored: True if it is mounted so that its own positive direction is backward.
         settings: Other items of the EEPROM that differ from the factory's, by name.
 
     Attributes:
         table: Its registers.
-        voltage_v: At its input; see `brown_out`.
-        temperature_c: Of the motor; see `overheat`.
-        time: That it lives by.
+        voltage_v: Voltage at its input; see `brown_out`.
+        temperature_c: Temperature of the motor; see `overheat`.
+        time: Time that it lives by.
     """
 
     def __init__(
@@ -154,7 +154,7 @@ class Servo:
 
     @property
     def answers(self) -> bool:
-        """Whether it has power and has started."""
+        """True if it has power and has started."""
         return self._has_power and self.time.now_s() >= self._silent_until_s
 
     @property
@@ -185,7 +185,7 @@ class Servo:
             self._fail(HardwareError.OVERLOAD)
 
     def due_s(self) -> float:
-        """When something will happen by itself."""
+        """Return the time when something will happen by itself."""
         found = math.inf
         if self._has_power and self.table["torque enable"]:
             if 0 < (periods := self.table["bus watchdog"]) < 0xFF:

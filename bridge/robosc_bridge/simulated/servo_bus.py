@@ -44,11 +44,11 @@ class ServoBus:
         return ()
 
     def due_s(self) -> float:
-        """When the first of them does something."""
+        """Return the time when the first of the servos does something."""
         return min(servo.due_s() for servo in self.servos)
 
     def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
-        """What those answer who listen at this speed."""
+        """Return the answers of the servos that listen at this speed."""
         found: list[Sending] = []
         for request in self._parser.feed(data, self.servos[0].time.now_s()):
             self.live()
@@ -112,7 +112,7 @@ def _identity(servo: Servo) -> bytes:
 
 
 def _own(request: Request, servo: Servo) -> Iterator[Answer]:
-    """What it answers to a packet that is addressed to it."""
+    """Yield the answers of a servo to a packet that is addressed to it."""
     level = servo.table["status return level"]
     if not request.is_intact:
         if level == 2:

@@ -1,4 +1,4 @@
-"""What stands on the floor, as a camera sees it: upright walls and round obstacles, all of one height and one grey.
+"""Things on the floor as a camera sees them: upright walls and round obstacles, all of one height and one grey.
 
 A pixel shows something that stands there where its ray meets one upright plane between the floor and the upper edge.
 Behind the eye's own plane nothing needs to be cut off: with the wall's ends a and b in the camera's axes, seen
@@ -8,7 +8,8 @@ counter-clockwise, c = a x b > 0 and e = b - a, the ray along (d, -g), which sin
 
 where H is the camera's height and h the wall's: between its ends, not below its foot, not above its top (the ray is
 there after c / (d x e) of its length). All four are linear in the column of a pixel, so that each row of the picture
-has one interval for each wall, which is exact to the pixel's middle and needs no loop over pixels. As all has the same
+has one interval for each wall, which is exact to the pixel's middle and needs no loop over pixels. As all has the
+same
 grey and hides the floor behind it, no order of depth is needed.
 """
 
@@ -31,11 +32,11 @@ class Rays:
     """The rays of a picture, each of length 1 along the camera's axis, in the robot's axes.
 
     Attributes:
-        height_m: Of the camera.
+        height_m: Height of the camera.
         focal: Pixels between two columns' rays that are 1 apart.
-        forward: How far those of each row go forward, shape (height,).
-        below: How far they sink.
-        left: How far those of each column go to the left, shape (width,).
+        forward: Distance that those of each row go forward, shape (height,).
+        below: Distance that they sink.
+        left: Distance that those of each column go to the left, shape (width,).
     """
 
     height_m: float
@@ -67,11 +68,11 @@ class Standing:
         self._last = np.where(sinking > 0, to_floor, to_top)
 
     def mask(self, x_m: float, y_m: float, turn: Floats, discs: Iterable[tuple[float, float, float]]) -> Mask:
-        """Which pixels show something that stands there.
+        """Return a mask of the pixels that show something that stands there.
 
         Args:
-            x_m: Of the camera.
-            y_m: Of the camera.
+            x_m: x of the camera.
+            y_m: y of the camera.
             turn: Shape (2, 2): turns what is in the world's axes into the robot's, from the right.
             discs: Round things, (x, y, radius) in metres each.
 

@@ -34,7 +34,7 @@ class Sweep:
     """Turns of a laser among walls.
 
     Args:
-        walls: That it sees.
+        walls: Walls that it sees.
     """
 
     def __init__(self, walls: Walls) -> None:
@@ -44,12 +44,12 @@ class Sweep:
         self._ys: Floats = np.ascontiguousarray(table[:, :, 1].T)
 
     def lengths_m(self, x_m: float, y_m: float, heading_rad: float, rounds: Rounds) -> Floats:
-        """How far the rays go.
+        """Return the lengths of the rays, in metres.
 
         Args:
-            x_m: Of the laser.
-            y_m: Of the laser.
-            heading_rad: Of the first ray.
+            x_m: x of the laser.
+            y_m: y of the laser.
+            heading_rad: Heading of the first ray.
             rounds: Round things, which it sees, too.
 
         Returns:

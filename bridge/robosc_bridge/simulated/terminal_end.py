@@ -60,7 +60,7 @@ class TerminalEnd:
 
     @property
     def is_connected(self) -> bool:
-        """Whether the port is there."""
+        """True if the port is there."""
         return self._master >= 0
 
     def thread(self, run: Callable[[], None], name: str) -> threading.Thread:

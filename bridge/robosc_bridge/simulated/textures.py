@@ -1,4 +1,4 @@
-"""What a floor looks like: shades that a formula gives for every point, so that it has no end.
+"""Look of a floor: shades that a formula gives for every point, so that it has no end.
 
 The random shade of a cell of speckle is a hash of its place and of the seed, mixed as in MurmurHash3's last step
 (A. Appleby, "MurmurHash3", fmix32, 2011): nothing is kept, and the same place always looks the same.
@@ -41,7 +41,7 @@ class Texture:
     seed: int = 0
 
     def shades(self, points: Floats) -> Shades:
-        """How points of the floor look.
+        """Return the shades of points of the floor.
 
         Args:
             points: Shape (n, 2), in metres, finite.
@@ -76,4 +76,4 @@ def _hashed(cells: npt.NDArray[np.int64], seed: int) -> npt.NDArray[np.uint32]:
 
 
 PLAIN = Texture()
-"""What the floor is where nothing is said."""
+"""Floor where nothing is specified."""

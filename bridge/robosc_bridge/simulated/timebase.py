@@ -16,7 +16,7 @@ from collections.abc import Callable
 from robosc.execution.clock import Clock, ManualClock, SystemClock
 
 FASTEST = 100.0
-"""How many times as fast as the clock a world may pass; a fast computer lives some hundred seconds of it in one."""
+"""Largest factor of a world's speed to the clock's; a fast computer lives some hundred seconds of it in one."""
 
 _STEP_S = 0.005
 # Who lives for so long at once is too slow for the world's factor.
@@ -28,8 +28,8 @@ class Timebase:
 
     Args:
         clock: `SystemClock`: the devices live by themselves. `ManualClock`: they live when `advance` is called.
-        factor: How many seconds pass in the world in one of the clock.
-        patience_s: How many seconds may pass in the world after the host was heard; then it stands still until it is
+        factor: Seconds that pass in the world in one of the clock.
+        patience_s: Seconds that may pass in the world after the host was heard; then it stands still until it is
             heard again, or for the first time, and is not behind with what was sent to it. None: it never waits.
 
     Raises:
@@ -54,7 +54,7 @@ class Timebase:
 
     @property
     def is_manual(self) -> bool:
-        """Whether time passes only in `advance`."""
+        """True if time passes only in `advance`."""
         return isinstance(self.clock, ManualClock)
 
     def now_s(self) -> float:
@@ -93,7 +93,7 @@ class Timebase:
 
     @property
     def waits(self) -> bool:
-        """Whether the world waits for its host at all."""
+        """True if the world waits for its host at all."""
         return self._patience_s is not None
 
     def read(self, line: object, *, is_behind: bool) -> None:

@@ -43,24 +43,24 @@ class SimulatedTurtleBot3:
         robot: Key of `BODIES`.
         base: `opencr`, `dynamixel` for two servos behind an adapter, or `mavlink-rover`.
         lidar: Key of `LIDARS`.
-        scene: That it is in; None: there are `walls` and a `line` alone.
-        walls: Around it, in place of a scene; None: a room of 4 m by 3 m.
-        clock: Of its devices; None: the computer's.
-        factor: How much faster the world is than the clock.
-        pose: Where it starts: x, y in metres, heading in rad; None: where its scene says, or at the origin.
-        base_link: Where the base's port is to be; None: anywhere.
-        scanner_link: Where the LiDAR's port is to be; None: anywhere.
-        seed: Of all that comes by chance.
-        has_motors: Whether OpenCR has found its motors when it started.
-        calibration_s: How long OpenCR's gyroscope is calibrated.
+        scene: Scene that it is in; None: there are `walls` and a `line` alone.
+        walls: Walls around it, in place of a scene; None: a room of 4 m by 3 m.
+        clock: Clock of its devices; None: the computer's.
+        factor: Factor by which the world is faster than the clock.
+        pose: Start pose: x, y in metres, heading in rad; None: where its scene says, or at the origin.
+        base_link: Place of the base's port; None: anywhere.
+        scanner_link: Place of the LiDAR's port; None: anywhere.
+        seed: Seed of all that comes by chance.
+        has_motors: True if OpenCR has found its motors when it started.
+        calibration_s: Duration of the calibration of OpenCR's gyroscope.
         noise_m: Standard deviation of what the LiDAR measures; None: as its scene says, or 0.
-        line: On the floor, in place of a scene; with one, there is a camera.
-        camera_link: Where the camera's socket is to be; with a place, there is a camera, also without a line.
-        recorder: Takes all bytes, as of the lines `base` and `scanner`; None: nobody does.
-        patience_s: How many seconds of the world pass after the host was heard (`Timebase`); None: it never waits.
+        line: Line on the floor, in place of a scene; with one, there is a camera.
+        camera_link: Place of the camera's socket; with a place, there is a camera, also without a line.
+        recorder: Recorder that takes all bytes, as of the lines `base` and `scanner`; None: nobody does.
+        patience_s: Seconds of the world that pass after the host was heard (`Timebase`); None: it never waits.
 
     Attributes:
-        time: That all of it lives by.
+        time: Time that all of it lives by.
         world: Walls, pose, wheels.
         left: The left servo, also behind OpenCR; of no use where the base is a MAVLink rover.
         right: The right one.
@@ -70,7 +70,7 @@ class SimulatedTurtleBot3:
         scanner: The LiDAR.
         base_line: The base's line, with its faults.
         scanner_line: The LiDAR's.
-        camera: That looks at the floor; None: there is none.
+        camera: Camera that looks at the floor; None: there is none.
 
     Raises:
         ValueError: There is no such robot, base or LiDAR, or there are walls or a line beside a scene.

@@ -13,12 +13,12 @@ _MOST_RAD = 1000.0
 
 
 def number(text: str, least: float, most: float) -> float:
-    """A number within bounds.
+    """Read a number within bounds.
 
     Args:
-        text: As it was typed.
-        least: That it may be.
-        most: That it may be.
+        text: Text as it was typed.
+        least: Smallest number that it may be.
+        most: Largest number that it may be.
 
     Raises:
         ValueError: It is none, or beyond them; says what is needed.

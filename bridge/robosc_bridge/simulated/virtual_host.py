@@ -54,7 +54,7 @@ class VirtualHost:
 
     Args:
         now_s: First reading of its clock.
-        epoch_s: What is added to a reading for the wall clock.
+        epoch_s: Seconds that are added to a reading for the wall clock.
     """
 
     def __init__(self, now_s: float = 1000.0, epoch_s: float = 1_000_000.0) -> None:
@@ -140,7 +140,7 @@ class VirtualHost:
 
         Raises:
             LineMissingError: Nobody serves there.
-            LineBusyError: That port is in use.
+            LineBusyError: The port is in use.
         """
         return self._network.open(address)
 
@@ -148,7 +148,7 @@ class VirtualHost:
         """Return a server that takes connections on a port of its network; 0: any.
 
         Raises:
-            LineBusyError: That port is in use.
+            LineBusyError: The port is in use.
         """
         return self._network.serve(port)
 
@@ -312,7 +312,7 @@ class _Thread:
         self._host.wait(lambda: self._turn.is_over, math.inf if timeout is None else timeout)
 
     def is_alive(self) -> bool:
-        """Whether it has begun and not ended."""
+        """Return True if it has begun and not ended."""
         return self.ident is not None and not self._turn.is_over
 
 

@@ -34,7 +34,7 @@ class VirtualNetwork:
 
         Raises:
             LineMissingError: Nobody serves there.
-            LineBusyError: That port is in use.
+            LineBusyError: The port is in use.
         """
         scheme, port = address.partition(":")[0], int(address.rpartition(":")[2])
         if scheme == "tcp":
@@ -47,7 +47,7 @@ class VirtualNetwork:
         """Return a server.
 
         Raises:
-            LineBusyError: That port is in use.
+            LineBusyError: The port is in use.
         """
         return VirtualServer(self, self.free(port, self.servers))
 

@@ -46,7 +46,7 @@ class Walls:
         self._squares: Floats = np.maximum((self._edges**2).sum(axis=1), 1e-18)
 
     def cast(self, origins: Floats, directions: Floats) -> Floats:
-        """How far rays go until a wall; one that goes along a wall meets its near end.
+        """Return the lengths of rays up to a wall; one that goes along a wall meets its near end.
 
         Args:
             origins: Shape (n, 2), metres.
@@ -235,7 +235,7 @@ def _grid(columns: int, rows: int, cell_m: float, opened: AbstractSet[Opening]) 
 
 
 def _runs(flags: Iterable[bool]) -> Iterator[tuple[int, int]]:
-    """Where those begin and end that are true: a long wall is quicker to meet than many short ones."""
+    """Yield the begin and end of each run of true flags: a long wall is quicker to meet than many short ones."""
     places = groupby(enumerate(flags), key=itemgetter(1))
     for is_run, run in places:
         indices = [index for index, _ in run]

@@ -33,13 +33,13 @@ class Wheel:
     """A wheel and the motor in it; forward is positive.
 
     Attributes:
-        fastest_rad_s: What the motor turns without a load.
-        goal_rad_s: Where the motor drives its speed to, if it can.
-        acceleration_rad_s2: How fast at most.
-        is_driven: Whether the motor has torque; else the wheel runs out.
-        is_blocked: Whether something holds it.
-        speed_rad_s: At present.
-        angle_rad: Turned so far, as its encoder counts.
+        fastest_rad_s: Speed of the motor without a load.
+        goal_rad_s: Speed to which the motor drives it, if it can.
+        acceleration_rad_s2: Largest acceleration towards it.
+        is_driven: True if the motor has torque; else the wheel runs out.
+        is_blocked: True if something holds it.
+        speed_rad_s: Present speed.
+        angle_rad: Angle turned so far, as its encoder counts.
     """
 
     fastest_rad_s: float
@@ -71,15 +71,15 @@ class Wheel:
 
 @dataclass(frozen=True)
 class Happening:
-    """Something that is worth to be written down.
+    """Something that is worth writing down.
 
     Attributes:
         kind: A collision, the goal reached for the first time, an obstacle moved, put away or put back.
-        x_m: Where the robot is; of an obstacle, where that is now.
-        y_m: The same.
-        name: Of the obstacle that was met or moved; nothing for walls and the goal.
-        radius_m: Of an obstacle that was moved; 0: of something else.
-        is_there: Whether that is there now.
+        x_m: x of the robot; for an obstacle, x of the place where that is now.
+        y_m: y of the same.
+        name: Name of the obstacle that was met or moved; nothing for walls and the goal.
+        radius_m: Radius of an obstacle that was moved; 0: of something else.
+        is_there: True if that obstacle is there now.
     """
 
     kind: Literal["collision", "goal", "obstacle"]
@@ -101,23 +101,23 @@ class World:
     """A robot in a scene.
 
     Args:
-        body: Of the robot.
-        walls: That it meets and sees; a scene has more in it.
-        time: That its devices share.
-        pose: Where it starts: x, y in metres, heading in rad; None: where its scene says.
-        seed: Of slip and of what encoders count.
+        body: Body of the robot.
+        walls: Walls that it meets and sees; a scene has more in it.
+        time: Time that its devices share.
+        pose: Start pose: x, y in metres, heading in rad; None: where its scene says.
+        seed: Seed of slip and of what encoders count.
 
     Attributes:
-        scene: As it was at the start.
-        walls: Of the scene.
-        x_m: Of the middle between the wheels.
-        y_m: Of the same.
-        heading_rad: Counter-clockwise from x, unbounded.
-        floor_speed_m_s: Forward, as it moved on the floor in the last step: slip and walls make it less than what the
-            wheels turn.
-        floor_turn_rad_s: Counter-clockwise, likewise.
-        collisions: How often the body has come to a wall or an obstacle.
-        is_touching: Whether it is at one now.
+        scene: Scene as it was at the start.
+        walls: Walls of the scene.
+        x_m: x of the middle between the wheels.
+        y_m: y of the same.
+        heading_rad: Heading counter-clockwise from x, unbounded.
+        floor_speed_m_s: Forward speed, as it moved on the floor in the last step: slip and walls make it less than
+            what the wheels turn.
+        floor_turn_rad_s: Turn rate, counter-clockwise, likewise.
+        collisions: Number of times that the body has come to a wall or an obstacle.
+        is_touching: True if it is at one now.
         left: The left wheel.
         right: The right wheel.
         lived_s: World time that has been lived.
@@ -298,13 +298,13 @@ class World:
         return True
 
     def _nearest(self, x_m: float, y_m: float) -> tuple[float, str]:
-        """How far the nearest thing is, and its name; nothing for a wall."""
+        """Return the distance of the nearest thing, and its name; nothing for a wall."""
         to_wall_m = self.walls.distance_m(x_m, y_m)
         to_round_m, place = self._rounds.nearest(x_m, y_m)
         return (to_round_m, self._there[place].name) if to_round_m < to_wall_m else (to_wall_m, "")
 
     def cast(self, origins: Floats | None, directions: Floats) -> Floats:
-        """How far rays of the laser go, in its own axes (x forward, y left).
+        """Return the lengths of rays of the laser, in its own axes (x forward, y left).
 
         Args:
             origins: Shape (n, 2): in metres from the laser's middle; None: all are there.
@@ -329,20 +329,20 @@ class World:
         return np.minimum(found, rounds.cast(starts, along)) if rounds.discs else found
 
     def ranges(self, angles_rad: Sequence[float]) -> tuple[float, ...]:
-        """What an ideal laser would measure now.
+        """Return the ranges that an ideal laser would measure now.
 
         Args:
-            angles_rad: Counter-clockwise from the front.
+            angles_rad: Angles counter-clockwise from the front.
 
         Returns:
-            In metres; infinity where nothing is met.
+            Ranges in metres; infinity where nothing is met.
         """
         angles = np.asarray(angles_rad, dtype=np.float64)
         directions = np.stack((np.cos(angles), np.sin(angles)), axis=1)
         return tuple(self.cast(None, directions).tolist())
 
     def scan(self) -> Floats:
-        """What an ideal laser would measure now in a whole turn.
+        """Return the ranges that an ideal laser would measure now in a whole turn.
 
         Returns:
             Shape (360,): counter-clockwise from the front, in metres; infinity where nothing is met.

@@ -10,20 +10,20 @@ from robosc_bridge.skills.settings import EmergencyStopSettings
 
 
 class StopEvent(StrEnum):
-    """What the operator did."""
+    """Action of the operator."""
 
     STOP = "stop"
     RESUME = "resume"
 
 
 class EmergencyStop:
-    """Whether the operator has stopped the robot.
+    """State of the operator's stop: whether the operator has stopped the robot.
 
     Attributes:
-        is_stopped: Since a stop, until the operator lets it go on.
+        is_stopped: True since a stop, until the operator lets it go on.
 
     Args:
-        settings: Which keys and buttons stop, and which let it go on.
+        settings: Keys and buttons that stop, and those that let it go on.
     """
 
     def __init__(self, settings: EmergencyStopSettings) -> None:
@@ -35,7 +35,7 @@ class EmergencyStop:
 
     @property
     def is_held(self) -> bool:
-        """Whether a button that stops is pressed."""
+        """True if a button that stops is pressed."""
         return bool(self._stopping)
 
     def update(
@@ -44,16 +44,16 @@ class EmergencyStop:
         keys: Collection[str] = (),
         remote: StopEvent | None = None,
     ) -> StopEvent | None:
-        """What the model is told now.
+        """Return the event that the model is given now.
 
         Args:
             held_buttons: Names of the drive's buttons that are pressed; None: unknown, they count as they were.
             keys: Keys that were typed since the last call.
-            remote: What came over the network since the last call, the stop if both did.
+            remote: Event that came over the network since the last call, the stop if both did.
 
         Returns:
-            A stop at each new press, also of who has stopped already: it may have been missed. A resume once, when a
-            stop ends.
+            A stop at each new press, also by somebody who has stopped already: it may have been missed. A resume
+                once, when a stop ends.
         """
         settings = self._settings
         stopping, resuming = self._stopping, self._resuming

@@ -15,10 +15,10 @@ Picture = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """What a picture shows.
+    """Line that a picture shows.
 
     Attributes:
-        correction_rad_s: How to turn to keep on it, counter-clockwise above zero; None: no line is in sight.
+        correction_rad_s: Turn rate to keep on it, counter-clockwise above zero; None: no line is in sight.
     """
 
     correction_rad_s: float | None
@@ -28,11 +28,11 @@ LOST = Line(None)
 
 
 class LineDetector:
-    """Turns pictures into corrections, and silence of the camera into a lost line.
+    """Detector that turns pictures into corrections, and silence of the camera into a lost line.
 
     Args:
-        settings: What counts as a line, and how to steer.
-        time_s: Now.
+        settings: Settings of what counts as a line, and how to steer.
+        time_s: Current time, in seconds.
     """
 
     def __init__(self, settings: LineSettings, time_s: float) -> None:
@@ -40,11 +40,11 @@ class LineDetector:
         self._seen_s = time_s
 
     def update(self, picture: Picture | None, time_s: float) -> Line | None:
-        """What the model is told now; None: nothing new.
+        """Return the line that the model is given now; None: nothing new.
 
         Args:
-            picture: That came since the last call; None: there was none.
-            time_s: Now.
+            picture: Picture that came since the last call; None: there was none.
+            time_s: Current time, in seconds.
         """
         if picture is not None:
             self._seen_s = time_s
@@ -62,14 +62,14 @@ class LineDetector:
 
 
 def line_offset(picture: Picture, settings: LineSettings) -> float | None:
-    """How far the line is to the left of the middle, as a share of the width: within -0.5 and 0.5; None: there is none.
+    """Return the line's offset to the left of the middle as a share of the width (-0.5 to 0.5); None: no line.
 
     The line is the largest connected patch of its shade within the rows that are looked at, unless it is too small or
     too large; what counts is its centre of mass.
 
     Args:
-        picture: Of any size; an empty one, or one that is no picture, shows no line.
-        settings: What counts as a line.
+        picture: Picture of any size; an empty one, or one that is no picture, shows no line.
+        settings: Settings of what counts as a line.
     """
     grey = _grey(picture)
     if grey is None:

@@ -16,7 +16,7 @@ MAXIMUM_ANGLE_RAD = 200 * math.pi
 
 
 class RotateState(StrEnum):
-    """How far a turn is."""
+    """Progress of a turn."""
 
     IDLE = "idle"
     TURNING = "turning"
@@ -28,9 +28,9 @@ class Rotate:
     """A turn by an angle of any size, either way; one at a time.
 
     Attributes:
-        state: How far it is; `DONE` and `FAILED` stay until the next `start`.
-        reason: Why it failed; empty: it did not.
-        remaining_rad: What is left to turn, counter-clockwise above zero; 0 before the first turn.
+        state: Progress of the turn; `DONE` and `FAILED` stay until the next `start`.
+        reason: Reason why it failed; empty: it did not.
+        remaining_rad: Angle left to turn, counter-clockwise above zero; 0 before the first turn.
 
     Args:
         settings: Limits and tolerances.
@@ -47,7 +47,7 @@ class Rotate:
 
     @property
     def is_turning(self) -> bool:
-        """Whether a turn is under way."""
+        """True if a turn is under way."""
         return self.state is RotateState.TURNING
 
     def start(self, angle_rad: float, time_s: float) -> bool:

@@ -14,7 +14,7 @@ TypedKey = Annotated[
 
 
 class RotateSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How the robot turns by an angle."""
+    """Settings of the robot's turn by an angle."""
 
     speed_rad_s: Annotated[float, Meta(ge=0.05, le=10, description="Fastest turn, in rad/s.")] = 0.8
     slowest_rad_s: Annotated[
@@ -40,7 +40,7 @@ class RotateSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class LineSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How a line on the floor is seen."""
+    """Settings for seeing a line on the floor."""
 
     camera: Annotated[
         str,
@@ -74,7 +74,7 @@ class LineSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class EmergencyStopSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the operator stops the robot with, and lets it go on with."""
+    """Keys and buttons with which the operator stops the robot, and lets it go on."""
 
     stop_keys: Annotated[tuple[TypedKey, ...], Meta(description="Keys that stop: single characters, or `space`.")] = (
         "space",

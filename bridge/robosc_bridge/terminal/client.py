@@ -54,7 +54,7 @@ class UnreachableError(Exception):
 
 
 class Wish(StrEnum):
-    """What may be wanted of a bridge."""
+    """Request that may be made to a bridge."""
 
     START = "start"
     STANDBY = "standby"
@@ -67,11 +67,11 @@ _WISHES = {wish: f"COMMAND_KIND_{wish.name}" for wish in Wish}
 
 @dataclass(frozen=True, slots=True)
 class DriveTopic:
-    """Where the wheels are commanded.
+    """Topic on which the wheels are commanded.
 
     Attributes:
-        identifier: Of the communication.
-        is_stamped: Whether the velocity is in a field `twist`.
+        identifier: Identifier of the communication.
+        is_stamped: True if the velocity is in a field `twist`.
     """
 
     identifier: str
@@ -121,13 +121,13 @@ class BridgeClient:
             raise RefusedError(response.refusal)
 
     def status(self) -> pb.Snapshot | None:
-        """What the bridge is doing; None: its loop has not turned yet."""
+        """Return a snapshot of what the bridge is doing; None: its loop has not turned yet."""
         with self._translated():
             response = self._stub.GetStatus(pb.GetStatusRequest(), timeout=STATUS_LIMIT_S)
         return response.snapshot if response.HasField("snapshot") else None
 
     def definition(self) -> pb.GetDefinitionResponse:
-        """What does not change while it runs."""
+        """Return the definition, which does not change while the bridge runs."""
         with self._translated():
             definition: pb.GetDefinitionResponse = self._stub.GetDefinition(
                 pb.GetDefinitionRequest(), timeout=STATUS_LIMIT_S
@@ -135,7 +135,7 @@ class BridgeClient:
         return definition
 
     def drive_topic(self) -> DriveTopic:
-        """Where a supervision layer takes velocities for the wheels."""
+        """Return the topic on which a supervision layer takes velocities for the wheels."""
         definition = self.definition()
         if not definition.is_layer:
             raise RefusedError(
@@ -149,7 +149,7 @@ class BridgeClient:
         raise RefusedError(f"no communication of {definition.robot} is tied to 'drive'")
 
     def watch(self, *, with_scans: bool, rate_hz: float) -> Iterator[pb.WatchResponse]:
-        """What the bridge is doing and what happens, until the bridge or the caller ends it."""
+        """Yield what the bridge is doing and what happens, until the bridge or the caller ends it."""
         request = pb.WatchRequest(maximum_rate_hz=rate_hz, with_scans=with_scans)
         with self._translated():
             call = self._stub.Watch(request)
@@ -162,8 +162,8 @@ class BridgeClient:
         """Be the operator.
 
         Args:
-            name: Who it is, for the bridge's log.
-            told: Called from another thread with `blocked` and an identifier, or `refused` and why.
+            name: Name of the operator, for the bridge's log.
+            told: Function called from another thread with `blocked` and an identifier, or `refused` and why.
         """
         return Operator(self._stub, name, told, self._error)
 
@@ -262,7 +262,7 @@ def state_name(snapshot: pb.Snapshot) -> str:
 
 
 def is_fault(snapshot: pb.Snapshot) -> bool:
-    """Whether a fault has stopped the robot."""
+    """Return True if a fault has stopped the robot."""
     return snapshot.state == pb.BRIDGE_STATE_FAULT or bool(snapshot.problem)
 
 

@@ -1,4 +1,4 @@
-"""What the bridge tells, as lines for a person."""
+"""Reports of the bridge, as lines for a person."""
 
 import math
 import time
@@ -15,7 +15,7 @@ _SHOWN_APART = ("time", "kind", "state", "controllable", "decision_us")
 
 
 def status_lines(snapshot: Snapshot) -> Iterator[str]:
-    """What the bridge is doing: one fact a line."""
+    """Yield what the bridge is doing: one fact a line."""
     yield printable(state_name(snapshot) + (f": {snapshot.problem}" if snapshot.problem else ""))
     if snapshot.age_s > STALE_S:
         yield f"  this is {snapshot.age_s:.1f} s old: the bridge's loop hangs"
@@ -55,13 +55,13 @@ def _drive_lines(drive: DriveState) -> Iterator[str]:
 
 
 class Lines:
-    """What a watcher is shown: a line for each event, and one where the bridge's own state changes."""
+    """Lines that a watcher is shown: one for each event, and one where the bridge's own state changes."""
 
     def __init__(self) -> None:
         self._before: tuple[Any, ...] = ()
 
     def of(self, response: WatchResponse) -> Iterator[str]:
-        """What is new in a response."""
+        """Yield lines for what is new in a response."""
         if response.lost_events:
             yield f"{_clock(time.time())} ! {response.lost_events} events were lost: they came too quickly"
         for entry in events_of(response):

@@ -63,7 +63,7 @@ class Running(Protocol):
 
 
 class Terminal(Protocol):
-    """Where somebody types, and the time that passes there."""
+    """Terminal in which somebody types, and the time that passes there."""
 
     def monotonic(self) -> float:
         """Return the time in seconds."""
@@ -93,7 +93,7 @@ class Wished:
 
     @property
     def is_motion(self) -> bool:
-        """Whether the robot is to move."""
+        """True if the robot is to move."""
         return bool(self.linear_m_s or self.angular_rad_s)
 
     def lapse(self, now_s: float) -> None:
@@ -229,7 +229,7 @@ class _Resuming:
             self._running = self._terminal.start(self._ask)
 
     def look(self) -> None:
-        """Whether the bridge could be asked.
+        """Check that the bridge could be asked.
 
         Raises:
             UnreachableError: It could not.
@@ -248,10 +248,10 @@ class _Resuming:
 
 
 class _Teller:
-    """The one line that tells how it goes.
+    """The one line that reports the progress.
 
     Attributes:
-        note: What was said last.
+        note: Last thing that was said.
     """
 
     def __init__(self, terminal: Terminal) -> None:

@@ -24,7 +24,7 @@ _DATAGRAM = 65535
 
 
 def is_network_address(address: str) -> bool:
-    """Whether it is one of the kinds above, and no port's path."""
+    """Return True if an address is one of the kinds above, and no port's path."""
     return address.partition(":")[0] in SCHEMES
 
 
@@ -32,11 +32,11 @@ class NetworkLine(NetworkPort):
     """An open socket.
 
     Args:
-        address: As above. A host's name is looked up by the system, which may take its time; a number is not.
+        address: Address as above. A host's name is looked up by the system, which may take its time; a number is not.
 
     Attributes:
         path: The address.
-        is_datagram: Whether a read is one whole datagram.
+        is_datagram: True if a read is one whole datagram.
 
     Raises:
         LineMissingError: Nobody serves there, or there is no such host.
@@ -80,7 +80,7 @@ class NetworkLine(NetworkPort):
         return int(self._socket.getsockname()[1])
 
     def read(self, limit_s: float) -> bytes:
-        """What has come, waiting for the first of it.
+        """Return the data that has come, waiting for the first of it.
 
         Args:
             limit_s: Longest wait; 0: not at all.
@@ -124,10 +124,10 @@ class NetworkLine(NetworkPort):
         self._peer = self._sender
 
     def write(self, data: bytes, limit_s: float = 0.1) -> None:
-        """Send all of it; while a listener has no peer, it goes nowhere.
+        """Send all of the data; while a listener has no peer, it goes nowhere.
 
         Args:
-            data: What to send.
+            data: Data to send.
             limit_s: Longest wait for the line to take it.
 
         Raises:

@@ -55,7 +55,7 @@ class SerialLine:
         self._is_open = True
 
     def read(self, limit_s: float) -> bytes:
-        """What has come, waiting for the first byte.
+        """Return the bytes that have come, waiting for the first one.
 
         Args:
             limit_s: Longest wait; 0: not at all.
@@ -83,10 +83,10 @@ class SerialLine:
         return found
 
     def write(self, data: bytes, limit_s: float = 0.1) -> None:
-        """Send all of it.
+        """Send all of the data.
 
         Args:
-            data: What to send.
+            data: Data to send.
             limit_s: Longest wait for the line to take it.
 
         Raises:

@@ -1,7 +1,8 @@
-"""Who may use the page: which names this server is reached by, from which pages, and with which token.
+"""Rules on who may use the page: by which names of this server, from which pages, and with which token.
 
 A page of another site that a browser shows on this machine can send requests here. It is kept out in three ways: the
-header `Host` must be a name of this server, so that a name of somebody else that is made to lead here is of no use (DNS
+header `Host` must be a name of this server, so that a name of somebody else that is made to lead here is of no use
+(DNS
 rebinding); a WebSocket must come from a page of this server (`Origin`); and what makes the robot move needs a token
 that changes with each start and stands in no page but the one that was opened with it.
 """
@@ -22,13 +23,13 @@ class Access:
     """The rules of one server.
 
     Args:
-        host: What it listens on.
-        port: The same.
-        is_secure: Whether it speaks TLS.
+        host: Host on which it listens.
+        port: Port on which it listens.
+        is_secure: True if it speaks TLS.
         names: Further names by which it is reached.
 
     Attributes:
-        token: What commands need; another one for each start.
+        token: Token that commands need; another one for each start.
     """
 
     def __init__(self, host: str, port: int, *, is_secure: bool, names: Iterable[str] = ()) -> None:
@@ -46,7 +47,7 @@ class Access:
         return f"{self._scheme}://{joined(self._shown_host(), self._port)}/?token={self.token}"
 
     def is_ours(self, host: str | None) -> bool:
-        """Whether a header `Host` names this server; numbers need no name service, so nobody can bend them."""
+        """Return True if a header `Host` names this server; numbers need no name service, so nobody can bend them."""
         try:
             name, port = split(host if host and ":" in host.rpartition("]")[2] else f"{host}:{self._default_port()}")
         except ValueError:
@@ -62,11 +63,11 @@ class Access:
         return number.is_loopback or not self._is_loopback
 
     def is_own_page(self, origin: str | None, host: str | None) -> bool:
-        """Whether a header `Origin` is a page that this server has sent, by the name it was asked under."""
+        """Return True if a header `Origin` is a page that this server has sent, by the name it was asked under."""
         return bool(host) and origin == f"{self._scheme}://{host}"
 
     def is_token(self, text: object) -> bool:
-        """Whether somebody shows the token."""
+        """Return True if a text is the token."""
         if not isinstance(text, str) or not text.isascii() or len(text) > MAXIMUM_TOKEN:
             return False
         return secrets.compare_digest(text, self.token)

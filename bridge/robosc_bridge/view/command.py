@@ -113,9 +113,9 @@ def _add_serving(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_client(parser: argparse.ArgumentParser) -> None:
-    """How the bridge is reached: what `robosc_api.security.add_client_arguments` adds.
+    """Add the options for reaching the bridge, as `robosc_api.security.add_client_arguments` does.
 
-    Written again, since that would load gRPC for the help of every command.
+    Written again, since that function would load gRPC for the help of every command.
     """
     group = parser.add_argument_group("security")
     group.add_argument("--tls", action="store_true", help="with TLS, believing the usual certificate authorities")
@@ -193,7 +193,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool, Robot | None]":
-    """What makes the source, whether all pages share one, and the robot where it is known."""
+    """Return a function that makes the source, whether all pages share one, and the robot where it is known."""
     from robosc_bridge.view.scenery import scenery
 
     scene = scenery(arguments.scene, arguments.scene_seed)

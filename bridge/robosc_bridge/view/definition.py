@@ -30,7 +30,7 @@ _CONTROLLABLE = frozenset({"request", "cancel", "reset"})
 
 
 class DefinitionError(ValueError):
-    """What a source defines makes no sense; one sentence."""
+    """Error: the definition from a source makes no sense; one sentence."""
 
 
 class ShapeTransition(msgspec.Struct, frozen=True):
@@ -73,7 +73,7 @@ class ShapeComponent(msgspec.Struct, frozen=True):
 
 
 class Shape(msgspec.Struct, frozen=True):
-    """What the topic `/state` calls `definition`."""
+    """Part of the topic `/state` that is called `definition`."""
 
     name: _Name
     components: Annotated[tuple[ShapeComponent, ...], msgspec.Meta(max_length=MAXIMUM_COMPONENTS)]
@@ -96,14 +96,14 @@ class Robot:
     """A robot as a source defines it.
 
     Attributes:
-        source: Where it comes from.
-        version: Of the program that tells it; empty: not known.
-        is_layer: Whether its supervisor is a supervision layer.
+        source: Kind of source from which it comes.
+        version: Version of the program that reports it; empty: not known.
+        is_layer: True if its supervisor is a supervision layer.
         shape: Components and automata.
         talks: Its communications.
-        table: Which transition an event takes.
-        supervisor: With its model; None: not known.
-        can_command: Whether it can be stopped and commanded through the source.
+        table: Transitions that each event takes.
+        supervisor: Supervisor with its model; None: not known.
+        can_command: True if it can be stopped and commanded through the source.
         log: The log that is replayed; None: it is live.
         scene: Walls and line on the floor, for the map; None: not known.
     """
@@ -136,16 +136,16 @@ def robot_of(
     log: LogSpan | None = None,
     scene: Mapping[str, Any] | None = None,
 ) -> Robot:
-    """The robot of a supervisor.
+    """Return the robot of a supervisor.
 
     Args:
-        supervisor: With its model.
-        source: Where it comes from.
-        version: Of the program that tells it.
-        channels: What each communication is tied to; None: not known.
-        can_command: Whether it can be stopped and commanded.
+        supervisor: Supervisor with its model.
+        source: Kind of source from which it comes.
+        version: Version of the program that reports it.
+        channels: Channel that each communication is tied to; None: not known.
+        can_command: True if it can be stopped and commanded.
         log: The log that is replayed.
-        scene: For the map.
+        scene: Scene for the map.
     """
     model = supervisor.model
     topic = state_topic(model)
@@ -187,7 +187,7 @@ def talks_of(shape: Shape) -> tuple[Talk, ...]:
 
 
 def table_of(shape: Shape) -> Table:
-    """Which transition an event takes, as far as a definition tells: silent steps have no names in it."""
+    """Return the transitions each event takes, as far as a definition shows: silent steps have no names in it."""
     table: dict[str, dict[str, dict[str, int]]] = {}
     for component in shape.components:
         for state in component.behaviour.states if component.behaviour else ():

@@ -1,4 +1,4 @@
-"""Whether what the live view needs is installed."""
+"""Check that what the live view needs is installed."""
 
 import importlib.util
 

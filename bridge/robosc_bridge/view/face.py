@@ -15,13 +15,13 @@ class ViewFace(ServedFace):
 
     Args:
         operations: The daemon.
-        settings: Where and how.
+        settings: Settings of where and how it is served.
 
     Raises:
         ViewError: The extra `view` is not installed, or there is no such scene.
 
     Attributes:
-        url: What to open in a browser, with the token; empty: it does not listen yet.
+        url: URL to open in a browser, with the token; empty: it does not listen yet.
     """
 
     def __init__(self, operations: Operations, settings: ViewSettings) -> None:

@@ -1,4 +1,4 @@
-"""What a source tells, whatever it is: the robot, what it is doing, what happens. Plain values, ready for the page."""
+"""Facts that any source reports: the robot, what it is doing, what happens. Plain values, ready for the page."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ from robosc.execution.event_log import Entry
 
 
 class SourceKind(StrEnum):
-    """Where what is shown comes from."""
+    """Source of what is shown."""
 
     BRIDGE = "bridge"
     ROS2 = "ros2"
@@ -23,10 +23,10 @@ class Talk:
 
     Attributes:
         name: Its name.
-        component: Who declares it.
+        component: Component that declares it.
         kind: `incoming message`, `outgoing message`, `service` or `action`.
         identifier: Its topic, service or action.
-        channel: What it is tied to in a bridge; empty: nothing is known of that.
+        channel: Channel that it is tied to in a bridge; empty: nothing is known of that.
     """
 
     name: str
@@ -62,14 +62,14 @@ class Notice:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """What the drive base told.
+    """Report of the drive base.
 
     Attributes:
         pose: x and y in metres, heading in radians.
-        linear_m_s: Forward.
-        angular_rad_s: Counter-clockwise.
-        battery_v: None: not known.
-        is_torque_on: Whether the motors hold.
+        linear_m_s: Forward speed.
+        angular_rad_s: Turn rate, counter-clockwise.
+        battery_v: Battery voltage; None: not known.
+        is_torque_on: True if the motors hold.
     """
 
     pose: tuple[float, float, float]
@@ -81,23 +81,23 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What the robot is doing.
+    """Status of the robot: what it is doing.
 
     Attributes:
-        time_s: When that was so, in seconds since 1970-01-01 UTC.
-        state: What the bridge is doing; empty: there is none.
+        time_s: Time when that was so, in seconds since 1970-01-01 UTC.
+        state: State of the bridge; empty: there is none.
         problem: The fault that has stopped it; empty: none.
-        reasons: Why nothing moves.
-        warnings: What a person should know though it does.
-        stops: Why nothing is requested.
-        devices: Whether each device works.
+        reasons: Reasons why nothing moves.
+        warnings: Warnings that a person should know though it moves.
+        stops: Reasons why nothing is requested.
+        devices: Devices, with True for each that works.
         components: State and variables of each component with a behaviour; empty: nothing is executed.
         communications: Location of services and actions, as far as they are known.
         enabled: Names of the communications that may be requested, as the executor says; None: nobody says so.
-        drive: What the drive base told; None: nothing.
-        age_s: How old this was when it came.
+        drive: Report of the drive base; None: none.
+        age_s: Age of this when it came, in seconds.
         last: Number of the transition that each component took last; of one that is not named none is known. None:
-            the entries tell it.
+            the entries show it.
     """
 
     time_s: float
@@ -121,7 +121,7 @@ class LaserScan:
 
     Attributes:
         ranges_m: One a degree, counter-clockwise from the front; not finite: nothing was seen.
-        pose: Where the robot was; None: not known.
+        pose: Pose of the robot at that time; None: not known.
     """
 
     ranges_m: Sequence[float]
@@ -133,8 +133,8 @@ class Happenings:
     """Entries of the event log.
 
     Attributes:
-        entries: In their order.
-        lost: How many before them were lost.
+        entries: Entries in their order.
+        lost: Number of entries before them that were lost.
     """
 
     entries: Sequence[Entry]

@@ -55,7 +55,7 @@ class Arrow:
         number: Its number in the model's definition.
         source: The state it leaves.
         target: The state it goes to.
-        label: What it says.
+        label: Its text.
         kind: `controllable`, `uncontrollable` or `silent`.
     """
 
@@ -290,7 +290,7 @@ class _Drawing:
         return x, self._heights[box.layer]
 
     def _border(self, place: int, middle: tuple[float, float], towards: tuple[float, float]) -> tuple[float, float]:
-        """Where the way out of a state crosses its upper or lower border, a little towards where it goes."""
+        """Return the point where a state's way out crosses its upper or lower border, a little towards its target."""
         width, height = self._sizes[self._nodes[place].name]
         reach = max(width / 2 - 8.0, 0.0)
         x = min(max(towards[0], middle[0] - reach), middle[0] + reach)

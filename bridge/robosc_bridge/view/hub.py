@@ -37,7 +37,7 @@ _GOOD_S = 5.0
 
 
 class Viewer:
-    """What one who looks has not been sent yet."""
+    """Messages that one viewer has not been sent yet."""
 
     def __init__(self) -> None:
         self._news = asyncio.Event()
@@ -145,11 +145,11 @@ class Studio:
 
 
 class Hub:
-    """A source, and those who look at it; it is the source's sink.
+    """A source, and its viewers; it is the source's sink.
 
     Args:
-        source: What tells.
-        studio: Where portraits are made, and kept.
+        source: Source that reports.
+        studio: Studio where portraits are made, and kept.
     """
 
     def __init__(self, source: Source, studio: "Studio") -> None:
@@ -169,7 +169,7 @@ class Hub:
 
     @property
     def is_watched(self) -> bool:
-        """Whether anybody looks."""
+        """True if anybody is watching."""
         return bool(self._viewers)
 
     def join(self) -> Viewer:
@@ -244,12 +244,12 @@ class Hub:
             viewer.define(self._portrait.text)
 
     def begin(self, components: Mapping[str, object]) -> None:
-        """What happens next begins in a state that is known."""
+        """Receive the known state in which what happens next begins."""
         if self._teller is not None:
             self._teller.begin(components)
 
     def show(self, status: Status) -> None:
-        """What the robot is doing."""
+        """Receive what the robot is doing."""
         self._status = status
         self._told_s = asyncio.get_running_loop().time()
         self._is_dirty.set()
@@ -274,7 +274,7 @@ class Hub:
             viewer.jump()
 
     def moved(self, time_s: float, speed: float, *, is_playing: bool) -> None:
-        """Where the replay is."""
+        """Receive the position of the replay."""
         self._position = position_text(time_s, speed, is_playing=is_playing)
         for viewer in self._viewers:
             viewer.moved(self._position)

@@ -38,12 +38,12 @@ class ModelAlone:
     """A model in its initial state, for all pages.
 
     Args:
-        supervisor: Of the model.
-        seen: What its files were.
-        digest: Tells what the files are; called in a thread.
-        make: Makes the supervisor of what the files are.
-        scene: For the map.
-        pause: Waits for the next look at the files.
+        supervisor: Supervisor of the model.
+        seen: Digest that its files had.
+        digest: Function that returns the digest of the files; called in a thread.
+        make: Function that makes the supervisor of the files as they are.
+        scene: Scene for the map.
+        pause: Function that waits for the next look at the files.
 
     `digest` and `make` raise `NoSupervisorError`.
     """
@@ -67,7 +67,7 @@ class ModelAlone:
 
     @property
     def robot(self) -> Robot:
-        """What is shown."""
+        """Robot that is shown."""
         return robot_of(self._supervisor, SourceKind.MODEL, version="", can_command=False, scene=self._scene)
 
     async def run(self, sink: Sink) -> None:
@@ -141,7 +141,7 @@ async def _ended(making: asyncio.Task[Supervisor] | None) -> None:
 
 
 def file_digest(path: Path) -> str:
-    """What a supervisor's file is this moment.
+    """Return the digest of a supervisor's file at this moment.
 
     Raises:
         NoSupervisorError: It cannot be read.
@@ -205,7 +205,7 @@ class _Error(msgspec.Struct):
 
 
 class _Told(msgspec.Struct):
-    """What `robosc synth --json` says where there is no supervisor."""
+    """Output of `robosc synth --json` where there is no supervisor."""
 
     reason: str = ""
     diagnostics: tuple[_Place, ...] = ()

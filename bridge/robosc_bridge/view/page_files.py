@@ -11,7 +11,7 @@ MAXIMUM_BYTES = 2 * 1024 * 1024
 """Of one file."""
 
 TOKEN_PLACE = '<meta name="robosc-token" content="">'
-"""Where the token is put, once, in the page."""
+"""Place in the page where the token is put, once."""
 
 TYPES = {
     ".html": "text/html",

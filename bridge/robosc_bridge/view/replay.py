@@ -44,8 +44,8 @@ class Frame:
     Attributes:
         components: State and variables of each component.
         communications: Location of each service and action.
-        problem: The fault that was told last, until a restart.
-        stops: Why nothing was requested, each until it ended.
+        problem: The fault that was reported last, until a restart.
+        stops: Reasons why nothing was requested, each until it ended.
     """
 
     components: Mapping[str, Any]
@@ -88,7 +88,7 @@ class Recording:
         return self.times_s[-1]
 
     def count(self, time_s: float) -> int:
-        """How many entries have happened by a time."""
+        """Return the number of entries that have happened by a time."""
         return bisect_right(self.times_s, time_s)
 
     def frame(self, number: int) -> Frame:
@@ -101,10 +101,10 @@ class Recording:
 
 
 class LastTaken:
-    """Which transition each component took last, after any number of entries, since the model began.
+    """Transition that each component took last, after any number of entries, since the model began.
 
     Args:
-        lights: Tells which transitions an entry takes; in the initial state.
+        lights: Lights that report which transitions an entry takes; in the initial state.
         documents: The entries.
     """
 
@@ -184,15 +184,15 @@ def first_frame(model: Model) -> Frame:
 
 
 class Player:
-    """Where a replay is; knows no clock.
+    """Position of a replay; knows no clock.
 
     Args:
-        recording: What is replayed.
+        recording: Recording that is replayed.
 
     Attributes:
-        time_s: Where it is, in the log's time.
+        time_s: Position in the log's time.
         speed: Seconds of the log in a second.
-        is_playing: Whether it goes on by itself.
+        is_playing: True if it goes on by itself.
     """
 
     def __init__(self, recording: Recording) -> None:
@@ -225,7 +225,7 @@ class Replay:
     """A replay for one page.
 
     Args:
-        recording: What is replayed.
+        recording: Recording that is replayed.
     """
 
     def __init__(self, recording: Recording) -> None:

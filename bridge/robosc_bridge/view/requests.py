@@ -1,4 +1,4 @@
-"""What a page asks for over its WebSocket: read within bounds, as values."""
+"""Requests of a page over its WebSocket: read within bounds, as values."""
 
 import json
 from dataclasses import dataclass
@@ -23,11 +23,11 @@ class Stop:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """Want something of the robot.
+    """Command that is wanted of the robot.
 
     Attributes:
-        command: What.
-        token: What is shown for it.
+        command: The command.
+        token: Token that is shown for it.
     """
 
     command: Command
@@ -38,7 +38,7 @@ Asked = Stop | Order | Wish
 
 
 def asked(text: str) -> Asked:
-    """What a text asks for.
+    """Return the request in a text.
 
     Raises:
         RefusedError: It makes no sense.

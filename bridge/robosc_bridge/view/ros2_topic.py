@@ -65,8 +65,8 @@ class _Heard:
     """A message.
 
     Attributes:
-        robot: What it defines.
-        status: What the node is doing.
+        robot: Robot that it defines.
+        status: Status of the node.
     """
 
     robot: Robot
@@ -89,11 +89,11 @@ class StateReader:
         self._steps: dict[int, _Step] = {}
 
     def read(self, text: str, time_s: float) -> tuple[Robot, Status, list[dict[str, Any]]]:
-        """The robot, its state, and what happened since the message before.
+        """Return the robot, its state, and what happened since the message before.
 
         Args:
-            text: Of a message.
-            time_s: When it came, in seconds since 1970-01-01 UTC.
+            text: Text of a message.
+            time_s: Time when it came, in seconds since 1970-01-01 UTC.
 
         Raises:
             DefinitionError: It makes no sense, or is of another model.
@@ -163,10 +163,10 @@ class _Step:
 
     Attributes:
         number: Its number.
-        place: Of its component, in the model's order.
-        event: Of it.
-        is_silent: Whether it is one of its component alone.
-        is_controllable: Whether the executor takes it by itself.
+        place: Place of its component, in the model's order.
+        event: Its event.
+        is_silent: True if it is one of its component alone.
+        is_controllable: True if the executor takes it by itself.
     """
 
     number: int
@@ -176,7 +176,7 @@ class _Step:
     is_controllable: bool
 
     def is_followed_by(self, other: "_Step") -> bool:
-        """Whether another one belongs to the same event: components are told in the model's order."""
+        """Return True if another one belongs to the same event: components are reported in the model's order."""
         return not self.is_silent and other.event == self.event and other.place > self.place
 
 
@@ -221,7 +221,7 @@ def _components(current: object) -> Mapping[str, Mapping[str, Any]]:
 
 
 def _communications(told: object, robot: Robot) -> Mapping[str, str]:
-    """Where services and actions are; empty for a node that does not tell."""
+    """Return the locations of services and actions; empty for a node that does not report them."""
     if told is None:
         return {}
     if not isinstance(told, dict):
@@ -235,7 +235,7 @@ def _communications(told: object, robot: Robot) -> Mapping[str, str]:
 
 @dataclass
 class _News:
-    """What the thread of rclpy has heard and the event loop has not taken yet."""
+    """News that the thread of rclpy has heard and the event loop has not taken yet."""
 
     latest: _Heard | None = None
     entries: list[dict[str, Any]] = field(default_factory=list)

@@ -11,11 +11,11 @@ _DIGITS = 4
 
 
 def scenery(source: str | None, seed: int = 0) -> Mapping[str, Any] | None:
-    """What stands around a robot, as its odometry sees it: the origin is where the robot began, x its first heading.
+    """Return a robot's surroundings as its odometry sees them: the origin is where it began, x its first heading.
 
     Args:
         source: Name or file of a scene; None: nothing is known.
-        seed: Of what the scene leaves to chance.
+        seed: Seed of what the scene leaves to chance.
 
     Returns:
         `walls`, each [x1, y1, x2, y2], and `line`, each [x, y]; in metres.

@@ -84,17 +84,17 @@ _Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class ViewServer:
-    """Serves one source; lives in one event loop.
+    """Server of one source; lives in one event loop.
 
     Args:
-        settings: Where and how.
-        source: What is shown; called for each page where each has a replay of its own, else once.
-        is_shared: Whether all pages see the same.
-        robot: What will be shown, where that is known: laid out now, before anything moves.
+        settings: Settings of where and how it serves.
+        source: Function that returns the source; called for each page where each has a replay of its own, else once.
+        is_shared: True if all pages see the same.
+        robot: Robot that will be shown, where that is known: laid out now, before anything moves.
 
     Attributes:
         address: `HOST:PORT` that it listens on; empty: it does not yet.
-        url: What to open in a browser, with the token.
+        url: URL to open in a browser, with the token.
     """
 
     def __init__(
@@ -309,7 +309,7 @@ async def _close(page: web.WebSocketResponse, code: WSCloseCode, why: bytes) -> 
 
 
 class _Session:
-    """What one page asks for."""
+    """Requests of one page."""
 
     def __init__(
         self, page: web.WebSocketResponse, viewer: Viewer, source: Source, access: Access | None, by: str
@@ -399,7 +399,7 @@ class _Session:
 
 
 def tls_context(security: ServerSecurity) -> ssl.SSLContext | None:
-    """What the server shows of itself; None: no TLS.
+    """Return the TLS context with which the server identifies itself; None: no TLS.
 
     Raises:
         ViewError: A file cannot be used.
@@ -416,5 +416,5 @@ def tls_context(security: ServerSecurity) -> ssl.SSLContext | None:
 
 
 def _os_text(error: OSError) -> str:
-    """What went wrong, without the words that asyncio puts around it."""
+    """Return what went wrong, without the words that asyncio puts around it."""
     return os.strerror(error.errno) if error.errno else str(error)

@@ -1,4 +1,4 @@
-"""Where and how the page is served."""
+"""Settings of where and how the page is served."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,12 +7,12 @@ from robosc_api.security import ServerSecurity
 from robosc_bridge.configuration.structure import Configuration
 
 ADDRESS = "127.0.0.1:8066"
-"""Where the page is served unless somebody says otherwise."""
+"""Address at which the page is served unless another one is specified."""
 
 
 @dataclass(frozen=True, slots=True)
 class ViewSettings:
-    """Where and how the page is served.
+    """Settings of where and how the page is served.
 
     Attributes:
         address: `HOST:PORT`; port 0 picks a free one.
@@ -20,7 +20,7 @@ class ViewSettings:
         names: Further names by which browsers reach the server.
         framed_by: Origins, or schemes with their colon, whose pages may show this one in a frame.
         scene: Name or file of a scene that the map shows; None: none.
-        scene_seed: Of what the scene leaves to chance.
+        scene_seed: Seed of what the scene leaves to chance.
     """
 
     address: str = ADDRESS
@@ -32,10 +32,10 @@ class ViewSettings:
 
 
 def settings_of(configuration: Configuration) -> ViewSettings | None:
-    """What a configuration says; None: no page is to be served.
+    """Return the settings of a configuration; None: no page is to be served.
 
     Args:
-        configuration: Of the robot.
+        configuration: Configuration of the robot.
     """
     view = configuration.view
     chosen = view.address

@@ -1,4 +1,4 @@
-"""Where what is shown comes from, behind one narrow protocol: a source tells a sink, and may be steered."""
+"""Sources of what is shown, behind one narrow protocol: a source reports to a sink, and may be steered."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class SourceWrongError(Exception):
 
 
 class RefusedError(Exception):
-    """What was asked for is not done; one sentence for a person."""
+    """Refusal of what was asked for; one sentence for a person."""
 
 
 class Sink(Protocol):
@@ -33,10 +33,10 @@ class Sink(Protocol):
         """There is a robot; told first, and again where it has become another."""
 
     def begin(self, components: Mapping[str, object]) -> None:
-        """What happens next begins in a state that is known; an empty one is the initial state."""
+        """Receive the known state in which what happens next begins; an empty one is the initial state."""
 
     def show(self, status: Status) -> None:
-        """What the robot is doing; the latest alone counts."""
+        """Receive what the robot is doing; the latest alone counts."""
 
     def happened(self, happenings: Happenings, first: int | None = None) -> None:
         """Entries of the event log; `first` is the number of the first of them, where they have one of their own."""
@@ -48,7 +48,7 @@ class Sink(Protocol):
         """The replay of a log is elsewhere; all there is to tell of the place follows."""
 
     def moved(self, time_s: float, speed: float, *, is_playing: bool) -> None:
-        """Where the replay of a log is."""
+        """Receive the position of the replay of a log."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,5 +110,5 @@ class Source(Protocol):
 
 
 def not_replayed() -> RefusedError:
-    """What a live source answers to those who would move in time."""
+    """Return the answer of a live source to those who would move in time."""
     return RefusedError("this robot is shown live: only a log can be replayed")

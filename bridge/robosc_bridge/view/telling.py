@@ -1,4 +1,4 @@
-"""What a source tells as the messages of the page: updates, and entries with the transitions that they lit."""
+"""Messages of the page from what a source reports: updates, and entries with the transitions that they lit."""
 
 import json
 import math
@@ -26,15 +26,15 @@ _SHOWN_APART = ("time", "kind", "event", "controllable", "state", "decision_us",
 
 
 class Portrait:
-    """What is made of a robot once, since it takes its time: laid out graphs, and what its requests need.
+    """Data made of a robot once, since it takes its time: laid out graphs, and what its requests need.
 
     Args:
-        robot: As the source defines it.
+        robot: Robot as the source defines it.
 
     Attributes:
         robot: The same.
         text: The message `definition`.
-        requests: Judges its requests; None: nobody knows its supervisor.
+        requests: Judge of its requests; None: nobody knows its supervisor.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -45,10 +45,10 @@ class Portrait:
 
 
 class Teller:
-    """Tells what one robot does.
+    """Reporter of what one robot does.
 
     Args:
-        portrait: What was made of it.
+        portrait: Portrait that was made of it.
     """
 
     def __init__(self, portrait: Portrait) -> None:
@@ -59,12 +59,12 @@ class Teller:
         self._number = 0
 
     def update(self, status: Status, number: int, age_s: float) -> str:
-        """The message `update`.
+        """Return the message `update`.
 
         Args:
-            status: What the robot is doing.
-            number: Of the message.
-            age_s: How old that is.
+            status: Status of the robot.
+            number: Number of the message.
+            age_s: Age of the status, in seconds.
         """
         enabled, disabled, warnings = self._permitted(status)
         drive = status.drive
@@ -97,10 +97,10 @@ class Teller:
         return _text(message)
 
     def entries(self, happenings: Happenings, first: int | None = None) -> list[str]:
-        """Entries of the event log, each as the JSON text that stands in the message `events`.
+        """Return entries of the event log, each as the JSON text that stands in the message `events`.
 
         Args:
-            happenings: What happened.
+            happenings: Entries that happened.
             first: Number of its first entry; None: the next one.
         """
         if first is not None:
@@ -129,7 +129,7 @@ class Teller:
         )
 
     def _permitted(self, status: Status) -> tuple[list[str], list[dict[str, Any]], list[Notice]]:
-        """What may be requested, what may not and why, and what there is to say about that."""
+        """Return the events that may be requested, those that may not and why, and any notices about that."""
         events = self._robot.requests
         if not status.components:
             # A robot without any behaviour has no components to tell of, executed or not.
@@ -168,12 +168,13 @@ class Teller:
 
 
 class Lights:
-    """Which transitions an event takes: those of the states that its components were in before it.
+    """Transitions that an event takes: those of the states that its components were in before it.
 
-    What came before may not be known: then the state after the event tells, where it can only come from one state.
+    The states before it may not be known: then the state after the event decides, where it can only come from one
+    state.
 
     Args:
-        robot: As the source defines it.
+        robot: Robot as the source defines it.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -240,7 +241,7 @@ def _states(components: Any) -> dict[str, str | None]:
 
 
 def entry_text(entry: Entry) -> str:
-    """What an entry says beside its event, for a person."""
+    """Return the text of an entry beside its event, for a person."""
     told = [_word(entry[name]) for name in ("identifier", "what") if name in entry]
     rest = {name: value for name, value in entry.items() if name not in (*_SHOWN_APART, "identifier", "what")}
     told += [

@@ -1,4 +1,4 @@
-"""Which server a command asks, and how long it waits for it."""
+"""Server that a command asks, and the time that the command waits for it."""
 
 import argparse
 import os
@@ -16,16 +16,16 @@ SERVICE = (
     "the server is not there, refused, failed or did not answer before the deadline; or its answer is not believed"
 )
 SIGNED_SERVICE = f"{SERVICE}, such\n     as a supervisor that none of the keys of --signed-by has signed"
-"""What the exit status 3 tells; the latter where signatures are asked for."""
+"""Meaning of the exit status 3; this one where signatures are asked for, and `SERVICE` elsewhere."""
 
 
 def exit_statuses(done: str, failed: str | None = None, service: str | None = SERVICE) -> str:
-    """What the exit statuses of a command tell, for its help.
+    """Return the meanings of the exit statuses of a command, for its help.
 
     Args:
-        done: What 0 tells.
-        failed: What 1 tells; None: it does not happen.
-        service: What 3 tells; None: no server is asked.
+        done: Meaning of 0.
+        failed: Meaning of 1; None: it does not happen.
+        service: Meaning of 3; None: no server is asked.
     """
     told = {0: done, 1: failed, 2: "wrong use", 3: service, 130: "Ctrl-C"}
     return "exit status:\n" + "".join(f"  {status}  {what}\n" for status, what in told.items() if what is not None)
@@ -49,12 +49,12 @@ _FIELDS = ("ca", "certificate", "key", "token_file")
 def add_connection_arguments(
     parser: argparse.ArgumentParser, *, deadline_s: float | None = None, epilog: str = MODEL_EPILOG
 ) -> None:
-    """Which server is asked, and how long.
+    """Add the arguments for the server that is asked, and for the waiting time.
 
     Args:
-        parser: Of the command.
+        parser: Parser of the command.
         deadline_s: Seconds, unless the arguments say otherwise; None: as long as it takes.
-        epilog: What its exit statuses tell.
+        epilog: Meanings of its exit statuses.
     """
     parser.epilog, parser.formatter_class = epilog, argparse.RawDescriptionHelpFormatter
     server = parser.add_mutually_exclusive_group()

@@ -255,7 +255,7 @@ def _add_verify_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _generation(arguments: argparse.Namespace) -> GenerateOptions:
-    """What is asked of the target: by the arguments, and by the file beside the model."""
+    """Return the options that are asked of the target: by the arguments, and by the file beside the model."""
     try:
         return read_controller_config(arguments.model.parent).options(arguments.package)
     except ControllerConfigError as error:
@@ -263,7 +263,7 @@ def _generation(arguments: argparse.Namespace) -> GenerateOptions:
 
 
 def _task(arguments: argparse.Namespace) -> Task | None:
-    """What is to be done; None: that cannot be, and why has been told."""
+    """Return the task to be done; None: it cannot be done, and the reason has been reported."""
     if arguments.task == "format":
         return Format(SourceFile(arguments.file.name, property_file(arguments.file).text))
     if arguments.task == "verify":
@@ -281,7 +281,7 @@ def _task(arguments: argparse.Namespace) -> Task | None:
 
 
 def _verification(arguments: argparse.Namespace) -> Verify | None:
-    """What is to be verified, refused as `verify` refuses it; None: what is wrong with a property has been told."""
+    """Return the verification to do, refused as `verify` refuses it; None: errors of a property were reported."""
     found: list[Verify] = []
 
     def with_file(arguments: argparse.Namespace) -> int:
@@ -475,7 +475,7 @@ def job_json(job: Job) -> dict[str, Any]:
 
 
 def result_json(found: TaskResult) -> dict[str, Any]:
-    """What a job has found, as JSON values; what is no text is left to -o."""
+    """Return the result of a job, as JSON values; anything that is no text is left to -o."""
     import msgspec
 
     match found:

@@ -1,4 +1,4 @@
-"""What is shown while work goes on: a line with a bar, on a terminal alone."""
+"""Display while work goes on: a line with a bar, on a terminal alone."""
 
 import sys
 from types import TracebackType
@@ -13,7 +13,7 @@ _MAXIMUM = 100
 _BAR_WIDTH = 20
 
 _STAGES = ("check", "synthesis", "verification", "controller")
-"""What a supervisor goes through, one after the other; how long each takes depends on the model."""
+"""Stages of making a supervisor, one after the other; the time that each takes depends on the model."""
 
 
 class Shown:
@@ -48,8 +48,8 @@ class Shown:
         """Replace the line.
 
         Args:
-            text: What it says.
-            stage: Where the work is, for the bar; one that moves to and fro stands for what is not known.
+            text: Text of the line.
+            stage: Stage of the work, for the bar; a bar that moves to and fro means that it is not known.
         """
         if self._bar is not None and self._line is not None:
             self._bar.update(self._line, description=text[:_MAXIMUM])

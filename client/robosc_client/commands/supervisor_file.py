@@ -10,13 +10,13 @@ def write_supervisor(output: Path, content: bytes, signature: bytes) -> None:
     """Write a supervisor's file, and then what belongs beside it.
 
     A signature that is there stays beside the same bytes, which it still vouches for, as where `robosc sign` has made
-    it; beside others it is replaced or removed. Until the file is written it is not touched: whatever goes wrong, what
-    is left is the file that was there with its signature, or the new one with a signature that does not fit it.
+    it; beside others it is replaced or removed. Until the file is written it is not touched: whatever goes wrong,
+    what is left is the file that was there with its signature, or the new one with a signature that does not fit it.
 
     Args:
-        output: The supervisor's file; what is no plain file (a device, a pipe) has nothing beside it.
+        output: The supervisor's file; one that is no plain file (a device, a pipe) has nothing beside it.
         content: Its bytes.
-        signature: That of the server; empty: it has not signed.
+        signature: Signature of the server; empty: it has not signed.
 
     Raises:
         UsageError: A file cannot be written or removed.
@@ -36,7 +36,7 @@ def write_supervisor(output: Path, content: bytes, signature: bytes) -> None:
 
 
 def _holds(file: Path, content: bytes) -> bool:
-    """Whether a plain file has just these bytes; one that cannot be read does not count."""
+    """Return True if a plain file has just these bytes; one that cannot be read does not count."""
     try:
         return file.is_file() and file.stat().st_size == len(content) and file.read_bytes() == content
     except OSError:

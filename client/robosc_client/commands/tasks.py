@@ -97,11 +97,11 @@ def add_parsers(commands: Commands) -> None:
 
 
 def add_synthesis_arguments(parser: argparse.ArgumentParser, *, has_choice: bool = True) -> None:
-    """How a supervisor is made.
+    """Add the arguments that say how a supervisor is made.
 
     Args:
-        parser: Of the command.
-        has_choice: Whether silent steps that never end can be refused.
+        parser: Parser of the command.
+        has_choice: True if silent steps that never end can be refused.
     """
     add_deployment_argument(parser)
     add_engine_options(parser)
@@ -121,7 +121,7 @@ def sendable(number: int | None, option: str) -> int | None:
 
 
 def synthesis_options(arguments: argparse.Namespace) -> SynthesisOptions:
-    """What `add_synthesis_arguments` has read."""
+    """Return the options that `add_synthesis_arguments` has read."""
     return SynthesisOptions(
         deployment=Deployment(arguments.deployment),
         engine=arguments.engine or "auto",
@@ -144,7 +144,7 @@ def property_texts(arguments: argparse.Namespace) -> tuple[list[SourceFile], lis
 
 
 def verify_task(arguments: argparse.Namespace, bundle: Bundle, supervisor: bytes) -> Verify:
-    """What the arguments of `verify` ask for."""
+    """Return the task that the arguments of `verify` ask for."""
     texts, listings = property_texts(arguments)
     return Verify(
         bundle=bundle,
@@ -335,7 +335,7 @@ def _verify_properties(arguments: argparse.Namespace, client: Client) -> int:
 
 
 def are_understood(arguments: argparse.Namespace, bundle: Bundle) -> bool:
-    """Whether the properties can be understood; what is wrong with one is told before the server is asked."""
+    """Return True if the properties can be understood; errors of one are reported before the server is asked."""
     from robosc.model import check
 
     model = check(bundle).model

@@ -71,12 +71,12 @@ def diagnostics_of(messages: Sequence[pb.Diagnostic]) -> tuple[Diagnostic, ...]:
 
 
 def progress_of(message: pb.Progress) -> Progress:
-    """Where work is: two short texts that are harmless on a terminal."""
+    """Return the progress of work: two short texts that are harmless on a terminal."""
     return Progress(visible(message.stage[:MAXIMUM_SHOWN]), visible(message.message[:MAXIMUM_SHOWN]))
 
 
 def status_of(number: pb.SynthesisStatus) -> SynthesisStatus:
-    """How a synthesis ended.
+    """Return the status with which a synthesis ended.
 
     Raises:
         ServiceError: The number says nothing.
@@ -87,14 +87,14 @@ def status_of(number: pb.SynthesisStatus) -> SynthesisStatus:
 
 
 def verification_status_of(number: pb.VerificationStatus) -> VerificationStatus:
-    """What a verification found; raises as `status_of`."""
+    """Return the status that a verification found; raises as `status_of`."""
     if number not in _VERDICTS:
         raise malformed(f"unknown status {number}")
     return _VERDICTS[number]
 
 
 def explanation_of(text: str) -> EmptyExplanation | None:
-    """What is to blame, or None where nothing is told.
+    """Return the explanation of what is to blame, or None where none is given.
 
     Raises:
         ServiceError: The text is no such document.
@@ -128,13 +128,13 @@ def statistics_of(message: pb.Statistics) -> Statistics:
 
 
 def targets_of(message: pb.ListTargetsResponse) -> tuple[TargetInfo, ...]:
-    """What can be generated; raises ServiceError for too many."""
+    """Return the targets that can be generated; raises ServiceError for too many."""
     require_at_most(_MAXIMUM_TARGETS, len(message.targets), "targets")
     return tuple(TargetInfo(item.name, item.description) for item in message.targets)
 
 
 def server_info_of(message: pb.GetVersionResponse) -> ServerInfo:
-    """What a server is; raises ServiceError for too many engines."""
+    """Return the description of a server; raises ServiceError for too many engines."""
     require_at_most(_MAXIMUM_TARGETS, len(message.engines), "engines")
     limits = message.limits
     return ServerInfo(

@@ -92,7 +92,7 @@ class Whole[Message, Result]:
 
 
 class _Stream:
-    """What every stream of the service has: progress, then one result."""
+    """Common part of every stream of the service: progress, then one result."""
 
     def __init__(self) -> None:
         self._reports = 0
@@ -156,7 +156,7 @@ class SynthesisAssembly(_Stream):
         )
 
     def result(self) -> Synthesis:
-        """How it ended."""
+        """Return the outcome of the synthesis."""
         self._require_result()
         return self._found
 
@@ -210,7 +210,7 @@ class GenerationAssembly(_Stream):
         return len(self._contents[place]) == self._head.files[place].size
 
     def result(self) -> Generation:
-        """How it ended."""
+        """Return the outcome of the generation."""
         self._require_result()
         head = self._head
         files = None
@@ -273,7 +273,7 @@ class ExplorationAssembly(_Stream):
         self._content += chunk
 
     def result(self) -> Exploration:
-        """How it ended."""
+        """Return the outcome of the exploration."""
         self._require_result()
         head = self._head
         if len(self._content) != head.size:
@@ -315,7 +315,7 @@ class VerificationAssembly(_Stream):
         )
 
     def result(self) -> Verification:
-        """How it ended."""
+        """Return the outcome of the verification."""
         self._require_result()
         return self._found
 
@@ -343,7 +343,7 @@ def format_assembly(before: str | None) -> Whole[pb.FormatResponse, Formatted]:
 
 
 def _differ_in_layout_alone(before: str, after: str) -> bool:
-    """Whether two texts have the same tokens and the same comments, but for blanks."""
+    """Return True if two texts have the same tokens and the same comments, but for blanks."""
     if "".join(before.split()) != "".join(after.split()):
         return False
     # A comment that ends a line later would swallow what was behind it.
@@ -354,10 +354,10 @@ class JobResultAssembly:
     """Of GetJobResult: the messages of one of the others, each in an envelope."""
 
     def __init__(self, expected: TaskKind | None = None) -> None:
-        """Begin.
+        """Prepare the assembly.
 
         Args:
-            expected: What the job's task is; None: it is not known.
+            expected: Kind of the job's task; None: it is not known.
         """
         self._expected = expected
         self._kind: TaskKind | None = None

@@ -1,4 +1,4 @@
-"""How a call failed, as gRPC tells it and as google.rpc tells more (AIP-193)."""
+"""Failure of a call, as gRPC reports it and as google.rpc adds to it (AIP-193)."""
 
 import math
 from dataclasses import dataclass
@@ -16,13 +16,13 @@ _MAXIMUM_REASON = 400
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """How a call failed.
+    """Failure of a call.
 
     Attributes:
         code: gRPC's status code.
         message: One sentence; harmless on a terminal.
-        reason: The server's word for it; empty: it has told none.
-        retry_after_s: When the server wants to be asked again; None: it has not told.
+        reason: Server's word for the reason; empty: it has given none.
+        retry_after_s: Seconds after which the server wants to be asked again; None: it has not said.
     """
 
     code: grpc.StatusCode
@@ -32,12 +32,15 @@ class Failure:
 
 
 def first_line(text: str) -> str:
-    """What gRPC or a server says of a connection, as a sentence may end with it: bounded, harmless on a terminal."""
+    """Return the words of gRPC or a server about a connection, as a sentence may end with them.
+
+    They are bounded, and harmless on a terminal.
+    """
     return visible(text[:_MAXIMUM_REASON].strip().partition("\n")[0].rstrip())
 
 
 def failure_of(error: grpc.RpcError) -> Failure:
-    """How a call failed; what is malformed in the details counts as not told."""
+    """Return the failure of a call; malformed details count as not given."""
     # Every error of a call is also a grpc.Call; the stubs do not say so.
     call: Any = error
     details = call.details() or ""

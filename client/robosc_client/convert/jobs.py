@@ -66,7 +66,7 @@ def job_of(message: pb.Job) -> Job:
 
 
 def submission_of(message: pb.SubmitJobResponse) -> Submission:
-    """What became of a submission; raises as `job_of`."""
+    """Return the outcome of a submission; raises as `job_of`."""
     return Submission(job_of(message.job), message.existed)
 
 

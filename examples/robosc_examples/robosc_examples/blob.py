@@ -1,4 +1,4 @@
-"""Where a thing of a colour stands in a picture. Without ROS."""
+"""Place of a thing of a colour in a picture. Without ROS."""
 
 import math
 from typing import NamedTuple
@@ -26,12 +26,12 @@ class Colour(NamedTuple):
 
 
 class Blob(NamedTuple):
-    """What was found.
+    """Patch that was found.
 
     Attributes:
-        aside: How far its middle is off the picture's, to the left above zero, as a share of the width.
-        size: How wide it is, as a share of the width.
-        confidence: How much of a disc or a rectangle as large as it is filled, 0 to 1.
+        aside: Distance of its middle from the picture's, to the left above zero, as a share of the width.
+        size: Its width, as a share of the picture's.
+        confidence: Filled share of a disc or a rectangle as large as it is, 0 to 1.
     """
 
     aside: float
@@ -47,11 +47,11 @@ class Place(NamedTuple):
 
 
 def find_blob(picture: Picture, colour: Colour, smallest: float) -> Blob | None:
-    """The largest connected patch of a colour; None if there is none.
+    """Return the largest connected patch of a colour; None if there is none.
 
     Args:
-        picture: In blue, green and red.
-        colour: What counts.
+        picture: Picture in blue, green and red.
+        colour: Colour of the patch.
         smallest: Smallest share of all pixels that a patch must fill.
     """
     hues = cv2.cvtColor(picture, cv2.COLOR_BGR2HSV)
@@ -71,6 +71,6 @@ def find_blob(picture: Picture, colour: Colour, smallest: float) -> Blob | None:
 
 
 def place_of(blob: Blob, real_width_m: float, field_of_view_rad: float) -> Place:
-    """Where a thing of known width stands, seen by a camera that looks straight ahead."""
+    """Return the place of a thing of known width, seen by a camera that looks straight ahead."""
     ahead_m = real_width_m / (2.0 * blob.size * math.tan(field_of_view_rad / 2.0))
     return Place(ahead_m, real_width_m * blob.aside / blob.size)

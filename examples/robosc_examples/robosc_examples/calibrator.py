@@ -45,7 +45,7 @@ class Calibrator(HelperNode):
         return response
 
     def _fault(self) -> str:
-        """What is wrong with the odometry; empty if nothing is."""
+        """Return the fault of the odometry, in words; empty if there is none."""
         if len(self._poses) < LEAST_POSES:
             return f"{len(self._poses)} poses within {self._duration_s:g} s; there must be {LEAST_POSES}"
         first = self._poses[0][1]

@@ -19,7 +19,7 @@ from robosc_examples.wheels import REST, Wheels
 
 PROGRESS_M = 0.05
 TURN_M_RAD = 0.2
-"""How many metres of way a radian that is still to be turned counts for."""
+"""Metres of way that a radian which is still to be turned counts for."""
 
 NO_PROGRESS, NO_ODOMETRY = 1, 2
 FAILURES = {0: "", NO_PROGRESS: "no progress", NO_ODOMETRY: "no odometry"}
@@ -57,7 +57,7 @@ class DriveToPose(Wheels):
 
     @property
     def is_busy(self) -> bool:
-        """Whether a goal is under way."""
+        """Return True if a goal is under way."""
         return self._goal is not None
 
     def _judge(self, goal: NavigateToPose.Goal) -> GoalResponse:
@@ -111,7 +111,7 @@ class DriveToPose(Wheels):
             self.drive(REST if self.now_s() < self._wait_until_s else speed)
 
     def _is_getting_on(self, way_m: float) -> bool:
-        """Whether to go on, with so much still to do; counts recoveries."""
+        """Return True if the robot shall go on, with so much still to do; count recoveries."""
         now_s = self.now_s()
         if way_m < self._shortest_m - PROGRESS_M:
             self._progress_s, self._shortest_m = now_s, way_m

@@ -1,4 +1,4 @@
-"""Where a line on the floor runs in a picture. Without ROS."""
+"""Place of a line on the floor in a picture. Without ROS."""
 
 import cv2
 import numpy as np
@@ -8,13 +8,13 @@ from robosc_examples.pictures import Picture
 
 
 def find_line(picture: Picture, settings: LineSettings = USUAL) -> float | None:
-    """How far the line is off the middle, to the left above zero, as a share of the width; None without a line.
+    """Return the distance of the line off the middle, to the left above zero, as a share of the width; None: no line.
 
     The line is the largest connected patch of its shade; its centre of mass is what counts.
 
     Args:
-        picture: In shades of grey.
-        settings: What counts as a line.
+        picture: Picture in shades of grey.
+        settings: Properties of a line.
     """
     height, width = int(picture.shape[0]), int(picture.shape[1])
     # At least one row, however small the picture.

@@ -1,4 +1,4 @@
-"""Where a line on the floor runs in a grey picture, with the standard library alone: no OpenCV, no numpy, no ROS.
+"""Place of a line on the floor in a grey picture, with the standard library alone: no OpenCV, no numpy, no ROS.
 
 The same answer as `line.find_line`, from runs of dark pixels that are joined row by row (union of equivalent runs: A.
 Rosenfeld, J. L. Pfaltz, "Sequential operations in digital picture processing", Journal of the ACM 13 (4), 1966).
@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 
 class LineSettings(NamedTuple):
-    """What counts as a line, here and for `line.find_line`.
+    """Properties of a line, here and for `line.find_line`.
 
     Attributes:
         threshold: Shade that parts the line from the floor, 0 (black) to 255.
-        is_dark: Whether the line is the darker of the two.
-        top: Where the rows that are looked at begin, as a share of the height from above.
-        bottom: Where they end.
+        is_dark: True if the line is the darker of the two.
+        top: Begin of the rows that are looked at, as a share of the height from above.
+        bottom: Their end.
         smallest: Smallest share of the looked-at pixels that is a line.
         largest: Largest; a picture that is dark all over shows no line.
     """
@@ -31,17 +31,17 @@ USUAL = LineSettings()
 
 
 def find_line(data: bytes, width: int, height: int, step: int, settings: LineSettings = USUAL) -> "float | None":
-    """How far the line is off the middle, to the left above zero, as a share of the width; None without a line.
+    """Return the distance of the line off the middle, to the left above zero, as a share of the width; None: no line.
 
     The line is the largest patch of its shade, the pixels of which touch at edges or corners; its centre of mass is
     what counts. Takes time in the pixels looked at.
 
     Args:
         data: Shades, row by row from above.
-        width: In pixels, at least 1.
-        height: In pixels, at least 1.
+        width: Width in pixels, at least 1.
+        height: Height in pixels, at least 1.
         step: Bytes from row to row.
-        settings: What counts as a line.
+        settings: Properties of a line.
     """
     first = min(int(settings.top * height), height - 1)
     last = max(first + 1, round(settings.bottom * height))
@@ -62,7 +62,7 @@ def find_line(data: bytes, width: int, height: int, step: int, settings: LineSet
 
 
 def _runs(marks: bytes) -> "list[tuple[int, int]]":
-    """Where the ones begin and end (exclusively)."""
+    """Return the begin and the end (exclusive) of each run of ones."""
     found = []
     begin = marks.find(1)
     while begin >= 0:

@@ -10,7 +10,7 @@ SMALLEST_NORM = 0.1
 
 
 class Pose(NamedTuple):
-    """Where a robot is and where it looks, counter-clockwise from the x axis."""
+    """Position of a robot, and its heading, counter-clockwise from the x axis."""
 
     x_m: float
     y_m: float
@@ -53,14 +53,14 @@ def pose_of(message: object) -> Pose | None:
 
 
 class Turn:
-    """A turn by an angle, of any size and either way, followed from yaw to yaw.
+    """Turn by an angle, of any size and either way, followed from yaw to yaw.
 
     Each yaw is taken as less than half a turn away from the one before: where the yaw jumps from pi to -pi, the turn
     goes on.
 
     Args:
-        angle_rad: By how much, to the left above zero.
-        yaw_rad: Where it begins.
+        angle_rad: Angle to turn by, to the left above zero.
+        yaw_rad: Heading at the begin.
     """
 
     def __init__(self, angle_rad: float, yaw_rad: float) -> None:
@@ -68,20 +68,23 @@ class Turn:
         self._last_rad = yaw_rad
 
     def update(self, yaw_rad: float) -> float:
-        """What remains to be turned, to the left above zero."""
+        """Return the angle that is still to be turned, to the left above zero."""
         self.remaining_rad -= wrapped(yaw_rad - self._last_rad)
         self._last_rad = yaw_rad
         return self.remaining_rad
 
 
 def turning_speed(remaining_rad: float, limit_rad_s: float) -> float:
-    """How fast to turn: as fast as may be, slower towards the end, never so slow that wheels stand still."""
+    """Return the turn rate: as fast as may be, slower towards the end, never so slow that wheels stand still."""
     size = min(limit_rad_s, max(3.0 * abs(remaining_rad), 0.1 * limit_rad_s))
     return math.copysign(size, remaining_rad)
 
 
 def steered(distance_m: float, aside_rad: float, ahead_limit_m_s: float, turn_limit_rad_s: float) -> Speed:
-    """How to drive to a point so far away, and so far to the left: on the spot until it is about ahead, then there."""
+    """Return the velocity towards a point so far away, and so far to the left.
+
+    The robot turns on the spot until the point is about ahead, and drives there then.
+    """
     if abs(aside_rad) > SHARPEST_RAD:
         return Speed(0.0, turning_speed(aside_rad, turn_limit_rad_s))
     ahead_m_s = min(ahead_limit_m_s, max(2.0 * distance_m, 0.1 * ahead_limit_m_s))

@@ -1,4 +1,4 @@
-"""What in a laser scan is as wide as a person. Without ROS."""
+"""Things in a laser scan that are as wide as a person. Without ROS."""
 
 import math
 from collections.abc import Sequence
@@ -9,12 +9,12 @@ SURE_BEAMS = 5
 
 
 class PersonSettings(NamedTuple):
-    """What counts as a person.
+    """Properties of a person in a scan.
 
     Attributes:
         narrowest_m: Least width.
         widest_m: Largest width.
-        gap_m: Neighbouring ranges that differ by more are of two things.
+        gap_m: Difference of neighbouring ranges from which they are of two things.
         beams: Least number of beams.
     """
 
@@ -33,7 +33,7 @@ class Person(NamedTuple):
 
     @property
     def distance_m(self) -> float:
-        """How far away."""
+        """Distance from the scanner, in metres."""
         return math.hypot(self.ahead_m, self.left_m)
 
 
@@ -48,7 +48,7 @@ class Scan(NamedTuple):
 
 
 def is_blind(scan: Scan) -> bool:
-    """Whether a scan tells nothing: no beams, no sensible angles or limits, or most of it unknown."""
+    """Return True if a scan tells nothing: no beams, no sensible angles or limits, or most of it unknown."""
     sensible = all(map(math.isfinite, scan[1:])) and 0.0 <= scan.nearest_m < scan.farthest_m
     if not sensible or scan.step_rad == 0.0 or not scan.ranges:
         return True
@@ -88,7 +88,7 @@ def _things(scan: Scan, gap_m: float) -> list[list[int]]:
 
 
 def _person(scan: Scan, beams: list[int]) -> tuple[float, Person]:
-    """How wide a thing is, and where."""
+    """Return the width of a thing, in metres, and the person that it would be."""
     places = [
         (scan.ranges[beam] * math.cos(angle), scan.ranges[beam] * math.sin(angle))
         for beam in beams

@@ -1,4 +1,4 @@
-"""What every helper node is made of: checked parameters, an orderly end, one clear line for what goes wrong.
+"""Parts of every helper node: checked parameters, an orderly end, one clear line for what goes wrong.
 
 rclpy's own answer to a signal is to make its context invalid, before any code of ours runs: a zero velocity could not
 be published any more, and the robot would go on. So the signals are ours: they end the loop, the node brings its robot
@@ -147,8 +147,8 @@ def run(name: str, make: Callable[[], HelperNode], args: Sequence[str] | None = 
     """Run a node until a signal, its own end or an error.
 
     Args:
-        name: What it is called in error lines.
-        make: Makes the node.
+        name: Name of the node in error lines.
+        make: Function that makes the node.
         args: The command line; None for the program's own.
 
     Returns:

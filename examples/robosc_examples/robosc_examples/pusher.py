@@ -33,7 +33,7 @@ class Pusher(Wheels):
 
     @property
     def is_busy(self) -> bool:
-        """Whether a push is under way."""
+        """Return True if a push is under way."""
         return self._speed_m_s > 0.0
 
     def _ask(self, message: Float32) -> None:

@@ -28,7 +28,7 @@ class Rotator(Wheels):
 
     @property
     def is_busy(self) -> bool:
-        """Whether a turn is under way."""
+        """Return True if a turn is under way."""
         return self._asked_rad is not None
 
     def _ask(self, angle_deg: int) -> None:

@@ -37,12 +37,12 @@ class Wheels(HelperNode):
 
     @property
     def pose(self) -> Pose | None:
-        """Where the robot is; None while nobody knows."""
+        """Pose of the robot; None while nobody knows it."""
         return self._pose if self.now_s() - self._seen_s <= self._timeout_s else None
 
     @property
     def is_busy(self) -> bool:
-        """Whether there is a job, for which odometry is needed."""
+        """Return True if there is a job that needs odometry."""
         raise NotImplementedError
 
     def advance(self, pose: Pose) -> None:
@@ -50,7 +50,7 @@ class Wheels(HelperNode):
         raise NotImplementedError
 
     def without_odometry(self) -> None:
-        """What a job wants to do while nobody knows where the robot is; called again and again."""
+        """Do what a job wants while nobody knows where the robot is; called again and again."""
 
     def drive(self, speed: Speed) -> None:
         """Move the robot."""

@@ -1,6 +1,7 @@
-"""Who may reach a service of RoboSC, the same for each: TLS, client certificates, bearer tokens with scopes.
+"""Access to a service of RoboSC, the same for each: TLS, client certificates, bearer tokens with scopes.
 
-A service listens beyond this machine with TLS only, unless it is told otherwise. Tokens are random texts of 256 bits; a
+A service listens beyond this machine with TLS only, unless it is told otherwise. Tokens are random texts of 256 bits;
+a
 file holds their SHA-256 digests, so that who reads it learns none. Without tokens and client certificates, whatever
 changes something is for callers on this machine alone.
 """

@@ -1,4 +1,4 @@
-"""Which addresses are on this machine."""
+"""Addresses, and which of them are on this machine."""
 
 import ipaddress
 import re
@@ -26,7 +26,7 @@ def joined(host: str, port: int) -> str:
 
 
 def is_loopback_host(host: str) -> bool:
-    """Whether all that a host's name stands for is on this machine; one that stands for nothing is not."""
+    """Return True if all that a host's name stands for is on this machine; one that stands for nothing is not."""
     try:
         found = socket.getaddrinfo(host.strip("[]"), None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError):
@@ -35,7 +35,10 @@ def is_loopback_host(host: str) -> bool:
 
 
 def is_loopback_peer(peer: str) -> bool:
-    """Whether a caller, in gRPC's words (`ipv4:127.0.0.1:4711`, `ipv6:[::1]:4711`, `unix:...`), is on this machine."""
+    """Return True if a caller is on this machine.
+
+    The caller is in gRPC's words (`ipv4:127.0.0.1:4711`, `ipv6:[::1]:4711`, `unix:...`).
+    """
     kind, _, rest = unquote(peer).partition(":")
     if kind == "unix":
         return True

@@ -14,7 +14,7 @@ TOKEN_VARIABLE = "ROBOSC_TOKEN_FILE"  # its name
 
 
 def add_server_arguments(parser: argparse.ArgumentParser) -> None:
-    """How a service is secured."""
+    """Add the options for securing a service."""
     group = parser.add_argument_group("security")
     group.add_argument("--tls-certificate", type=Path, metavar="FILE", help="certificate chain (PEM): listen with TLS")
     group.add_argument("--tls-key", type=Path, metavar="FILE", help="its private key (PEM)")
@@ -30,7 +30,7 @@ def add_server_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def server_security_of(arguments: argparse.Namespace) -> ServerSecurity:
-    """What those options say."""
+    """Return the security that those options describe."""
     return ServerSecurity(
         certificate=arguments.tls_certificate,
         key=arguments.tls_key,
@@ -41,7 +41,7 @@ def server_security_of(arguments: argparse.Namespace) -> ServerSecurity:
 
 
 def add_client_arguments(parser: argparse.ArgumentParser) -> None:
-    """How a service is reached."""
+    """Add the options for reaching a service."""
     group = parser.add_argument_group("security")
     group.add_argument("--tls", action="store_true", help="with TLS, believing the usual certificate authorities")
     group.add_argument(
@@ -63,7 +63,7 @@ def add_client_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def credentials_of(arguments: argparse.Namespace) -> Credentials:
-    """What those options say."""
+    """Return the credentials that those options describe."""
     return Credentials(
         is_secure=arguments.tls,
         ca=arguments.ca,

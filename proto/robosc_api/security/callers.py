@@ -1,4 +1,4 @@
-"""Who is behind the call under way."""
+"""Caller behind the call under way."""
 
 from contextvars import ContextVar
 from functools import lru_cache
@@ -32,7 +32,7 @@ def token_or_host_of(context: Any) -> str:
 
 
 def is_admin() -> bool:
-    """Whether the call under way came with a token for the scope `admin`."""
+    """Return True if the call under way came with a token for the scope `admin`."""
     entry = ENTRY.get()
     return entry is not None and Scope.ADMIN in entry.scopes
 

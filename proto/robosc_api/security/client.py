@@ -15,14 +15,14 @@ from robosc_api.security.tokens import MAXIMUM_TOKEN
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Credentials:
-    """How a service is reached.
+    """Way to reach a service.
 
     Attributes:
-        is_secure: With TLS, believing the usual certificate authorities; a CA or certificate implies TLS.
+        is_secure: True to use TLS, believing the usual certificate authorities; a CA or certificate implies TLS.
         ca: Certificates (PEM) that are believed instead; None: the usual ones.
         certificate: The caller's own chain of certificates (PEM); None: none is shown.
         key: Its private key.
-        token_file: Holds the caller's token, and nothing else; None: none is sent.
+        token_file: File that holds the caller's token, and nothing else; None: none is sent.
     """
 
     is_secure: bool = False

@@ -1,4 +1,4 @@
-"""What is wrong with certificates, keys, tokens or where a service is to listen."""
+"""Error in certificates, keys, tokens or where a service is to listen."""
 
 
 class SecurityError(Exception):

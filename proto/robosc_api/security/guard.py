@@ -1,4 +1,4 @@
-"""Whether a caller may do what it asks for, before the service sees it."""
+"""Check of whether a caller may do what it asks for, before the service sees it."""
 
 import logging
 from collections.abc import Awaitable, Callable, Mapping
@@ -23,11 +23,11 @@ _SCHEME = "bearer "
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """Who may call a method.
+    """Rule for who may call a method.
 
     Attributes:
-        scopes: A token with one of them may; empty: any token.
-        is_open: Whether callers from other machines may, too, where neither tokens nor client certificates are asked
+        scopes: Scopes of which a token needs one; empty: any token.
+        is_open: True if callers from other machines may, too, where neither tokens nor client certificates are asked
             for.
     """
 
@@ -36,12 +36,13 @@ class Rule:
 
 
 class Guard(Layer):
-    """Looks at the token of each call, or at where it comes from. Health checks need none.
+    """Guard that looks at the token of each call, or at where it comes from. Health checks need none.
 
     Args:
-        rules: By full name of a method (`/package.Service/Method`); what is not named may be called with any token.
-        tokens: None: callers need none.
-        has_client_certificates: Whether callers have shown certificates that were asked for.
+        rules: Rules by full name of a method (`/package.Service/Method`); what is not named may be called with any
+            token.
+        tokens: File of tokens; None: callers need none.
+        has_client_certificates: True if callers have shown certificates that were asked for.
     """
 
     def __init__(
@@ -88,7 +89,7 @@ class Guard(Layer):
         return with_behaviour(inner, _guarded(writing(answer) if inner.response_streaming else answer, admit))
 
     def _refusal(self, rule: Rule, method: str, metadata: Any, peer: str) -> tuple[grpc.StatusCode, str] | None:
-        """Why a call is not admitted; None: it is."""
+        """Return the reason why a call is not admitted; None: it is."""
         if self._tokens is None:
             if rule.is_open or self._has_client_certificates or is_loopback_peer(peer):
                 return None

@@ -1,4 +1,4 @@
-"""Where a service listens, and behind which certificate."""
+"""Address on which a service listens, and the certificate behind which it does."""
 
 import logging
 import os
@@ -21,14 +21,14 @@ _MAXIMUM_BYTES = 1024 * 1024
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServerSecurity:
-    """How a service is secured.
+    """Security of a service.
 
     Attributes:
         certificate: Chain of certificates (PEM), the service's own first; None: no TLS.
         key: Its private key (PEM, not encrypted).
         client_ca: Certificates (PEM) of those who sign callers' certificates; None: callers need none.
         tokens: File of tokens; None: callers need none.
-        insecure_beyond_loopback: Listen beyond this machine without TLS all the same.
+        insecure_beyond_loopback: True to listen beyond this machine without TLS all the same.
     """
 
     certificate: Path | None = None
@@ -46,7 +46,7 @@ def add_port(server: Any, address: str, security: ServerSecurity) -> str:
     Args:
         server: A `grpc.Server` or `grpc.aio.Server`.
         address: `HOST:PORT`; port 0 picks a free one.
-        security: How it is secured.
+        security: Security of the server.
 
     Raises:
         SecurityError: It may not listen there like this, a file is wrong, or the address is in use or not ours.
@@ -66,7 +66,7 @@ def add_port(server: Any, address: str, security: ServerSecurity) -> str:
 
 
 def check_listening(address: str, security: ServerSecurity) -> None:
-    """What can be known before it listens, without a look at the files.
+    """Check what can be known before it listens, without a look at the files.
 
     Raises:
         SecurityError: It may not listen there like this.
@@ -99,7 +99,7 @@ def check_files(security: ServerSecurity) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Files:
-    """What gRPC is given, as it stands in the files."""
+    """Data that gRPC is given, as it stands in the files."""
 
     certificate: bytes
     key: bytes
@@ -114,7 +114,7 @@ def _credentials(security: ServerSecurity) -> grpc.ServerCredentials:
         return grpc.ssl_server_certificate_configuration([(files.key, files.certificate)], files.client_ca)
 
     def changed() -> Any:
-        """What is to be used from now on; None: what is used now. Called for each connection."""
+        """Return the configuration for use from now on; None: the one in use stays. Called for each connection."""
         nonlocal latest, told
         found: object = None
         try:

@@ -36,7 +36,7 @@ _LINE = re.compile(
 
 
 class Scope(StrEnum):
-    """What a token is for."""
+    """Purpose of a token."""
 
     WATCH = "watch"
     OPERATE = "operate"
@@ -46,7 +46,7 @@ class Scope(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Quota:
-    """What whoever shows a token may ask of a server; None: as much as anybody.
+    """Quota of what the holder of a token may ask of a server; None: as much as anybody.
 
     Attributes:
         waiting: Tasks that may wait at once.
@@ -75,10 +75,10 @@ class Entry:
     """One token of a file.
 
     Attributes:
-        name: Whose it is, for the log.
-        scopes: What it is for.
+        name: Name of its owner, for the log.
+        scopes: Scopes that it is for.
         digest: SHA-256 of the token, in hexadecimal digits.
-        quota: What it may ask for.
+        quota: Quota of what it may ask for.
     """
 
     name: str
@@ -150,7 +150,7 @@ def _quota(words: list[str], place: str) -> Quota:
 
 
 def nobody_let_in(entries: Iterable[Entry], needed: Scope) -> str | None:
-    """That no token of a file has the scope without which nothing can be called; None: one has it."""
+    """Return a message if no token of a file has the scope that every call needs; None: one has it."""
     if any(needed in entry.scopes for entry in entries):
         return None
     return f"no token has the scope '{needed}', so nobody is let in"

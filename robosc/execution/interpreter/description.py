@@ -14,7 +14,7 @@ _WITH_RESET = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 
 
 def describe(supervisor: Supervisor) -> Description:
-    """What the executor must know beforehand of a supervisor's controlled system."""
+    """Return what the executor must know beforehand of a supervisor's controlled system."""
     model = supervisor.model
     return Description(
         name=model.name,

@@ -37,7 +37,7 @@ Data = Callable[[Path], Any]
 """Received data by path; None where it is unknown. Arrays are lists, and objects in them mappings."""
 
 Elements = tuple[Any, ...]
-"""What the quantifiers around an expression look at, the innermost first."""
+"""Elements that the quantifiers around an expression look at, the innermost first."""
 
 Function = Callable[[State, Data], Any]
 """The value of an expression; None where it is unknown."""
@@ -125,7 +125,7 @@ def _quantifier(apply: Callable[[Any, Any], Any], array: Inner, part: ArrayPart,
 
 
 def holds(function: Function, state: State) -> bool:
-    """Whether a condition is true: neither false nor unknown."""
+    """Return True if a condition is true: neither false nor unknown."""
     return function(state, no_data) is True
 
 

@@ -29,12 +29,12 @@ class Reader:
         self._enums = {item.name: _CompiledEnum(item) for item in model.enums}
 
     def read(self, root: Type | None, paths: tuple[Path, ...], raw: Any) -> Reading:
-        """What paths of received data are.
+        """Return the values of paths of received data.
 
         Args:
             root: The declared type of the data, or None if the event carries none.
-            paths: What to read.
-            raw: What came, whatever it is.
+            paths: Paths to read.
+            raw: Data as it came, whatever it is.
         """
         datum = _Datum(self, root, raw)
         found = {path: datum.value(path) for path in paths}
@@ -78,8 +78,8 @@ class _Datum:
     """One received datum while it is read.
 
     Attributes:
-        unknown: What was unknown or moved into its range, in words.
-        enum_unknown: Whether an enum fell to its default although an earlier rule was unknown.
+        unknown: Parts that were unknown or moved into their range, in words.
+        enum_unknown: True if an enum fell to its default although an earlier rule was unknown.
     """
 
     def __init__(self, reader: Reader, root: Type | None, raw: Any) -> None:
@@ -100,7 +100,7 @@ class _Datum:
         return self._known[path]
 
     def is_array(self, path: Path) -> bool:
-        """Whether there is an array at a path."""
+        """Return True if there is an array at a path."""
         type_ = self._root
         for step in path:
             type_ = self._reader.step(type_, step)

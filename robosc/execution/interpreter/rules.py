@@ -42,7 +42,7 @@ class UpdateRule:
     function: Function
 
     def assigned(self, value: Value | None) -> Value | None:
-        """What the variable takes, or None if the update is skipped."""
+        """Return the value that the variable takes, or None if the update is skipped."""
         match self.variable.type:
             case IntegerType(low=int(low), high=int(high)):
                 return values.assignable_integer(value, low, high)  # type: ignore[no-any-return]
@@ -52,7 +52,7 @@ class UpdateRule:
                 return value
 
     def leaves_range(self, value: Value | None) -> bool:
-        """Whether a synthesis variable would leave its range."""
+        """Return True if a synthesis variable would leave its range."""
         return self.variable.is_synthesis and value is not None and self.assigned(value) is None
 
 
@@ -71,8 +71,8 @@ class Participant:
 
     Attributes:
         name: The component.
-        may_block: Whether the event is blocked in the states where it writes no transition.
-        transitions: By state: the state's own first, then the behaviour's, each in source order.
+        may_block: True if the event is blocked in the states where it writes no transition.
+        transitions: Transitions by state: the state's own first, then the behaviour's, each in source order.
     """
 
     name: str
@@ -85,11 +85,11 @@ class EventRule:
     """Everything about one event.
 
     Attributes:
-        is_controllable: Whether it is one that the executor takes by itself.
+        is_controllable: True if it is one that the executor takes by itself.
         plant: Service or action that it belongs to, with its moves, or None for a message or tau.
         participants: Components with the event in their alphabet.
-        conditions: What must be true beside plants and ranges.
-        added: What the supervisor adds, or None.
+        conditions: Conditions that must be true beside plants and ranges.
+        added: Condition that the supervisor adds, or None.
         received: Declared type of its data, or None.
         paths: The parts of its data that are converted.
     """
@@ -105,12 +105,12 @@ class EventRule:
 
 @dataclass(frozen=True, slots=True)
 class WhenRule:
-    """Which messages are an incoming message (language B.13).
+    """Rule for the messages that count as an incoming message (language B.13).
 
     Attributes:
         type: Its declared type.
         paths: The parts of a message that are converted.
-        condition: What must be true of them.
+        condition: Condition that must be true of them.
     """
 
     type: Type | None

@@ -24,12 +24,12 @@ from robosc.supervisor.structure import Supervisor
 
 @dataclass(frozen=True, slots=True)
 class _Successor:
-    """Where an event leads.
+    """State that an event leads to.
 
     Attributes:
         state: The new state.
         skipped: Variables whose update was skipped.
-        leaves_range: Whether a synthesis variable would leave its range.
+        leaves_range: True if a synthesis variable would leave its range.
     """
 
     state: dict[Place, Value]
@@ -38,14 +38,14 @@ class _Successor:
 
 
 class InterpretedSystem:
-    """Implements `robosc.execution.protocol.ControlledSystem` for any supervisor.
+    """Implementation of `robosc.execution.protocol.ControlledSystem` for any supervisor.
 
     Args:
-        supervisor: What to interpret.
+        supervisor: Supervisor to interpret.
 
     Attributes:
         description: Its static part.
-        changes: How often the state became another.
+        changes: Number of times that the state became another.
     """
 
     def __init__(self, supervisor: Supervisor) -> None:
@@ -89,7 +89,7 @@ class InterpretedSystem:
         self._state = self._initial
 
     def enabled(self, event: str) -> bool:
-        """Whether a controllable event is allowed now (KeyError if there is no such event)."""
+        """Return True if a controllable event is allowed now (KeyError if there is no such event)."""
         rule = self._events[event]
         state = self._state
         if not all(holds(condition, state) for condition in rule.conditions):
@@ -144,7 +144,7 @@ class InterpretedSystem:
         return True, None
 
     def matches(self, communication: str, data: Any) -> Match:
-        """Whether a message is an incoming message, by its condition `when`."""
+        """Tell whether a message is an incoming message, by its condition `when`."""
         rule = self._when.get(communication)
         if rule is None:
             return MATCHES
@@ -152,11 +152,11 @@ class InterpretedSystem:
         return Match(rule.condition({}, reading.values.get) is True, reading.unknown, reading.enum_unknown)
 
     def requirements(self, communication: str) -> tuple[bool, ...]:
-        """Which requirements on a request hold."""
+        """Return which requirements on a request hold."""
         return tuple(holds(function, self._state) for function in self._requirements[communication])
 
     def conjuncts(self, communication: str) -> tuple[bool, ...]:
-        """Which top-level conjuncts of the requirements on a request hold."""
+        """Return which top-level conjuncts of the requirements on a request hold."""
         return tuple(holds(function, self._state) for function in self._conjuncts[communication])
 
     def location(self, communication: str) -> str:
@@ -182,7 +182,7 @@ class InterpretedSystem:
         return tuple(self._state.values())
 
     def _successor(self, rule: EventRule, data: Data) -> _Successor | None:
-        """Where an event leads from the current state by the plants alone; None if one of them blocks it."""
+        """Return the successor that an event leads to by the plants alone; None if one of them blocks it."""
         old = self._state
         new = dict(old)
         skipped: list[str] = []

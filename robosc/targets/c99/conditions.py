@@ -93,7 +93,7 @@ class Conditions:
         return [head, "{", "    (void)s;", "    (void)holds;", *indent(body), "}"]
 
     def accepted(self, event: str, reading: Reading) -> list[Condition]:
-        """Where the behaviours accept a controllable event, without leaving a range of a synthesis variable."""
+        """Return conditions for behaviours to accept a controllable event and keep synthesis variables in range."""
         return [(words, self._code(item, reading)) for words, item in accepting_conditions(self._model, event)]
 
     def _conditions(self, event: str) -> list[Condition]:
@@ -101,7 +101,7 @@ class Conditions:
         return [*((words, self._code(item, self._reading)) for words, item in found), *self._added_condition(event)]
 
     def _code(self, condition: acceptance.Condition, reading: Reading) -> Code:
-        """Whether a condition holds."""
+        """Return the code that tests whether a condition holds."""
         match condition:
             case InOneOf(automaton=automaton, locations=locations):
                 return in_one_of(reading, automaton, locations)
@@ -114,7 +114,7 @@ class Conditions:
                 return truth(condition, reading.scope)
 
     def _fits(self, code: Code, type_: IntegerType) -> Code:
-        """Whether a value is in a range; an unknown one leaves the variable alone."""
+        """Return the code that tests whether a value is in a range; an unknown one leaves the variable alone."""
         low = MINIMUM_INTEGER if type_.low is None else type_.low
         high = MAXIMUM_INTEGER if type_.high is None else type_.high
         if not code.may_be_unknown and low <= code.low and code.high <= high:
@@ -164,7 +164,7 @@ class Conditions:
         return [*lines, f"    return {branches[-1]};", "}"]
 
     def _is_before(self, node: DecisionNode, end: int) -> str:
-        """Whether the subject's value stands before place `end` of its domain."""
+        """Return the code that tests whether the subject's value stands before place `end` of its domain."""
         domain = self._formulas.domains[node.automaton, node.variable]
         if node.variable is None:
             number = end  # Locations are numbered in the order of their domain.
@@ -176,7 +176,7 @@ class Conditions:
 
 
 def in_one_of(reading: Reading, automaton: str, names: tuple[str, ...]) -> Code:
-    """Whether an automaton is in one of some locations."""
+    """Return the code that tests whether an automaton is in one of some locations."""
     result = FALSE_CODE
     for name in names:
         result = either(result, reading.in_state(automaton, name))

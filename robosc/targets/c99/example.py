@@ -102,14 +102,14 @@ def example_file(unit: Unit) -> str:
 def main_text(
     layout: Layout, subject: str, purpose: str, callbacks: list[str], settings: list[str], period: str
 ) -> str:
-    """The text of a `main.c`.
+    """Return the text of a `main.c`.
 
     Args:
         layout: Names.
-        subject: What the variable is called.
-        purpose: What it is an example of.
+        subject: Name of the variable.
+        purpose: Description of what it is an example of.
         callbacks: Functions, with `{prefix}` in place of the prefix.
-        settings: What is assigned to which callback.
+        settings: Assignments to the callbacks.
         period: Statements of one period.
     """
     text = _MAIN.format(

@@ -41,7 +41,7 @@ from robosc.targets.c99.text import string_literal
 
 
 class Sort(Enum):
-    """What a value is, with the C type that holds it where it may be unknown and the letter of its functions."""
+    """Sort of a value, with the C type that holds it where it may be unknown and the letter of its functions."""
 
     BOOLEAN = ("int", "b", "KLEENE_UNKNOWN")
     INTEGER = ("int64_t", "i", "INT64_MIN")
@@ -61,7 +61,7 @@ class Sort(Enum):
 
     @property
     def unknown(self) -> str:
-        """What stands for unknown."""
+        """Text that stands for unknown."""
         return self.value[2]
 
 
@@ -71,14 +71,14 @@ class Code:
 
     Attributes:
         text: The expression.
-        sort: What it yields.
-        may_be_unknown: Whether it can be unknown.
-        is_atom: Whether it needs no parentheses anywhere.
+        sort: Sort of the value that it yields.
+        may_be_unknown: True if it can be unknown.
+        is_atom: True if it needs no parentheses anywhere.
         operator: `&&` or `||`, if that is outermost.
         low: Least value of an integer.
         high: Greatest value of an integer.
-        is_constant: Whether it is a constant of which there are not two texts.
-        tests: The tests of places against constants that it joins, or is: place, constant, whether they are equal.
+        is_constant: True if it is a constant of which there are not two texts.
+        tests: The tests of places against constants that it joins, or is: place, constant, True if they are equal.
     """
 
     text: str
@@ -103,16 +103,16 @@ FALSE_CODE = Code("false")
 
 @dataclass(frozen=True)
 class Scope:
-    """What names stand for.
+    """Meanings of names.
 
     Attributes:
         variable: Text and type of a variable, given component and variable.
-        in_state: Whether an automaton is in a location.
+        in_state: Code that tests whether an automaton is in a location.
         enum_value: Text of a value of an enum.
         received: The code that reads received data of a path.
         element: The code of a part of a quantifier's element, given level and path.
-        reduction: Writes a reduction.
-        quantifier: Writes a quantifier.
+        reduction: Function that writes a reduction.
+        quantifier: Function that writes a quantifier.
     """
 
     variable: Callable[[str, str], tuple[str, Type]]
@@ -239,7 +239,7 @@ def _alike(left: Code, right: Code) -> tuple[Code, Code]:
 
 
 def truth(expression: Expression, scope: Scope) -> Code:
-    """Whether a boolean expression is true; never unknown."""
+    """Return the code that tests whether a boolean expression is true; never unknown."""
     match expression:
         case Unary(operator="not", operand=operand):
             return falsity(operand, scope)
@@ -257,7 +257,7 @@ def truth(expression: Expression, scope: Scope) -> Code:
 
 
 def falsity(expression: Expression, scope: Scope) -> Code:
-    """Whether a boolean expression is false; never unknown."""
+    """Return the code that tests whether a boolean expression is false; never unknown."""
     match expression:
         case Unary(operator="not", operand=operand):
             return truth(operand, scope)
@@ -281,7 +281,7 @@ def equality(place: str, constant: str, is_equal: bool) -> Code:
 
 
 def _is_decided(operator: str, tests: frozenset[tuple[str, str, bool]]) -> bool:
-    """Whether tests joined by an operator say nothing, as compilers warn: never all true, or always one of them."""
+    """Return True if tests joined by an operator say nothing, as compilers warn: never all true, or always one."""
     # Of a conjunction at most one equality of a place can be true, of a disjunction at most one inequality false.
     told = {(place, constant) for place, constant, is_equal in tests if is_equal is (operator == "&&")}
     others = {(place, constant) for place, constant, is_equal in tests if is_equal is not (operator == "&&")}
@@ -439,7 +439,7 @@ def _kleene_comparison(operator: str, left: Code, right: Code) -> Code:
 
 
 def _comparison_is(operator: str, left: Code, right: Code, wanted: bool) -> Code:
-    """Whether a comparison is `wanted`, with native operators wherever NaN stands for unknown."""
+    """Return a test that a comparison is `wanted`, with native operators wherever NaN stands for unknown."""
     left, right = _alike(left, right)
     wanted_operator = operator if wanted else _OPPOSITE[operator]
     if not left.may_be_unknown and not right.may_be_unknown:
@@ -450,7 +450,7 @@ def _comparison_is(operator: str, left: Code, right: Code, wanted: bool) -> Code
 
 
 def _is(code: Code, wanted: bool) -> Code:
-    """Whether a boolean value is `wanted`."""
+    """Return a test that a boolean value is `wanted`."""
     if not code.may_be_unknown:
         return code if wanted else negated(code)
     return Code(f"{code.atom} == {int(wanted)}", is_atom=False)

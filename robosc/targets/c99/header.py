@@ -133,7 +133,7 @@ def _about(layout: Layout) -> list[str]:
 
 
 def _purpose(layout: Layout) -> str:
-    """What the generated code is, in a few sentences."""
+    """Return a description of the generated code, in a few sentences."""
     owned = f"No allocation, no recursion, no global variable: everything is in one {layout.prefix}_t"
     if layout.is_layer:
         return (

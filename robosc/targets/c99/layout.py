@@ -1,4 +1,4 @@
-"""What everything of a model is called in C, and which C type holds it."""
+"""Names of everything of a model in C, and the C types that hold it."""
 
 from dataclasses import dataclass, field
 
@@ -49,7 +49,7 @@ class Layout:
     """Names of one generated unit.
 
     Attributes:
-        supervisor: What is generated.
+        supervisor: Supervisor that is generated.
         prefix: Beginning of every global name.
         description: Its static part, as every executor knows it.
         events: Enumerator of each event.
@@ -90,7 +90,7 @@ class Layout:
 
     @property
     def is_layer(self) -> bool:
-        """Whether a supervision layer is generated, not a controller."""
+        """True if a supervision layer is generated, not a controller."""
         return self.supervisor.deployment is Deployment.LAYER
 
     @property
@@ -170,7 +170,7 @@ class Layout:
         return self._types[key]
 
     def is_by_pointer(self, type_: Type) -> bool:
-        """Whether received data of a type is handed over by its address."""
+        """Return True if received data of a type is handed over by its address."""
         if isinstance(type_, EnumType):
             return self.is_by_pointer(self.model.enum(type_.name).source)
         return isinstance(type_, ObjectType | ArrayType)
@@ -183,7 +183,7 @@ class Layout:
         return f"{raw}{'' if raw.endswith('*') else ' '}{name}"
 
     def source(self, type_: Type) -> Type:
-        """What received data of a type comes as: an enum's source, else the type itself."""
+        """Return the type as which received data of a type comes: an enum's source, else the type itself."""
         return self.model.enum(type_.name).source if isinstance(type_, EnumType) else type_
 
 
@@ -244,7 +244,10 @@ def _name_state(layout: Layout) -> None:
 
 
 def possible_messages(model: Model, identifier: str) -> tuple[Communication, ...]:
-    """What a message on an identifier may be in a supervision layer: up to the first that needs no condition."""
+    """Return the communications that a message on an identifier may be in a supervision layer.
+
+    They go up to the first that needs no condition.
+    """
     found = []
     for item in model.communications:
         if item.kind is CommunicationKind.INCOMING_MESSAGE and item.identifier == identifier:

@@ -103,7 +103,7 @@ def _refuse(supervisor: Supervisor) -> None:
 
 
 def _takes_received(model: Model, component: str, variable: str) -> bool:
-    """Whether an update of a text reads received data."""
+    """Return True if an update of a text reads received data."""
     behaviour = model.component(component).behaviour
     return behaviour is not None and any(
         isinstance(leaf, Received) and _is_text(model, transition.event, leaf)
@@ -115,7 +115,7 @@ def _takes_received(model: Model, component: str, variable: str) -> bool:
 
 
 def _is_text(model: Model, event: str, leaf: Received) -> bool:
-    """Whether a part of an event's data is a text."""
+    """Return True if a part of an event's data is a text."""
     data = event_data(model, event)
     return data is not None and isinstance(path_type(model, data, leaf.path), StringType)
 

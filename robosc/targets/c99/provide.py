@@ -21,7 +21,7 @@ from robosc.targets.words import provide_text
 
 @dataclass
 class Field:
-    """What provide statements give of one datum.
+    """Parts of one datum that provide statements give.
 
     Attributes:
         type: Its declared type.

@@ -30,12 +30,12 @@ _ARITHMETIC = frozenset({"+", "-", "*", "/"})
 
 @dataclass
 class Reader:
-    """Writes declarations that read paths of one received datum; each path is read once.
+    """Writer of declarations that read paths of one received datum; each path is read once.
 
     Attributes:
         unit: The file.
         root: Type of the datum.
-        lvalue: Where it is.
+        lvalue: Place of the datum.
         notes: Text of the address of what is noted.
     """
 
@@ -156,7 +156,7 @@ def _declared_and_used(reader: Reader) -> list[str]:
 
 
 def _may_be_unknown(condition: Expression) -> bool:
-    """Whether a condition reads received data or computes: even constants can leave 32 bits."""
+    """Return True if a condition reads received data or computes: even constants can leave 32 bits."""
     stack = [condition]
     while stack:
         node = stack.pop()

@@ -66,12 +66,12 @@ def _called(functions: dict[str, str], text: str) -> set[str]:
 
 
 def _never_taken(layout: Layout, event: str) -> bool:
-    """Whether an event is a tau that would change nothing in any state."""
+    """Return True if an event is a tau that would change nothing in any state."""
     return is_tau(event) and event not in layout.description.taus
 
 
 def _happens(layout: Layout, event: str) -> bool:
-    """Whether the environment causes an event otherwise than by an error."""
+    """Return True if the environment causes an event otherwise than by an error."""
     return not is_controllable(event) and split(event)[1] != EventKind.ERROR
 
 
@@ -220,7 +220,7 @@ def _switch(head_: str, subject: str, cases: list[tuple[str, str]], default: str
 
 
 def _dispatchers(layout: Layout) -> list[list[str]]:
-    """What the engine asks of the model."""
+    """Return the functions through which the engine asks the model."""
     prefix, function, events = layout.prefix, layout.function, layout.events
     result = [_initial(layout), _same(layout), _model_settings(layout)]
     allowed = [(events[event], f"return {function('allows', event)}(s);") for event in layout.controllable]
@@ -360,7 +360,7 @@ def _same(layout: Layout) -> list[str]:
 
 
 def _model_settings(layout: Layout) -> list[str]:
-    """What the model itself says about the deployment."""
+    """Return the function that sets what the model itself says about the deployment."""
     lines = [f"static void set_model_settings({layout.prefix}_settings_t *settings)", "{", "    (void)settings;"]
     for item in layout.of_kind(CommunicationKind.OUTGOING_MESSAGE):
         if item.max_age is not None:

@@ -161,7 +161,7 @@ class Stepper:
         return f"s->{layout.locations[automaton]} = {layout.location_names[automaton, target]};"
 
     def _block(self, component: str, behaviour: Behaviour, branches: list[Branch]) -> list[str]:
-        """What one component does."""
+        """Return the statements of what one component does."""
         lines: list[str] = []
         for states, transition in branches:
             body = self._transition(component, behaviour, states, transition)

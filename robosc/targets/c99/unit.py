@@ -1,4 +1,4 @@
-"""What all parts of one generated C file share, and how expressions in it are read."""
+"""Things that all parts of one generated C file share, and the reading of expressions in it."""
 
 import re
 from collections.abc import Callable
@@ -70,7 +70,7 @@ class Unit:
         return code_for(lvalue, type_, True)
 
     def access(self, lvalue: str, type_: Type, path: Path) -> tuple[list[str], str, Type]:
-        """What must hold for a part of received data to be there, its place and its type."""
+        """Return the conditions for a part of received data to be there, its place and its type."""
         guards = []
         for step in path:
             if isinstance(step, int):
@@ -99,7 +99,7 @@ def member(lvalue: str, name: str) -> str:
 
 
 def address(lvalue: str) -> str:
-    """Where something is."""
+    """Return the address of something."""
     found = re.fullmatch(r"\(\*(\w+)\)", lvalue)
     return found.group(1) if found else f"&{lvalue}"
 
@@ -129,7 +129,7 @@ def _no_type(path: Path) -> Type:
 
 @dataclass(frozen=True)
 class Reading:
-    """How expressions are read at one place of the generated code.
+    """Reading of expressions at one place of the generated code.
 
     Attributes:
         unit: The file.
@@ -164,7 +164,7 @@ class Reading:
         return f"{self.base}{attribute}", type_
 
     def in_state(self, automaton: str, state: str) -> Code:
-        """Whether an automaton is in a location."""
+        """Return the code that tests whether an automaton is in a location."""
         if automaton not in self.unit.layout.locations:
             return TRUE_CODE  # A message's plant has one location.
         return equality(self.location(automaton), self.unit.layout.location_names[automaton, state], True)
@@ -193,7 +193,7 @@ class Reading:
         return text, type_
 
     def _loop(self, part: ArrayPart) -> tuple[str, str]:
-        """How many elements are looked at, and the place of the one with number `k`."""
+        """Return the number of elements that are looked at, and the place of the one with number `k`."""
         if part.low is None or part.high is None:
             return "array->length", "k"
         bounds = f"array->length, {part.low}U"

@@ -106,8 +106,8 @@ class _Translation:
     Its methods return None for a number that CIF cannot compute: a double, or more than 32 bits.
 
     Attributes:
-        reader: Writes down what is read.
-        place: Where the expression stands.
+        reader: Writer of what is read.
+        place: Place of the expression.
         root: The expression.
     """
 
@@ -247,7 +247,7 @@ class _Translation:
 
     def _conditional(self, test: Predicate, then: Result | None, otherwise: Result | None) -> Result | None:
         def branches(first: Text, second: Text) -> Text:
-            """Where the condition chooses something that has a property."""
+            """Return the condition under which the choice is something that has a property."""
             if test.false is not None or TRUE in (first, second) or FALSE in (first, second):
                 _require_short([test.true, test.is_false], MAXIMUM_REPEATED, self)
                 if test.false is None and first == TRUE:
@@ -334,7 +334,7 @@ class _Translation:
 
 
 def _same_symbol(left: Text, right: Text, reader: Reader) -> Text:
-    """Whether two values of one enum are equal."""
+    """Return the condition that two values of one enum are equal."""
     if left == right:
         return TRUE
     if reader.is_literal(left) and reader.is_literal(right):

@@ -120,7 +120,7 @@ class _Writer:
         return has_action and self._supervisor.deployment is Deployment.LAYER
 
     def _common_lines(self) -> Iterator[str]:
-        """What both files have: the table, enums and plants."""
+        """Yield the lines that both files have: the table, enums and plants."""
         yield from self._table()
         yield ""
         yield from self._plant_lines()

@@ -11,8 +11,8 @@ class Predicate:
     """A condition.
 
     Attributes:
-        true: Where it is true.
-        false: Where it is false; None if that is wherever it is not true.
+        true: Text that holds where the condition is true.
+        false: Text that holds where the condition is false; None if that is wherever it is not true.
     """
 
     true: Text
@@ -20,12 +20,12 @@ class Predicate:
 
     @property
     def is_false(self) -> Text:
-        """Where it is false."""
+        """Text that holds where it is false."""
         return negated(self.true) if self.false is None else self.false
 
     @property
     def known(self) -> Text:
-        """Where it is known."""
+        """Text that holds where it is known."""
         return TRUE if self.false is None else any_of([self.true, self.false])
 
 
@@ -54,7 +54,7 @@ def implication(left: Predicate, right: Predicate) -> Predicate:
 
 
 def same_truth(left: Predicate, right: Predicate) -> Predicate:
-    """Whether two conditions are equal."""
+    """Return the condition that two conditions are equal."""
     if left.false is None and right.false is None:
         return Predicate(equivalent(left.true, right.true))
     pairs = (left.true, right.true), (left.is_false, right.is_false)

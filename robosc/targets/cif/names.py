@@ -39,10 +39,10 @@ Array = tuple[PathStep, ...]
 
 @dataclass(frozen=True, slots=True)
 class Presence:
-    """How many of the elements that synthesis reads an array has.
+    """Number of elements that an array has, of those that synthesis reads.
 
     Attributes:
-        name: Local name of the input that tells it.
+        name: Local name of the input that reports it.
         event: The event that carries the array.
         array: Its path.
         indices: The indices that are read, ascending; the element at `indices[n]` is there if the input exceeds n.
@@ -80,7 +80,7 @@ class Names:
     Attributes:
         enums: CIF name of each enum type that synthesis uses, by name.
         plants: CIF name of each automaton; the data plant of communication m is called `data m` here.
-        presences: How many elements arrays have, by event and array.
+        presences: Number of elements that arrays have, by event and array.
     """
 
     def __init__(self, model: Model, system: System) -> None:
@@ -120,13 +120,13 @@ class Names:
         return _Space([self._top.used, *locals_], set()).take(f"bdd_{number}")
 
     def reference(self, automaton: str, name: str, here: str | None) -> str:
-        """How something of an automaton is called in the automaton `here`, or outside all of them."""
+        """Return the name of something of an automaton in the automaton `here`, or outside all of them."""
         if automaton == here:
             return escaped(name)
         return f"{escaped(self.plants[automaton])}.{escaped(name)}"
 
     def event_reference(self, event: str, here: str | None) -> str:
-        """How an event is called in the automaton `here`, or outside all of them."""
+        """Return the name of an event in the automaton `here`, or outside all of them."""
         return self.reference(self._owners[event], self.events[event], here)
 
     def _event(self, event: Event) -> str:
@@ -178,12 +178,12 @@ class Names:
 
 
 def data_plant(communication: str) -> str:
-    """What the data plant of a communication is called among the automata."""
+    """Return the name of the data plant of a communication among the automata."""
     return f"{_DATA} {communication}"
 
 
 def shift(type_: Type) -> int:
-    """What is added to a variable's value to get the one that CIF stores: a negative range starts at 0 there."""
+    """Return the offset of a variable's value to get the one that CIF stores: a negative range starts at 0 there."""
     return -type_.low if isinstance(type_, IntegerType) and type_.low is not None and type_.low < 0 else 0
 
 

@@ -17,10 +17,10 @@ class Term:
     """A multiple of something.
 
     Attributes:
-        atom: What, as CIF text.
+        atom: The thing, as CIF text.
         low: Its least value.
         high: Its greatest value.
-        factor: How many times.
+        factor: Number of times that it is taken.
     """
 
     atom: Text
@@ -48,8 +48,8 @@ class Number:
 
     Attributes:
         terms: The terms, each atom once.
-        constant: What is added to them.
-        known: Where the number is known; elsewhere the sum means nothing.
+        constant: Constant that is added to them.
+        known: Text that holds where the number is known; elsewhere the sum means nothing.
     """
 
     terms: tuple[Term, ...]
@@ -80,7 +80,7 @@ def scaled(number: Number, factor: int, known: Text) -> Number:
 
 
 def fits(number: Number) -> bool:
-    """Whether neither its value nor a sum on the way to it can exceed 32 bits."""
+    """Return True if neither its value nor a sum on the way to it can exceed 32 bits."""
     furthest = abs(number.constant) + sum(max(map(abs, term.bounds)) for term in number.terms)
     low, high = number.bounds
     return furthest <= MAXIMUM_INTEGER and low >= MINIMUM_INTEGER and high <= MAXIMUM_INTEGER
@@ -119,7 +119,7 @@ def comparison(operator: str, left: Number, right: Number) -> Text:
 
 
 def _decided(operator: str, low: int, high: int) -> bool | None:
-    """What a comparison of something between `low` and `high` with 0 always is, or None if it depends."""
+    """Return the constant outcome of comparing something from `low` to `high` with 0, or None if it depends."""
     match operator:
         case "<":
             return True if high < 0 else False if low >= 0 else None

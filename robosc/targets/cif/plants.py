@@ -91,7 +91,7 @@ class Plants:
         yield "end"
 
     def data_guard(self, communication: str, number: int) -> Text:
-        """Where a provide statement of a communication applies, counted from 0."""
+        """Return the condition that a provide statement of a communication, counted from 0, applies."""
         condition = self._model.provides_for(communication)[number].condition
         if condition is None:
             return TRUE
@@ -171,7 +171,7 @@ class Plants:
         )
 
     def guard(self, automaton: Automaton, edge: Edge, *, is_outside: bool = False) -> Text:
-        """Where an edge of the current location can be taken."""
+        """Return the condition that an edge of the current location can be taken."""
         place = Place(f"the guard of {edge.event}", None if is_outside else automaton.name)
         return self._translator.predicate(edge.guard, place).true
 
@@ -191,7 +191,10 @@ class Plants:
         return f"{name} := {value}"
 
     def range_condition(self, automaton: Automaton, edge: Edge) -> Text:
-        """Where an edge leaves no variable's range, outside all automata; for events that carry no data."""
+        """Return the condition that an edge leaves no variable's range, outside all automata.
+
+        It is for events that carry no data.
+        """
         found = []
         for update in edge.updates:
             type_ = self._types[automaton.name, update.variable]
@@ -244,7 +247,7 @@ def _number_update(number: Number, type_: Type, old: Text, place: Place) -> Text
 
 
 def _is_apart(number: Number, type_: Type) -> bool:
-    """Whether a number is always outside a range."""
+    """Return True if a number is always outside a range."""
     low, high = number.bounds
     return isinstance(type_, IntegerType) and (
         (type_.low is not None and high < type_.low) or (type_.high is not None and low > type_.high)

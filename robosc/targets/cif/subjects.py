@@ -1,4 +1,4 @@
-"""What expressions of a synthesis problem read, as CIF text: locations, variables, received data."""
+"""Sources that expressions of a synthesis problem read, as CIF text: locations, variables, received data."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -23,10 +23,10 @@ from robosc.targets.cif.text import TRUE, Text, all_of, any_of, compared, escape
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where an expression stands.
+    """Place of an expression.
 
     Attributes:
-        what: In words, for messages, e.g. `the guard of Base.tau_1`.
+        what: Description in words, for messages, e.g. `the guard of Base.tau_1`.
         automaton: The automaton around it, or None outside all of them.
         event: The event whose data it may read, or None.
     """
@@ -37,7 +37,7 @@ class Place:
 
 
 Source = Subject | InputVariable
-"""What a leaf of an expression reads."""
+"""Source that a leaf of an expression reads."""
 
 
 class Reader:
@@ -65,7 +65,7 @@ class Reader:
         self._locations = {automaton.name: automaton.locations for automaton in system.automata}
 
     def source(self, leaf: VariableRead | StateTest | Received, place: Place) -> Source:
-        """What a leaf reads."""
+        """Return the source that a leaf reads."""
         match leaf:
             case VariableRead(component=automaton, variable=variable):
                 return Subject(automaton, variable)
@@ -96,13 +96,16 @@ class Reader:
         return Text(self.names.reference(owner, name, place.automaton))
 
     def location(self, automaton: str, location: str, place: Place) -> Text:
-        """Whether an automaton is in a location."""
+        """Return the condition that an automaton is in a location."""
         if len(self._locations[automaton]) == 1:
             return TRUE
         return Text(self.names.reference(automaton, self.names.locations[automaton, location], place.automaton))
 
     def known(self, source: Source, place: Place) -> Text:
-        """Where what is read is known: an element is, if each index on its path lies inside its array."""
+        """Return the condition that a source is known.
+
+        An element is known if each index on its path lies inside its array.
+        """
         if not isinstance(source, InputVariable) or not source.may_be_unknown:
             return TRUE
         tests = []
@@ -125,11 +128,11 @@ class Reader:
         return Text(escaped(self.names.literals[enum, value]))
 
     def is_literal(self, text: Text) -> bool:
-        """Whether a text is a value of an enum."""
+        """Return True if a text is a value of an enum."""
         return text.text in self._literals
 
     def test(self, source: Source, runs: Iterable[range], place: Place) -> Text:
-        """Whether what is read is one of the values with some indices (in runs, ascending, apart)."""
+        """Return the condition that a source has one of the values with some indices (in runs, ascending, apart)."""
         values = self.values(source)
         runs = list(runs)
         if sum(map(len, runs)) == len(values):

@@ -70,14 +70,14 @@ class Diagrams:
 def supervisor_lines(
     supervisor: Supervisor, system: System, plants: Plants, translator: Translator, requirements: dict[str, Text]
 ) -> Iterator[str]:
-    """The supervisor automaton, behind the algebraic variables that it needs.
+    """Yield the lines of the supervisor automaton, behind the algebraic variables that it needs.
 
     Args:
         supervisor: The supervisor.
         system: Its plants and requirements.
-        plants: Writes the plants.
-        translator: Writes expressions.
-        requirements: What the requirements ask of each event, of those that they ask anything of.
+        plants: Writer of the plants.
+        translator: Writer of expressions.
+        requirements: Condition of the requirements for each event, of those on which there are any.
     """
     names, diagrams = translator.reader.names, Diagrams(system, translator)
     loops: list[str] = []
@@ -124,7 +124,7 @@ def _alphabet(events: list[str]) -> Iterator[str]:
 
 
 def _ranges(system: System, plants: Plants, event: str) -> Iterator[Text]:
-    """Where an event leaves no range."""
+    """Yield the conditions that an event leaves no range."""
     for automaton in system.automata:
         for edge in automaton.edges:
             if edge.event == event and edge.updates:

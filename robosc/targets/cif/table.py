@@ -74,5 +74,5 @@ def _steps(path: tuple[PathStep, ...]) -> str:
 
 
 def _less(type_: Type) -> str:
-    """How to get a value back from the one that CIF stores."""
+    """Return the words on getting a value back from the one that CIF stores."""
     return f", the value is {shift(type_)} less" if shift(type_) else ""

@@ -33,7 +33,7 @@ class TableTooLargeError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class _Choice:
-    """What an expression is, by the value of one thing that it reads.
+    """Result of an expression, by the value of one thing that it reads.
 
     Attributes:
         source: The thing.
@@ -52,8 +52,8 @@ class Table:
     """The value of an expression for every value of what it reads.
 
     Attributes:
-        reader: Writes down what is read.
-        place: Where the expression stands.
+        reader: Writer of what is read.
+        place: Place of the expression.
         result: The decision.
     """
 
@@ -73,7 +73,7 @@ class Table:
         return found
 
     def where(self, wanted: Callable[[Value | None], bool]) -> Text:
-        """Where the expression has one of some values."""
+        """Return the condition that the expression has one of some values."""
         return self._where(self.result, wanted)
 
     def number(self) -> Number:
@@ -117,11 +117,11 @@ def _merged(runs: list[range]) -> list[range]:
 
 @dataclass(slots=True)
 class _Builder:
-    """Builds a decision bottom-up.
+    """Builder of a decision, bottom-up.
 
     Attributes:
-        sources: What is read.
-        domains: Its values.
+        sources: Sources that are read.
+        domains: Their values.
         values: Results of all combinations, the last source changing fastest.
         cases: Runs of values told apart so far.
     """

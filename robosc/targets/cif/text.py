@@ -47,7 +47,7 @@ def shortened(text: str) -> str:
 
 
 class Level(IntEnum):
-    """How tightly the outermost operator of a text binds."""
+    """Binding strength of the outermost operator of a text."""
 
     IMPLICATION = 0
     OR = 1
@@ -65,9 +65,9 @@ class Text:
 
     Attributes:
         text: The text.
-        level: How tightly it binds.
-        parts: Of a conjunction or disjunction, what it joins.
-        opposite: Of a comparison, the text of its negation.
+        level: Binding strength of the text.
+        parts: Parts that a conjunction or disjunction joins.
+        opposite: Text of the negation of a comparison.
     """
 
     text: str
@@ -144,7 +144,7 @@ def implied(condition: Text, result: Text) -> Text:
 
 
 def equivalent(left: Text, right: Text) -> Text:
-    """Whether two predicates are equal."""
+    """Return the condition that two predicates are equal."""
     if TRUE in (left, right):
         return right if left == TRUE else left
     if FALSE in (left, right):

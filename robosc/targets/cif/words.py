@@ -26,7 +26,7 @@ def _data_text(value: ProvidedValue) -> str:
 
 
 def _is_shallow(expression: Expression) -> bool:
-    """Whether an expression is shallow enough to be gone down recursively."""
+    """Return True if an expression is shallow enough to be gone down recursively."""
     level = [expression]
     for _ in range(_MAXIMUM_DEPTH):
         level = [child for node in level for child in children(node)]

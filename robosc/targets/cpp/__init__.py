@@ -1,1 +1,1 @@
-"""What the C++ nodes share, whatever their middleware: around the supervisor in C99, tables and conversions."""
+"""Common parts of the C++ nodes, whatever their middleware: around the supervisor in C99, tables and conversions."""

@@ -248,7 +248,7 @@ class Writer:
         )
 
     def _checks(self, type_: Type, place: str, path: tuple[str, ...]) -> list[str]:
-        """That the message has every field that the model declares, of a fitting type."""
+        """Return the checks that the message has every field that the model declares, of a fitting type."""
         if isinstance(type_, NoneType):
             return []
         if not path and not isinstance(type_, ObjectType):

@@ -45,7 +45,7 @@ _OWN_TYPES = (_DIAGNOSTICS, Interface("String", "std_msgs"))
 
 @dataclass(frozen=True, slots=True)
 class Middleware:
-    """What a target says about its middleware.
+    """Description of a target's middleware.
 
     Attributes:
         target: Name of the target.
@@ -124,7 +124,7 @@ def _context(
     options: GenerateOptions,
     middleware: Middleware,
 ) -> dict[str, object]:
-    """What the templates speak of."""
+    """Return the values that the templates refer to."""
     model, layout = supervisor.model, unit.layout
     released = release_identifiers(found)
     types = [("msg", topic.interface) for topic in found]

@@ -55,7 +55,7 @@ class Truth:
 
     @property
     def false(self) -> str:
-        """Where it is false."""
+        """Text that holds where it is false."""
         return negated(self.true) if self.false_text is None else self.false_text
 
 
@@ -97,11 +97,11 @@ class Translator:
         self._data = data or {}
 
     def condition(self, expression: Expression) -> str:
-        """Where a condition is true (not unknown)."""
+        """Return the text that holds where a condition is true (not unknown)."""
         return self._truth(expression).true
 
     def value(self, expression: Expression, type_: Type) -> Number:
-        """What an update writes: 0 or 1, an integer, or the index of an enum's value."""
+        """Return the number that an update writes: 0 or 1, an integer, or the index of an enum's value."""
         if isinstance(type_, BooleanType):
             truth = self._truth(expression)
             known = None if truth.false_text is None else any_of([truth.true, truth.false])
@@ -321,7 +321,7 @@ class Translator:
 
 
 def index_of(value: Value | None, type_: Type) -> int:
-    """What stands for a value in Promela: an integer itself, 0 or 1, or the place of an enum's value."""
+    """Return the number for a value in Promela: an integer itself, 0 or 1, or the place of an enum's value."""
     return type_.values.index(str(value)) if isinstance(type_, EnumType) else int(value or 0)
 
 

@@ -22,11 +22,11 @@ from robosc.targets.promela.names import Names
 
 
 def promela_model(system: System, added: Sequence[AddedCondition]) -> str:
-    """The text of the model.
+    """Return the text of the model.
 
     Args:
         system: Plants and event conditions.
-        added: What the supervisor adds.
+        added: Conditions that the supervisor adds.
 
     Raises:
         UnsupportedModelError: A condition becomes too large, or a controllable event carries data.
@@ -39,7 +39,7 @@ class _Choice:
     """A number that the environment chooses.
 
     Attributes:
-        name: What holds it.
+        name: Name of what holds it.
         low: The least one.
         high: The greatest one.
     """
@@ -128,7 +128,7 @@ class _Writer:
     # Steps
 
     def _option(self, event: Event) -> Iterator[str]:
-        """What happens at one event, as an option of the selection."""
+        """Yield the lines of what happens at one event, as an option of the selection."""
         participants = [item for item in self._system.automata if event.name in item.alphabet]
         # An event in no alphabet belongs to no plant, so it cannot happen.
         if not participants:
@@ -162,13 +162,13 @@ class _Writer:
             yield from (item for item in self._system.conditions if item.event == event.name)
 
     def _taken(self, edge: Edge, automaton: Automaton) -> str:
-        """Where an edge can be taken."""
+        """Return the condition that an edge can be taken."""
         location = self._names.locations[automaton.name, edge.source]
         place = "true" if Subject(automaton.name) not in self._names.places else location
         return all_of([place, self._translator.condition(edge.guard)])
 
     def _in_range(self, edge: Edge, automaton: Automaton) -> Iterator[str]:
-        """Where an edge, if it is taken, keeps every variable that it writes in its range."""
+        """Yield the conditions that an edge, if it is taken, keeps every variable that it writes in its range."""
         for update in edge.updates:
             type_ = subject_type(self._system, Subject(automaton.name, update.variable))
             number = self._translator.value(update.expression, type_)
@@ -178,7 +178,7 @@ class _Writer:
                 yield negated(leaves)
 
     def _data(self, event: Event, edges: Sequence[Edge]) -> tuple[list[_Choice], dict[Path, Datum]]:
-        """What the environment chooses at an event, and the received data that this makes."""
+        """Return the choices of the environment at an event, and the received data that these make."""
         paths = {path for edge in edges for update in edge.updates for path in paths_read(update.expression)}
         inputs = [item for item in self._system.inputs if item.event == event.name and item.path in paths]
         if inputs and event.is_controllable:
@@ -237,7 +237,7 @@ class _Writer:
     def _writes(
         self, event: Event, automaton: Automaton, edge: Edge, translator: Translator
     ) -> Iterator[tuple[Subject, list[str]]]:
-        """What an edge changes: each place with the statements that say what it is next."""
+        """Yield the changes of an edge: each place with the statements that set its next value."""
         if edge.target != edge.source:
             subject = Subject(automaton.name)
             yield subject, [f"{self._next[subject]} = {automaton.locations.index(edge.target)};"]
@@ -284,7 +284,7 @@ class _Writer:
         return names, ["d_step {", *lines, *(f"  {name} = 0;" for name in names), "}"]
 
     def _branches(self, node: DecisionNode, built: Sequence[str]) -> str:
-        """Which node follows a decision, by the index of what it tests."""
+        """Return the expression of the node that follows a decision, by the index of what it tests."""
         subject = Subject(node.automaton, node.variable)
         name = self._names.places.get(subject, "0")
         low = 0 if node.variable is None else _range(subject_type(self._system, subject))[0]
@@ -314,7 +314,7 @@ def _range(type_: Type) -> tuple[int, int]:
 
 
 def _outside(text: str, low: int, high: int, type_: Type) -> str:
-    """Where a number that lies between two bounds is out of a type's range; `false` where it never is."""
+    """Return the condition that a number between two bounds is out of a type's range; `false` where it never is."""
     if not isinstance(type_, IntegerType):
         return "false"
     least, most = _range(type_)

@@ -14,10 +14,10 @@ class Names:
         system: The system.
 
     Attributes:
-        places: What holds each place of a state; locations of automata that have only one are missing.
+        places: Name of what holds each place of a state; locations of automata that have only one are missing.
         locations: Predicates that tell whether an automaton is in a location.
         values: Names for the values of enums, by enum and value.
-        numbers: What stands for a value of an enum, by its name here.
+        numbers: Number that stands for a value of an enum, by its name here.
     """
 
     def __init__(self, system: System) -> None:

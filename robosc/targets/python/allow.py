@@ -73,7 +73,7 @@ def _return_all(conditions: list[Condition]) -> list[str]:
 
 
 def accepted(writer: Writer, event: str) -> list[Condition]:
-    """Where the behaviours accept a controllable event, without leaving a range of a synthesis variable."""
+    """Return the conditions for behaviours to accept a controllable event and keep synthesis variables in range."""
     return [(words, _code(writer, item)) for words, item in accepting_conditions(writer.model, event)]
 
 
@@ -83,7 +83,7 @@ def _conditions(writer: Writer, event: str) -> list[Condition]:
 
 
 def _code(writer: Writer, condition: acceptance.Condition) -> Code:
-    """Whether a condition holds."""
+    """Return the code that tests whether a condition holds."""
     match condition:
         case InOneOf(automaton=automaton, locations=locations):
             return _in_one_of(writer, automaton, locations)
@@ -103,7 +103,7 @@ def _in_one_of(writer: Writer, automaton: str, names: tuple[str, ...]) -> Code:
 
 
 def _fits(writer: Writer, type_: IntegerType, expression: Expression) -> Code:
-    """Whether an update keeps a synthesis variable in its range; an unknown value leaves the variable alone."""
+    """Return code for whether an update keeps a synthesis variable in range; an unknown value leaves it alone."""
     low, high = type_.low, type_.high
     code = value(expression, writer.scope)
     if low is None or high is None:

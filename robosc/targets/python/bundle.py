@@ -21,7 +21,7 @@ class _Module:
         title: Its docstring's lines.
         imports: (module, name) of what it imports from elsewhere; the name is None for a whole module.
         needs: The own modules that it imports from.
-        names: What it defines at its top level.
+        names: Names that it defines at its top level.
         body: Its text without docstring and imports.
     """
 
@@ -40,7 +40,7 @@ class Bundle:
     Attributes:
         imports: Statements that import what they need from Python's library, sorted.
         sections: Name, title and text of each module, each after those that it needs.
-        names: What they define.
+        names: Names that they define.
     """
 
     imports: tuple[str, ...]

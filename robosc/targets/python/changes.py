@@ -39,7 +39,7 @@ def _name(lines: Sequence[str]) -> str:
 
 
 def _read(method: str, named: dict[str, set[str]]) -> set[str]:
-    """What a method reads, and all that it calls."""
+    """Return the names that a method and all methods that it calls read."""
     seen: set[str] = set()
     to_do = [method]
     while to_do:

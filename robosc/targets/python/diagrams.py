@@ -69,7 +69,7 @@ class Diagrams:
 
 
 def _test(subject: str, values: Sequence[Value], start: int, end: int) -> str:
-    """Whether the subject has one of `values[start:end]`, all earlier ones being excluded already."""
+    """Return a test that the subject has one of `values[start:end]`, all earlier ones being excluded already."""
     if isinstance(values[0], bool):
         return f"not {subject}" if not values[end - 1] else subject
     if isinstance(values[0], int):

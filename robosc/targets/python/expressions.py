@@ -44,7 +44,7 @@ from robosc.targets.arithmetic import arithmetic_bounds, is_safe_divisor
 
 
 class Precedence(Enum):
-    """How tightly a piece of Python binds; a larger number binds tighter."""
+    """Binding strength of a piece of Python; a larger number binds tighter."""
 
     OR = 1
     AND = 2
@@ -57,7 +57,7 @@ class Precedence(Enum):
 
 
 class Unknown(Enum):
-    """How a value can be unknown at run time."""
+    """Way in which a value can be unknown at run time."""
 
     NEVER = "never"
     NAN = "as NaN"
@@ -65,7 +65,7 @@ class Unknown(Enum):
 
 
 class Sort(Enum):
-    """What a value is, as far as the choice of operators goes."""
+    """Sort of a value, as far as the choice of operators goes."""
 
     BOOLEAN = "boolean"
     INTEGER = "integer"
@@ -79,9 +79,9 @@ class Code:
 
     Attributes:
         text: The expression.
-        precedence: Of its outermost operator.
-        sort: What it yields.
-        unknown: How it can be unknown.
+        precedence: Precedence of its outermost operator.
+        sort: Sort of the value that it yields.
+        unknown: Way in which it can be unknown.
         low: Least value of an integer.
         high: Greatest value of an integer.
     """
@@ -99,19 +99,19 @@ class Code:
 
     @property
     def is_number(self) -> bool:
-        """Whether it is an integer or a double."""
+        """True if it is an integer or a double."""
         return self.sort in (Sort.INTEGER, Sort.DOUBLE)
 
 
 @dataclass(frozen=True, slots=True)
 class Scope:
-    """What names stand for in the generated code.
+    """Meanings of names in the generated code.
 
     Attributes:
         variable: Text and type of a variable, given component and variable.
         location: Text of an automaton's current location.
         received: The code that reads received data of a path.
-        used: Called with the name of each function of `values` that the code needs.
+        used: Function called with the name of each function of `values` that the code needs.
         received_type: The type of received data of a path.
         type_below: The type of a part of a type.
         elements: Local name and type of what the quantifiers around look at, the innermost first.
@@ -281,7 +281,7 @@ def _quantifier(expression: Quantifier, scope: Scope) -> Code:
 
 
 def truth(expression: Expression, scope: Scope) -> Code:
-    """Whether a boolean expression is true; never unknown."""
+    """Return the code that tests whether a boolean expression is true; never unknown."""
     match expression:
         case Unary(operator="not", operand=operand):
             return falsity(operand, scope)
@@ -299,7 +299,7 @@ def truth(expression: Expression, scope: Scope) -> Code:
 
 
 def falsity(expression: Expression, scope: Scope) -> Code:
-    """Whether a boolean expression is false; never unknown."""
+    """Return the code that tests whether a boolean expression is false; never unknown."""
     match expression:
         case Unary(operator="not", operand=operand):
             return truth(operand, scope)
@@ -420,7 +420,7 @@ def _compare(operator: str, left: Code, right: Code) -> Code:
 
 
 def _comparison_is(operator: str, left: Code, right: Code, wanted: bool, scope: Scope) -> Code:
-    """Whether a comparison is `wanted`, with native operators wherever NaN stands for unknown."""
+    """Return a test that a comparison is `wanted`, with native operators wherever NaN stands for unknown."""
     wanted_operator = operator if wanted else _OPPOSITE[operator]
     if Unknown.NEVER is left.unknown is right.unknown:
         return _compare(_NATIVE[wanted_operator], left, right)
@@ -432,7 +432,7 @@ def _comparison_is(operator: str, left: Code, right: Code, wanted: bool, scope: 
 
 
 def _is(code: Code, wanted: bool) -> Code:
-    """Whether a boolean value is `wanted`."""
+    """Return a test that a boolean value is `wanted`."""
     if code.unknown is Unknown.NEVER:
         return code if wanted else negated(code)
     return Code(f"{code.within(Precedence.SUM)} is {wanted}", Precedence.COMPARISON)

@@ -46,11 +46,11 @@ RUNTIME = {
 
 
 def supervisor_module(supervisor: Supervisor, usage: str) -> str:
-    """The whole text of the generated module.
+    """Return the whole text of the generated module.
 
     Args:
-        supervisor: What to generate.
-        usage: How it is used; stands at its top.
+        supervisor: Supervisor to generate.
+        usage: Text on its use, which stands at its top.
 
     Raises:
         UnsupportedModelError: An expression is nested too deeply for Python.

@@ -1,4 +1,4 @@
-"""What everything of a model is called in the generated class."""
+"""Names of everything of a model in the generated class."""
 
 from dataclasses import dataclass
 
@@ -41,7 +41,7 @@ class Layout:
     """Names of attributes, methods and functions.
 
     Attributes:
-        supervisor: What is generated.
+        supervisor: Supervisor that is generated.
         locations: Attribute of each automaton's location: components by name, `service s`, `action a`.
         variables: Attribute and type of each variable, by component and variable.
         methods: Method by (purpose, event or communication); purposes are `allow`, `read`, `step`,

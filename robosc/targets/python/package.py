@@ -53,7 +53,7 @@ and `LayerMiddleware`.
 `Settings` are those of the deployment; `open_event_log` makes the file of an event log.
 """,
 }
-"""What stands at the top of a module."""
+"""Text that stands at the top of a module."""
 
 _MAXIMUM_NAME = 100
 

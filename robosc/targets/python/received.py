@@ -46,7 +46,7 @@ _PLAIN: dict[type, str] = {
 
 
 def received_unknown(type_: Type, path: Path) -> Unknown:
-    """How received data of a type, at a path, is unknown."""
+    """Return the way in which received data of a type, at a path, is unknown."""
     match type_:
         case DoubleType() | IntegerType():
             return Unknown.NAN
@@ -262,7 +262,7 @@ _ARITHMETIC = frozenset({"+", "-", "*", "/"})
 
 
 def _may_be_unknown(conditions: list[Expression]) -> bool:
-    """Whether a condition reads received data or computes: even constants can leave 32 bits."""
+    """Return True if a condition reads received data or computes: even constants can leave 32 bits."""
     stack = list(conditions)
     while stack:
         node = stack.pop()

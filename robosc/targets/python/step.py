@@ -53,11 +53,11 @@ def read_method(writer: Writer, event: str) -> list[str]:
 
 
 def receive_method(writer: Writer, identifier: str, batch: tuple[str, ...]) -> list[str]:
-    """The method that takes all events of a message that came, if nothing of its data is unknown.
+    """Return the method that takes all events of a message that came, if nothing of its data is unknown.
 
     Args:
         writer: The writer, after the step methods of these events.
-        identifier: Where it comes.
+        identifier: Identifier on which it comes.
         batch: The events, in source order.
     """
     namer = reader_namer()
@@ -91,7 +91,7 @@ def receive_method(writer: Writer, identifier: str, batch: tuple[str, ...]) -> l
 
 
 def _is_array(reader: Reader, path: Path) -> bool:
-    """Whether a path leads to an array: those can be long, so they are not logged."""
+    """Return True if a path leads to an array: those can be long, so they are not logged."""
     return isinstance(reader.type_at(path), ArrayType)
 
 
@@ -222,7 +222,7 @@ class _StepWriter:
         return path_type(self.writer.model, type_, path)
 
     def _block(self, component: str, behaviour: Behaviour, branches: list[Branch]) -> list[str]:
-        """What one component does."""
+        """Return the statements of what one component does."""
         lines: list[str] = []
         location = self.writer.scope.location(component)
         tested: set[str] = set()

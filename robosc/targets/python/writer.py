@@ -1,4 +1,4 @@
-"""What all parts of the Python generator share: the names, the scope of expressions, the diagrams."""
+"""Things that all parts of the Python generator share: the names, the scope of expressions, the diagrams."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -29,8 +29,8 @@ class Writer:
         layout: Names.
         system: The automata, for the domains of decision diagrams.
         used: Functions of the runtime modules that the generated code calls.
-        scope: How expressions over the state are written.
-        diagrams: Writes the supervisor's added conditions.
+        scope: Scope for writing expressions over the state.
+        diagrams: Writer of the supervisor's added conditions.
         stale: For each attribute the bits of the events whose permission reads it, once that is known.
         skipping: Events whose step may skip an update, so far.
     """

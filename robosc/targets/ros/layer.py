@@ -1,4 +1,4 @@
-"""What a supervision layer means on ROS, and which names of a model have no meaning there."""
+"""Meaning of a supervision layer on ROS, and the names of a model that have no meaning there."""
 
 from collections.abc import Callable, Iterable
 

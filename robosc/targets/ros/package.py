@@ -1,4 +1,4 @@
-"""What the packages for ROS 2 and ROS 1 are made from: what templates speak of, filters that escape, copied modules."""
+"""Parts of the packages for ROS 2 and ROS 1: values that templates refer to, filters that escape, copied modules."""
 
 import json
 import pprint
@@ -28,7 +28,7 @@ from robosc.targets.words import requirement_text
 MAXIMUM_STARTER = 100
 
 EVENT_LOG_FOLDER = "event_log"
-"""Where events are logged if the user asked for it without a folder: in the folder that the node is started in."""
+"""Folder of the event log if the user asked for it without a folder: in the folder that the node is started in."""
 
 _DIAGNOSTICS = Interface("DiagnosticArray", "diagnostic_msgs")
 _RELEASED_TYPES = frozenset({"Twist", "TwistStamped"})
@@ -83,7 +83,7 @@ def release_identifiers(found: tuple[Topic, ...]) -> tuple[str, ...]:
 def context(
     supervisor: Supervisor, package: str, found: tuple[Topic, ...], asked: tuple[Communication, ...]
 ) -> dict[str, object]:
-    """What the templates of every kind of package speak of."""
+    """Return the values that the templates of every kind of package refer to."""
     model = supervisor.model
     layout = make_layout(supervisor)
     tables = state_topic(model)
@@ -133,10 +133,10 @@ def chosen(parameters: tuple[Parameter, ...], options: GenerateOptions) -> tuple
 
 
 def python_files(supervisor: Supervisor, package: str, modules: Mapping[str, str]) -> dict[str, str]:
-    """A package's Python files that come from no template, by path: the supervisor, and what a node runs on.
+    """Return a package's Python files without a template, by path: the supervisor, and what a node runs on.
 
     Args:
-        supervisor: What to generate.
+        supervisor: Supervisor to generate.
         package: The package's name.
         modules: Runtime modules, such as `early`, with the packages that they are copied from.
     """

@@ -10,11 +10,11 @@ Table = dict[str, tuple[tuple[str, dict[str, int]], ...]]
 
 @dataclass(frozen=True, slots=True)
 class StateTopic:
-    """What the generated node needs to publish its state.
+    """Data that the generated node needs to publish its state.
 
     Attributes:
         definition: The `definition` of semantics 3.10.
-        transitions: Which transition an event takes.
+        transitions: Transition that an event takes.
     """
 
     definition: dict[str, object]

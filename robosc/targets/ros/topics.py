@@ -1,4 +1,4 @@
-"""What a model means on the topics, services and actions of ROS, and what of it has no meaning there."""
+"""Meaning of a model on the topics, services and actions of ROS, and the parts of it without a meaning there."""
 
 import re
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ _BASIC_INTERFACES: dict[type[Type], Interface] = {
     IntegerType: Interface("Int16", "std_msgs"),
     DoubleType: Interface("Float32", "std_msgs"),
 }
-"""What crosses the middleware without `links` (language A.5)."""
+"""Interface for each type that crosses the middleware without `links` (language A.5)."""
 
 _BASIC_SHAPES: dict[type[Type], str] = {
     BooleanType: "boolean",
@@ -204,7 +204,7 @@ def _require_one_quality(identifier: str, items: list[Communication]) -> None:
 def shapes_of(
     model: Model, communication: Communication, deployment: Deployment = Deployment.CONTROLLER
 ) -> dict[str, Shape]:
-    """What the model says about data, by the event that carries it: every property that its types declare.
+    """Return the shapes of the model's data, by the event that carries it: every property that its types declare.
 
     A controller makes the data of its requests; a layer receives it from an existing controller.
 

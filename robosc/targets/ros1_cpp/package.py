@@ -15,7 +15,7 @@ _ENDINGS = {
     "request": "::Request",
     "response": "::Response",
 }
-"""What stands after a type's name, by kind or part."""
+"""Text after a type's name, by kind or part."""
 
 
 def _ended(kind: str, type_: Interface) -> str:

@@ -1,4 +1,4 @@
-"""Whether a supervisor is safe, controllable and nonblocking, on sets of states."""
+"""Check that a supervisor is safe, controllable and nonblocking, on sets of states."""
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -26,17 +26,17 @@ def verify_symbolically(
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> Verification:
-    """Whether a supervisor is safe, controllable and nonblocking; what it permits is not compared with anything.
+    """Check that a supervisor is safe, controllable and nonblocking; what it permits is compared with nothing.
 
     Args:
         system: Plants and event conditions.
         added: For each event to which the supervisor adds a condition, that condition.
-        initial: In which of its initial states the supervisor lets the system begin; None: in all of them.
+        initial: Condition on the initial states in which the supervisor lets the system begin; None: in all of them.
         limit: Nodes of diagrams, each counted whenever it is made, after which nothing more is checked. The same
             work counts alike with every engine.
         engine: `autoref` for decision diagrams in plain Python; else the fastest installed are used.
-        should_stop: Asked again and again; once true, the work ends.
-        on_progress: Told now and then where the work is, in one short line.
+        should_stop: Function called again and again; once it returns true, the work ends.
+        on_progress: Function called now and then with the progress of the work, in one short line.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.

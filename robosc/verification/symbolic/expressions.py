@@ -40,7 +40,7 @@ _COMPARISONS = ("=", "!=", "<", "<=", ">", ">=")
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """Where a condition is true and where it is false; elsewhere it is unknown."""
+    """Predicates that a condition is true and that it is false; elsewhere it is unknown."""
 
     true: Any
     false: Any
@@ -61,7 +61,7 @@ class Expressions:
         self._linear = Linear(variables)
 
     def truth(self, expression: Expression) -> Truth:
-        """Where a condition is true and where it is false."""
+        """Return the predicates that a condition is true and that it is false."""
         # A chain is a tree as deep as it is long, leaning left: a loop takes it.
         spine: list[Binary] = []
         while isinstance(expression, Binary) and self._is_split(expression):
@@ -73,13 +73,13 @@ class Expressions:
         return result
 
     def _is_split(self, item: Binary) -> bool:
-        """Whether an operation is one between two conditions."""
+        """Return True if an operation is one between two conditions."""
         return item.operator in _CONNECTIVES or (
             item.operator in ("=", "!=") and self.is_condition(item.left) and self.is_condition(item.right)
         )
 
     def is_condition(self, expression: Expression) -> bool:
-        """Whether an expression is certainly boolean."""
+        """Return True if an expression is certainly boolean."""
         match expression:
             case Binary(operator=operator):
                 return operator in _CONNECTIVES or operator in _COMPARISONS
@@ -165,15 +165,15 @@ class Expressions:
             return None
 
     def equal(self, form: Form, digits: Digits) -> Any:
-        """Where a form and some digits are the same integer."""
+        """Return the predicate that a form and some digits are the same integer."""
         return self._linear.compared("=", form, self._linear.form(digits))
 
     def between(self, form: Form, low: int, high: int) -> Any:
-        """Where a form is between two numbers."""
+        """Return the predicate that a form is between two numbers."""
         return self._linear.between(form, low, high)
 
     def _valuations(self, expression: Expression) -> int:
-        """How many combinations of values what an expression reads has."""
+        """Return the number of combinations of values of what an expression reads."""
         places = (self._variables.place_of[subject] for subject in subjects_read(expression))
         count = prod(self._variables.places[place].size() for place in places)
         return count * prod(self._data(path).size() for path in paths_read(expression))
@@ -274,7 +274,7 @@ class Table:
 
     Attributes:
         variables: The variables.
-        read: What it reads.
+        read: Digits that it reads.
         values: Its value for each combination of values of what it reads, the last of them varying fastest; None
             where it is unknown.
     """
@@ -284,7 +284,7 @@ class Table:
     values: Sequence[Value | None]
 
     def where(self, leaf: Callable[[Value | None], Any]) -> Any:
-        """What a predicate for each value makes together."""
+        """Return the predicate combined from a predicate for each value."""
         known = {_key(value): value for value in self.values}
         made = {key: leaf(value) for key, value in known.items()}
         level = [made[_key(value)] for value in self.values]

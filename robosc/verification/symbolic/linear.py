@@ -31,8 +31,8 @@ class Form:
 
     Attributes:
         weights: Bits and their weights, none of them 0; in the order of their names.
-        constant: What is added to them.
-        divisor: What the sum is divided by, positive.
+        constant: Constant that is added to them.
+        divisor: Positive number by which the sum is divided.
     """
 
     weights: tuple[tuple[str, int], ...]
@@ -59,13 +59,13 @@ class Form:
         return Form(signed.weights, signed.constant, signed.divisor * abs(number))
 
     def bounds(self) -> tuple[int, int]:
-        """What the undivided sum cannot be less and more than."""
+        """Return a lower and an upper bound of the undivided sum."""
         low = sum(weight for _, weight in self.weights if weight < 0)
         return low + self.constant, sum(weight for _, weight in self.weights if weight > 0) + self.constant
 
 
 Cases = tuple[tuple[Any, Form], ...]
-"""Where an integer has a form; the predicates exclude each other, and beyond all of them it is unknown."""
+"""Predicates for where an integer has a form; they exclude each other, and beyond all of them it is unknown."""
 
 
 class Linear:
@@ -87,7 +87,7 @@ class Linear:
     # Predicates
 
     def compared(self, operator: str, a: Form, b: Form) -> Any:
-        """Where a comparison of two forms is true."""
+        """Return the predicate that a comparison of two forms is true."""
         difference = a.plus(b, -1)
         match operator:
             case "=":
@@ -104,11 +104,11 @@ class Linear:
                 return ~self._at_most(difference, -1)
 
     def between(self, a: Form, low: int, high: int) -> Any:
-        """Where a form is between two numbers."""
+        """Return the predicate that a form is between two numbers."""
         return self.compared(">=", a, Form((), low)) & self.compared("<=", a, Form((), high))
 
     def _at_most(self, form: Form, most: int) -> Any:
-        """Where the undivided sum is at most a number."""
+        """Return the predicate that the undivided sum is at most a number."""
 
         def known(left: int, least: int, greatest: int) -> bool | None:
             return True if left >= greatest else False if left < least else None
@@ -116,7 +116,7 @@ class Linear:
         return self._held(form.weights, most - form.constant, known, lambda left: left)
 
     def _zero(self, form: Form) -> Any:
-        """Where the sum is 0."""
+        """Return the predicate that the sum is 0."""
 
         def known(left: int, least: int, greatest: int) -> bool | None:
             return left == 0 if least == greatest else None if least <= left <= greatest else False
@@ -124,7 +124,7 @@ class Linear:
         return self._held(form.weights, -form.constant, known, lambda left: left)
 
     def congruent(self, form: Form, number: int, modulus: int) -> Any:
-        """Where a form, which is whole, and a number leave the same remainder."""
+        """Return the predicate that a form, which is whole, and a number leave the same remainder."""
         whole = modulus * form.divisor
 
         def known(left: int, least: int, greatest: int) -> bool | None:
@@ -140,14 +140,14 @@ class Linear:
         known: Callable[[int, int, int], bool | None],
         reduced: Callable[[int], int],
     ) -> Any:
-        """Where the weights of the bits that are set are to a number as wanted.
+        """Return the predicate that the weights of the bits that are set relate to a number as wanted.
 
         Args:
             weights: Bits and weights.
             left: The number.
             known: The outcome for what is left of the number beneath some bits, given the least and the greatest sum
                 of the bits there; None where it depends on them. Without bits it is known.
-            reduced: What stands for all numbers that make no difference.
+            reduced: Function that returns the number that stands for all numbers that make no difference.
         """
         ordered = sorted(weights, key=lambda item: self._variables.level[item[0]])
         least, greatest = [0], [0]
@@ -196,7 +196,7 @@ class Linear:
         return tuple((self._variables.work.count(where), form) for form, where in found.items())
 
     def joined(self, a: Cases, b: Cases, function: Callable[[Form, Form], Iterable[tuple[Any, Form]]]) -> Cases:
-        """What a function makes of the forms of two integers, case by case."""
+        """Return the result of a function on the forms of two integers, case by case."""
         if len(a) * len(b) > MAXIMUM_CASES:
             raise NotLinearError
         return self.collected(
@@ -240,7 +240,7 @@ class Linear:
         return form.constant // form.divisor
 
     def _remainders(self, form: Form, by: int) -> list[tuple[Any, int]]:
-        """Where each remainder is left; by 0 none is."""
+        """Return the predicate of each remainder, with the remainder; division by 0 leaves none."""
         if abs(by) > MAXIMUM_CASES:
             raise NotLinearError
         negative = self.compared("<", form, Form((), 0))

@@ -84,13 +84,15 @@ def tied(
     widths: Mapping[int, int],
     data: Mapping[tuple[str, Path], int],
 ) -> tuple[Set[Hashable], ...]:
-    """The wide places and data that simple conditions and updates compute with together, those that share one joined.
+    """Return the wide places and data that simple conditions and updates compute with together.
+
+    Those that share one are joined.
 
     Args:
         system: The system.
         places: The place of each subject.
-        widths: How many digits each place has.
-        data: How many digits each datum has, by event and path.
+        widths: Number of digits of each place.
+        data: Number of digits of each datum, by event and path.
     """
     groups: list[set[Hashable]] = []
     for expression, event, subject in _computed(system):

@@ -1,4 +1,4 @@
-"""What events lead to, again and again, from some states or back to them."""
+"""States reachable by events from some states, and states from which some states are reachable."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class Run:
     Attributes:
         trace: Its events.
         state: The state that it ends in.
-        is_shortest: Whether there is certainly none shorter.
+        is_shortest: True if there is certainly none shorter.
     """
 
     trace: tuple[str, ...]

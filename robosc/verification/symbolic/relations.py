@@ -1,4 +1,4 @@
-"""What events do, as relations between the state before and the state after."""
+"""Effects of events, as relations between the state before and the state after."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ class Relation:
 
     Attributes:
         event: The event.
-        enabled: Where the plants enable it and, for a controllable one, every range is kept.
-        allowed: Where the supervisor lets it happen; everywhere where nothing is added.
-        guard: Where it can happen in the controlled system: enabled, allowed and, for a controllable event, its
-            conditions true.
-        bad: Where it makes a state bad: an uncontrollable event that can happen against its conditions, or leave a
+        enabled: States in which the plants enable it and, for a controllable one, every range is kept.
+        allowed: States in which the supervisor lets it happen; all states where nothing is added.
+        guard: States in which it can happen in the controlled system: enabled, allowed and, for a controllable event,
+            its conditions true.
+        bad: States that it makes bad: an uncontrollable event that can happen against its conditions, or leave a
             range.
         steps: State before and state after, for the places that it may change; the others stay as they are.
         names: The variables of these places.
@@ -40,7 +40,7 @@ class Relation:
     touched: frozenset[str]
 
     def image(self, variables: Variables, states: Any) -> Any:
-        """Where the event leads to from some states."""
+        """Return the states that the event leads to from some states."""
         manager = variables.manager
         found = states & self.guard & self.steps
         if self.names:
@@ -61,7 +61,7 @@ class Relation:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """What one automaton does at an event; predicates over the state before, the data and the state after."""
+    """Effect of one automaton at an event; predicates over the state before, the data and the state after."""
 
     possible: Any
     leaves_range: Any
@@ -82,7 +82,7 @@ class Relations:
         self._plain = Expressions(variables)
 
     def holds(self, conditions: Iterable[Expression]) -> Any:
-        """Where conditions are all true."""
+        """Return the predicate that conditions are all true."""
         return self._variables.all_of(self._plain.truth(condition).true for condition in conditions)
 
     def relation(self, event: Event) -> Relation:
@@ -153,7 +153,10 @@ class Relations:
         return _Part(possible, leaves_range, steps)
 
     def _edge(self, automaton: Automaton, edge: Edge, changed: set[int]) -> tuple[Any, Any]:
-        """Where the updates of an edge leave a range, and what the edge makes of the places that may change."""
+        """Return the predicate that the updates of an edge leave a range, and the effect of the edge.
+
+        The effect is what the edge makes of the places that may change.
+        """
         variables = self._variables
         leaving, updated = variables.manager.false, variables.manager.true
         location = variables.place_of[Subject(automaton.name)]
@@ -171,7 +174,7 @@ class Relations:
         return leaving, updated
 
     def _update(self, automaton: Automaton, update: Assignment, expressions: Expressions) -> tuple[Any, Any]:
-        """Where an update leaves its range, and what it makes of its variable elsewhere."""
+        """Return the predicate that an update leaves its range, and the effect on its variable elsewhere."""
         variables, manager = self._variables, self._variables.manager
         subject = Subject(automaton.name, update.variable)
         place = variables.place_of[subject]
@@ -201,7 +204,10 @@ class Relations:
         return beyond, table.where(result)
 
     def _written(self, expressions: Expressions, whole: Cases, digits: Digits, kept: Any) -> tuple[Any, Any]:
-        """Where one of the linear forms of an integer leaves a range, and what is made of its variable elsewhere."""
+        """Return the predicate that a linear form of an integer leaves a range, and the effect on its variable.
+
+        The effect is what is made of the variable elsewhere.
+        """
         variables = self._variables
         beyond, result, known = variables.manager.false, variables.manager.false, variables.manager.false
         for where, form in whole:

@@ -21,8 +21,11 @@ _FRAMES_PER_LEVEL = 6
 _CACHE_SLOTS = 2**14
 _MEMORY_ESTIMATE_BYTES = 2**24
 _LOOSE_SLOTS = 6_710_886
-"""What CUDD begins with: as it chooses by itself, to set it up takes longer than to verify a dozen states. Its tables
-grow as fast as by its own choice, and as large."""
+"""Sizes that CUDD begins with.
+
+With the sizes of its own choice, setting it up takes longer than verifying a dozen states. Its tables grow as fast as
+by its own choice, and as large.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +47,7 @@ class Digits:
         return replace(self, names=tuple(map(after, self.names)))
 
     def size(self) -> int:
-        """How many choices there are."""
+        """Return the number of choices."""
         return len(self.values) + (self.known is not None)
 
     def choices(self) -> tuple[Value | None, ...]:
@@ -84,7 +87,7 @@ class Variables:
         system: The system.
         places: The digits of each place of a state.
         names: Every variable of the state before an event, topmost first.
-        level: How far down each variable stands, of all there are.
+        level: Depth of each variable, of all there are.
     """
 
     def __init__(self, system: System, engine: str, work: Work) -> None:
@@ -168,14 +171,14 @@ class Variables:
     # Predicates
 
     def any_of(self, predicates: Iterable[Any]) -> Any:
-        """Where one of the predicates is true."""
+        """Return the predicate that one of the predicates is true."""
         result = self.manager.false
         for predicate in predicates:
             result = result | predicate
         return result
 
     def all_of(self, predicates: Iterable[Any]) -> Any:
-        """Where all of the predicates are true."""
+        """Return the predicate that all of the predicates are true."""
         result = self.manager.true
         for predicate in predicates:
             result = result & predicate
@@ -201,7 +204,7 @@ class Variables:
         return self.manager.ite(self.manager.var(digits.known), level[0], branches[-1])
 
     def has_index(self, digits: Digits, index: int) -> Any:
-        """Where some digits hold an index."""
+        """Return the predicate that some digits hold an index."""
         result = self.manager.true
         for place, name in enumerate(reversed(digits.names)):
             variable = self.manager.var(name)
@@ -209,36 +212,36 @@ class Variables:
         return result
 
     def has_value(self, digits: Digits, value: Value) -> Any:
-        """Where some digits hold a value."""
+        """Return the predicate that some digits hold a value."""
         return self.has_index(digits, digits.values.index(value))
 
     def in_location(self, automaton: str, location: str) -> Any:
-        """Where an automaton is in a location."""
+        """Return the predicate that an automaton is in a location."""
         return self.has_value(self.places[self.place_of[Subject(automaton)]], location)
 
     def unchanged(self, place: int) -> Any:
-        """Where a place has one value before and after an event."""
+        """Return the predicate that a place has one value before and after an event."""
         return self.all_of(
             self.manager.ite(self.manager.var(name), self.manager.var(after(name)), ~self.manager.var(after(name)))
             for name in reversed(self.places[place].names)
         )
 
     def states(self, states: Iterable[State]) -> Any:
-        """Where the state is one of some states."""
+        """Return the predicate that the state is one of some states."""
         return self.any_of(
             self.all_of(self.has_value(digits, value) for digits, value in zip(self.places, state, strict=True))
             for state in states
         )
 
     def initial(self) -> Any:
-        """Where every place has a value that it may begin with."""
+        """Return the predicate that every place has a value that it may begin with."""
         return self.all_of(
             self.any_of(self.has_value(digits, value) for value in values)
             for digits, values in zip(self.places, initial_values(self.system), strict=True)
         )
 
     def marked(self) -> Any:
-        """Where every automaton is in a marked location."""
+        """Return the predicate that every automaton is in a marked location."""
         return self.all_of(
             self.chosen(
                 self.places[self.place_of[Subject(item.name)]],
@@ -263,13 +266,13 @@ class Variables:
         return result
 
     def _has_any_value(self, digits: Digits) -> Any:
-        """Where some digits hold the index of a value at all."""
+        """Return the predicate that some digits hold the index of a value at all."""
         if len(digits.values) == 1 << len(digits.names):
             return self.manager.true
         return self._by_ranges(digits.names, (0, len(digits.values)), (self.manager.true, self.manager.false))
 
     def _possible_knowledge(self, group: Sequence[InputVariable]) -> Any:
-        """Which data of an array can be known together."""
+        """Return the predicate that a combination of the data of an array can be known together."""
         # With one value each, what remains of the choices is which are known.
         single = [replace(item, type=IntegerType(0, 0)) for item in group]
         found = self.manager.false
@@ -285,7 +288,7 @@ class Variables:
         return found
 
     def decision(self, decision: Decision) -> Any:
-        """Where a supervisor's condition is true."""
+        """Return the predicate that a supervisor's condition is true."""
         made = [self.manager.false, self.manager.true]
         for node in decision.nodes:
             digits = self.places[node.place]
@@ -329,7 +332,7 @@ class Variables:
         )
 
     def count(self, predicate: Any) -> int:
-        """How many states a predicate over the state's variables is true in, exactly."""
+        """Return the exact number of states in which a predicate over the state's variables is true."""
         level = {name: number for number, name in enumerate(self.names)}
         nodes: dict[int, Any] = {}
         stack = [predicate]
@@ -350,7 +353,7 @@ class Variables:
 
 
 def cofactors(node: Any) -> tuple[Any, Any]:
-    """What a diagram is where its topmost variable is false, and where it is true."""
+    """Return the cofactors of a diagram: where its topmost variable is false, and where it is true."""
     return (~node.low, ~node.high) if node.negated else (node.low, node.high)
 
 

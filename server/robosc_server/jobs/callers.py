@@ -8,11 +8,11 @@ from robosc_api import security
 
 @dataclass(frozen=True, slots=True)
 class Caller:
-    """Who calls.
+    """Caller of the server.
 
     Attributes:
-        name: Tells callers apart.
-        is_admin: Whether the jobs of others are this caller's, too.
+        name: Name that tells callers apart.
+        is_admin: True if the jobs of others count as this caller's, too.
     """
 
     name: str
@@ -20,7 +20,7 @@ class Caller:
 
 
 def caller_of(context: Any) -> Caller:
-    """Who is behind the call under way."""
+    """Return the caller of the call under way."""
     # A certificate may name anybody, in any characters; a database takes no NUL.
     name = "".join(character if character.isprintable() else "?" for character in security.caller_of(context))
     return Caller(name, security.is_admin())

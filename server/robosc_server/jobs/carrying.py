@@ -21,13 +21,13 @@ from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, T
 from robosc_server.workers import WorkerLostError, WorkersError
 
 _RETRY_S = 0.5
-"""How long a job waits before the database or the workers are tried again for it."""
+"""Waiting time of a job before the database or the workers are tried again for it, in seconds."""
 
 _LONGEST_RETRY_S = 8.0
 """The same, where it was in vain again and again."""
 
 _QUOTA_S = 30.0
-"""How long a job waits at most before it is asked again whether its owner has something left: quotas are changed."""
+"""Longest time in seconds before a waiting job's quota is checked again: quotas are changed."""
 
 MAXIMUM_LOSSES = 3
 """A job whose worker was lost under it so often has failed: whoever starts workers may end of it."""
@@ -43,11 +43,11 @@ class Carried:
     """A job of this server that has not ended.
 
     Attributes:
-        record: How it is; with what its worker has told, which may not be in the database yet.
-        place: In the line; None: it waits for the database or for workers.
-        carrier: What carries it to its end; None: it is being accepted.
-        is_kept: Whether it is known to be in the database.
-        noted: The revision that the database has, at least.
+        record: Record of the job, with the reports of its worker, which may not be in the database yet.
+        place: Place in the queue; None: it waits for the database or for workers.
+        carrier: Task that carries it to its end; None: it is being accepted.
+        is_kept: True if it is known to be in the database.
+        noted: Revision that the database has, at least.
     """
 
     record: JobRecord
@@ -58,7 +58,7 @@ class Carried:
 
     @property
     def runs(self) -> bool:
-        """Whether a worker is at it."""
+        """True if a worker is busy with it."""
         return self.record.state is JobState.RUNNING
 
 
@@ -67,16 +67,16 @@ class Carrying:
 
     Args:
         store: The database.
-        scheduler: The line before the workers.
-        results: What was worked out before.
-        task_limits: What one task may take.
-        retention: Is told of new results.
-        watchers: Are told what changes.
-        tracing: Where a span of each job goes.
+        scheduler: The queue before the workers.
+        results: Results that were worked out before.
+        task_limits: Limits of one task.
+        retention: Retention that is notified of new results.
+        watchers: Watchers that are notified of changes.
+        tracing: Tracing that receives a span of each job.
 
     Attributes:
         replica: The name of this server in the database.
-        has_doubts: Whether the acceptance of a job failed in a way that leaves open whether it is kept.
+        has_doubts: True if the acceptance of a job failed in a way that leaves open whether it is kept.
     """
 
     def __init__(
@@ -133,13 +133,13 @@ class Carrying:
 
         Args:
             record: The job.
-            place: That it has in the line.
-            task: What is to be done.
-            bound: How many jobs of its owner may be kept.
+            place: Place that it has in the queue.
+            task: Task to be done.
+            bound: Number of jobs of its owner that may be kept.
 
         Returns:
-            The job, or the one that was accepted with its idempotency key, and whether that was there before; None: its
-            owner has too many.
+            The job, or the one that was accepted with its idempotency key, and whether that was there before; None:
+            its owner has too many.
 
         Raises:
             StoreUnavailableError: It is not known whether it is accepted.
@@ -243,7 +243,7 @@ class Carrying:
                 tell_fault(error)
 
     async def _outcome(self, carried: Carried) -> Outcome | None:
-        """What becomes of a job; None: it has ended, or is another server's."""
+        """Return the outcome of a job; None: it has ended, or is another server's."""
         pause_s = _RETRY_S
         while True:
             place = carried.place = carried.place or self._scheduler.enter_anyway(carried.record.owner)
@@ -294,13 +294,13 @@ class Carrying:
         self._watchers.tell(carried.record)
 
     async def _wait_again(self, carried: Carried, place: Place, pause_s: float, *, is_lost: bool = False) -> None:
-        """Have a job wait that could not run, also in the database if it is noted there that it runs.
+        """Make a job wait that could not run, also in the database if it is noted there that it runs.
 
         Args:
             carried: The job.
-            place: That it had.
-            pause_s: How long, in seconds.
-            is_lost: Whether its worker was lost under it; that is counted.
+            place: Place that it had in the queue.
+            pause_s: Waiting time, in seconds.
+            is_lost: True if its worker was lost while it ran; that is counted.
         """
         carried.place = None
         with self._scheduler.aside(place):

@@ -62,10 +62,10 @@ def submission(content: bytes, limits: RequestLimits) -> pb.SubmitJobRequest:
 
 
 def kind_and_request(task: pb.Task) -> tuple[TaskKind, bytes]:
-    """What a task is, and its request, serialized.
+    """Return the kind of a task, and its request, serialized.
 
     Raises:
-        RefusedError: There is none.
+        RefusedError: There is no task.
     """
     name = task.WhichOneof("request")
     if name is None:
@@ -110,7 +110,7 @@ def retention_s_of(request: pb.SubmitJobRequest) -> float | None:
 
 
 def filter_of(request: pb.ListJobsRequest, caller: str) -> JobFilter:
-    """Which jobs are asked for.
+    """Return the filter for the jobs that are asked for.
 
     Raises:
         RefusedError: There are no such states or kinds.
@@ -124,12 +124,12 @@ def filter_of(request: pb.ListJobsRequest, caller: str) -> JobFilter:
 
 
 def page_size_of(request: pb.ListJobsRequest) -> int:
-    """How many jobs are asked for."""
+    """Return the number of jobs that are asked for."""
     return min(request.page_size or _DEFAULT_PAGE, MAXIMUM_PAGE)
 
 
 def page_token(last: JobRecord, chosen: JobFilter) -> str:
-    """What asks for the jobs that follow one."""
+    """Return the page token that asks for the jobs that follow a given one."""
     return urlsafe_b64encode(_TOKEN.pack(last.created_us, bytes.fromhex(last.id), _digest(chosen))).decode()
 
 

@@ -1,22 +1,23 @@
-"""How long and how many jobs are kept, and how often the manager looks after them."""
+"""Limits on the time and the number of kept jobs, and the periods of the manager that looks after them."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class JobLimits:
-    """What jobs may take, and the periods of their manager.
+    """Limits of jobs, and the periods of their manager.
 
     Attributes:
         retention_s: Longest time that a job is kept after its end.
-        results_bytes: Of kept results. Beyond it, results that no kept job refers to are deleted; where those that jobs
-            do refer to are as large, jobs that have ended are forgotten before their time, and new ones are refused
-            until then. Each time those of the caller who has most.
+        results_bytes: Bytes of kept results. Beyond it, results that no kept job refers to are deleted; where those
+            that jobs do refer to are as large, jobs that have ended are forgotten before their time, and new ones are
+            refused until then. Each time, those of the caller who has most are chosen.
         jobs_per_owner: Kept jobs of one caller; beyond it, those that ended first are forgotten.
-        look_s: How often a server that shares its database looks what others have done there; one that has a database
-            of its own needs it only after that was away.
-        lease_s: After how long without a sign of life a server is taken for dead by those that share its database.
-        sweep_s: How often it is looked for what need not be kept any more.
+        look_s: Period, in seconds, at which a server that shares its database looks for what others have done there;
+            one that has a database of its own needs it only after that was away.
+        lease_s: Time without a sign of life, in seconds, after which a server is taken for dead by those that share
+            its database.
+        sweep_s: Period, in seconds, of the search for what need not be kept any more.
     """
 
     retention_s: float = 7 * 86400.0

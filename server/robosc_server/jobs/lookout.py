@@ -1,8 +1,8 @@
-"""What one server finds out in the database: what others have done there, and which of them are dead.
+"""Findings of one server in the database: what others have done there, and which of them are dead.
 
-A server that shares its database counts up a number there, its beats. One that finds the beats of another one unchanged
-for as long as a lease takes it for dead, and adopts its jobs; a server that was taken for dead by mistake finds out at
-its next beat, stops its work, and takes part again under another name.
+A server that shares its database counts up a number there, its beats. One that finds the beats of another one
+unchanged for as long as a lease takes it for dead, and adopts its jobs; a server that was taken for dead by mistake
+finds out at its next beat, stops its work, and takes part again under another name.
 """
 
 import asyncio
@@ -18,19 +18,19 @@ from robosc_server.store import Store, StoreUnavailableError
 _log = logging.getLogger(__name__)
 
 _DOUBTFUL_LOOKS = 40
-"""So often it is looked for a job whose acceptance failed in a way that leaves open whether it is kept."""
+"""Number of looks for a job whose acceptance failed in a way that leaves open whether it is kept."""
 
 _BEATS_PER_LEASE = 5
 
 
 class Lookout:
-    """Looks into the database for one server.
+    """Lookout of one server, which looks into the database.
 
     Args:
         store: The database.
         carrying: The jobs of this server.
-        watchers: Are told what others have changed.
-        limits: How often it looks, and how long a lease is.
+        watchers: Watchers that are notified of what others have changed.
+        limits: Limits with the period of its looks, and the length of a lease.
         clock: Seconds of a monotonic clock, for leases.
     """
 

@@ -40,12 +40,12 @@ class JobManager:
 
     Args:
         store: The database.
-        scheduler: The line before the workers, which direct calls stand in, too.
-        results: What was worked out before.
-        task_limits: What one task may take.
-        limits: What jobs may take.
+        scheduler: The queue before the workers, in which direct calls wait, too.
+        results: Results that were worked out before.
+        task_limits: Limits of one task.
+        limits: Limits of jobs.
         clock: Seconds of a monotonic clock, for leases.
-        tracing: Where a span of each job goes.
+        tracing: Tracing that receives a span of each job.
     """
 
     def __init__(
@@ -81,12 +81,12 @@ class JobManager:
 
     @property
     def counts(self) -> Mapping[JobState, int]:
-        """How many jobs the database has in each state, as of the last sweep."""
+        """Number of jobs that the database has in each state, as of the last sweep."""
         return self._retention.counts
 
     @property
     def carried(self) -> int:
-        """How many jobs this server has that have not ended."""
+        """Number of jobs of this server that have not ended."""
         return len(self._carrying)
 
     async def submit(
@@ -101,11 +101,11 @@ class JobManager:
         """Accept a job; when this returns, it is kept.
 
         Args:
-            task: What is to be done.
-            caller: Whose it is.
-            idempotency_key: The same again answers with the same job; empty: no such care.
-            label: What its owner calls it.
-            retention_s: How long it is kept after its end; None, or too long: as long as jobs are kept.
+            task: Task to be done.
+            caller: Caller whose job it is.
+            idempotency_key: Key that answers with the same job when it is given again; empty: no such care.
+            label: Owner's name for the job.
+            retention_s: Time that it is kept after its end, in seconds; None, or too long: as long as jobs are kept.
 
         Returns:
             The job, and whether it was there before.
@@ -172,17 +172,17 @@ class JobManager:
         return self._carrying.current(await self._find(job_id, caller))
 
     def waiting_before(self, record: JobRecord) -> int:
-        """How many tasks wait before a job on its server; 0 where that is another one."""
+        """Return the number of tasks that wait before a job on its server; 0 if that is another one."""
         carried = self._carrying.get(record.id)
         return 0 if carried is None or carried.place is None else self._scheduler.before(carried.place)
 
     async def watch(self, job_id: str, caller: Caller, after_revision: int) -> AsyncIterator[JobRecord]:
-        """A job whenever it has changed, up to its end.
+        """Yield a job whenever it has changed, up to its end.
 
         Args:
-            job_id: Which.
-            caller: Whose.
-            after_revision: What was seen before; 0: nothing.
+            job_id: Id of the job.
+            caller: Caller whose job it is.
+            after_revision: Revision that was seen before; 0: none.
 
         Raises:
             RefusedError: There is none, the database is away, or the server ends.

@@ -20,7 +20,7 @@ _AT_ONCE_BYTES = 4 * 2**20
 _TOUCHED = 10_000
 _TOUCH_S = 30.0
 _GATHER_S = 0.1
-"""How long a result waits for others that are written with it: a transaction costs as much as a small task."""
+"""Time that a result waits for others written with it, in seconds: a transaction costs as much as a small task."""
 
 
 def _as_it_is(kind: TaskKind, result: Result) -> Result:
@@ -28,14 +28,14 @@ def _as_it_is(kind: TaskKind, result: Result) -> Result:
 
 
 class Results:
-    """What was worked out before. Without the database it goes on with what it has in memory.
+    """Results that were worked out before; without the database, those in memory remain.
 
-    Inside the context, what is kept is written to the database beside; outside, it stays in memory.
+    Inside the context, kept results are written to the database in the background; outside, they stay in memory.
 
     Args:
         store: The database.
-        memory_bytes: How much is kept in memory, those that were asked for last.
-        finish: What is done to a result before it is sent; the database has it as it was made.
+        memory_bytes: Bytes of results that are kept in memory, those that were asked for last.
+        finish: Function that is applied to a result before it is sent; the database has the result as it was made.
     """
 
     def __init__(
@@ -108,10 +108,10 @@ class Results:
         """Keep a new result in memory, and before long in the database, unless too much waits to be written there.
 
         Args:
-            key: Of its task.
-            kind: Of its task.
-            result: As it was made.
-            owner: Who asked for it.
+            key: Key of its task.
+            kind: Kind of its task.
+            result: Result as it was made.
+            owner: Caller who asked for it.
 
         Returns:
             The result as it is sent.

@@ -1,4 +1,4 @@
-"""How long jobs and results are kept, and how much of them."""
+"""Retention of jobs and results: how long they are kept, and how much of them."""
 
 import asyncio
 import contextlib
@@ -17,14 +17,14 @@ _SHORTEST_PAUSE_S = 1.0
 
 
 class Retention:
-    """Deletes what need not be kept any more, and knows how much there is.
+    """Retention, which deletes what need not be kept any more, and knows how much there is.
 
     Args:
         store: The database.
-        limits: What jobs may take.
+        limits: Limits of jobs.
 
     Attributes:
-        counts: How many jobs the database has in each state, as of the last sweep.
+        counts: Number of jobs that the database has in each state, as of the last sweep.
     """
 
     def __init__(self, store: Store, limits: JobLimits) -> None:
@@ -34,7 +34,7 @@ class Retention:
         self.counts: Mapping[JobState, int] = dict.fromkeys(JobState, 0)
 
     def kept_us(self, asked_s: float | None) -> int:
-        """How long a job is kept after its end, in microseconds.
+        """Return the time that a job is kept after its end, in microseconds.
 
         Args:
             asked_s: Seconds that were asked for; None, or too long: as long as jobs are kept.
@@ -55,7 +55,7 @@ class Retention:
             raise RefusedError(Reason.SERVER_BUSY, message, retry_after_s=2 * _SHORTEST_PAUSE_S)
 
     def too_many(self) -> RefusedError:
-        """What is told to a caller who has as many jobs as it may, none of which has ended."""
+        """Return the error for a caller who has as many jobs as it may, none of which has ended."""
         message = f"{self._limits.jobs_per_owner} jobs of yours have not ended; try again when some have"
         return RefusedError(Reason.QUOTA_EXCEEDED, message, retry_after_s=self._limits.sweep_s)
 

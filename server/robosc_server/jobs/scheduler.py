@@ -1,4 +1,4 @@
-"""Who is next: a bounded line of tasks, fair between callers.
+"""Queue of tasks: bounded, and fair between callers.
 
 Callers take turns: whoever has had one goes to the end of the ring, so that a caller with a thousand tasks delays one
 with a single task by no more than one task (M. Shreedhar and G. Varghese, "Efficient Fair Queuing Using Deficit
@@ -30,13 +30,13 @@ _LONGEST_RETRY_S = 60.0
 
 @dataclass(frozen=True, slots=True)
 class QueueLimits:
-    """How many tasks may wait for a worker.
+    """Limits on the number of tasks that wait for a worker.
 
     Attributes:
-        waiting: Of all callers.
-        waiting_per_caller: Of one.
-        reserved: Tasks that may run beyond what the workers are for, one for each caller of whom none runs: whoever
-            has all workers taken for a long time makes everybody a little slower, and nobody wait.
+        waiting: Waiting tasks of all callers.
+        waiting_per_caller: Waiting tasks of one caller.
+        reserved: Tasks that may run beyond the capacity of the workers, one for each caller of whom none runs: a
+            caller who has all workers taken for a long time makes everybody a little slower, but makes nobody wait.
     """
 
     waiting: int = 1000
@@ -45,10 +45,10 @@ class QueueLimits:
 
 
 class Accounts(Protocol):
-    """What single callers may take, and have taken."""
+    """Accounts of single callers: what each may take, and has taken."""
 
     def waiting(self, caller: str) -> int | None:
-        """How many tasks of a caller may wait; None: as many as anybody's."""
+        """Return the number of tasks of a caller that may wait; None: as many as anybody's."""
 
     def check(self, caller: str) -> None:
         """See whether a task of a caller may begin.
@@ -62,13 +62,13 @@ class Accounts(Protocol):
 
 
 class Place:
-    """A place in the line, and later at a worker; given back with `Scheduler.leave`, whatever happens.
+    """A place in the queue, and later at a worker; given back with `Scheduler.leave`, whatever happens.
 
     Args:
-        caller: Whose.
+        caller: Caller whose place it is.
 
     Attributes:
-        line: Where it stands: all addresses of one network stand in one line.
+        line: Line of the queue in which it stands: all addresses of one network stand in one line.
     """
 
     __slots__ = ("_begun_s", "_turn", "caller", "line")
@@ -81,7 +81,7 @@ class Place:
 
     @property
     def has_turn(self) -> bool:
-        """Whether a worker is free for it."""
+        """True if a worker is free for it."""
         return self._begun_s is not None
 
     async def turn(self) -> None:
@@ -90,13 +90,13 @@ class Place:
 
 
 class Scheduler:
-    """The line before the workers.
+    """The queue before the workers.
 
     Args:
-        workers: Who does the tasks.
-        limits: How many may wait.
+        workers: Workers that do the tasks.
+        limits: Limits on the number of waiting tasks.
         clock: Seconds of a monotonic clock.
-        accounts: Of single callers; None: all may take the same.
+        accounts: Accounts of single callers; None: all may take the same.
     """
 
     def __init__(
@@ -119,12 +119,12 @@ class Scheduler:
 
     @property
     def waiting(self) -> int:
-        """How many tasks wait for a worker."""
+        """Number of tasks that wait for a worker."""
         return self._waiting
 
     @property
     def running(self) -> int:
-        """How many workers are taken."""
+        """Number of workers that are taken."""
         return self._running
 
     def close(self) -> None:
@@ -139,18 +139,19 @@ class Scheduler:
         on_report: OnReport,
         known: Callable[[], Outcome | None] = lambda: None,
     ) -> Outcome:
-        """The outcome of a task that is bound to its call; cancelling this ends it.
+        """Return the outcome of a task that is bound to its call; cancelling this ends it.
 
         Args:
-            task: What is to be done.
-            caller: Whose it is.
-            limits: What it may take.
-            on_report: Is told where the work is.
-            known: Asked when it has its turn: the outcome, if there is one by now, since an equal task was done.
+            task: Task to be done.
+            caller: Caller whose task it is.
+            limits: Limits of the task.
+            on_report: Callback that receives reports of the progress.
+            known: Function that is called when the task has its turn: returns the outcome, if there is one by now,
+                since an equal task was done.
 
         Raises:
-            RefusedError: There is too much to do, there are no workers, the server ends, or the caller has used up what
-                it may take while this waited.
+            RefusedError: There is too much to do, there are no workers, the server ends, or the caller has used up
+                what it may take while this waited.
         """
         if self._workers.capacity < 1:
             raise _no_workers()
@@ -220,7 +221,7 @@ class Scheduler:
                 raise RefusedError(Reason.SERVER_BUSY, "the server has too much to do; try again later", after_s)
 
     def _is_reserved_for(self, line: str) -> bool:
-        """Whether a task of a line may begin though workers are taken."""
+        """Return True if a task of a line may begin although the workers are taken."""
         capacity = self._workers.capacity
         return 0 < capacity <= self._running < capacity + self._limits.reserved and not self._running_of[line]
 
@@ -267,7 +268,10 @@ class Scheduler:
             self._aside += Counter()
 
     def before(self, place: Place) -> int:
-        """How many tasks would begin before one that waits, if nothing else came; 0 for one that does not wait."""
+        """Return the number of tasks that would begin before a waiting one, if nothing else came.
+
+        It is 0 for one that does not wait.
+        """
         if self._order is None:
             self._order = self._order_now()
         return self._order.get(place, 0)

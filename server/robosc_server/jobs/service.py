@@ -33,15 +33,15 @@ async def _write(context: Context, messages: AsyncIterable[bytes]) -> None:
 
 
 class JobService(convert.JobServiceServicer):
-    """Submits, tells about and cancels jobs.
+    """Service that submits, reports on and cancels jobs.
 
     Args:
-        manager: Who has the jobs.
-        accept: Looks at a request and makes a task of it, or raises RefusedError.
-        identify: Who calls.
-        admit: Counts a job that somebody asks for, or raises RefusedError; is given the caller's name.
-        send: Sends the messages of a result, serialized.
-        limits: What a request may have.
+        manager: Manager that has the jobs.
+        accept: Function that looks at a request and makes a task of it, or raises RefusedError.
+        identify: Function that returns the caller.
+        admit: Function that counts a job that somebody asks for, or raises RefusedError; is given the caller's name.
+        send: Function that sends the messages of a result, serialized.
+        limits: Limits of a request.
     """
 
     def __init__(
@@ -141,10 +141,10 @@ def add_job_service(service: JobService, server: grpc.aio.Server) -> None:
 
 
 class _BytesToo:
-    """Passes handlers on to a server, with a serializer that takes serialized messages, too.
+    """Adapter that passes handlers on to a server, with a serializer that takes serialized messages, too.
 
     Args:
-        server: Which.
+        server: Server that receives the handlers.
     """
 
     def __init__(self, server: grpc.aio.Server) -> None:

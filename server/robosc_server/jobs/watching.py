@@ -1,4 +1,4 @@
-"""Who watches which job: whoever waits costs nothing until there is something to tell."""
+"""Watchers of jobs: one that waits costs nothing until there is something to report."""
 
 import asyncio
 from collections.abc import Iterator
@@ -8,11 +8,11 @@ from robosc_server.store import JobRecord
 
 
 class Watch:
-    """One watcher of one job: holds the newest that it was told, and drops what was between.
+    """One watcher of one job: holds the newest record that it was given, and drops those between.
 
     Attributes:
-        revision: The one that it knows; set by whoever uses it.
-        is_gone: Whether the job is there no more.
+        revision: Revision that it knows; set by whoever uses it.
+        is_gone: True if the job is there no more.
     """
 
     __slots__ = ("_news", "_record", "is_gone", "revision")
@@ -34,7 +34,7 @@ class Watch:
         self._news.set()
 
     async def news(self) -> JobRecord | None:
-        """What it was told since it asked last, once there is something; None: it was woken."""
+        """Return the newest record received since the last call, once there is one; None: it was woken."""
         await self._news.wait()
         self._news.clear()
         record, self._record = self._record, None

@@ -1,1 +1,1 @@
-"""What operators need: settings, health, metrics, logs, traces."""
+"""Tools for operators: settings, health, metrics, logs, traces."""

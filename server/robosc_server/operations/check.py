@@ -1,7 +1,7 @@
-"""Whether a server could start with such settings: everything that can be known without starting it.
+"""Check of whether a server could start with given settings: everything that can be known without starting it.
 
-Nothing is made or changed. What another process holds now, such as the server that runs with the same settings, is a
-warning.
+Nothing is made or changed. Anything that another process holds now, such as the server that runs with the same
+settings, is a warning.
 """
 
 import asyncio
@@ -47,7 +47,7 @@ _SOON_DAYS = 14
 
 
 class Grade(StrEnum):
-    """How grave a finding is."""
+    """Severity of a finding."""
 
     OK = "ok"
     WARNING = "warning"
@@ -56,11 +56,11 @@ class Grade(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What was found about one part.
+    """Finding about one part.
 
     Attributes:
-        part: Which.
-        grade: How grave it is; with an error a server does not start, or cannot work.
+        part: Name of the part.
+        grade: Severity of the finding; with an error a server does not start, or cannot work.
         message: One sentence, without a secret.
     """
 
@@ -70,7 +70,7 @@ class Finding:
 
 
 def check_settings(settings: Settings) -> tuple[Finding, ...]:
-    """What is found about every part of the settings, in the order in which a server comes to them."""
+    """Return the findings about every part of the settings, in the order in which a server comes to them."""
     parts: dict[str, Callable[[Settings], Iterator[tuple[Grade, str]]]] = {
         "listening": _listening,
         "certificates": _certificates,
@@ -98,7 +98,7 @@ def _listening(settings: Settings) -> Iterator[tuple[Grade, str]]:
 
 
 def _bindable(host: str, port: int) -> tuple[Grade, str]:
-    """Whether somebody could listen there now."""
+    """Check whether a server could listen on a host and port now."""
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
     except (OSError, UnicodeError) as error:
@@ -131,7 +131,7 @@ def _certificates(settings: Settings) -> Iterator[tuple[Grade, str]]:
 
 
 def _valid(file: Path) -> tuple[Grade, str]:
-    """Whether the certificates of a file are valid today."""
+    """Check whether the certificates of a file are valid today."""
     if importlib.util.find_spec("cryptography") is None:
         return Grade.OK, f"{file}: can be used; until when cannot be told without the extra `signing`"
     from cryptography import x509
@@ -205,7 +205,7 @@ def _postgresql(text: str) -> tuple[Grade, str]:
 
 
 def _sqlite(file: Path) -> tuple[Grade, str]:
-    """Whether the file can be used, or made."""
+    """Check whether the file can be used, or made."""
     folder = file.parent
     try:
         there = next(place for place in (folder, *folder.parents) if place.exists())
@@ -225,7 +225,10 @@ def _sqlite(file: Path) -> tuple[Grade, str]:
 
 
 def _unwritable(folder: Path) -> str | None:
-    """Why nothing can be made in a folder; None: something can. Rights alone do not tell: root has them all."""
+    """Return the reason why nothing can be made in a folder; None: something can.
+
+    The permissions alone do not show it: root has them all.
+    """
     try:
         try:
             # A file without a name, which nobody sees and which is gone when it is closed.
@@ -257,7 +260,7 @@ def _workers(settings: Settings) -> Iterator[tuple[Grade, str]]:
 
 
 def _confinement(settings: Settings) -> Iterator[tuple[Grade, str]]:
-    """What the kernel keeps workers from, tried in a process of its own: there is no way back."""
+    """Check what the kernel keeps workers from, in a process of its own: confinement cannot be undone."""
     if settings.workers != "local":
         yield Grade.OK, "each machine of the cluster sees to it"
         return
@@ -295,7 +298,7 @@ def _cluster(spec: str) -> tuple[Grade, str]:
 
 
 def _unreachable(address: str) -> str | None:
-    """Why nobody takes a connection there; None: somebody does."""
+    """Return the reason why nobody takes a connection at an address; None: somebody does."""
     try:
         socket.create_connection(split(address), timeout=_CONNECT_S).close()
     except (OSError, UnicodeError) as error:

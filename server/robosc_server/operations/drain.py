@@ -1,4 +1,4 @@
-"""How the server ends without taking anything out of a caller's hands that it could still give."""
+"""Shutdown of the server that takes nothing from a caller that the server could still give."""
 
 import asyncio
 from collections.abc import Callable
@@ -13,19 +13,19 @@ from robosc_server.operations.interceptor import CallInterceptor
 _LOOK_S = 0.05
 
 _LAST_WORDS_S = 0.2
-"""How long answers that were handed to gRPC, and are small, have to get on the line."""
+"""Time that small answers have to get on the wire after they were handed to gRPC, in seconds."""
 
 
 STOP_S = 5.0
-"""How long gRPC may take to let go of its connections once all calls are cancelled."""
+"""Time that gRPC may take to let go of its connections once all calls are cancelled, in seconds."""
 
 
 async def stop(server: Any, grace_s: float | None = None) -> None:
-    """End a server's calls and connections; what gRPC does not let go of by then ends with the process.
+    """End a server's calls and connections; those that gRPC does not let go of by then end with the process.
 
     Args:
         server: A `grpc.aio.Server`.
-        grace_s: How long calls under way are given; None: none at all.
+        grace_s: Time that calls under way are given, in seconds; None: none at all.
     """
     stopping = asyncio.ensure_future(server.stop(grace_s))
     await asyncio.wait([stopping], timeout=(grace_s or 0.0) + STOP_S)
@@ -43,17 +43,18 @@ async def drain(
     idle_methods: frozenset[str] = frozenset(),
     unread_bytes: Callable[[], int] = lambda: 0,
 ) -> None:
-    """End a server: health says no, then calls are refused, those under way are given time, and the rest is cancelled.
+    """End a server: health says no, then calls are refused, those under way get time, and the rest is cancelled.
 
     Until then its port stays open, so that callers hear that it ends, and load balancers that it is not well.
 
     Args:
         server: A `grpc.aio.Server`.
         health: Its health.
-        calls: Stands before its services.
-        seconds: How long calls under way are given.
+        calls: Interceptor in front of its services.
+        seconds: Time that calls under way are given, in seconds.
         idle_methods: Methods that are not waited for, since their callers can ask another server at any time.
-        unread_bytes: Of large answers that were sent and are not read yet; they are waited for like calls.
+        unread_bytes: Function that returns the bytes of large answers that were sent and are not read yet; they are
+            waited for like calls.
     """
     log = structlog.get_logger()
     begun_s = monotonic()

@@ -1,4 +1,4 @@
-"""That a server which is told to end does end: once more at once, and in any case before long.
+"""Guaranteed end of a server that is told to end: at once if it is told once more, and in any case before long.
 
 Nothing is lost by an end that is forced: what was accepted is on disk, and workers go with the server.
 """
@@ -16,18 +16,18 @@ from typing import Any
 _log = logging.getLogger(__name__)
 
 END_S = 20.0
-"""How long the end may take beside what calls under way are given: mostly for a database that does not answer."""
+"""Time for the end beyond that of calls under way, in seconds: mostly for a database that does not answer."""
 
 _TOLD_BEFORE_S = 0.5
 _BY_SIGNAL = 128
 
 
 class Ending:
-    """What the signals to end mean; to be used in the main thread.
+    """Handler of the signals to end; to be used in the main thread.
 
     Args:
-        drain_s: How long calls under way are given.
-        end_s: How long the end may take beside.
+        drain_s: Time that calls under way are given, in seconds.
+        end_s: Additional time that the end may take, in seconds.
     """
 
     def __init__(self, drain_s: float, end_s: float = END_S) -> None:
@@ -72,7 +72,7 @@ def _tell_tasks() -> None:
 
 
 def _places(waiting: Any) -> Iterator[str]:
-    """Where a coroutine stands, and each that it waits for, the outermost first."""
+    """Yield the place in the code of a coroutine, and of each that it waits for, the outermost first."""
     while waiting is not None:
         frame = getattr(waiting, "cr_frame", None) or getattr(waiting, "gi_frame", None)
         if frame is not None:

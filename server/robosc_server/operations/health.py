@@ -1,4 +1,4 @@
-"""Whether each service is well, as gRPC's health checks ask: it follows what the service needs."""
+"""Health of each service, as gRPC's health checks ask for it: it follows what the service needs."""
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
@@ -33,11 +33,11 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
         self._changed = asyncio.Event()
 
     def conditions(self) -> dict[str, bool]:
-        """What the services need, and whether it is there; and whether the server takes calls at all."""
+        """Return the conditions that services need and whether they hold; and whether the server takes calls."""
         return {**self._conditions, "accepting": not self._is_draining}
 
     def is_serving(self, service: str) -> bool | None:
-        """Whether a service is well; None: there is no such service."""
+        """Return True if a service is well; None: there is no such service."""
         if service == "":
             return not self._is_draining and all(self._conditions.values())
         needed = self._services.get(service)
@@ -46,11 +46,11 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
         return not self._is_draining and all(self._conditions[name] for name in needed)
 
     def set_condition(self, name: str, holds: bool) -> None:
-        """Note that something is there, or not; the log tells changes.
+        """Note that a condition holds, or not; the log reports changes.
 
         Args:
-            name: One that a service needs.
-            holds: Whether it is.
+            name: Condition that a service needs.
+            holds: True if the condition holds.
 
         Raises:
             KeyError: No service needs it.
@@ -105,7 +105,7 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
         self._changed = asyncio.Event()
 
     async def Check(self, request: Any, context: Any) -> Any:  # noqa: N802  # named by the .proto file
-        """How a service is."""
+        """Return the health of a service."""
         is_serving = self.is_serving(request.service)
         if is_serving is None:
             code, message = grpc.StatusCode.NOT_FOUND, "there is no such service here"
@@ -113,7 +113,7 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
         return _Response(status=_status(is_serving))
 
     async def Watch(self, request: Any, context: Any) -> None:  # noqa: N802
-        """How a service is, and how it becomes."""
+        """Send the health of a service, and each change of it."""
         last = None
         while True:
             changed = self._changed

@@ -1,4 +1,4 @@
-"""What is done around every call: a request id, a line in the log, metrics, a span; and failures told in one way.
+"""Frame around every call: a request id, a line in the log, metrics, a span; and failures reported in one way.
 
 One interceptor for all of it, since each costs every call some microseconds.
 """
@@ -26,7 +26,7 @@ _HEALTH = "/grpc.health."
 _REFUSED_RETRY_S = 1.0
 
 _ON_THE_WAY_S = 0.1
-"""So much sooner than our own timer a caller's may tell us that a deadline has passed, beside what was rounded."""
+"""Time by which a caller's timer may report a passed deadline before our own, in seconds, apart from rounding."""
 
 _ROUNDED = 0.01
 """Share of a call's time by which its deadline is later for us than for its caller."""
@@ -35,11 +35,11 @@ _ROUNDED = 0.01
 class CallInterceptor(Layer):
     """The outermost layer, so that it sees what others refuse.
 
-    Handlers may raise `RefusedError`, and need not care for other exceptions: the caller is told the id of a fault.
+    Handlers may raise `RefusedError`, and need not care for other exceptions: the caller is given the id of a fault.
 
     Args:
-        metrics: Where calls are counted.
-        tracing: Where spans go.
+        metrics: Metrics that count calls.
+        tracing: Tracing that receives spans.
     """
 
     def __init__(self, metrics: Metrics, tracing: Tracing = NO_TRACING) -> None:
@@ -152,15 +152,15 @@ _CODES = {code.value[0]: code for code in grpc.StatusCode}
 
 
 def _is_at_its_deadline(context: Any, given_s: float | None) -> bool:
-    """Whether a call that is cancelled is so because its deadline has passed, by our timer or by its caller's.
+    """Return True if a call was cancelled because its deadline has passed, by our timer or by its caller's.
 
     Both count from when they knew of the call, and a deadline goes over the line in units of up to a hundredth of it,
     rounded up: so the caller's timer is mostly the first one, and all that comes of it here is that the call is
     cancelled.
 
     Args:
-        context: Of the call.
-        given_s: What was left of its time when it began; None: it has no deadline.
+        context: Context of the call.
+        given_s: Time that was left when the call began, in seconds; None: it has no deadline.
     """
     if given_s is None:
         return False
@@ -169,7 +169,7 @@ def _is_at_its_deadline(context: Any, given_s: float | None) -> bool:
 
 
 def _code_of(context: Any) -> grpc.StatusCode:
-    """What the handler has said, as a number or by name; OK if it has said nothing."""
+    """Return the status that the handler has set, as a number or by name; OK if it has set none."""
     code = context.code()
     if isinstance(code, int):
         return _CODES.get(code, grpc.StatusCode.UNKNOWN)
@@ -182,9 +182,9 @@ def _refuse(method: str) -> None:
 
 
 def fault_of(fault: BaseException | str) -> RefusedError:
-    """What a caller is told of a fault of ours, which the log has from now on.
+    """Return the error that a caller gets for a fault of ours, which the log has from now on.
 
     Args:
-        fault: It, or a traceback of it from another process.
+        fault: The fault, or a traceback of it from another process.
     """
     return RefusedError(Reason.INTERNAL_FAULT, fault_words(tell_fault(fault)))

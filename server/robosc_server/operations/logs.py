@@ -42,8 +42,8 @@ def set_up_logs(log_format: LogFormat, log_level: LogLevel, stream: TextIO | Non
 
     Args:
         log_format: Text or JSON.
-        log_level: From which on.
-        stream: Where to; None: standard error.
+        log_level: Lowest level that is logged.
+        stream: Destination; None: standard error.
     """
     target = sys.stderr if stream is None else stream
     level = _LEVELS[log_level]

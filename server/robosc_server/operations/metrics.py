@@ -1,4 +1,4 @@
-"""What the server counts, for Prometheus: in a registry of its own, asked for over HTTP at /metrics."""
+"""Metrics of the server, for Prometheus: in a registry of its own, asked for over HTTP at /metrics."""
 
 import asyncio
 import contextlib
@@ -53,9 +53,9 @@ class MethodMetrics:
         """Count a call.
 
         Args:
-            code: How it ended.
-            reason: Why it has failed, as in google.rpc.ErrorInfo; empty: nothing is known.
-            seconds: How long it took.
+            code: Status code with which the call ended.
+            reason: Reason of its failure, as in google.rpc.ErrorInfo; empty: nothing is known.
+            seconds: Duration of the call, in seconds.
         """
         if code is grpc.StatusCode.OK:
             self._ok.inc()
@@ -142,12 +142,12 @@ class Metrics:
         return sum(method.under_way for method in tuple(self._methods.values()))
 
     def task_ended(self, kind: TaskKind, outcome: Outcome | None, seconds: float) -> None:
-        """Count a task that a worker was at.
+        """Count a task that a worker was busy with.
 
         Args:
-            kind: What it was.
-            outcome: How it ended; None: nobody waits for it any more.
-            seconds: By the clock, while a worker was at it.
+            kind: Kind of the task.
+            outcome: Outcome of the task; None: nobody waits for it any more.
+            seconds: Wall-clock time during which a worker was busy with it, in seconds.
         """
         match outcome:
             case None:
@@ -180,14 +180,14 @@ class Metrics:
         conditions: Callable[[], Mapping[str, bool]] | None = None,
         restarts: Callable[[], int] | None = None,
     ) -> None:
-        """Who is asked each time that somebody wants the metrics, on the event loop: it must be quick.
+        """Set the functions that are called for each request for metrics, on the event loop: they must be quick.
 
         Args:
-            waiting: How many tasks wait.
-            running: How many tasks workers are at.
-            jobs: How many jobs there are, by state.
-            conditions: What the service needs, and whether it is there.
-            restarts: How often what starts workers had to be started again.
+            waiting: Number of tasks that wait.
+            running: Number of tasks that workers are busy with.
+            jobs: Number of jobs, by state.
+            conditions: Conditions that the service needs, and whether they hold.
+            restarts: Number of times that the process that starts workers had to be started again.
         """
         self._waiting = waiting or self._waiting
         self._running = running or self._running
@@ -196,7 +196,7 @@ class Metrics:
         self._restarts = restarts or self._restarts
 
     def followed(self) -> Iterable[Metric]:
-        """What is asked for, and has labels."""
+        """Return the metrics whose values are asked for, and that have labels."""
         jobs = GaugeMetricFamily("robosc_server_jobs", "Jobs that are kept, by state.", labels=("state",))
         for state, number in sorted(self._jobs().items()):
             jobs.add_metric((state,), number)
@@ -229,12 +229,12 @@ class _Asked:
 
 
 class MetricsEndpoint:
-    """Answers Prometheus over HTTP/1.1: one GET of /metrics for each connection. An asynchronous context.
+    """HTTP/1.1 endpoint for Prometheus: one GET of /metrics for each connection; an asynchronous context.
 
     Args:
-        metrics: What it shows.
+        metrics: Metrics that it shows.
         address: `HOST:PORT`; port 0 picks a free one.
-        beyond_loopback: Whether other machines may reach it.
+        beyond_loopback: True if other machines may reach it.
 
     Attributes:
         address: `HOST:PORT` with the port that it got, once it is entered.
@@ -306,7 +306,7 @@ def _http(status: str, body: bytes, content: str = "text/plain", *, is_head: boo
 
 
 def check_metrics_address(address: str, *, beyond_loopback: bool) -> None:
-    """What can be known before it listens.
+    """Check what can be known before the endpoint listens.
 
     Raises:
         SecurityError: It may not listen there.

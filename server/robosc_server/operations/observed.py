@@ -14,9 +14,9 @@ class ObservedWorkers:
     """Some workers, watched.
 
     Args:
-        workers: Who does the work; entered and left with this.
-        metrics: Where tasks are counted.
-        tracing: Where spans go.
+        workers: Workers that do the work; entered and left with this.
+        metrics: Metrics that count tasks.
+        tracing: Tracing that receives spans.
     """
 
     def __init__(self, workers: Workers, metrics: Metrics, tracing: Tracing = NO_TRACING) -> None:
@@ -39,12 +39,12 @@ class ObservedWorkers:
 
     @property
     def capacity(self) -> int:
-        """How many tasks they can be at, at once."""
+        """Number of tasks that they can be busy with at once."""
         return self._workers.capacity
 
     @property
     def running(self) -> int:
-        """How many tasks they are at."""
+        """Number of tasks that they are busy with."""
         return self._running
 
     async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:

@@ -1,4 +1,4 @@
-"""How many calls a caller has open at once, those that only watch included, so that others find a place."""
+"""Limit on the calls that a caller has open at once, those that only watch included, so that others find a place."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,11 +23,11 @@ _RETRY_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class CallLimits:
-    """What may be open at once.
+    """Limits on the calls that are open at once.
 
     Attributes:
-        calls: Of all callers.
-        per_caller: Of one caller, unless its token says otherwise.
+        calls: Open calls of all callers.
+        per_caller: Open calls of one caller, unless its token says otherwise.
     """
 
     calls: int
@@ -35,14 +35,15 @@ class CallLimits:
 
 
 class OpenCalls(Layer):
-    """Counts them, and refuses those beyond. Behind the guard, which tells whose they are, and before any wait.
+    """Layer that counts open calls, and refuses those beyond the limits.
 
-    Never the outermost layer: what it gives is for others to call.
+    It stands behind the guard, which knows whose calls they are, and before any wait. Never the outermost layer: what
+    it gives is for others to call.
 
     Args:
-        limits: Health checks aside.
-        identify: Who is behind the call of a context.
-        health: Of health checks.
+        limits: Limits, health checks aside.
+        identify: Function that returns the caller behind the call of a context.
+        health: Limits of health checks.
     """
 
     def __init__(
@@ -82,10 +83,10 @@ class OpenCalls(Layer):
 
 
 class _Places:
-    """For the calls of some methods.
+    """Places for the calls of some methods.
 
     Attributes:
-        taken: How many are taken.
+        taken: Number of places that are taken.
     """
 
     def __init__(self, limits: CallLimits) -> None:

@@ -1,4 +1,4 @@
-"""How much each token may ask for: a bucket that fills steadily, from which each task takes.
+"""Quota of what each token may ask for: a bucket that fills steadily, from which each task takes.
 
 Token buckets: J. Turner, New directions in communications, IEEE Communications Magazine 24(10), 1986, pp. 8-15. Each
 server counts by itself, in memory: after a restart the buckets are full.
@@ -16,12 +16,12 @@ _HOUR_S = 3600.0
 
 
 class Bucket:
-    """Holds at most so much, and that much flows in within a time; it may be overdrawn.
+    """Bucket of limited size, into which that amount flows within a given time; it may be overdrawn.
 
     Args:
-        size: How much it holds; it is full at first.
+        size: Amount that it holds; it is full at first.
         filled_in_s: Seconds within which an empty one is full.
-        now_s: Of a monotonic clock.
+        now_s: Current time of a monotonic clock, in seconds.
     """
 
     def __init__(self, size: int, filled_in_s: float, now_s: float) -> None:
@@ -54,10 +54,10 @@ class _Account:
 
 
 class Quotas:
-    """What each token has left. Not for several threads.
+    """Remaining quota of each token; not for several threads.
 
     Args:
-        tokens: Where the quotas stand; None: there are no tokens, and no quotas.
+        tokens: File with the quotas; None: there are no tokens, and no quotas.
         clock: Seconds of a monotonic clock.
     """
 
@@ -107,7 +107,7 @@ class Quotas:
             account.seconds.take(cpu_s, self._clock())
 
     def waiting(self, caller: str) -> int | None:
-        """How many tasks of a token may wait; None: as many as anybody's."""
+        """Return the number of tasks of a token that may wait; None: as many as anybody's."""
         quota = self._quota(caller)
         return None if quota is None else quota.waiting
 

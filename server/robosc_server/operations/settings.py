@@ -1,4 +1,4 @@
-"""What an operator may set: one definition, from which the flags, the file, the environment and the manual follow.
+"""Settings for operators: one definition, from which the flags, the file, the environment and the manual follow.
 
 A flag goes before the environment, the environment before the file, the file before the default.
 """
@@ -32,7 +32,7 @@ _UNITS = {None: 1, "B": 1, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30, "TiB": 2**4
 
 
 class LogFormat(StrEnum):
-    """How lines of the log look."""
+    """Format of the lines of the log."""
 
     TEXT = "text"
     JSON = "json"
@@ -48,7 +48,7 @@ class LogLevel(StrEnum):
 
 
 class Confinement(StrEnum):
-    """Whether there are workers where a part of their confinement cannot be had."""
+    """Rule that says whether there are workers where a part of their confinement is not available."""
 
     REQUIRED = "required"
     BEST_EFFORT = "best-effort"
@@ -290,7 +290,7 @@ class Settings(BaseModel):
 
     @property
     def security(self) -> ServerSecurity:
-        """How the service is secured."""
+        """Security of the service."""
         return ServerSecurity(
             certificate=self.tls_certificate,
             key=self.tls_key,
@@ -301,7 +301,7 @@ class Settings(BaseModel):
 
     @property
     def task_limits(self) -> TaskLimits:
-        """What one task may take."""
+        """Limits of one task."""
         return TaskLimits(
             seconds=self.task_seconds,
             cpu_seconds=self.task_cpu_seconds,
@@ -346,7 +346,7 @@ class _Given(BaseSettings, Settings):
         dotenv_settings: PydanticBaseSettingsSource,
         file_secret_settings: PydanticBaseSettingsSource,
     ) -> tuple[Any, ...]:
-        """What goes first stands first."""
+        """Return the sources of the settings, the one that takes precedence first."""
         return init_settings, env_settings, lambda: dict(cls.from_file)
 
 
@@ -377,7 +377,7 @@ def settings_from(flags: Mapping[str, Any], config: Path | None) -> Settings:
 
 
 def source_of(name: str, flags: Mapping[str, Any], config: Path | None) -> str:
-    """Where the value of a setting comes from that somebody has set, in words."""
+    """Return the source of the value that somebody has set for a setting, in words."""
     if name in flags:
         return flag_of(name)
     variable = variable_of(name)
@@ -405,7 +405,7 @@ def _sentence(kind: str, message: str) -> str:
 
 
 def read_file(path: Path) -> dict[str, Any]:
-    """What stands in a file of settings.
+    """Return the content of a file of settings.
 
     Raises:
         SettingsError: It cannot be read, is too large, or is not TOML.
@@ -438,7 +438,7 @@ def variable_of(name: str) -> str:
 
 
 def default_text(name: str) -> str:
-    """What a setting is where nobody sets it, in words."""
+    """Return the value of a setting that nobody has set, in words."""
     field = Settings.model_fields[name]
     extra: Any = field.json_schema_extra
     if extra["default"] is not None:
@@ -466,7 +466,7 @@ def group_of(name: str) -> str:
 
 
 def words_of(name: str) -> str:
-    """What a setting is."""
+    """Return the description of a setting."""
     return Settings.model_fields[name].description or ""
 
 

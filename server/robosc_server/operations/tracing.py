@@ -17,20 +17,20 @@ class TracingError(Exception):
 
 
 class Tracing:
-    """Makes no spans.
+    """Tracing that makes no spans.
 
     Attributes:
-        is_on: Whether it makes any.
+        is_on: True if it makes any.
     """
 
     is_on = False
 
     def span(self, name: str, attributes: Attributes | None = None) -> AbstractContextManager[Any]:
-        """What happens inside is a span, a child of the one around it.
+        """Make a span of what happens inside the context, a child of the one around it.
 
         Args:
-            name: What it is; few different ones.
-            attributes: What is known at its beginning; nothing of a model.
+            name: Name of the span; few different ones.
+            attributes: Attributes that are known at its beginning; nothing of a model.
 
         Returns:
             A context; what it yields takes `set_attribute(name, value)`.
@@ -38,11 +38,11 @@ class Tracing:
         return nullcontext(_NO_SPAN)
 
     def call_span(self, method: str, metadata: Any) -> AbstractContextManager[Any]:
-        """The same for a call, a child of its caller's span.
+        """Make a span of a call, a child of its caller's span.
 
         Args:
             method: `/package.Service/Method`.
-            metadata: What the caller sent with it.
+            metadata: Metadata that the caller sent with it.
         """
         return nullcontext(_NO_SPAN)
 
@@ -103,7 +103,7 @@ class SentTracing(Tracing):
         self._kinds = SpanKind
 
     def span(self, name: str, attributes: Attributes | None = None) -> AbstractContextManager[Any]:
-        """What happens inside is a span."""
+        """Make a span of what happens inside the context."""
         return self._span(name, attributes, self._kinds.INTERNAL, None)
 
     def call_span(self, method: str, metadata: Any) -> AbstractContextManager[Any]:

@@ -1,7 +1,7 @@
-"""What may be logged of the words in which a worker tells how it failed.
+"""Filter for the words in which a worker reports its failure: only some of them may be logged.
 
 A worker has handled a stranger's model, and may say anything: what looks like a traceback may quote the model, or be
-made up. Above the level debug only such words are told as this server could have written itself: how a process ended,
+made up. Above the level debug, only words are logged that this server could have written itself: how a process ended,
 in a fixed form, names of exceptions that there are, and places in RoboSC's own code.
 """
 
@@ -24,10 +24,10 @@ _KIND = re.compile(r"([A-Za-z_][A-Za-z0-9_.]{0,100})(?::.*)?")
 
 
 def safe_words(words: str) -> dict[str, object]:
-    """What of a worker's words holds nothing of a model, as fields of a line of the log.
+    """Return the parts of a worker's words that hold nothing of a model, as fields of a line of the log.
 
     Args:
-        words: Such as a traceback, or the facts of `workers.endings`.
+        words: Words of a worker, such as a traceback, or the facts of `workers.endings`.
     """
     lines = [line[:_LINE_CHARACTERS] for line in words.split("\n")]
     told: dict[str, object] = {}

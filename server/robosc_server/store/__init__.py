@@ -1,4 +1,4 @@
-"""What is kept: jobs and results, in a database."""
+"""Storage of what is kept: jobs and results, in a database."""
 
 from robosc_server.store.errors import StoreError, StoreUnavailableError
 from robosc_server.store.opening import open_store

@@ -45,9 +45,9 @@ class _Transaction[T]:
     """One unit of work, which another thread may cut off.
 
     Args:
-        engine: Of the database.
-        work: What is done; it may be done again after a collision.
-        is_write: Whether it changes anything.
+        engine: Engine of the database.
+        work: Function that does the work; it may be done again after a collision.
+        is_write: True if it changes anything.
     """
 
     def __init__(self, engine: Engine, work: Callable[[Connection], T], *, is_write: bool) -> None:
@@ -57,7 +57,7 @@ class _Transaction[T]:
         self._is_abandoned = False
 
     def run(self) -> T:
-        """What the work gives back; called in a thread.
+        """Return the result of the work; called in a thread.
 
         Raises:
             DBAPIError: As the database says.
@@ -153,16 +153,16 @@ class Database:
 
     @property
     def is_available(self) -> bool:
-        """Whether what was read and what was changed last worked."""
+        """True if the last read and the last change worked."""
         return not any(self._is_failing.values())
 
     @property
     def is_readable(self) -> bool:
-        """Whether what was read last worked, whatever became of changes."""
+        """True if the last read worked, whatever became of changes."""
         return not self._is_failing[False]
 
     async def read[T](self, work: Callable[[Connection], T]) -> T:
-        """What some work finds, in a transaction.
+        """Run some work in a transaction, and return what it finds.
 
         Raises:
             StoreUnavailableError: The database is away or too slow.
@@ -170,7 +170,7 @@ class Database:
         return await self._run(work, is_write=False)
 
     async def write[T](self, work: Callable[[Connection], T]) -> T:
-        """What some work gives back whose changes are kept when this returns; it may be done twice.
+        """Return the result of some work whose changes are kept when this returns; it may be done twice.
 
         Raises:
             StoreUnavailableError: The database is away, too slow or full.

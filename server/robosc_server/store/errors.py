@@ -1,4 +1,4 @@
-"""What can go wrong with a database."""
+"""Errors of a database."""
 
 from robosc_server.failures import RefusedError
 from robosc_server.tasks.task import Reason

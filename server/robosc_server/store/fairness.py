@@ -1,4 +1,4 @@
-"""Who gives something back first: whoever holds most."""
+"""Choice of who gives something back first: whoever holds most."""
 
 import heapq
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -7,19 +7,20 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 def given_back(
     held: Mapping[str, int], oldest: Callable[[str], Iterable[tuple[str, int]]], excess: int, limit: int
 ) -> tuple[list[str], dict[str, int]]:
-    """Choose what goes, one after the other: each time the oldest thing of the owner who holds most at that moment.
+    """Choose the things that go, one by one: each time the oldest of the owner who holds most at that moment.
 
     So nobody can push out what others have by holding much: all who hold more than the others come down to the same
     level first (max-min fairness; D. Bertsekas and R. Gallager, Data Networks, 2nd edition, 1992, section 6.5.2).
 
     Args:
-        held: How much each owner holds.
-        oldest: The things of an owner that may go, the oldest first, each with how much its owner holds less then.
-        excess: How much is too much, of all together.
+        held: Amount that each owner holds.
+        oldest: Function that returns the things of an owner that may go, the oldest first, each with the amount that
+            its owner holds less then.
+        excess: Amount that is too much, of all together.
         limit: Things that may go at once.
 
     Returns:
-        What goes, and what each owner holds then.
+        The things that go, and the amount that each owner holds then.
     """
     left = dict(held)
     heap = [(-amount, owner) for owner, amount in left.items()]

@@ -125,13 +125,13 @@ def find_many(connection: Connection, revisions: dict[str, int]) -> tuple[list[J
 def listed(
     connection: Connection, chosen: JobFilter, after: tuple[int, str] | None, limit: int, now_us: int
 ) -> list[JobRecord]:
-    """Jobs, the youngest first.
+    """Return jobs, the youngest first.
 
     Args:
-        connection: In a transaction.
-        chosen: Which.
+        connection: Connection, in a transaction.
+        chosen: Filter of the jobs.
         after: Time of creation and id of the job that they follow; None: from the first one on.
-        limit: How many at most.
+        limit: Largest number of jobs.
         now_us: The time.
     """
     query = select(JOBS).where(_IS_KEPT)
@@ -148,7 +148,7 @@ def listed(
 
 
 def counts_by_state(connection: Connection) -> dict[JobState, int]:
-    """How many jobs there are in each state."""
+    """Return the number of jobs in each state."""
     found = dict.fromkeys(JobState, 0)
     for row in connection.execute(select(JOBS.c.state, func.count().label("number")).group_by(JOBS.c.state)):
         found[JobState(row.state)] = row.number
@@ -161,11 +161,11 @@ def accept(
     """Keep a new job, and end it at once if there is a result of its task.
 
     Args:
-        connection: In a transaction.
+        connection: Connection, in a transaction.
         record: The job, which waits.
-        request: What it is asked to do.
-        result: One of the same task that is known elsewhere; None: only the database is asked.
-        bound: How many jobs of one owner are kept; the one that ended first makes room for a new one.
+        request: Request of the job.
+        result: Result of the same task that is known elsewhere; None: only the database is asked.
+        bound: Number of jobs of one owner that are kept; the one that ended first makes room for a new one.
         now_us: The time.
 
     Returns:
@@ -215,11 +215,11 @@ def put_back(
     """Have running jobs wait again that were interrupted; the attempt does not count.
 
     Args:
-        connection: In a transaction.
-        ids: Which; those that do not run, or are another server's, stay as they are.
-        replica: Whose they are.
-        next_replica: Whose they will be; None: whoever finds them first.
-        is_lost: Whether they lost their workers, perhaps through their own fault; that is counted.
+        connection: Connection, in a transaction.
+        ids: Ids of the jobs; those that do not run, or are another server's, stay as they are.
+        replica: Server whose jobs they are.
+        next_replica: Server whose jobs they will be; None: the one that finds them first.
+        is_lost: True if they lost their workers, perhaps through their own fault; that is counted.
     """
     found = []
     for job_id in sorted(ids):  # The same order in each server: none waits for one that waits for it.
@@ -290,7 +290,7 @@ def active_ids_of(connection: Connection, replica: str) -> set[str]:
 
 
 def has_orphans(connection: Connection) -> bool:
-    """Whether there are jobs that have not ended, and are no server's."""
+    """Return True if there are jobs that have not ended, and are no server's."""
     return connection.scalar(select(JOBS.c.id).where(_is_orphan()).limit(1)) is not None
 
 
@@ -298,10 +298,10 @@ def take_orphans(connection: Connection, ours: str, now_us: int, limit: int) -> 
     """Take over the jobs that have not ended, and are no server's; those that ran wait again, or have failed.
 
     Args:
-        connection: In a transaction.
+        connection: Connection, in a transaction.
         ours: The server that takes them.
         now_us: The time.
-        limit: How many at most, the oldest first.
+        limit: Largest number of jobs, the oldest first.
 
     Returns:
         The jobs that have changed.
@@ -338,16 +338,16 @@ def results_by_owner(connection: Connection) -> dict[str, int]:
 
 
 def forget(connection: Connection, held: dict[str, int], excess: int, limit: int) -> tuple[int, dict[str, int]]:
-    """Delete jobs that have results before their time: of the owner whose results take most, the one that ended first.
+    """Delete jobs with results before their time: of the owner whose results take most, the one that ended first.
 
     Args:
-        connection: In a transaction.
+        connection: Connection, in a transaction.
         held: Bytes of the results that each owner's jobs refer to.
-        excess: How many bytes are too many.
-        limit: How many jobs at most.
+        excess: Number of bytes that are too many.
+        limit: Largest number of jobs.
 
     Returns:
-        How many there were, and what each owner's jobs refer to then.
+        Number of deleted jobs, and the bytes of the results that each owner's jobs refer to then.
     """
 
     def oldest(owner: str) -> Iterator[tuple[str, int]]:

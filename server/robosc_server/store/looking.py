@@ -27,11 +27,11 @@ def look_at_sqlite(file: Path) -> None:
 
 
 def look_at_postgresql(url: URL, connect_s: float) -> str:
-    """Look at a database of a server that is asked; its version.
+    """Look at a database by asking its server, and return its version.
 
     Args:
-        url: Of the database.
-        connect_s: How long a connection may take.
+        url: URL of the database.
+        connect_s: Time that a connection may take, in seconds.
 
     Raises:
         StoreError: It cannot be reached, or is none that a server of this version can use.
@@ -48,7 +48,7 @@ def look_at_postgresql(url: URL, connect_s: float) -> str:
 
 
 def _look(engine: Engine, question: str = "SELECT sqlite_version()") -> str:
-    """What a database answers to a question, if its tables are missing or ours."""
+    """Return a database's answer to a question, if its tables are missing or ours."""
     try:
         with engine.connect() as connection:
             answer = str(connection.scalar(text(question)))

@@ -191,10 +191,10 @@ def _lock_of(path: Path) -> Path:
 
 
 def is_in_use(given: Path) -> bool:
-    """Whether a server has a file of SQLite now; asks for the lock without taking it, and makes nothing.
+    """Return True if a server uses an SQLite file now; ask for the lock without taking it, and make nothing.
 
     Raises:
-        OSError: It cannot be told.
+        OSError: It cannot be determined.
     """
     path = given.resolve()
     with _held_lock:

@@ -1,4 +1,4 @@
-"""What the database holds, as values."""
+"""Content of the database, as values."""
 
 import struct
 from collections.abc import Iterator, Sequence
@@ -8,15 +8,18 @@ from enum import StrEnum
 from robosc_server.tasks.task import Failure, Report, TaskKind
 
 STEP = 2**20
-"""What a change that is kept adds to a job's revision. Between two of them, what a worker reports counts up by one in
-the memory of one server, so that no watcher sees a revision fall when that server dies."""
+"""Amount that a change that is kept adds to a job's revision.
+
+Between two of them, each report of a worker counts up by one in the memory of one server, so that no watcher sees a
+revision fall when that server dies.
+"""
 
 _BLOCK_BYTES = 512 * 1024
 _LENGTH = struct.Struct("<I")
 
 
 class JobState(StrEnum):
-    """Where a job is."""
+    """State of a job."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -26,7 +29,7 @@ class JobState(StrEnum):
 
     @property
     def has_ended(self) -> bool:
-        """Whether it stays as it is."""
+        """True if the state does not change any more."""
         return self not in ACTIVE
 
 
@@ -35,30 +38,30 @@ ACTIVE = frozenset({JobState.QUEUED, JobState.RUNNING})
 
 @dataclass(frozen=True, slots=True)
 class JobRecord:
-    """A job, without its request and result. Times are microseconds since 1970, in UTC.
+    """A job, without its request and result; times are microseconds since 1970, in UTC.
 
     Attributes:
-        id: Cannot be guessed.
+        id: Id that cannot be guessed.
         owner: Name of the caller that it was accepted from.
-        kind: What its task is.
-        state: Where it is.
-        revision: Grows with each change.
-        key: Of its task.
+        kind: Kind of its task.
+        state: State of the job.
+        revision: Number that grows with each change.
+        key: Key of its task.
         main_file: Name of the main file.
-        label: What its owner calls it; may be empty.
-        idempotency_key: None: it was given none.
-        retention_us: How long it is kept after its end.
-        created_us: When it was accepted.
-        started_us: When a worker began; None: not yet.
-        ended_us: When it ended; None: not yet.
-        expires_us: When it is forgotten; None: not before it has ended.
-        attempts: How often a worker has begun.
-        progress: What a worker has told last; None: nothing.
-        failure: Why it has failed; None: it has not.
-        is_from_store: Whether its result is that of an earlier task.
-        replica: Which server has it to do; None: none.
-        result_key: Of its result; None: it has none.
-        losses: How often its worker was lost under it in a way that may be its own fault.
+        label: Owner's name for it; may be empty.
+        idempotency_key: Idempotency key; None: it was given none.
+        retention_us: Time that it is kept after its end, in microseconds.
+        created_us: Time of its acceptance.
+        started_us: Time at which a worker began; None: not yet.
+        ended_us: Time of its end; None: not yet.
+        expires_us: Time at which it is forgotten; None: not before it has ended.
+        attempts: Number of times that a worker has begun.
+        progress: Last report of a worker; None: nothing.
+        failure: Failure of the job; None: it has not failed.
+        is_from_store: True if its result is that of an earlier task.
+        replica: Server that has it to do; None: none.
+        result_key: Key of its result; None: it has none.
+        losses: Number of times that its worker was lost while it ran, in a way that may be its own fault.
     """
 
     id: str
@@ -86,12 +89,12 @@ class JobRecord:
 
 @dataclass(frozen=True, slots=True)
 class JobFilter:
-    """Which jobs are listed.
+    """Filter of the jobs that are listed.
 
     Attributes:
-        owner: None: of all.
-        states: Empty: in any.
-        kind: None: of any.
+        owner: Owner of the jobs; None: any.
+        states: States of the jobs; empty: any.
+        kind: Kind of their tasks; None: any.
     """
 
     owner: str | None

@@ -30,7 +30,7 @@ def beat(connection: Connection, replica: str) -> bool:
 
 
 def beats_of_others(connection: Connection, replica: str) -> dict[str, int]:
-    """How far each other server has counted."""
+    """Return the number of beats that each other server has counted."""
     rows = connection.execute(select(REPLICAS).where(REPLICAS.c.id != replica))
     return {row.id: row.beats for row in rows}
 

@@ -32,7 +32,7 @@ def insert_result(connection: Connection, key: str, kind: TaskKind, result: Resu
 
 
 def count_blocks(connection: Connection, key: str) -> int | None:
-    """How many blocks a result has; None: there is none."""
+    """Return the number of blocks that a result has; None: there is no such result."""
     if connection.scalar(_KIND, {"of": key}) is None:
         return None
     return connection.scalar(select(func.count()).select_from(BLOCKS).where(BLOCKS.c.key == key))
@@ -45,7 +45,7 @@ def read_block(connection: Connection, key: str, number: int) -> bytes | None:
 
 
 def read_blocks(connection: Connection, key: str) -> tuple[TaskKind, list[bytes]] | None:
-    """What a result is of, and all its blocks; None: there is none."""
+    """Return the kind of task that a result is of, and all its blocks; None: there is no such result."""
     kind = connection.scalar(_KIND, {"of": key})
     if kind is None:
         return None
@@ -67,16 +67,16 @@ def sizes_by_owner(connection: Connection) -> dict[str, int]:
 
 
 def trim(connection: Connection, held: dict[str, int], excess: int, limit: int) -> tuple[int, dict[str, int]]:
-    """Delete results that no job refers to: of the owner who holds most, the one that was not asked for longest.
+    """Delete results that no job refers to: of the owner who holds most, the one that was asked for longest ago.
 
     Args:
-        connection: In a transaction.
+        connection: Connection, in a transaction.
         held: Bytes that each owner holds.
-        excess: How many bytes are too many.
-        limit: How many results at most.
+        excess: Number of bytes that are too many.
+        limit: Largest number of results.
 
     Returns:
-        How many there were, and what each owner holds then.
+        Number of deleted results, and the bytes that each owner holds then.
     """
 
     def oldest(owner: str) -> Iterator[tuple[str, int]]:

@@ -1,6 +1,6 @@
-"""What is kept: jobs, results, and which servers there are.
+"""Storage of what is kept: jobs, results, and the servers that there are.
 
-Each call is one transaction, or, where there may be many jobs, several, each of which leaves what makes sense.
+Each call is one transaction, or, where there may be many jobs, several, each of which leaves a sensible state.
 
 Every call raises StoreUnavailableError where the database is away, full or too slow.
 """
@@ -50,17 +50,17 @@ class Store:
 
     @property
     def is_shared(self) -> bool:
-        """Whether other servers may use it at the same time."""
+        """True if other servers may use it at the same time."""
         return self._database.dialect != "sqlite"
 
     @property
     def is_available(self) -> bool:
-        """Whether what was asked of it last worked."""
+        """True if the last request to it worked."""
         return self._database.is_available
 
     @property
     def is_readable(self) -> bool:
-        """Whether what was read last could be; a full disk is."""
+        """True if the last read was possible; a full disk can be read."""
         return self._database.is_readable
 
     def now_us(self) -> int:
@@ -104,7 +104,7 @@ class Store:
         return await self._database.read(lambda connection: job_rows.listed(connection, chosen, after, limit, now_us))
 
     async def counts_by_state(self) -> dict[JobState, int]:
-        """How many jobs there are in each state."""
+        """Return the number of jobs in each state."""
         return await self._database.read(job_rows.counts_by_state)
 
     async def begin(self, job_id: str, replica: str) -> tuple[JobRecord, bytes] | None:
@@ -184,7 +184,7 @@ class Store:
         return await self._database.write(partial(_beat, replica))
 
     async def others(self, replica: str) -> tuple[dict[str, int], bool]:
-        """How far each other server has counted, and whether there are jobs of nobody."""
+        """Return the number of beats that each other server has counted, and whether there are jobs of nobody."""
         return await self._database.read(
             lambda connection: (replica_rows.beats_of_others(connection, replica), job_rows.has_orphans(connection))
         )
@@ -220,7 +220,7 @@ class Store:
         return kind, Result(tuple(message for block in blocks for message in messages_of(block)))
 
     async def count_blocks(self, key: str) -> int | None:
-        """How many blocks a result has; None: there is none."""
+        """Return the number of blocks that a result has; None: there is no such result."""
         return await self._database.read(lambda connection: result_rows.count_blocks(connection, key))
 
     async def read_block(self, key: str, number: int) -> bytes | None:

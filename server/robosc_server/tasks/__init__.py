@@ -1,1 +1,1 @@
-"""What the server is asked to do, whoever does it: tasks, their limits, and how they end."""
+"""Work that the server is asked to do, whoever does it: tasks, their limits, and how they end."""

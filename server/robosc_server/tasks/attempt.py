@@ -24,15 +24,15 @@ class Request(Protocol):
 
     @property
     def options(self) -> pb.SynthesisOptions:
-        """How it is made."""
+        """Options for making the supervisor."""
 
 
 class Attempt:
-    """Around all that may find out that a model cannot be handled: that error is kept, and ends the block.
+    """Context around all that may find out that a model cannot be handled: that error is kept, and ends the block.
 
     Attributes:
-        made: What was made; None where the attempt did not come so far.
-        error: Why the model cannot be handled, or None.
+        made: Result of making the supervisor; None where the attempt did not come so far.
+        error: Error that says why the model cannot be handled, or None.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""What this server is and can generate: answers that stay the same as long as it runs.
+"""Description of this server and of what it can generate: answers that stay the same as long as it runs.
 
 Making them imports targets and looks for engines, which takes a while: make them once, before serving.
 """
@@ -17,14 +17,14 @@ def server_limits(
     waiting_tasks_per_caller: int,
     retention_seconds: float,
 ) -> pb.ServerLimits:
-    """What a server takes and gives.
+    """Return the limits of what a server takes and gives.
 
     Args:
-        request: What a request may have.
-        task: What a task may take.
+        request: Limits of a request.
+        task: Limits of a task.
         waiting_tasks: Tasks that may wait, of all callers together.
         waiting_tasks_per_caller: Tasks of one caller that may wait.
-        retention_seconds: How long a job is kept after it has ended.
+        retention_seconds: Time that a job is kept after it has ended, in seconds.
     """
     return pb.ServerLimits(
         bundle_bytes=request.bundle_bytes,
@@ -41,14 +41,14 @@ def server_limits(
 
 
 def version_response(limits: pb.ServerLimits) -> pb.GetVersionResponse:
-    """What this server is."""
+    """Return the description of this server."""
     from robosc.synthesis.engines import installed_engines
 
     return pb.GetVersionResponse(version=__version__, engines=installed_engines(), limits=limits)
 
 
 def targets_response() -> pb.ListTargetsResponse:
-    """What can be generated, the name that stands for all targets included."""
+    """Return the targets that can be generated, the name that stands for all targets included."""
     from robosc.targets import ALL, available_targets
 
     descriptions = {info.name: info.description for info in available_targets()}

@@ -1,7 +1,8 @@
-"""How many fields a serialized message has, found out before it is parsed.
+"""Number of fields of a serialized message, found out before it is parsed.
 
-A megabyte of empty files is half a million messages: the parser takes a tenth of a second for them, though their bytes
-are within every limit. The encoding is read as it stands (protobuf.dev: Encoding), and no further than up to the limit.
+A megabyte of empty files is half a million messages: the parser takes a tenth of a second for them, though their
+bytes are within every limit. The encoding is read as it stands (protobuf.dev: Encoding), and no further than up to
+the limit.
 """
 
 from typing import Any
@@ -17,10 +18,10 @@ type Nested = dict[int, Nested]
 
 
 def nested_of(message_type: Any) -> Nested:
-    """Which fields of a message are messages.
+    """Return the fields of a message that are messages.
 
     Args:
-        message_type: Its class.
+        message_type: Class of the message.
     """
     return _nested(message_type.DESCRIPTOR, {})
 
@@ -36,13 +37,13 @@ def _nested(descriptor: Any, made: dict[str, Nested]) -> Nested:
 
 
 def has_few_fields(content: bytes, nested: Nested, limit: int) -> bool:
-    """Whether a message has no more fields than it may have, those of messages in it included.
+    """Return True if a message has no more fields than it may have, those of messages in it included.
 
     Takes a time in proportion to the limit, however long the message is.
 
     Args:
-        content: The message, serialized. Of one that cannot be parsed nothing is said: the parser says it.
-        nested: Which of its fields are messages.
+        content: The message, serialized. If it cannot be parsed, the result says nothing: the parser reports that.
+        nested: Fields of the message that are messages.
         limit: Fields that it may have.
     """
     place, end = 0, len(content)

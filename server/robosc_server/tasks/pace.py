@@ -1,4 +1,4 @@
-"""How often somebody is told where the work is."""
+"""Pace at which somebody receives reports of the progress."""
 
 from collections.abc import Callable
 
@@ -9,10 +9,12 @@ PAUSE_S = 0.1
 
 
 class PacedReports:
-    """Passes reports on: the first of each stage, and others if none was for a while; small work tells little.
+    """Filter of reports: passes on the first of each stage, and others if none was for a while.
+
+    Small work reports little.
 
     Args:
-        on_report: Who is told.
+        on_report: Receiver of the reports.
         clock: Seconds that never go back.
     """
 

@@ -29,10 +29,10 @@ _PLUGINS = ("robosc.targets", "robosc.bdd_engines")
 """Groups of entry points of packages that have a say in results."""
 
 _FRAMING_BYTES = 64 * 1024
-"""What a message may have beside its names and texts: tags and lengths of a thousand files take 20 kB."""
+"""Bytes that a message may have besides its names and texts: tags and lengths of a thousand files take 20 kB."""
 
 _SUBMISSION_BYTES = 4096
-"""What a job's submission has beside its request."""
+"""Bytes that a job's submission has besides its request."""
 
 _FIELDS_A_FILE = 8
 """A file of a bundle is a field with two, and so is one of properties; a place and a property are one each."""
@@ -47,7 +47,7 @@ _ALL_REMEMBERED_BYTES = 4 * 2**20
 """Of requests that are known again; a longer one is looked at each time."""
 
 _ENTRY_BYTES = 500
-"""What one of them takes beside its own bytes."""
+"""Bytes that a remembered request takes besides its own."""
 
 _DEFAULT_GRAPH_STATES = 100_000
 _DEFAULT_VERIFIED_STATES = 1_000_000
@@ -57,13 +57,13 @@ _MAXIMUM_VERIFIED_STATES = 10**9
 
 @dataclass(frozen=True, slots=True)
 class RequestLimits:
-    """What a request may have.
+    """Limits of a request.
 
     Attributes:
-        bundle_bytes: Of all its names and texts; a given supervisor and properties count, too.
-        bundle_files: Its files; as many places that were searched, and as many properties.
-        name_bytes: Of the name of a file, a target or an engine.
-        nodes: Of decision diagrams, all together, that a task may have; whoever asks for more gets so many.
+        bundle_bytes: Bytes of all its names and texts; a given supervisor and properties count, too.
+        bundle_files: Number of its files; as many places that were searched, and as many properties.
+        name_bytes: Bytes of the name of a file, a target or an engine.
+        nodes: Nodes of decision diagrams, all together, that a task may have; a request for more gets so many.
     """
 
     bundle_bytes: int = 2**20
@@ -102,8 +102,8 @@ def require_parsable(content: bytes, nested: Nested, limits: RequestLimits) -> N
 
     Args:
         content: The message, serialized.
-        nested: Which of its fields are messages.
-        limits: What a request may have.
+        nested: Fields of the message that are messages.
+        limits: Limits of a request.
 
     Raises:
         RefusedError: It has too many fields.
@@ -113,15 +113,15 @@ def require_parsable(content: bytes, nested: Nested, limits: RequestLimits) -> N
 
 
 def accepted(kind: TaskKind, request: bytes, limits: RequestLimits) -> Task:
-    """The task that a request asks for.
+    """Return the task that a request asks for.
 
     Args:
-        kind: What the request is.
+        kind: Kind of the request.
         request: Its message, serialized.
-        limits: What it may have.
+        limits: Limits of the request.
 
     Raises:
-        RefusedError: It is no message, has names that cannot be, lacks something or has too much.
+        RefusedError: It is no message, has invalid names, lacks something or has too much.
     """
     require_short(request, limits.request_bytes)
     parse, look_at, nested = _KINDS[kind]
@@ -139,10 +139,10 @@ def accepted(kind: TaskKind, request: bytes, limits: RequestLimits) -> Task:
 
 
 class RecentRequests:
-    """Accepts requests, and knows again those that came before, byte by byte: a client that asks twice is common.
+    """Acceptance of requests that knows earlier ones again, byte by byte: a client that asks twice is common.
 
     Args:
-        limits: What a request may have.
+        limits: Limits of a request.
     """
 
     def __init__(self, limits: RequestLimits) -> None:
@@ -172,7 +172,10 @@ class RecentRequests:
 
 @cache
 def _makers() -> tuple[str, ...]:
-    """What makes results, by version: this distribution, the diagrams, and those whose targets and engines it uses."""
+    """Return everything that makes results, by version.
+
+    It is this distribution, the diagrams, and those distributions whose targets and engines it uses.
+    """
     # Without dd's extension the engine `auto` is another one.
     diagrams = f"dd {version('dd')} {'with' if has_cudd() else 'without'} cudd"
     dists = [point.dist for group in _PLUGINS for point in entry_points(group=group)]
@@ -215,10 +218,10 @@ class _Look:
             raise _too_large(f"the request has {count} {what}, this server takes at most {limit}")
 
     def bundle(self, message: Any) -> tuple[object, ...]:
-        """What a bundle means, whatever the order of its libraries and of its interfaces.
+        """Return the meaning of a bundle, whatever the order of its libraries and of its interfaces.
 
         Raises:
-            RefusedError: Its names cannot be, or it has too much.
+            RefusedError: Its names are invalid, or it has too much.
         """
         libraries, interfaces, searched = message.libraries, message.interfaces, message.searched
         self.require_few(1 + len(libraries) + len(interfaces), "files")
@@ -270,11 +273,11 @@ class _Look:
         return hashlib.sha256(content).hexdigest()
 
     def options(self, message: Any, *, deployment: int = pb.DEPLOYMENT_CONTROLLER) -> tuple[object, ...]:
-        """What options of a synthesis mean, with the defaults filled in.
+        """Return the meaning of the options of a synthesis, with the defaults filled in.
 
         Args:
             message: The options.
-            deployment: What it means to say nothing of the deployment.
+            deployment: Deployment that is meant if the options give none.
 
         Raises:
             RefusedError: There is no such deployment.

@@ -53,10 +53,10 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
     """Do a task to its end.
 
     Args:
-        kind: What it is.
+        kind: Kind of the task.
         request: The message of an accepted request.
-        limits: What it may take; time and memory are the process's, and its keeper sees to them.
-        on_report: Told now and then where the work is.
+        limits: Limits of the task; time and memory are the process's, and its keeper sees to them.
+        on_report: Callback that receives reports of the progress now and then.
     """
     try:
         return Result(_bounded(_WORK[kind](request, limits, PacedReports(on_report)), limits.result_bytes))
@@ -90,7 +90,7 @@ def rehearse() -> None:
 
 
 def _places(error: BaseException) -> str:
-    """Where a fault was, for a log: without its message, which may hold names of the model."""
+    """Return the places of a fault, for a log: without its message, which may hold names of the model."""
     cause = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
     before = f"{_places(cause)}\n" if cause is not None else ""
     return f"{before}{''.join(traceback.format_tb(error.__traceback__))}{type(error).__qualname__}"
@@ -177,10 +177,10 @@ def _explore(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterato
 
 
 def _graph(supervisor: Supervisor, maximum_states: int) -> Graph:
-    """Everything that the robot may do.
+    """Return the graph of everything that the robot may do.
 
     Raises:
-        UnsupportedModelError: That is more than `maximum_states`.
+        UnsupportedModelError: The graph has more than `maximum_states` states.
     """
     system = to_automata(supervisor.model, supervisor.deployment)
     return explore(system, state_predicates(system, supervisor.added), supervisor.model, limit=maximum_states)

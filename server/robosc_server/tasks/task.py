@@ -5,7 +5,7 @@ from enum import StrEnum
 
 
 class TaskKind(StrEnum):
-    """What a task is; each has a message of the API for its request, and one for its responses."""
+    """Kind of a task; each has a message of the API for its request, and one for its responses."""
 
     CHECK = "check"
     SYNTHESIZE = "synthesize"
@@ -20,7 +20,7 @@ class Task:
     """A request that was looked at and accepted.
 
     Attributes:
-        kind: What it is.
+        kind: Kind of the task.
         request: The request's message, serialized.
         key: SHA-256 (64 hexadecimal digits) of all that decides the result: the kind, every file by name and content,
             the options and the version of RoboSC.
@@ -35,14 +35,14 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class TaskLimits:
-    """What one task may take.
+    """Limits of one task.
 
     Attributes:
-        seconds: By the clock, while a worker is at it.
-        cpu_seconds: Of a processor's time.
-        memory_bytes: Of address space, the worker's own included.
-        nodes: Of decision diagrams, all together.
-        result_bytes: Of all messages of the result.
+        seconds: Wall-clock time while a worker is busy with it, in seconds.
+        cpu_seconds: Processor time, in seconds.
+        memory_bytes: Bytes of address space, the worker's own included.
+        nodes: Nodes of decision diagrams, all together.
+        result_bytes: Bytes of all messages of the result.
     """
 
     seconds: float = 600.0
@@ -54,14 +54,14 @@ class TaskLimits:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """Where the work is: a stage, and one short line."""
+    """Progress of the work: a stage, and one short line."""
 
     stage: str
     message: str
 
 
 class Reason(StrEnum):
-    """Why something ended without a result: the reason of google.rpc.ErrorInfo."""
+    """Reason why something ended without a result: the reason of google.rpc.ErrorInfo."""
 
     MALFORMED_REQUEST = "MALFORMED_REQUEST"
     REQUEST_TOO_LARGE = "REQUEST_TOO_LARGE"
@@ -99,9 +99,9 @@ class Failure:
     """A task that ended without a result.
 
     Attributes:
-        reason: Why.
+        reason: Reason of the failure.
         message: One sentence for the caller; nothing of the model in it.
-        details: For the log of the server alone, such as a traceback.
+        details: Text for the log of the server alone, such as a traceback.
     """
 
     reason: Reason

@@ -35,12 +35,12 @@ class NoPropertyError(Exception):
 
 
 def verification(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) -> pb.VerificationResult:
-    """What a request finds out.
+    """Return the result of a verification request.
 
     Args:
         request: An accepted request.
-        maximum_nodes: Of decision diagrams, whatever the request says.
-        on_report: Told where the work is.
+        maximum_nodes: Nodes of decision diagrams that are allowed, whatever the request says.
+        on_report: Callback that receives reports of the progress.
 
     Raises:
         NoPropertyError: There is nothing to verify in the texts.
@@ -56,7 +56,7 @@ def verification(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnRep
 
 
 def _given(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) -> pb.VerificationResult:
-    """Whether the supervisor that is given is right; if so, and only if it is asked for, its robot's properties."""
+    """Verify the given supervisor; if it is right, and only if asked for, verify its robot's properties."""
     engine = resolve_engine(given.engine_name(request.options))
     try:
         supervisor = decode(request.supervisor)
@@ -78,7 +78,7 @@ def _given(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) -
 
 
 def _no_robot(found: Recheck) -> str:
-    """Why nothing was looked at where nothing is wrong either."""
+    """Return the reason why nothing was looked at where nothing is wrong either."""
     if found.diagnostics or found.judgement or found.faults:
         return ""
     return "a library has no robot that a supervisor could be for"
@@ -99,7 +99,7 @@ def _made(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) ->
 
 
 def _property_errors(request: pb.VerifyRequest, model: Model) -> pb.VerificationResult | None:
-    """What is wrong with the properties, or None."""
+    """Return the errors of the properties, or None."""
     try:
         _properties(request, model)
     except LanguageError as error:

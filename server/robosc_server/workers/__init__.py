@@ -26,7 +26,7 @@ class Workers(Protocol):
 
     @property
     def capacity(self) -> int:
-        """How many tasks they can be at, at once; may change."""
+        """Number of tasks that they can be busy with at once; may change."""
 
     async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:
         """The outcome of a task, begun at once: the caller sees to it that no more than `capacity` are under way.

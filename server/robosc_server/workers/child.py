@@ -33,11 +33,11 @@ def work(connection: socket.socket, last_words: int, function: TaskFunction, san
     """Wait for a task, do it, send its outcome; confined before anything of a stranger's is read.
 
     Args:
-        connection: To the server; where it ends before a task came, nobody needs this process.
+        connection: Connection to the server; where it ends before a task came, nobody needs this process.
         last_words: Descriptor to which the interpreter writes where it was when it crashed.
-        function: Does the task.
-        sandbox: What it is confined by.
-        used_bytes: Of address space, that this process has.
+        function: Function that does the task.
+        sandbox: Sandbox that confines this process.
+        used_bytes: Bytes of address space that this process has.
 
     Raises:
         SandboxError: It cannot be confined.

@@ -1,4 +1,4 @@
-"""What a worker's process may take, held by the kernel; and that it does not outlive who started it."""
+"""Limits of a worker's process, enforced by the kernel; the process does not outlive the one that started it."""
 
 import math
 import os
@@ -43,12 +43,12 @@ def confine(limits: TaskLimits, used_bytes: int) -> None:
     """Set the limits of the task that this process is about to do.
 
     Args:
-        limits: What the task may take.
-        used_bytes: Of address space, that the process has already.
+        limits: Limits of the task.
+        used_bytes: Bytes of address space that the process has already.
 
-    The address space counts what the process has already; at least 64 MiB more are left to it, since less than that is
-    too little for any task. Processor time counts from here on, in whole seconds. No byte can be
-    written to a file.
+    The address space counts what the process has already; at least 64 MiB more are left to it, since less than that
+    is too little for any task. Processor time counts from here on, in whole seconds. No byte can be written to a
+    file.
     """
     memory_bytes = max(limits.memory_bytes, used_bytes + _LEAST_ROOM_BYTES)
     _set(resource.RLIMIT_AS, memory_bytes, memory_bytes + _FAREWELL_BYTES)
@@ -80,6 +80,6 @@ def _set(kind: int, soft: int, hard: int) -> None:
 
 
 def address_space_bytes() -> int:
-    """How much address space this process has."""
+    """Return the size of this process's address space, in bytes."""
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     return pages * resource.getpagesize()

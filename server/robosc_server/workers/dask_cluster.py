@@ -22,17 +22,17 @@ from robosc_server.workers.local import TASK_FUNCTION
 _LOG = logging.getLogger(__name__)
 
 CONNECT_S = 5.0
-"""How long one attempt to reach the scheduler may take."""
+"""Time that one attempt to reach the scheduler may take, in seconds."""
 
 LOOK_S = 0.5
-"""How often the cluster is asked for its workers."""
+"""Period at which the cluster is asked for its workers, in seconds."""
 
 _TLS = "tls://"
 _ATTEMPTS = 2
-"""How often a task may begin."""
+"""Number of times that a task may begin."""
 
 _STARTS = 3
-"""How often it is handed to the cluster: its workers may be lost before they begin it."""
+"""Number of times that it is handed to the cluster: its workers may be lost before they begin it."""
 
 _GRACE_S = 30.0
 _CANCEL_S = 1.0
@@ -45,7 +45,7 @@ _LOST = "two workers of the cluster were lost while they did this task"
 
 
 class _Watched:
-    """What a cluster tells of one task under way."""
+    """Reports of a cluster on one task under way."""
 
     def __init__(self) -> None:
         self.begun = 0
@@ -73,19 +73,19 @@ class _Watched:
 
 
 class DaskWorkers:
-    """The workers of a cluster; an asynchronous context. It is there also while the cluster is away.
+    """The workers of a cluster; an asynchronous context, which is there also while the cluster is away.
 
     Attributes:
-        fault: Why no task can be done now, in one sentence; empty where tasks can be done.
+        fault: Reason why no task can be done now, in one sentence; empty where tasks can be done.
     """
 
     def __init__(self, address: str, task_function: str = TASK_FUNCTION, *, must_be_confined: bool = False) -> None:
-        """Plan.
+        """Prepare the workers, without starting them.
 
         Args:
-            address: Of the scheduler, such as `tcp://HOST:PORT` or `tls://HOST:PORT`.
-            task_function: What does tasks there, `package.module:name`.
-            must_be_confined: Whether no task is to be done where a part of the confinement cannot be had.
+            address: Address of the scheduler, such as `tcp://HOST:PORT` or `tls://HOST:PORT`.
+            task_function: Function that does tasks there, `package.module:name`.
+            must_be_confined: True if no task is to be done where a part of the confinement is not available.
 
         Raises:
             WorkersError: The package `distributed` is missing, or cannot be loaded here; or there is to be TLS, and
@@ -146,15 +146,15 @@ class DaskWorkers:
         return sum(self._threads.values())
 
     async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:
-        """The outcome of a task; see `Workers.run`.
+        """Return the outcome of a task; see `Workers.run`.
 
         A worker of the cluster that is lost has its task done by another one, once. Reports come at most ten times a
         second, and of many at once only the last.
 
         Raises:
-            WorkersError: The cluster is away, was lost on the way, has no worker, only such as cannot be used, or loses
-                them before they begin.
-            WorkerLostError: What starts processes on a worker ended under it, more than once.
+            WorkersError: The cluster is away, was lost on the way, has no worker, only such as cannot be used, or
+                loses them before they begin.
+            WorkerLostError: The starter of processes on a worker ended under it, more than once.
         """
         watched = _Watched()
         for _ in range(_STARTS):
@@ -218,7 +218,7 @@ class DaskWorkers:
                     await asyncio.gather(*works, return_exceptions=True)
 
     async def _answer(self, future: Any, limits: TaskLimits) -> Outcome | None:
-        """What the cluster answers; None: it gave up."""
+        """Return the answer of the cluster; None: it gave up."""
         from robosc_server.workers.dask_task import ANSWER, LOST, NO_WORKER, outcome_of
 
         try:
@@ -243,17 +243,17 @@ class DaskWorkers:
     async def _guard(
         self, client: Any, watched: _Watched, limits: TaskLimits, named: list[str] | None
     ) -> Failure | None:
-        """End a wait for what will not come.
+        """End a wait for something that will not come.
 
         Args:
-            client: Of the cluster that has the task.
-            watched: What is told of the task.
-            limits: What it may take.
+            client: Client of the cluster that has the task.
+            watched: Reports of the cluster on the task.
+            limits: Limits of the task.
             named: The workers that alone may do it; None: any.
 
         Returns:
-            What has become of the task; None: those workers are gone and others are there, but the scheduler would go
-            on waiting for them.
+            Failure of the task; None: those workers are gone and others are there, but the scheduler would go on
+            waiting for them.
 
         Raises:
             WorkersError: The cluster is lost, or has had no worker for a while.
@@ -301,7 +301,7 @@ class DaskWorkers:
         )
 
     async def _tls_fault(self) -> str | None:
-        """What is wrong with certificates, theirs or ours, where Dask does not tell that."""
+        """Return the fault of the certificates, theirs or ours, where Dask does not report it."""
         if not self._address.startswith(_TLS):
             return None
         from robosc_server.workers.dask_tls import tls_fault

@@ -1,4 +1,4 @@
-"""What a task on a cluster has taken of processors, put together from what the cluster's workers tell."""
+"""Processor time that a task on a cluster has taken, put together from the reports of the cluster's workers."""
 
 import math
 from collections.abc import Callable

@@ -1,7 +1,7 @@
-"""What a Dask worker does for the server: a task in a process of its own, reports told on the way, an answer in bytes.
+"""Work of a Dask worker for the server: a task in a process of its own, reports on the way, an answer in bytes.
 
-The answer is bytes with a mark before it, and never an object: what a hostile model has been through is read by the
-server with the care of `frames`.
+The answer is bytes with a mark before it, and never an object: the output of a process that has handled a hostile
+model is read by the server with the care of `frames`.
 """
 
 import threading
@@ -53,13 +53,13 @@ def run_on_cluster(
     identity: tuple[str, str],
     limits: tuple[float, float, int, int, int],
 ) -> bytes:
-    """Do a task on this worker; stops when nobody on the cluster wants its result any more.
+    """Do a task on this worker; stop when nobody on the cluster wants its result any more.
 
     Args:
-        version: Of the server.
-        task_function: What does tasks, `package.module:name`.
-        must_be_confined: Whether there are to be no workers where a part of their confinement cannot be had.
-        topic: Where reports are told.
+        version: Version of the server.
+        task_function: Function that does tasks, `package.module:name`.
+        must_be_confined: True if there are to be no workers where a part of their confinement is not available.
+        topic: Topic of the reports.
         kind: The task's kind.
         request: Its request.
         identity: Its key and the name of its main file.
@@ -108,7 +108,7 @@ def run_on_cluster(
 
 
 def mismatch(address: str, theirs: str, ours: str) -> str:
-    """What is told of a worker with another version."""
+    """Return the message about a worker with another version."""
     return f"the Dask worker at {address} has RoboSC {theirs}, and this server {ours}: they must be the same"
 
 

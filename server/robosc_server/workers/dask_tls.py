@@ -17,10 +17,10 @@ _SETTINGS = "DASK_DISTRIBUTED__COMM__TLS__CA_FILE, â€¦__TLS__CLIENT__CERT and â€
 
 
 def client_context() -> ssl.SSLContext:
-    """How this server shows who it is to a scheduler, and knows the scheduler by; read from the files each time.
+    """Return the TLS context that identifies server and scheduler to each other; read from the files each time.
 
     Raises:
-        WorkersError: Dask's settings do not say so, or a file of theirs cannot be used.
+        WorkersError: Dask's settings do not give it, or a file of theirs cannot be used.
     """
     settings: Any = Security()  # type: ignore[no-untyped-call]
     try:
@@ -35,12 +35,12 @@ def client_context() -> ssl.SSLContext:
 
 
 async def tls_fault(host: str, port: int, limit_s: float) -> str | None:
-    """Why there is no TLS with a scheduler; None: there is, or nobody is there at all.
+    """Return the reason why there is no TLS with a scheduler; None: there is, or nobody is there at all.
 
     Args:
         host: Its host.
         port: Its port.
-        limit_s: How long that may take.
+        limit_s: Time that this may take, in seconds.
     """
     try:
         context = client_context()
@@ -67,5 +67,5 @@ async def tls_fault(host: str, port: int, limit_s: float) -> str | None:
 
 
 def _words(error: ssl.SSLError) -> str:
-    """What OpenSSL says, such as `tlsv1 alert unknown ca`."""
+    """Return the words of OpenSSL, such as `tlsv1 alert unknown ca`."""
     return (error.reason or str(error)).replace("_", " ").lower()

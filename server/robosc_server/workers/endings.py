@@ -1,4 +1,4 @@
-"""Why a worker's process ended without an answer, told honestly from what the kernel says of it."""
+"""Reasons why a worker's process ended without an answer, given honestly from the kernel's facts about it."""
 
 import math
 import re
@@ -22,11 +22,11 @@ _NEVER_RESIDENT_BYTES = 96 * 2**20  # Of the address space: mostly parts of libr
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """How a worker's process ended.
+    """End of a worker's process.
 
     Attributes:
         exit_code: Its status, or the signal that ended it, negative.
-        cpu_s: Time of a processor that it took.
+        cpu_s: Processor time that it took, in seconds.
         peak_bytes: Most memory that was resident at once.
     """
 
@@ -39,11 +39,11 @@ FACTS = re.compile(
     r"(ended with status \d{1,3} and no answer|was ended by (SIG[A-Z0-9]{2,8}|signal \d{1,3})) "
     r"after \d{1,9}\.\d\d s of a processor's time, with at most \d{1,15} bytes resident"
 )
-"""What `facts_of` says: nobody can say anything of a model in this form."""
+"""Pattern of the text that `facts_of` returns: nobody can say anything of a model in this form."""
 
 
 def facts_of(ending: Ending) -> str:
-    """How a process ended, in one line."""
+    """Return a description of a process's end, in one line."""
     return (
         f"{_told(ending.exit_code)} after {ending.cpu_s:.2f} s of a processor's time, "
         f"with at most {ending.peak_bytes} bytes resident"
@@ -51,13 +51,13 @@ def facts_of(ending: Ending) -> str:
 
 
 def failure_of(ending: Ending, limits: TaskLimits, last_words: str, was_memory_short: bool) -> Failure:
-    """What is told of a task whose worker ended without an answer, and was not killed by the server.
+    """Return the failure of a task whose worker ended without an answer, and was not killed by the server.
 
     Args:
-        ending: How it ended.
-        limits: What the task was allowed.
-        last_words: What the interpreter wrote when it crashed.
-        was_memory_short: Whether the kernel killed some process for want of memory meanwhile.
+        ending: End of the worker's process.
+        limits: Limits of the task.
+        last_words: Text that the interpreter wrote when it crashed.
+        was_memory_short: True if the kernel killed some process for want of memory meanwhile.
     """
     details = f"{facts_of(ending)}\n{last_words}".rstrip()
     out_of_processor = ending.cpu_s >= limits.cpu_seconds
@@ -72,7 +72,7 @@ def failure_of(ending: Ending, limits: TaskLimits, last_words: str, was_memory_s
 
 
 def kills_for_memory() -> int:
-    """How often this machine's kernel has killed a process for want of memory; 0 where that is not told."""
+    """Return the number of processes that this machine's kernel has killed for want of memory; 0 if unknown."""
     with suppress(OSError, ValueError):
         for line in Path("/proc/vmstat").read_text().splitlines():
             if line.startswith("oom_kill "):
@@ -81,13 +81,13 @@ def kills_for_memory() -> int:
 
 
 class KillsBefore:
-    """How often processes were killed for want of memory before now; asked of the kernel at most once a second.
+    """Number of processes killed for want of memory before now; asked of the kernel at most once a second.
 
     Asking takes a tenth of a millisecond, and the answer is of use only where a worker is killed: one that was killed
     within a second after another process ran out of memory is taken for one that did so itself.
 
     Args:
-        count: Asks the kernel.
+        count: Function that asks the kernel.
         clock: Seconds that never go back.
     """
 

@@ -1,4 +1,4 @@
-"""Which files a worker may read: the programs it consists of. Landlock, the kernel's own, holds it, for any user."""
+"""Files that a worker may read: the programs it consists of; the kernel's Landlock enforces it, for any user."""
 
 import contextlib
 import os
@@ -24,7 +24,7 @@ _SCOPES_FROM, _SCOPES = 6, 0b11  # Sockets without a file, and signals, of proce
 
 
 class FileRules:
-    """What may be read, made once; forks of this process restrict themselves by it.
+    """Rules of what may be read, made once; forks of this process restrict themselves by them.
 
     Raises:
         OSError: The kernel has no Landlock, or it is turned off.
@@ -68,7 +68,7 @@ class FileRules:
 
 
 def program_places() -> set[Path]:
-    """Where the programs lie that this process consists of: Python's library, what is installed, and loaded packages.
+    """Return the places of the programs of this process: Python's library, what is installed, and loaded packages.
 
     Not all of `sys.path`: the folder that a server was started in may be on it, and hold anything.
     """

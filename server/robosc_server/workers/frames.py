@@ -1,7 +1,8 @@
-"""What a worker and the server say to each other: frames of a tag byte, a length of 8 bytes and a payload.
+"""Messages between a worker and the server: frames of a tag byte, a length of 8 bytes and a payload.
 
-Nothing here builds objects other than bytes, numbers and text: what has handled a stranger's model could say anything,
-and must not run code in the server by it. A payload is read only after its length was found to be allowed.
+Nothing here builds objects other than bytes, numbers and text: a process that has handled a stranger's model could
+say anything, and must not run code in the server by it. A payload is read only after its length was found to be
+allowed.
 
     server to worker   T  JSON: the kind and the limits        Q  the request's message
     worker to server   P  JSON: a report                       M  one message of the result
@@ -49,7 +50,7 @@ _TOLD_BY_WORKERS = frozenset(
 
 
 class Tag(Enum):
-    """What a frame holds."""
+    """Content of a frame."""
 
     TASK = b"T"
     REQUEST = b"Q"
@@ -60,7 +61,7 @@ class Tag(Enum):
 
 
 class FrameError(Exception):
-    """What came is no answer of a worker."""
+    """Received data that is no answer of a worker."""
 
 
 def frame(tag: Tag, payload: bytes) -> bytes:
@@ -69,7 +70,7 @@ def frame(tag: Tag, payload: bytes) -> bytes:
 
 
 def task_frames(task: Task, limits: TaskLimits) -> bytes:
-    """What a worker is told."""
+    """Return the frames that give a worker its task."""
     head = {
         "kind": str(task.kind),
         "key": task.key,
@@ -86,7 +87,7 @@ def task_frames(task: Task, limits: TaskLimits) -> bytes:
 
 
 def task_of(head: bytes, request: bytes) -> tuple[Task, TaskLimits]:
-    """What the server's frames tell."""
+    """Return the task and the limits that the server's frames hold."""
     values = json.loads(head)
     task = Task(TaskKind(values["kind"]), request, values["key"], values["main_file"])
     return task, TaskLimits(**values["limits"])
@@ -163,7 +164,7 @@ class AnswerReader:
         return tag, length
 
     def read(self, tag: Tag, payload: bytes) -> Report | Outcome | None:
-        """What a frame says; None: more of the result is to come.
+        """Return the content of a frame; None: more of the result is to come.
 
         Raises:
             FrameError: It says nothing that a worker may say.

@@ -49,8 +49,8 @@ def prepare(task_function: str = TASK_FUNCTION, *, must_be_confined: bool = Fals
     """Have processes stand ready for tasks; they stay as long as this process.
 
     Args:
-        task_function: What does tasks, `package.module:name`.
-        must_be_confined: Whether there are to be none where a part of their confinement cannot be had.
+        task_function: Function that does tasks, `package.module:name`.
+        must_be_confined: True if there are to be none where a part of their confinement is not available.
 
     Raises:
         WorkersError: None can be had.
@@ -76,17 +76,17 @@ def run_isolated(
     *,
     must_be_confined: bool = False,
 ) -> Outcome:
-    """The outcome of a task, done in a process of its own within limits.
+    """Return the outcome of a task, done in a process of its own within limits.
 
     Args:
-        task: What to do.
-        limits: What it may take.
-        on_report: Told each report, in another thread; must not wait.
-        should_stop: Asked every 20 ms, in this thread; once true, the process is killed.
-        task_function: What does tasks, `package.module:name`.
-        on_spent: Told the processor's time of each process that was at it, in another thread, maybe after the outcome;
-            see `Workers.run`.
-        must_be_confined: Whether it is not to be done where a part of the confinement cannot be had.
+        task: Task to do.
+        limits: Limits of the task.
+        on_report: Callback that receives each report, in another thread; must not wait.
+        should_stop: Function that is asked every 20 ms, in this thread; once true, the process is killed.
+        task_function: Function that does tasks, `package.module:name`.
+        on_spent: Callback that receives the processor time of each process that was busy with it, in another thread,
+            maybe after the outcome; see `Workers.run`.
+        must_be_confined: True if it is not to be done where a part of the confinement is not available.
 
     Raises:
         StoppedError: `should_stop` said so.

@@ -29,13 +29,13 @@ class LocalWorkers:
         *,
         must_be_confined: bool = False,
     ) -> None:
-        """Plan.
+        """Prepare the workers, without starting them.
 
         Args:
             size: Tasks under way at once.
-            task_function: What does them, `package.module:name`; imported by the processes alone.
+            task_function: Function that does them, `package.module:name`; imported by the processes alone.
             spare: Processes that stand ready beside those at work; None: as many as `size`.
-            must_be_confined: Whether there are to be none where a part of their confinement cannot be had.
+            must_be_confined: True if there are to be none where a part of their confinement is not available.
         """
         self._size = size
         self._supply = Supply(task_function, size if spare is None else spare, must_be_confined=must_be_confined)
@@ -49,7 +49,7 @@ class LocalWorkers:
 
     @property
     def capacity(self) -> int:
-        """How many tasks can be under way; 0 while no process can be had."""
+        """Number of tasks that can be under way; 0 while no process can be had."""
         return 0 if self._supply.is_hopeless else self._size
 
     @property
@@ -59,7 +59,7 @@ class LocalWorkers:
 
     @property
     def fault(self) -> str:
-        """Why no process can be had now, in one sentence; empty where there are."""
+        """Reason why no process can be had now, in one sentence; empty where there are some."""
         return self._supply.fault
 
     @property
@@ -69,7 +69,7 @@ class LocalWorkers:
 
     @property
     def restarts(self) -> int:
-        """How often the process that starts workers ended and was started again."""
+        """Number of times that the process that starts workers ended and was started again."""
         return self._supply.restarts
 
     async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:

@@ -11,13 +11,13 @@ _CLUSTER = re.compile(r"dask(\+tls)?://(?P<address>(\[[0-9a-fA-F:.]+\]|[^\s/\[\]
 def open_workers(
     spec: str, processes: int, task_function: str = TASK_FUNCTION, *, must_be_confined: bool = False
 ) -> LocalWorkers | DaskWorkers:
-    """Workers that are not started yet: enter them.
+    """Return workers that are not started yet: enter them.
 
     Args:
         spec: `local`, `dask://HOST:PORT` or `dask+tls://HOST:PORT`.
         processes: Tasks that this machine does at once; a cluster has its own number.
-        task_function: What does tasks, `package.module:name`.
-        must_be_confined: Whether there are to be none where a part of their confinement cannot be had.
+        task_function: Function that does tasks, `package.module:name`.
+        must_be_confined: True if there are to be none where a part of their confinement is not available.
 
     Raises:
         ValueError: The specification is none of these.

@@ -28,8 +28,8 @@ class WorkerProcess:
 
     Attributes:
         pid: Its number.
-        task: What it is at, or was.
-        ending: How it ended, as soon as that is known; None: the template that could have told it is gone.
+        task: Task that it is busy with, or was.
+        ending: End of the process, as soon as that is known; None: the template that could have reported it is gone.
     """
 
     def __init__(self, pid: int, connection: socket.socket, descriptor: int, last_words: int) -> None:
@@ -53,7 +53,7 @@ class WorkerProcess:
             signal.pidfd_send_signal(self._descriptor, signal.SIGKILL)
 
     def has_ended(self) -> bool:
-        """Whether it is no more, asked of the kernel."""
+        """Return True if the process is no more, asked of the kernel."""
         poll = select.poll()
         poll.register(self._descriptor, select.POLLIN)
         return bool(poll.poll(0))
@@ -105,7 +105,7 @@ class WorkerProcess:
                 return told
 
     async def _failure(self, limits: TaskLimits, kills: int) -> Failure:
-        """Why the connection ended before an answer was whole."""
+        """Return the reason why the connection ended before an answer was whole."""
         self.kill()  # It closed its end, but may live: then it was told nothing of a limit by the kernel.
         try:
             async with asyncio.timeout(_ENDING_S):

@@ -1,8 +1,8 @@
-"""What a worker is kept from, should a model ever bring it to run somebody else's program: nearly everything.
+"""Things that a worker is kept from, should a model ever make it run somebody else's program: nearly everything.
 
 The limits of `confinement` bound what a task takes; this bounds what its process can reach. Each part is held by the
-kernel, for any user, and cannot be given up again. A kernel may lack a part, or whoever runs the server's container may
-forbid it: the others hold all the same, and what is missing is told.
+kernel, for any user, and cannot be given up again. A kernel may lack a part, or whoever runs the server's container
+may forbid it: the others hold all the same, and what is missing is reported.
 """
 
 import contextlib
@@ -49,12 +49,12 @@ class Sandbox:
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """What this machine cannot keep workers from and why, one sentence for each part."""
+        """Things that this machine cannot keep workers from and why, one sentence for each part."""
         return tuple(f"{words}: {fault}" for words, fault in self._faults.items())
 
     @property
     def descriptors(self) -> frozenset[int]:
-        """What a fork has to have open to enter; closed by that."""
+        """Descriptors that a fork has to have open to enter; closed by that."""
         return frozenset() if self._rules is None else frozenset({self._rules.descriptor})
 
     def enter(self) -> None:
@@ -77,7 +77,10 @@ class Sandbox:
 
 
 def _tried(restrict: Callable[[], None]) -> str:
-    """Why a process cannot be confined by something, found out by a fork that ends at once; empty if it can."""
+    """Return the reason why a process cannot be confined by something; empty if it can.
+
+    It is found out by a fork that ends at once.
+    """
     told, telling = os.pipe2(os.O_CLOEXEC)
     pid = os.fork()
     if pid == 0:

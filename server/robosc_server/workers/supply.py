@@ -21,7 +21,7 @@ from robosc_server.workers.template import MUST_BE_CONFINED, PACKET_BYTES
 _LOG = logging.getLogger(__name__)
 
 START_S = 60.0
-"""How long a template may take until its first worker stands ready, also on a machine with too much to do."""
+"""Time that a template may take until its first worker stands ready, in seconds, also on an overloaded machine."""
 
 _PAUSES_S = (0.0, 0.0, 0.2, 1.0, 5.0)
 _HOPELESS = 3
@@ -34,13 +34,13 @@ _HANDED_ON_PREFIXES = ("LC_", "PYTHON")
 
 
 class Supply:
-    """Has workers stand ready; an asynchronous context.
+    """Supply of workers that stand ready; an asynchronous context.
 
     Attributes:
-        restarts: How many templates ended without being told to.
-        fault: Why no process can be had now, in one sentence; empty where there are.
-        missing: Parts of the workers' confinement that this machine does not have, one sentence for each; None: that is
-            not known yet.
+        restarts: Number of templates that ended without being told to.
+        fault: Reason why no process can be had now, in one sentence; empty where there are some.
+        missing: Parts of the workers' confinement that this machine does not have, one sentence for each; None: that
+            is not known yet.
     """
 
     def __init__(self, task_function: str, spare: int, *, must_be_confined: bool) -> None:
@@ -96,7 +96,7 @@ class Supply:
 
     @property
     def is_hopeless(self) -> bool:
-        """Whether one template after the other ended without a worker; it is tried again now and then."""
+        """True if one template after the other ended without a worker; it is tried again now and then."""
         return self._failures >= _HOPELESS
 
     async def take(self) -> WorkerProcess:
@@ -222,7 +222,7 @@ class Supply:
                 await process.wait()
 
     def _hear_all(self, line: socket.socket) -> None:
-        """What a template told before it ended."""
+        """Take everything that a template reported before it ended."""
         with contextlib.suppress(OSError):
             while self._hear(line):
                 pass
@@ -292,7 +292,7 @@ def _suspects(tasks: list[Task]) -> str:
 
 
 def _environment() -> dict[str, str]:
-    """What programs of Python need of the server's environment; the same modules are found.
+    """Return what Python programs need of the server's environment; the same modules are found.
 
     Nothing else: a database's password, keys of a cloud or the server's own settings are no task's business.
     """

@@ -1,8 +1,8 @@
-"""What a worker may ask of the kernel: memory, time, its files' content and its connection; all else is refused.
+"""Kernel requests that a worker may make: memory, time, its files' content, its connection; all else is refused.
 
-A filter of seccomp in the kernel's language of filters (classic BPF), for 64-bit machines of two kinds. What is not
-listed here, also what kernels to come will offer, fails with EPERM: new processes and programs, sockets, signals to
-others, looking into others, files that are made or written, more rights.
+A filter of seccomp in the kernel's language of filters (classic BPF), for 64-bit machines of two kinds. Anything that
+is not listed here, also what kernels to come will offer, fails with EPERM: new processes and programs, sockets,
+signals to others, looking into others, files that are made or written, more rights.
 """
 
 import ctypes
@@ -44,8 +44,8 @@ class Architecture:
     """A kind of machine.
 
     Attributes:
-        mark: What the kernel calls it (AUDIT_ARCH_...).
-        numbers: Of the calls that a worker may make, by name.
+        mark: Kernel's name for it (AUDIT_ARCH_...).
+        numbers: Numbers of the calls that a worker may make, by name.
     """
 
     mark: int
@@ -169,7 +169,7 @@ def filter_program(architecture: Architecture, pid: int) -> bytes:
 
 
 def _conditions(pid: int) -> dict[str, list[_Instruction]]:
-    """What refuses a call that is allowed with some arguments alone."""
+    """Return the instructions that refuse a call that is allowed with some arguments alone."""
     refused = _Instruction(_RETURN, REFUSE)
     own_process = [_argument(0), *_unless_equal(pid, refused)]
     return {

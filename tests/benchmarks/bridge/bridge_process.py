@@ -32,7 +32,7 @@ SETTLE_S = 1.0
 
 
 def _watch_decisions(machine: Machine) -> list[float]:
-    """Where it will be noted how late each decision is."""
+    """Return the list in which the lateness of each decision will be noted, in seconds."""
     found: list[float] = []
     tick = Executor.tick
 
@@ -107,7 +107,7 @@ def _await(machine: Machine, state: State) -> None:
 
 
 def _share(seconds: float) -> float:
-    """How much of a processor the process takes for so long."""
+    """Return the share of a processor that the process takes during the given time."""
     begin_cpu_s, begin_s = time.process_time(), time.monotonic()
     time.sleep(seconds)
     return (time.process_time() - begin_cpu_s) / (time.monotonic() - begin_s)

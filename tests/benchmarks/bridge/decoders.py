@@ -1,7 +1,7 @@
-"""How many bytes of each LiDAR the bridge decodes in a second, beside what its line brings at most.
+"""Benchmark of the bytes of each LiDAR that the bridge decodes in a second, beside the maximum of its line.
 
 The aim is a hundred times the line; time is that of the processor. *Frames*: bytes to frames. *Scans*: bytes to 360
-ranges. *Noise*: random bytes. *Headers*: nothing but what looks like the beginning of a frame, the worst that a line
+ranges. *Noise*: random bytes. *Headers*: only bytes that look like the beginning of a frame, the worst that a line
 can bring.
 
 Usage: decoders.py

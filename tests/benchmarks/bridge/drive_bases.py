@@ -1,4 +1,4 @@
-"""How long an exchange with a drive base takes, and what waiting costs.
+"""Benchmark of the duration of an exchange with a drive base, and of the cost of waiting.
 
 The simulated robot is a process of its own, at the far end of a real pseudo-terminal, and moves; exchanges follow one
 another by their period. *Command*: from the call to the first byte of the command on the line. *CPU*: of the thread

@@ -1,9 +1,9 @@
-"""How soon the live view tells what has happened, and how much of a processor it takes.
+"""Benchmark of the delay until the live view reports an event, and of the share of a processor that it takes.
 
 A robot of many components lives in a process of its own, with events at a steady rate, behind the live view of a
 bridge; pages are open in another process. *Late*: from the event to the WebSocket message with it, on one clock.
 *Update*: the same to the first update that was made after the event. *CPU*: user and system time of the robot's
-process, with and without pages, over the time that passed; what the pages take is the difference.
+process, with and without pages, over the time that passed; the share of the pages is the difference.
 
 Usage: live_view.py [SECONDS]
 """
@@ -48,12 +48,12 @@ HEADER = [
 
 @dataclass
 class Seen:
-    """What a page was told.
+    """Data that a page received.
 
     Attributes:
-        late_s: Of each event.
-        update_s: Of each event, until an update that was made after it.
-        numbers: Of the entries.
+        late_s: Delay of each event, in seconds.
+        update_s: Time from each event until an update that was made after it, in seconds.
+        numbers: Numbers of the entries.
     """
 
     late_s: list[float] = field(default_factory=list)

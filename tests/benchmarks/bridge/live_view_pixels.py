@@ -1,11 +1,11 @@
-"""How soon an event of a robot is seen in the live view: from the control loop's thread to the painted frame.
+"""Benchmark of the delay from an event in the control loop's thread to the painted frame of the live view.
 
 A robot of sixty components lives through fifty events a second; its live view is served in the same process, as by
-`robosc-bridge run`, and shown by a real browser without a window. The clock of the one is that of the other. *Seen* is
-an entry when the frame that shows it has been painted: its row is found by a MutationObserver, and the first task
-after the next animation frame is taken for the moment; what a screen takes to light up comes on top. The same is
-measured of the state that stands at a component, where it changes. Browser and server go before other programs where
-that is permitted.
+`robosc-bridge run`, and shown by a real browser without a window. Both use the same clock. An entry is *seen* when
+the frame that shows it has been painted: its row is found by a MutationObserver, and the first task after the next
+animation frame is taken for the moment; the time that a screen takes to light up comes on top. The same is measured
+for the state shown at a component, where it changes. Browser and server have priority over other programs where that
+is permitted.
 
 Usage: live_view_pixels.py [--events N] [--components N] [--rate HZ]
 """
@@ -59,7 +59,7 @@ PAINTED = "() => new Promise((done) => requestAnimationFrame(() => requestAnimat
 
 
 def table(events: int = EVENTS, components: int = COMPONENTS, rate_hz: float = RATE_HZ) -> str:
-    """What was measured."""
+    """Return the table of the measurements."""
     if CHROMIUM is None:
         return "From event to pixel: not measured, there is no Chromium on this machine."
     robot = LiveRobot(supervisor_without_synthesis(large_model(components)))
@@ -107,7 +107,10 @@ def _measured(robot: LiveRobot, events: int, rate_hz: float) -> tuple[list[float
 
 
 def _until_rows(happened_s: dict[int, float], rows_ms: dict[str, float]) -> Iterator[float]:
-    """Where more entries came within a frame than there is room for, what has gone by is seen with the next."""
+    """Yield the time until each entry is seen, in milliseconds.
+
+    If more entries came within a frame than there is room for, those that have gone by are seen with the next one.
+    """
     next_ms = math.inf
     for number, at_s in sorted(happened_s.items(), reverse=True):
         next_ms = min(next_ms, rows_ms.get(str(number), math.inf))
@@ -119,7 +122,11 @@ def _states(robot: LiveRobot) -> dict[str, str]:
 
 
 def _until_states(changes: list[tuple[float, int, str]], seen: list[tuple[int, str, float]]) -> Iterator[float]:
-    """What was undone soon, or undid, is left out: maybe no frame came between, and nothing was seen of either."""
+    """Yield the time until each change of a state is seen, in milliseconds.
+
+    A change that was undone soon, or that undid another one, is left out: maybe no frame came between, and neither
+    was seen.
+    """
     for number, (at_s, i, state) in enumerate(changes):
         others = (*changes[:number], *changes[number + 1 :])
         if any(j == i and abs(then_s - at_s) < KEPT_S for then_s, j, _ in others):

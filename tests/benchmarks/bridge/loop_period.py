@@ -1,9 +1,10 @@
-"""How punctually the bridge decides, and how much of a processor it takes in standby and driving.
+"""Benchmark of the punctuality of the bridge's decisions, and of its share of a processor in standby and driving.
 
-A robot wanders through a simulated room. It is a process of its own at the far end of real pseudo-terminals, the bridge
-another one; they go before other programs where that is permitted. *Watchers* take all that the bridge shows; *pages*
-of its live view are open in processes of their own, which take what they are told and draw nothing. *Late*: a decision,
-against the schedule. *CPU*: user and system time of the whole bridge process over the time that passed.
+A robot wanders through a simulated room. It is a process of its own at the far end of real pseudo-terminals, the
+bridge another one; both have priority over other programs where that is permitted. *Watchers* take all that the
+bridge shows; *pages* of its live view are open in processes of their own, which receive the messages and draw
+nothing. *Late*: delay of a decision against the schedule. *CPU*: user and system time of the whole bridge process
+over the time that passed.
 
 Usage: loop_period.py [SECONDS]
 """
@@ -56,14 +57,14 @@ HEADER = [
 
 @dataclass(frozen=True)
 class Measured:
-    """What one run has shown.
+    """Results of one run.
 
     Attributes:
-        late_s: Of each decision.
+        late_s: Lateness of each decision, in seconds.
         overruns: Decisions that were left out.
-        standby: Share of a processor.
-        running: The same, driving.
-        messages: How many each page got.
+        standby: Share of a processor in standby.
+        running: Share of a processor while driving.
+        messages: Number of messages that each page got.
     """
 
     late_s: tuple[float, ...]

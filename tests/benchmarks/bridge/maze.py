@@ -1,4 +1,6 @@
-"""How fast a maze is solved through serial lines: server, client, bridge and robot, in a world that passes faster.
+"""Benchmark of the speed of solving a maze through serial lines.
+
+Server, client, bridge and robot take part, in a world in which time passes faster.
 
 Usage: maze.py [SPEED...]      (default: 5 10 20)
 """

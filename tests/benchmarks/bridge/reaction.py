@@ -1,13 +1,13 @@
-"""How soon the bridge stops a robot that sees an obstacle, from the wire to the wire.
+"""Benchmark of the time until the bridge stops a robot that sees an obstacle, from the wire to the wire.
 
-`robosc-bridge run` drives a simulated robot that is put before a wall and back again; what passes at the devices' ends
+`robosc-bridge run` drives a simulated robot that is put before a wall and back again; all data at the devices' ends
 of both lines is recorded with its times. *Reaction*: from the last byte of the frame that ends the first turn of the
 LiDAR with the obstacle in it, to the first byte of the command of zero; the bridge decides at each event, and nothing
-is wrong with the lines. The bridge and the simulator go before other programs where that is permitted.
+is wrong with the lines. The bridge and the simulator have priority over other programs where that is permitted.
 
-A virtual machine is not always there: *undisturbed* are the trials during which no processor was taken away for more
-than a millisecond, from the last exchange before the obstacle was shown to the command; what remains is the bridge's
-own and the simulator's.
+A virtual machine does not always run: *undisturbed* are the trials during which no processor was taken away for more
+than a millisecond, from the last exchange before the obstacle was shown to the command; the remaining time is that of
+the bridge and the simulator.
 
 Usage: reaction.py [--trials N] [--lidar NAME]
 """
@@ -68,11 +68,12 @@ HEADER = [
 
 @dataclass(frozen=True)
 class Trial:
-    """One stop.
+    """One stop of the robot.
 
     Attributes:
-        shown_s: When the last byte of the turn was sent that shows the obstacle.
-        stopped_s: When the first byte of the command of zero had come; infinity: not while the obstacle was there.
+        shown_s: Time at which the last byte of the turn that shows the obstacle was sent, in seconds.
+        stopped_s: Time at which the first byte of the command of zero had come, in seconds; infinity: not while the
+            obstacle was there.
     """
 
     shown_s: float
@@ -85,7 +86,7 @@ class Trial:
 
 
 def turns(records: Sequence[Record], lidar: str) -> Iterator[tuple[float, bool]]:
-    """When each turn of the LiDAR was sent to its end, and whether it shows an obstacle."""
+    """Yield the time at which each turn of the LiDAR was sent to its end, and True if it shows an obstacle."""
     model = MODELS[lidar]
     decoder, builder = model.make_decoder(), TurnBuilder()
     for record in records:
@@ -100,7 +101,7 @@ def turns(records: Sequence[Record], lidar: str) -> Iterator[tuple[float, bool]]
 
 
 def commands(records: Sequence[Record]) -> Iterator[tuple[float, bool]]:
-    """When the first byte of each command to the wheels had come, and whether it is one of zero.
+    """Yield the time at which the first byte of each command to the wheels had come, and True if it is zero.
 
     Dynamixel protocol 2.0 by hand: the header, the device, the length, the instruction, its parameters.
     """
@@ -125,7 +126,7 @@ def commands(records: Sequence[Record]) -> Iterator[tuple[float, bool]]:
 
 
 def trials(records: Sequence[Record], lidar: str) -> list[Trial]:
-    """What came of each obstacle that was shown while the robot was driving."""
+    """Return the outcome of each obstacle that was shown while the robot was driving."""
     seen, told = list(turns(records, lidar)), list(commands(records))
     found = []
     before = True

@@ -1,4 +1,4 @@
-"""What the bridge's benchmarks share: a simulated robot as a process of its own, configurations, and figures."""
+"""Shared parts of the bridge's benchmarks: a simulated robot as a process of its own, configurations, and figures."""
 
 import json
 import math
@@ -99,7 +99,7 @@ def spread(samples_s: Sequence[float]) -> list[str]:
 
 
 class Machine:
-    """What else the machine did while something was measured: a figure says little without it."""
+    """Other activity of the machine during a measurement: a figure says little without it."""
 
     def __init__(self) -> None:
         self._late_s: list[float] = []
@@ -122,7 +122,7 @@ class Machine:
             self._late_s, self._away_s = found["late_s"], found["away_s"]
 
     def was_away(self, begin_s: float, end_s: float) -> bool:
-        """Whether a processor did nothing for anyone during a part of this time, by `time.monotonic`."""
+        """Return True if a processor did nothing for anyone during a part of this time, by `time.monotonic`."""
         return any(since_s < end_s and until_s > begin_s for since_s, until_s in self._away_s)
 
     def __str__(self) -> str:

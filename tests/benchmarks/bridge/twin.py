@@ -1,4 +1,4 @@
-"""How many steps of the simulated world a core lives in a second, each with a scan of 360 rays.
+"""Benchmark of the steps of the simulated world that a core executes in a second, each with a scan of 360 rays.
 
 The robot drives through mazes of growing size, its wheels reversed where it comes to a wall. *Steps alone*: without a
 scan. A step is 5 ms of the world; time is that of the processor.

@@ -1,7 +1,8 @@
-"""How late this machine wakes a program that sleeps for a millisecond: below that, no program here can react.
+"""Lateness of this machine in waking a program that sleeps for a millisecond: no program here reacts sooner.
 
-A thread on each processor, before all other programs where that is permitted; what is late then is what the machine's
-host took away. Measures until its standard input ends, then prints as JSON what `Machine` reads.
+A thread runs on each processor, with priority over all other programs where that is permitted; its lateness is then
+time that the machine's host took away. Measures until its standard input ends, then prints as JSON the data that
+`Machine` reads.
 """
 
 import json

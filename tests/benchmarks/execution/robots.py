@@ -35,7 +35,7 @@ def supervisor(name: str) -> Supervisor:
 
 
 def feed(name: str, number: int) -> tuple[str, Any]:
-    """What comes: every other time a scan, whose obstacle comes and goes."""
+    """Return the input that comes: every other time a scan, whose obstacle comes and goes."""
     if name == LARGE and number % 2 == 0:
         return _SEEN
     return comes(EXPERIMENTS.get(name, "line"), number)

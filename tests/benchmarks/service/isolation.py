@@ -1,6 +1,6 @@
-"""What a process of its own costs each task: here, in a process that stands ready, in one from scratch.
+"""Benchmark of the cost of a process of its own for each task: here, in a process that stands ready, in a new one.
 
-Each round does the same task in all ways, one after the other, so that other work on the machine meets them alike.
+Each round does the same task in all ways, one after the other, so that other work on the machine affects them alike.
 """
 
 import asyncio

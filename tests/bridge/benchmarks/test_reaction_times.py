@@ -1,4 +1,4 @@
-"""What the benchmark of reactions reads out of a record of both lines."""
+"""Tests of the data that the benchmark of reactions reads out of a record of both lines."""
 
 import math
 import sys

@@ -1,4 +1,4 @@
-"""What is refused before anything is opened, and how the parts start and stop together."""
+"""Tests of the refusals before anything is opened, and of starting and stopping the parts together."""
 
 import re
 import sys

@@ -70,7 +70,7 @@ class Scene:
         self.clock.now_s = max(self.clock.now_s, self.worker.step(self.clock.now_s))
 
     def steps(self, seconds: float) -> list[Report]:
-        """What is told in this time."""
+        """Step for this time, and return the reports."""
         end_s = self.clock.now_s + seconds - 1e-9
         while self.clock.now_s < end_s:
             self.step()

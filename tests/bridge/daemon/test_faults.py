@@ -258,7 +258,7 @@ def test_an_operator_who_is_lost_stops_the_wheels_until_he_is_back() -> None:
 
 
 def _ordered(bridge: Driven, command: Command) -> str:
-    """Why it cannot be, or nothing."""
+    """Give an order, and return the reason why it cannot be executed, or nothing."""
     answer = bridge.machine.operations.order(command, "test")
     bridge.until(answer.done, "an answer to the order", 2 * LIMIT_S)
     return answer.result()

@@ -187,7 +187,7 @@ class Twins:
 
 
 def _caller_side(program: Program, item: Any) -> tuple[Any, ...] | None:
-    """What the daemon's caller is told, in the words of the twin; None: the twin has none for it."""
+    """Return the message to the daemon's caller in the words of the twin; None: the twin has none for it."""
 
     def key(own: str) -> tuple[Program, str]:
         return (program, own)

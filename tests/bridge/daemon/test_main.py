@@ -18,7 +18,7 @@ MODEL = EXAMPLES / "maze_solver" / "maze_solver.rscd"
 
 
 class Done(NamedTuple):
-    """What a command has left."""
+    """Result of a command that has ended."""
 
     returncode: int
     stdout: str
@@ -29,8 +29,8 @@ class Bridge:
     """The program, called in this process.
 
     Args:
-        capsys: That takes what it prints.
-        caplog: That takes what it tells while it runs.
+        capsys: Capture of its printed output.
+        caplog: Capture of its log messages while it runs.
     """
 
     def __init__(self, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture) -> None:

@@ -1,4 +1,4 @@
-"""What operators order: in each state each command is done or refused with a sentence, and never left unanswered."""
+"""Tests of operators' orders: in each state each command is done or refused with a sentence, never unanswered."""
 
 import threading
 from collections.abc import Callable
@@ -21,13 +21,13 @@ class Operated(Scene):
     """A scene with an operator who waits for answers."""
 
     def order(self, command: Command) -> list[str]:
-        """Where the answer will stand."""
+        """Give an order, and return the list that will hold the answer."""
         answers: list[str] = []
         self.daemon.post(Order(command, "a test", answers.append))
         return answers
 
     def ask(self, command: Command, seconds: float) -> list[str]:
-        """What is answered within some time."""
+        """Give an order, and return the answers within some time."""
         answers = self.order(command)
         self.live(seconds, 2.0)
         return answers

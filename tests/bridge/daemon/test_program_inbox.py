@@ -1,4 +1,4 @@
-"""What waits for the loop of each program is bounded, in number and in memory."""
+"""Tests of the bounds, in number and in memory, on the messages of each program that wait for the loop."""
 
 import random
 import tracemalloc

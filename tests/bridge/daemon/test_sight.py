@@ -1,4 +1,4 @@
-"""What the camera shows and what becomes of it reach the model, and who needs a camera has one."""
+"""Tests that the camera's sightings and its state reach the model, and that whoever needs a camera has one."""
 
 import logging
 

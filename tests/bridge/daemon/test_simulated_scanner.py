@@ -56,7 +56,7 @@ class Scene:
         return [item for item in self.reports if isinstance(item, DeviceDown)]
 
     def output(self, speed_m_s: float) -> tuple[Velocity, tuple[Reason, ...], tuple[Caution, ...]]:
-        """What the safety layer lets through of a speed, with a drive base that does as it is told."""
+        """Return the output of the safety layer for a speed, with a drive base that does as it is told."""
         for _ in range(20):
             now_s = self.time.monotonic()
             self.safety.loop_turned(now_s)

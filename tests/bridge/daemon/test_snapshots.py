@@ -1,4 +1,4 @@
-"""What watchers are shown: every change at once, measurements at most twenty times a second, entries of the log."""
+"""Tests of the data for watchers: every change at once, measurements at most twenty times a second, log entries."""
 
 from robosc_bridge.daemon.feed import Snapshot
 from robosc_bridge.daemon.reports import Device, DeviceDown, SafetyNotice

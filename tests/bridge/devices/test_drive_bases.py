@@ -1,7 +1,7 @@
-"""What holds for every drive base, tested on each over the serial line of a virtual host.
+"""Tests that hold for every drive base, run on each over the serial line of a virtual host.
 
-Most is about wheels that are asked for an answer in every cycle; a MAVLink rover tells by itself, at its own pace, and
-takes part where that makes no difference. Its line's faults are in its own tests.
+Most are about wheels that are asked for an answer in every cycle; a MAVLink rover reports by itself, at its own pace,
+and takes part where that makes no difference. Its line's faults are in its own tests.
 """
 
 import contextlib

@@ -1,4 +1,4 @@
-"""What the wheels are told: within every limit, with the curvature kept."""
+"""Tests of the commands to the wheels: within every limit, with the curvature kept."""
 
 import math
 

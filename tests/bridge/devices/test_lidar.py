@@ -78,7 +78,7 @@ class Rig:
         self.lidar.open()
 
     def scans(self, frames: list[bytes]) -> list[Scan]:
-        """What the driver makes of frames that are read a few at a time."""
+        """Return the scans that the driver makes of frames that are read a few at a time."""
         found = []
         for begin in range(0, len(frames), 8):
             self.pty.send(b"".join(frames[begin : begin + 8]))

@@ -31,7 +31,7 @@ class Scene:
         self.name = name
 
     def scans(self, seconds: float) -> list[Scan]:
-        """What is seen while time passes."""
+        """Return the scans that are seen while time passes."""
         end_s = self.time.monotonic() + seconds
         found = []
         while (left_s := end_s - self.time.monotonic()) > 0:

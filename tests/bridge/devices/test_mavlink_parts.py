@@ -1,4 +1,4 @@
-"""What a vehicle has told, where it is, and the time of signed packets: without a line."""
+"""Tests of a vehicle's reports, its position, and the time of signed packets: without a line."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a MAVLink rover refuses, and what others do with it."""
+"""Tests of the refusals of a MAVLink rover, and of the actions of others on it."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Where the body is, from ticks that wrap around and fall back."""
+"""Tests of the body's pose, computed from ticks that wrap around and fall back."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What is tried over ROS 2 stays away from robots."""
+"""Tests that experiments over ROS 2 stay away from robots."""
 
 import itertools
 import os

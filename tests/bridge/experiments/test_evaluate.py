@@ -23,7 +23,7 @@ _sizes = cache(evaluate._sizes)
 
 @pytest.fixture
 def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
-    """What the scenarios were asked for; over ROS 1 none can be run."""
+    """Requests that the scenarios received; over ROS 1 none can be run."""
     found: list[tuple[Any, ...]] = []
 
     def run(folder: Path, scene: str, *, speed: float, say: Any, seed: int) -> Outcome:

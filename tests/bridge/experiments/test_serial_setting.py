@@ -1,4 +1,4 @@
-"""What a scenario refuses before anything is started, and what it tells while it runs."""
+"""Tests of a scenario's refusals before anything is started, and of its reports while it runs."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a ground station commands, on a clock that the test sets: what is answered, ordered, held and refused."""
+"""Tests of a ground station's commands on a clock that the test sets: answered, ordered, held and refused ones."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What each command means, and what set-points ask for."""
+"""Tests of the meaning of each command, and of the motion that set-points ask for."""
 
 import math
 from typing import Any

@@ -36,9 +36,9 @@ class Peer:
     """A station at an end of a line of the virtual host.
 
     Args:
-        host: The virtual one.
-        address: That it calls, or listens at.
-        key: Of signing.
+        host: The virtual host.
+        address: Address that it calls, or listens at.
+        key: Signing key.
         system: Its own number.
     """
 

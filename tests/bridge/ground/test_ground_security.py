@@ -1,4 +1,4 @@
-"""Who may do what: signatures, other computers, other stations."""
+"""Tests of permissions: signatures, other computers, other stations."""
 
 import re
 import subprocess

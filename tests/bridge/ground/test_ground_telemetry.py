@@ -1,4 +1,4 @@
-"""What the daemon shows as messages: bytes, signs, units, and the ring of obstacles against a slow twin."""
+"""Tests of the daemon's telemetry messages: bytes, signs, units, and the ring of obstacles against a slow twin."""
 
 import math
 from dataclasses import replace

@@ -10,7 +10,7 @@ from support.ground import Station, joined_texts
 
 
 def _received(text: str) -> str:
-    """What a station puts together: a chunk that is not full ends a text."""
+    """Return the text that a station puts together: a chunk that is not full ends a text."""
     parts = b""
     for place, chunk in enumerate(chunks(text, 7)):
         assert (chunk.number, chunk.place) in ((0, 0), (7, place))

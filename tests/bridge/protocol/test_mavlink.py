@@ -45,7 +45,7 @@ def _decoder() -> Decoder[Message]:
 
 
 def _said(make: Any) -> Any:
-    """What is understood of a message."""
+    """Return the decoded content of a message."""
     (message,) = _decoder().feed(Codec(1, 1).encode(make))
     return message.content
 

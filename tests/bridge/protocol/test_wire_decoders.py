@@ -1,4 +1,4 @@
-"""What a fuzzer asks of the decoders holds for some bytes at each run of the tests, too."""
+"""Tests that the fuzzer's demands on the decoders also hold for some bytes at each run of the tests."""
 
 from typing import Any
 

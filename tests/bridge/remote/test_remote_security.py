@@ -1,4 +1,4 @@
-"""Who may do what with a bridge, over real TLS sockets."""
+"""Tests of the permissions of a bridge's callers, over real TLS sockets."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -33,7 +33,7 @@ def bridge(security: ServerSecurity, host: str = "127.0.0.1") -> Iterator[tuple[
 
 
 def outcome(stub: Any, call: str) -> str:
-    """What becomes of a call: that it was admitted, or its status."""
+    """Make a call, and return its outcome: that it was admitted, or its status."""
     try:
         match call:
             case "Watch":

@@ -1,4 +1,4 @@
-"""What passes, when torque comes and goes, and what counts as a command."""
+"""Tests of the output that passes, of torque that comes and goes, and of the inputs that count as a command."""
 
 import math
 import signal

@@ -38,7 +38,7 @@ LATCHED: dict[Reason, Callable[[Bench], object]] = {
 
 
 def restart(bench: Bench) -> None:
-    """What an operator does after a stop."""
+    """Do as an operator does after a stop."""
     bench.cycles(2.0)  # torque goes off
     assert bench.layer.reset() == ()
     assert bench.cycle().reasons == (Reason.STANDBY,)

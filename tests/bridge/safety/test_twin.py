@@ -27,7 +27,7 @@ FAULTS = st.sampled_from([frozenset[MotorFault]()] * 8 + [frozenset({fault}) for
 
 
 class Sequence(RuleBasedStateMachine):
-    """What threads, motors and operators may do, in any order."""
+    """Possible actions of threads, motors and operators, in any order."""
 
     def __init__(self) -> None:
         super().__init__()

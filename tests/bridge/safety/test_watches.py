@@ -1,4 +1,4 @@
-"""What is remembered of reports, at the border of each time and threshold."""
+"""Tests of the data that is remembered of reports, at the border of each time and threshold."""
 
 import math
 from dataclasses import replace

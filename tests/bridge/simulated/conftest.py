@@ -1,3 +1,3 @@
-"""What holds for the tests of simulated devices."""
+"""Common setup of the tests of simulated devices."""
 
 from support.patient_sdk import patient_sdk as patient_sdk

@@ -109,9 +109,9 @@ class Scene:
     """A simulated LiDAR, and the host's end of its line.
 
     Attributes:
-        time: On which both live.
-        robot: That has it.
-        host: Its line.
+        time: Virtual host on which both live.
+        robot: Robot that has the LiDAR.
+        host: The host's end of its line.
     """
 
     def __init__(self, time: VirtualHost, robot: SimulatedTurtleBot3, lidar: str, baud: int | None) -> None:
@@ -130,7 +130,7 @@ class Scene:
             assert self.robot.scanner.is_spinning
 
     def heard(self, seconds: float) -> bytes:
-        """What comes while time passes; read in between, as a full line loses bytes."""
+        """Return the bytes that come while time passes; read in between, as a full line loses bytes."""
         found = b""
         for _ in range(round(seconds / 0.05)):
             self.time.sleep(0.05)

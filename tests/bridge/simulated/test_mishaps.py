@@ -1,4 +1,4 @@
-"""What goes wrong while a simulator serves: it is told, and nothing goes on mute."""
+"""Tests of failures while a simulator serves: they are reported, and nothing continues silently."""
 
 import io
 import signal

@@ -56,7 +56,7 @@ def pixel_rays(mount: Mount, heading_rad: float) -> Iterator[Ray]:
 
 
 def slow_shade(scene: Scene, eye_m: Ray, ray: Ray, grow_m: float) -> int:
-    """What one ray meets first, with everything a little larger, or smaller."""
+    """Return the first thing that one ray meets, with everything a little larger, or smaller."""
     (x, y, z), (dx, dy, dz) = eye_m, ray
     height = scene.wall_height_m + grow_m
     hits: list[tuple[float, int]] = []
@@ -78,7 +78,7 @@ def slow_shade(scene: Scene, eye_m: Ray, ray: Ray, grow_m: float) -> int:
 
 
 def slow_disc(disc: Obstacle, eye_m: Ray, ray: Ray, height: float, grow_m: float) -> Iterator[float]:
-    """Where a ray meets the round side of an upright cylinder, or its flat top; at once if it begins within."""
+    """Yield the places of a ray on an upright cylinder's round side or flat top; at once if it begins within."""
     (x, y, z), (dx, dy, dz) = eye_m, ray
     radius = disc.radius_m + grow_m
     ax, ay = x - disc.x_m, y - disc.y_m

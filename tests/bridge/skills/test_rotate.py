@@ -54,7 +54,7 @@ class Body:
 
 
 def turn(rotate: Rotate, body: Body, angle_rad: float, period_s: float = PERIOD_S) -> float:
-    """How long a turn took; every command is within the limit."""
+    """Turn, and return the time that it took, in seconds; every command is within the limit."""
     now_s = 1000.0
     assert rotate.start(angle_rad, now_s)
     while rotate.is_turning:

@@ -1,4 +1,4 @@
-"""What a person types, against a face on a real socket; as programs where the process matters."""
+"""Tests of commands that a person types, against a face on a real socket; as programs where the process matters."""
 
 import json
 import math

@@ -100,13 +100,13 @@ class Bridge:
     """A bridge with an operator's stream, as the client of it has them.
 
     Attributes:
-        wishes: When what was asked for: forward, and counter-clockwise.
-        signs_s: When the operator was said to be there without a wish.
+        wishes: Time and velocities of each request: forward, and counter-clockwise, in m/s and rad/s.
+        signs_s: Times at which the operator was reported present without a wish, in seconds.
         heard: Stops, and wishes of other kinds.
-        told: How something is told to the operator; set when the stream is begun.
-        refusal: Of a resume; None: it is never answered.
-        failure: Of whatever is sent next.
-        is_closed: Whether the stream has ended in order.
+        told: Callback that reports something to the operator; set when the stream is begun.
+        refusal: Refusal of a resume; None: it is never answered.
+        failure: Failure of whatever is sent next.
+        is_closed: True if the stream has ended in order.
     """
 
     def __init__(self, time: VirtualHost) -> None:
@@ -152,10 +152,10 @@ class Typed:
     """A terminal whose keys a test types, and the program in it.
 
     Attributes:
-        seen: All that it was told to show.
-        answers: Whether it tells that it is there when it is asked.
-        asked: How often it was.
-        error: What has ended the program; None: it goes on, or has ended in order.
+        seen: All output that it was told to show.
+        answers: True if it reports that it is there when it is asked.
+        asked: Number of times that it was asked.
+        error: Error that has ended the program; None: it goes on, or has ended in order.
     """
 
     def __init__(self, time: VirtualHost) -> None:

@@ -1,4 +1,4 @@
-"""Who is let in: by name, by page and by token; and the bounds of what may be asked for."""
+"""Tests of access, by name, by page and by token; and of the bounds of requests."""
 
 import asyncio
 import contextlib

@@ -27,7 +27,10 @@ def large_robot() -> LiveRobot:
 
 
 async def lived(page: OpenPage, robot: LiveRobot, count: int) -> list[str]:
-    """So many events, in a thread like that of the control loop, and all that a page is told of them; their names."""
+    """Execute `count` events in a thread like that of the control loop, and return their names.
+
+    Also receive everything that a page is told of them.
+    """
     taken: list[str] = []
     while len(page.entries()) + page.lost() < count:
         if len(taken) < count and len(taken) - len(page.entries()) < AHEAD:

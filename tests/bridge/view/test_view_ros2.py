@@ -1,4 +1,4 @@
-"""What generated nodes publish on `/state`, as they write it, read and shown; the way there is real DDS."""
+"""Tests of the messages that generated nodes publish on `/state`, as written, read and shown, over real DDS."""
 
 import json
 from pathlib import Path

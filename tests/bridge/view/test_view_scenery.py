@@ -1,4 +1,4 @@
-"""What stands around a robot, as its odometry sees it."""
+"""Tests of the surroundings of a robot, as its odometry sees them."""
 
 import json
 import math

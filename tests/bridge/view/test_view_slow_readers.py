@@ -1,6 +1,6 @@
-"""Who reads slowly, or not at all, holds no connection for long: real sockets that take as little as they like.
+"""Tests that clients that read slowly, or not at all, hold no connection for long.
 
-The server's time stands still until a test has it pass.
+Real sockets take as little as they like. The server's time stands still until a test has it pass.
 """
 
 import asyncio

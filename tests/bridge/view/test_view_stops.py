@@ -25,9 +25,9 @@ class Gate:
         address: `HOST:PORT`.
 
     Attributes:
-        address: Where to connect instead.
-        connections: How many did.
-        is_open: Whether anything gets through.
+        address: Address to connect to instead.
+        connections: Number of connections that were made.
+        is_open: Event that is set while anything gets through.
     """
 
     def __init__(self, address: str) -> None:

@@ -1,4 +1,4 @@
-"""What does not fit in a system, one fault at a time; and that what is made by the rules fits."""
+"""Tests of faults in a system, one at a time; and that everything made by the rules fits."""
 
 from dataclasses import replace
 from typing import Any

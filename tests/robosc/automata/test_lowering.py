@@ -216,7 +216,7 @@ def _at(system: System, **locations: str) -> State:
 
 
 def _table(system: System, event: str) -> dict[tuple[str, str], bool]:
-    """Whether an event meets its conditions, by the state of Door and Room."""
+    """Return a table by the state of Door and Room: True if an event meets its conditions."""
     semantics = Semantics(system)
     return {
         (door, room): semantics.condition(_at(system, Door=door, Room=room), event)

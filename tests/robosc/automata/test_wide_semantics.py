@@ -1,4 +1,4 @@
-"""What automata offer beyond RoboSC, state by state: ways to begin, requirement automata, input variables."""
+"""Tests of automata beyond RoboSC, state by state: ways to begin, requirement automata, input variables."""
 
 from dataclasses import replace
 

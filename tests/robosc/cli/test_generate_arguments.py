@@ -16,7 +16,7 @@ PROGRAMS = pytest.mark.parametrize("run", [main, client_main], ids=["robosc", "r
 
 
 def refused(capsys: pytest.CaptureFixture[str], run: Any, *words: str) -> str:
-    """What wrong use is told."""
+    """Return the error message for wrong use."""
     try:
         status = run(list(words))
     except SystemExit as raised:

@@ -104,7 +104,7 @@ def test_help_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("command", ["synth", "doc", "explore", "explain-synthesis", "generate"])
 def test_a_model_with_errors(command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """Whatever a command makes of it, it prints one document, with the findings."""
+    """Check that a command, whatever it makes of the model, prints one document, with the findings."""
     path = tmp_path / "broken.rscd"
     path.write_text("robot R {\n  requirement go needs Nobody.here\n}\n", encoding="utf-8")
     more = ["-o", str(tmp_path / "out"), "--target", "python"] if command == "generate" else []

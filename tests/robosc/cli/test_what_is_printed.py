@@ -1,4 +1,4 @@
-"""What programs print arrives, or that is told; a reader who left is nobody's fault. Whatever is printed."""
+"""Tests that any printed output arrives, or its loss is reported; a reader who left is nobody's fault."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""What can be written: of a sound text, every word is offered where it stands, and every name."""
+"""Tests of completion: in a sound text, every word is offered where it stands, and every name."""
 
 import pytest
 from hypothesis import given
@@ -28,7 +28,7 @@ def surroundings_of(bundle: Bundle) -> Surroundings:
 
 
 def offered(text: str, surroundings: Surroundings = NOTHING, **libraries: str) -> dict[str, Candidate]:
-    """What is offered at the `|` of a text."""
+    """Return the candidates that are offered at the `|` of a text."""
     before, _, behind = text.partition("|")
     _, found = complete(
         before + behind, len(before), inspect(bundle_of(before + behind, **libraries)), lambda: surroundings

@@ -27,7 +27,7 @@ ROBOT = """robot R {
 
 
 def titles_and_texts(text: str) -> dict[str, str]:
-    """What each mend of a text's first finding says, and the text with it."""
+    """Return the title of each fix for a text's first finding, and the text with it."""
     found = inspect(Bundle(SourceFile("r.rscd", text))).checked.diagnostics
     lines = text.split("\n")
     results = {}

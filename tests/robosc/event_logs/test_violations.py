@@ -1,4 +1,4 @@
-"""What the log check says, case by case, of a small robot."""
+"""Tests of the findings of the log check, case by case, of a small robot."""
 
 from pathlib import Path
 from typing import Any
@@ -145,7 +145,7 @@ def test_what_the_log_leaves_out_is_taken_from_it(tmp_path: Path) -> None:
 
 
 def test_messages_as_they_came_are_converted(tmp_path: Path) -> None:
-    """So nodes in C++ log them."""
+    """Check messages as nodes in C++ log them."""
     entries = wrong(2, data={"near": 2.0, "level": 5})
     entries[2]["data"] = {"near": 2.0, "level": 5}
     assert told(tmp_path, entries) == []

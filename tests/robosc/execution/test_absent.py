@@ -49,7 +49,7 @@ def system(request: pytest.FixtureRequest) -> ControlledSystem:
 
 
 def received(system: ControlledSystem, event: str, data: Any) -> tuple[tuple[str, ...], dict[str, Any]]:
-    """What an event skips, and the variables after it."""
+    """Return the updates that an event skips, and the variables after it."""
     skipped = system.step(event, system.read(event, data))
     assert skipped is not None
     return skipped, system.state()["S"]["variables"]

@@ -7,7 +7,7 @@ NAMES = ("a", "b", "c")
 
 
 def run(policy: Policy, *decisions: tuple[int, ...]) -> list[int]:
-    """What is issued when these requests are enabled, one decision after the other."""
+    """Return the requests that are issued when these are enabled, one decision after the other."""
     issued = []
     for enabled in decisions:
         if enabled:

@@ -1,4 +1,4 @@
-"""What an executor knows of a system beforehand."""
+"""Tests of an executor's prior knowledge of a system."""
 
 from robosc.execution.protocol import CommunicationInfo
 from support.execution import example_system, system_of

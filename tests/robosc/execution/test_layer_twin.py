@@ -225,7 +225,7 @@ def test_so_does_a_layer_on_generated_code(seed: int) -> None:
 
 @pytest.fixture(scope="module")
 def total() -> Counter[str]:
-    """What happens with some fixed seeds."""
+    """Counts of what happens with some fixed seeds."""
     found: Counter[str] = Counter()
     for seed in range(300):
         pair = Pair(seed)

@@ -78,7 +78,7 @@ class Pair:
         return tuple(values)
 
     def expected(self, event: str, state: tuple[Value, ...]) -> bool:
-        """Whether the automata and the supervisor allow a controllable event."""
+        """Return True if the automata and the supervisor allow a controllable event."""
         allowed = self.semantics.enabled(state, event) and self.semantics.condition(state, event)
         if event in self.added:
             allowed = allowed and self.added[event](state)

@@ -31,7 +31,7 @@ def bundle_of(blocks: tuple[Block, ...]) -> Bundle:
 
 
 def findings(item: Page, blocks: tuple[Block, ...]) -> tuple[Diagnostic, ...]:
-    """What the stage of a page says about its blocks."""
+    """Return the findings of a page's stage about its blocks."""
     bundle = bundle_of(blocks)
     # The definitions of ROS's own types come with what the tests are installed with.
     texts = (file.text for file in bundle.files)

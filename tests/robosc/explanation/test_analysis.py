@@ -1,4 +1,4 @@
-"""Why events cannot happen in the states of random systems, against their explicit meaning."""
+"""Tests of the reasons why events cannot happen in the states of random systems, against their explicit meaning."""
 
 from collections import Counter
 

@@ -1,4 +1,4 @@
-"""What is to blame and how trouble comes about, against explicit synthesis and search on random systems."""
+"""Tests of blame and of the way into trouble, against explicit synthesis and search on random systems."""
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
@@ -97,7 +97,7 @@ def test_the_blamed_set_is_minimal_and_the_removal_too() -> None:
 
 
 class Search:
-    """What can be reached under the requirements, state by state; bad states are its ends."""
+    """Search, state by state, for all that can be reached under the requirements; bad states are its ends."""
 
     def __init__(self, system: System) -> None:
         self.semantics = Semantics(system)
@@ -131,7 +131,7 @@ class Search:
         return False
 
     def inside(self, start: State) -> set[State]:
-        """What is reached by what may be allowed: no bad states, and no controllable events that may lead into them."""
+        """Return the states reached without bad states and without controllable events that may lead into them."""
         found, frontier = {start}, [start]
         while frontier:
             state = frontier.pop()
@@ -333,7 +333,7 @@ def _check_detour(system: System, search: Search, trouble: Trouble, last: State,
 
 
 def test_a_search_that_takes_too_long_tells_what_it_has() -> None:
-    """Whatever the limit: what is blamed is to blame, and only a search to its end calls it minimal."""
+    """Check for any limit: blamed obstacles are to blame, and only a search to its end calls the blame minimal."""
     symbolic = Symbolic(empty_system(3), "cudd")
     full = find_blame(symbolic.problems, symbolic.obstacles, symbolic.manager.false, symbolic.watch)
     needed = symbolic.watch.steps

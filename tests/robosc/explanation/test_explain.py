@@ -58,7 +58,7 @@ def robot(*parts: str) -> str:
 
 
 def explained(text: str, **asked: Any) -> Explanation:
-    """What is explained about a model, the same by both engines."""
+    """Return the explanation of a model, the same by both engines."""
     found = checked(text)
     assert found.model is not None, [str(item) for item in found.diagnostics]
     assert found.places is not None
@@ -496,7 +496,7 @@ class Enumerated:
         return self.semantics.enabled(state, name)
 
     def moves_on(self, state: State, name: str) -> bool:
-        """Whether an event can happen that is no silent step back into the same state."""
+        """Return True if an event can happen and is no silent step back into the same state."""
         return self.allows(state, name) and (not is_tau(name) or self.semantics.targets(state, name) != {state})
 
     def nearest(self, states: list[State]) -> int:

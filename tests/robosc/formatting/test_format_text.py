@@ -61,7 +61,7 @@ def words(text: str) -> tuple[list[str], list[int]]:
 
 
 def spans(text: str) -> Iterator[tuple[int, int]]:
-    """Where the comments stand."""
+    """Yield the begin and end of each comment."""
     end = 0
     tokens = tokenize(text)
     for token, start in zip(tokens.texts, tokens.starts, strict=True):

@@ -1,4 +1,4 @@
-"""Where libraries are found, which files become part of a bundle, and what cannot be read."""
+"""Tests of the places of libraries, of the files that become part of a bundle, and of files that cannot be read."""
 
 import os
 from pathlib import Path

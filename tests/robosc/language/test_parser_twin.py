@@ -24,7 +24,7 @@ from support.grammar_texts import WORDS, damaged_text, damaged_tokens, grammar_t
 from support.models import EXAMPLES
 
 HIDDEN = ("empty-file", "unclosed-comment", "unclosed-string")
-"""What the parser tells before it reads anything; the twin stops there, or at an error before it."""
+"""Errors that the parser reports before it reads anything; the twin stops there, or at an error before it."""
 
 OPTIONS = ("qos", "depth", "max_age", "stamped", "when")
 
@@ -60,7 +60,7 @@ def told(findings: Iterable[Diagnostic | textx_parser.Finding]) -> list[tuple[st
 
 
 def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
-    """Whether the parser tells of its first error, on purpose, elsewhere than where the first token fits nowhere."""
+    """Return True if the parser's first error is, on purpose, elsewhere than the first token that fits nowhere."""
     assert fault.location is not None
     here = (fault.location.line, fault.location.column)
     stops = (twin.findings[0].line, twin.findings[0].column) if twin.stopped else None
@@ -84,7 +84,7 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
 
 
 def offset(text: str, line: int, column: int) -> int:
-    """Where a place is in a text."""
+    """Return the offset of a place in a text."""
     return sum(len(before) + 1 for before in text.split("\n")[: line - 1]) + column - 1
 
 
@@ -271,7 +271,7 @@ EXPRESSIONS = (
     "0x10",
     "{}",
 )
-"""What may stand, or seem to stand, where an expression is wanted."""
+"""Texts that may stand, or seem to stand, where an expression is wanted."""
 
 PLACES = (
     "robot R {{ requirement m needs {} }}",
@@ -284,7 +284,7 @@ PLACES = (
     "robot R {{ component C {{ incoming message m with when: {}, type: none }} }}",
     "library L {{ constant c: double = {} provide m with c }}",
 )
-"""Where an expression is wanted, with something behind it."""
+"""Texts in which an expression is wanted, with something behind it."""
 
 
 @pytest.mark.parametrize("place", PLACES)

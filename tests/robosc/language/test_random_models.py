@@ -42,7 +42,7 @@ def test_blanks_and_comments_mean_nothing(seed: int) -> None:
 
 
 def assert_told_well(bundle: Bundle) -> None:
-    """Whatever a text is, it is checked and every finding is one that a user can work with."""
+    """Check for any text: it is checked, and every finding is one that a user can work with."""
     parsed, checked = parse(bundle.main), check(bundle)
     assert (parsed.tree is None) == bool(parsed.diagnostics)
     assert all(item.severity is Severity.ERROR for item in parsed.diagnostics)

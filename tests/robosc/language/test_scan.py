@@ -1,4 +1,4 @@
-"""What a scan sees of a text that the grammar has not read."""
+"""Tests of the facts that a scan finds in a text that the grammar has not read."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What names mean: everything that a name stands for can be renamed, and the model stays the same."""
+"""Tests of the meaning of names: everything that a name stands for can be renamed, and the model stays the same."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -89,7 +89,7 @@ def renamed(bundle: Bundle, places: list[Location], name: str) -> Bundle:
 
 
 def shape(bundle: Bundle) -> list[tuple[str, int, str]]:
-    """What must not change where something is renamed: each finding's code, line and severity, and that of the model."""
+    """Return the data that a renaming must not change: each finding's code, line, severity, and the model's shape."""
     found = check(bundle)
     counts = msgspec.json.encode(found.model).count(b"{") if found.model is not None else 0
     return [*((item.code, item.location.line if item.location else 0, item.severity) for item in found.diagnostics),

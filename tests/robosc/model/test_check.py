@@ -1,4 +1,4 @@
-"""What a checked model holds: names bound, types known, source order, imports, synthesis variables, places."""
+"""Tests of a checked model: names bound, types known, source order, imports, synthesis variables, places."""
 
 import re
 from random import Random
@@ -494,7 +494,7 @@ HOME = """robot R {{
 
 
 def writable(expression: Expression) -> bool:
-    """Whether an expression can be written in part A at all, and in one way only."""
+    """Return True if an expression can be written in part A at all, and in one way only."""
     match expression:
         case Unary(operator="holds"):
             return False

@@ -1,4 +1,4 @@
-"""What the extensions of part B mean, from text to supervisor; generated code must agree with the interpreter."""
+"""Tests of the meaning of part B's extensions, from text to supervisor; generated code must match the interpreter."""
 
 import math
 from array import array
@@ -28,7 +28,7 @@ SCAN += "datatype enum Kind from string to { value = 'box' -> box default -> oth
 
 
 def classified(condition: str, data: Any) -> tuple[str, bool]:
-    """What an enum rule makes of data: `yes` or `no`, and whether it fell to `no` because the rule was unknown."""
+    """Return an enum rule's value of data, `yes` or `no`, and True if it fell to `no` since the rule was unknown."""
     text = (
         f"robot R {{ {SCAN} datatype enum Answer from Scan to {{ {condition} -> yes default -> no }} "
         "component C { outgoing message seen with type: Answer links i behaviour { variable a: Answer "

@@ -1,4 +1,4 @@
-"""Whether an update can leave its variable's range, where conditions tell more than the types; against enumeration."""
+"""Tests of updates that can leave a variable's range, where conditions say more than types; against enumeration."""
 
 import pytest
 from hypothesis import given, settings
@@ -29,14 +29,14 @@ MODEL = f"""robot R {{
 
 
 def warns(update: str) -> bool:
-    """Whether there is a warning about the update."""
+    """Return True if there is a warning about the update."""
     found = checked(MODEL.replace("{update}", update))
     assert {item.code for item in found.diagnostics} <= {"may-leave-range"}, found.diagnostics
     return bool(found.diagnostics)
 
 
 def leaves_range(update: str) -> bool:
-    """Whether some values really take the variable out of its range."""
+    """Return True if some values really take the variable out of its range."""
     model = checked(MODEL.replace("{update}", update)).model_or_raise()
     behaviour = model.components[0].behaviour
     assert behaviour is not None

@@ -41,7 +41,10 @@ def claim(formula: Formula) -> Property:
 
 
 def supervised(given_system: System, engine: str = "auto") -> tuple[AddedCondition, ...]:
-    """What a supervisor adds; nothing where there is none: then it is the plants under their conditions."""
+    """Return the conditions that a supervisor adds; nothing if there is none.
+
+    Without a supervisor, the controlled system is the plants under their conditions.
+    """
     result = synthesize(given_system, engine=engine)
     return result.added if result.status is SynthesisStatus.SUPERVISOR else ()
 

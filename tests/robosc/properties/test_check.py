@@ -24,7 +24,7 @@ EYE = """component Eye {
         initial marked state s { }
     }
 }"""
-"""What is seen."""
+"""Component that represents what is seen."""
 
 ARM = """component Arm {
     action reach with request: none, response: none, feedback: none links i
@@ -263,7 +263,7 @@ def test_what_the_request_itself_makes_false_never_cancels() -> None:
 
 
 def test_a_cancel_that_was_forbidden_when_it_was_due_comes_later() -> None:
-    """What held in some stable state since the request is remembered, not only what held in the last one."""
+    """Check that everything that held in some stable state since the request is remembered, not only in the last."""
     gate = component(
         "Gate",
         "initial marked state shut { on response from open goto opened } marked state opened { }",

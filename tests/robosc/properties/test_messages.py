@@ -37,7 +37,7 @@ ROBOT = """robot R {
 
 
 def spins(first: str, second: str, *types: str, topic: str = "sample") -> bool:
-    """Whether a livelock is reported."""
+    """Return True if a livelock is reported."""
     first_type, second_type = types if len(types) == 2 else types * 2
     links = "links sample" if first_type == "Sample" else ""
     values = {"first": first, "second": second, "first_type": first_type, "second_type": second_type}

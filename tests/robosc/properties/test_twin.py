@@ -65,7 +65,7 @@ def test_the_executor_shows_what_the_automaton_has(record_property: Callable[[st
 
 
 def test_enums_of_one_field_agree(record_property: Callable[[str, object], None]) -> None:
-    """What one message cannot bring is neither visited nor reported; all that it can bring is."""
+    """Check that whatever one message cannot bring is neither visited nor reported; all that it can bring is."""
     met: Counter[str] = Counter()
     for seed in range(180):
         supervisor = random_controller(seed, enums=ONE_FIELD[seed % 2])

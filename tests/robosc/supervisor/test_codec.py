@@ -327,7 +327,7 @@ def test_a_layer_may_not_restrict_cancel() -> None:
 
 
 def survives(data: bytes) -> bool:
-    """Whether bytes are a supervisor; then every later stage must be able to take it."""
+    """Return True if bytes are a supervisor; then every later stage must be able to take it."""
     try:
         made = decode(data)
     except InvalidSupervisorError as error:

@@ -175,7 +175,7 @@ def test_a_choice_is_told_as_one() -> None:
 
 
 def parity(places: int) -> tuple[DecisionDiagram, dict[Subject, SubjectDomain]]:
-    """Whether an odd number of places is on: each doubles the formula but adds two nodes."""
+    """Return a diagram for an odd number of places that are on: each doubles the formula but adds two nodes."""
     domains: dict[Subject, SubjectDomain] = {
         (f"P{number}", None): SubjectDomain(("off", "on"), None) for number in range(places)
     }

@@ -39,7 +39,7 @@ def made(path: Path) -> tuple[Supervisor, System]:
 
 @pytest.fixture(autouse=True)
 def _searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is told in several ways is looked for once."""
+    """Cache with which anything that is reported in several ways is searched for once."""
     monkeypatch.setattr(summary, "_added", cache(summary._added))
 
 

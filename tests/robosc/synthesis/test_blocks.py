@@ -1,4 +1,4 @@
-"""Which wide integers have their bits among each other, and what that is good for."""
+"""Tests of the wide integers whose bits are interleaved, and of the benefit of that."""
 
 from dataclasses import replace
 
@@ -170,7 +170,7 @@ def test_a_million_values_are_compared_and_added(engine: str, relation: Expressi
 
 
 def test_a_relation_that_no_list_of_values_can_tell_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the event needs is small as a diagram over bits, but the supervisor's has a branch for each value."""
+    """Check an event's need that is small over bits, while the supervisor's diagram has a branch for each value."""
     monkeypatch.setattr(diagrams, "MAXIMUM_BRANCHES", 5000)
     pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
     with pytest.raises(UnsupportedModelError, match=r"more than 5000 ranges of the values of 'A\.n'"):

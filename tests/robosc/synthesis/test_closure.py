@@ -29,7 +29,7 @@ def silent() -> Watch:
 
 
 def random_moves(dice: Random) -> tuple[frozenset[str], Move]:
-    """Where one event leads to, nondeterministically, and the variables that it reads or changes."""
+    """Return one event's targets, nondeterministically, and the variables that it reads or changes."""
     names = dice.sample(ORDER, dice.randint(1, 3))
     places = [ORDER.index(name) for name in names]
     table = {
@@ -140,7 +140,7 @@ class States(frozenset[State]):
 
 
 class Everything:
-    """What all states keep to."""
+    """Restriction that all states meet."""
 
     def __and__(self, other: Any) -> Any:
         return other

@@ -99,7 +99,7 @@ def test_many_data_of_one_event_stay_small(engine: str) -> None:
     ],
 )
 def test_arrays_have_no_gaps(engine: str, paths: list[tuple[PathStep, ...]], expected: int) -> None:
-    """How many combinations of known and unknown data there are."""
+    """Check the number of combinations of known and unknown data."""
     inputs = tuple(InputVariable("e", path, IntegerType(0, 0), may_be_unknown=True) for path in paths)
     encoding = Encoding(System("Arrays", integer(2).events, integer(2).automata, inputs), make_manager(engine))
     known = [bits.known for bits in encoding.inputs_of("e").values()]

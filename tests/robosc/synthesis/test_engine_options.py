@@ -36,7 +36,7 @@ def test_a_synthesis_beyond_its_nodes_is_given_up(engine: str) -> None:
 
 
 def test_the_limit_is_one_of_nodes_in_use(engine: str) -> None:
-    """What is thrown away on the way does not count."""
+    """Check that nodes that are thrown away on the way do not count."""
     made = FAMILIES["counter"](200)
     assert synthesize(made, engine=EngineOptions(engine, maximum_nodes=5_000)).added
 

@@ -126,7 +126,10 @@ def test_a_request_whose_requirement_never_holds() -> None:
 
 
 def test_a_request_that_synthesis_forbids() -> None:
-    """Who locks the door cannot open it any more: the requirement on `unlock` never shows, but it is the reason."""
+    """Check a door that cannot be opened any more once locked.
+
+    The requirement on `unlock` never shows, but it is the reason.
+    """
     text = DOOR.replace("goto closed }", "goto closed }\n state locked { on request to unlock goto closed }")
     text = text.replace("goto opened }", "goto opened on request to lock goto locked }")
     text = text.replace(" behaviour", " incoming message §lock with type: none\nMORE\n behaviour")
@@ -440,7 +443,7 @@ def explicit(system: System) -> ExplicitSupervisor:
 
 
 class Twin:
-    """What the findings should be, from the graph of the controlled system."""
+    """Expected findings, from the graph of the controlled system."""
 
     def __init__(self, model: Model, system: System) -> None:
         self.model = model

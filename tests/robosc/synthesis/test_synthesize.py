@@ -183,7 +183,7 @@ def nested(paths: tuple[tuple[str | int, ...], ...]) -> System:
     ],
 )
 def test_arrays_within_arrays(paths: tuple[tuple[str | int, ...], ...]) -> None:
-    """Which elements can be missing together shows in the states that one event reaches."""
+    """Check that the states that one event reaches show the elements that can be missing together."""
     assert agree(nested(paths)) == "free"
 
 

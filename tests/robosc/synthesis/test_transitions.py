@@ -90,7 +90,7 @@ def functions_of(engine: str, source: System, event: str) -> tuple[Encoding, dic
 
 
 def test_where_all_edges_lead_to_one_place_the_functions_are_constants(engine: str) -> None:
-    """So that predecessors need a cofactor only, and no guard is substituted."""
+    """Check for constants, so that predecessors need a cofactor only, and no guard is substituted."""
     guard = operation(read("A.x"), "<", 2)
     arcs = [edge("a -go-> c", guard, x=read("A.x")), edge("b -go-> c"), "c -back-> b", "c -home-> a"]
     encoding, functions = functions_of(engine, one(*arcs), "go")

@@ -1,4 +1,4 @@
-"""What the supervisor adds, in generated Python: in words as a comment, as a formula or as methods that share nodes."""
+"""Tests of added conditions in generated Python: in words as a comment, as a formula or as methods sharing nodes."""
 
 import ast
 import io

@@ -78,7 +78,7 @@ class Twins:
                 assert self.generated.location(item.name) == self.interpreted.location(item.name)
 
     def match(self, data: Any) -> None:
-        """Which incoming messages a message could be."""
+        """Compare the incoming messages that a message could be."""
         for item in self.model.communications:
             if item.kind is CommunicationKind.INCOMING_MESSAGE:
                 generated, interpreted = (s.matches(item.name, data) for s in (self.generated, self.interpreted))

@@ -58,7 +58,7 @@ def test_every_name_of_an_existing_controller_is_remapped() -> None:
 
 
 def defaults(files: GeneratedFiles) -> list[str | None]:
-    """What the launch file starts before the layer unless its arguments say otherwise."""
+    """Return the controller that the launch file starts before the layer unless its arguments say otherwise."""
     arguments = {item.get("name"): item.get("default") for item in ElementTree.fromstring(files[LAUNCH]).iter("arg")}
     return [arguments[name] for name in CONTROLLER]
 

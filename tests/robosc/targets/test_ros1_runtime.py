@@ -1,4 +1,7 @@
-"""What generated ROS 1 packages carry, without ROS 1: the inbox, timers, service calls, goals, fields of genpy."""
+"""Tests of the runtime that generated ROS 1 packages carry, without ROS 1.
+
+Covered are the inbox, timers, service calls, goals, and fields of genpy.
+"""
 
 import threading
 from collections.abc import Callable

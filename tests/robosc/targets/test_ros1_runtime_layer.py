@@ -1,4 +1,4 @@
-"""What a supervision layer on ROS 1 runs on, without ROS: calls and goals of the caller, and default messages."""
+"""Tests of a supervision layer's runtime on ROS 1, without ROS: calls and goals of the caller, default messages."""
 
 import queue
 import threading
@@ -39,7 +39,7 @@ class Calls:
         return thread
 
     def turn(self) -> None:
-        """What the executor's thread does."""
+        """Do what the executor's thread does."""
         self.inbox.get(timeout=LIMIT_S)()
 
     def end(self) -> list[Any]:

@@ -113,7 +113,7 @@ class Goals:
         self.ends.append((handle, end))
 
     def finish(self) -> list[Any]:
-        """What rclpy does with the ends later: the results."""
+        """Call the ends as rclpy does later, and return the results."""
         ends, self.ends = self.ends, []
         return [end(handle) for handle, end in ends]
 

@@ -1,4 +1,4 @@
-"""What comes while a node waits for its servers: held, and taken in before the first decision."""
+"""Tests of input that comes while a node waits for its servers: held, and taken in before the first decision."""
 
 import importlib
 import warnings

@@ -1,4 +1,4 @@
-"""What the diagnostics say, around a real executor on a clock of its own."""
+"""Tests of the diagnostics, around a real executor on a clock of its own."""
 
 from typing import Any
 

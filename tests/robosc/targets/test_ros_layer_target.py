@@ -1,4 +1,4 @@
-"""What the generated packages of a supervision layer for ROS 1 and ROS 2 have in common."""
+"""Tests of the common parts of the generated packages of a supervision layer for ROS 1 and ROS 2."""
 
 import ast
 import re
@@ -29,13 +29,13 @@ PACKAGE = "porter_layer"
 
 
 class Ros(NamedTuple):
-    """One of the two.
+    """One of the two ROS targets.
 
     Attributes:
         target: The target's name.
         model: The robot Porter with types that it has.
         launch: The launch file of a layer.
-        not_launch: That of a controller.
+        not_launch: The launch file of a controller.
     """
 
     target: str

@@ -145,7 +145,7 @@ def test_it_stops_when_told() -> None:
 
 
 def _supports(semantics: Semantics, kept: frozenset[State]) -> bool:
-    """Whether a supervisor could keep the system in `kept` from every state of it."""
+    """Return True if a supervisor could keep the system in `kept` from every state of it."""
     steps: dict[State, set[State]] = {}
     for at in kept:
         if semantics.bad(at):

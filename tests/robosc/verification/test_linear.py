@@ -95,7 +95,7 @@ class Dice:
 
 
 def bits(digits: Digits, value: Value | None) -> dict[str, bool]:
-    """How some digits hold a value."""
+    """Return the bits with which some digits hold a value."""
     index = 0 if value is None else digits.values.index(value)
     held = {name: bool(index >> rank & 1) for rank, name in enumerate(reversed(digits.names))}
     return held if digits.known is None else held | {digits.known: value is not None}

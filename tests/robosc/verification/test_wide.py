@@ -1,4 +1,4 @@
-"""What automata offer beyond RoboSC, before the independent verifiers: several ways to begin above all."""
+"""Tests of the independent verifiers on automata beyond RoboSC: several ways to begin above all."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -33,7 +33,7 @@ NOWHERE = Decision((), 0, ())
 
 @pytest.mark.random
 def test_systems_may_not_begin_where_no_supervisor_can_go_on(record_property: Callable[[str, object], None]) -> None:
-    """Whoever forgets where the supervisor lets a system begin, or lets it begin nowhere, is told so."""
+    """Check the report if a supervisor's initial states are forgotten, or if it lets the system begin nowhere."""
     met: Counter[str] = Counter()
     for seed in seeds(40):
         made = wide_system(seed)

@@ -1,4 +1,4 @@
-"""What was worked out before: in memory, in the database, and without the database."""
+"""Tests of results that were worked out before: in memory, in the database, and without the database."""
 
 import asyncio
 from collections.abc import Sequence

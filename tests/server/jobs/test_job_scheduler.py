@@ -1,4 +1,4 @@
-"""Who is next: fair, bounded, and the same as an obvious twin."""
+"""Tests of the choice of the next task: fair, bounded, and the same as an obvious twin."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
@@ -255,7 +255,7 @@ class Twin:
             self.turns.append(caller)
 
     def is_reserved(self, caller: str) -> bool:
-        """Whether a task may begin though no worker is free."""
+        """Return True if a task may begin though no worker is free."""
         count, most = len(self.running), self.capacity + self.limits.reserved
         return self.capacity > 0 and self.capacity <= count < most and caller not in self.running.values()
 

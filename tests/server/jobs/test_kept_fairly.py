@@ -1,4 +1,4 @@
-"""Who gives something back where too much is kept: the same as an obvious twin, and nobody at another's cost."""
+"""Tests of the caller who gives back where too much is kept: as an obvious twin, and nobody at another's cost."""
 
 import asyncio
 import contextlib

@@ -1,4 +1,4 @@
-"""What the database lets a server do with a job: nothing, unless the job is its own and as it must be for that."""
+"""Tests of a server's permissions on a job in the database: none, unless the job is its own and as it must be."""
 
 from collections.abc import Awaitable, Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What is done around every call, over a real server."""
+"""Tests of the work around every call, over a real server."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -146,7 +146,7 @@ class CancelledContext:
     """The context of a call that is cancelled while its handler waits.
 
     Args:
-        given_s: What is left of its time when it begins; None: it has no deadline.
+        given_s: Time left when it begins, in seconds; None: it has no deadline.
         left_s: The same when it is cancelled.
     """
 

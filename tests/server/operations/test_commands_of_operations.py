@@ -38,7 +38,7 @@ def clean(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 class Checked:
-    """What `check-config --json` said."""
+    """Output of `check-config --json`."""
 
     def __init__(self, capsys: pytest.CaptureFixture[str], *words: str) -> None:
         self.status = run_command(["check-config", "--json", "--port", "0", *words])

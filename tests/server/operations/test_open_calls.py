@@ -1,4 +1,4 @@
-"""How many calls somebody may have open, with real calls: silent ones, watches, answers that nobody reads."""
+"""Tests of the limit on open calls, with real calls: silent ones, watches, answers that nobody reads."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -79,7 +79,7 @@ def request_for(method: str, text: str) -> Any:
 
 
 def ask(call: Any, request: Any, metadata: Any) -> None:
-    """Whatever becomes of it."""
+    """Make a call, whatever becomes of it."""
     with contextlib.suppress(grpc.RpcError):
         answer = call(request, metadata=metadata, timeout=PATIENCE_S)
         if hasattr(answer, "cancel"):

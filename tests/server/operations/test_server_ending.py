@@ -19,7 +19,7 @@ from support.waiting import PATIENCE_S, until
 
 @pytest.fixture
 def forced(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """What the process would be ended by, instead of that."""
+    """Forced end of the process, recorded instead of executed."""
     found: dict[str, Any] = {}
 
     def later(seconds: float, *, exit: bool, file: Any) -> None:  # noqa: A002  # its name there

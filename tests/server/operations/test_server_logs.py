@@ -1,4 +1,4 @@
-"""What lines of the log look like, and what never stands in them."""
+"""Tests of the form of log lines, and of the contents that never stand in them."""
 
 import json
 import logging

@@ -1,4 +1,4 @@
-"""Where settings come from, and what is said about wrong ones."""
+"""Tests of the sources of settings, and of the messages about wrong ones."""
 
 from pathlib import Path
 

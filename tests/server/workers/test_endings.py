@@ -1,4 +1,4 @@
-"""What is told of a worker that ended without an answer."""
+"""Tests of the report on a worker that ended without an answer."""
 
 import signal
 

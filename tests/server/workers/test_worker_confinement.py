@@ -65,7 +65,7 @@ def sibling(fake: Any) -> Iterator[int]:
 
 
 def tried(channel: Any, what: str) -> str:
-    """How it went when a task tried something."""
+    """Return the result of a task that tried something."""
     response = STUB(channel).Check(pb.CheckRequest(bundle=bundle(f"try {what}")), timeout=PATIENCE_S)
     return str(response.diagnostics[0].message)
 
@@ -298,7 +298,7 @@ class TestTheServerItself:
 
 
 def decided(instructions: bytes, machine: int, number: int, arguments: list[int]) -> int:
-    """What a filter says of a call: instruction by instruction, as the kernel's manual has them."""
+    """Return a filter's decision on a call: instruction by instruction, as the kernel's manual has them."""
     data = struct.pack("=IIQ6Q", number, machine, 0, *arguments)
     word, place = 0, 0
     while True:
@@ -314,7 +314,7 @@ def decided(instructions: bytes, machine: int, number: int, arguments: list[int]
 
 
 def expected(name: str, arguments: list[int]) -> bool:
-    """Whether a call may be made, in plain words."""
+    """Return True if a call may be made, in plain words."""
     low = [argument & 0xFFFFFFFF for argument in arguments]
     match name:
         case "kill" | "tgkill" | "tkill":

@@ -1,4 +1,4 @@
-"""What a worker says, however it is cut, long or wrong."""
+"""Tests of a worker's messages, however they are cut, long or wrong."""
 
 import json
 
@@ -24,7 +24,7 @@ LIMITS = TaskLimits(result_bytes=1000)
 
 
 def read(content: bytes, limits: TaskLimits = LIMITS) -> tuple[list[Report], Outcome | None]:
-    """What a whole answer says, and None where it ends too early."""
+    """Return the content of a whole answer, and None where it ends too early."""
     reader = AnswerReader(limits)
     reports: list[Report] = []
     place = 0

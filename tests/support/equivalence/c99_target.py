@@ -33,9 +33,9 @@ class C99Target:
     """A compiled test program around generated C.
 
     Args:
-        supervisor: What is generated.
-        folder: Where to compile, unless the same was compiled there before.
-        options: For the compiler.
+        supervisor: Supervisor from which the C is generated.
+        folder: Folder in which to compile, unless the same was compiled there before.
+        options: Options for the compiler.
     """
 
     name = "c99"
@@ -105,11 +105,11 @@ class C99Target:
         return self._tell(words + ([] if type_ is None else data_words(self._layout, type_, data, is_root=True)))
 
     def _handed(self, data: Any) -> list[object]:
-        """How the program is handed the message itself, which a controller does not need."""
+        """Return the words that hand the program the message itself, which a controller does not need."""
         return []
 
     def _ended(self, action: Action) -> list[object]:
-        """How it is told in what way a goal ended without success, which a controller does not need."""
+        """Return the words for how a goal ended without success, which a controller does not need."""
         return []
 
     def _tell(self, words: list[object]) -> Observation:

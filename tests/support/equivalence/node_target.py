@@ -22,7 +22,7 @@ LIMIT_S = 15.0
 RESEND_S = 3.0
 
 IN_CPP = Sight(log_keys=frozenset({"kind", "event", "controllable", "data", "state", "identifier"}), has_readings=False)
-"""What nodes in C++ tell in their logs: not in the same words what was unknown."""
+"""Sight of nodes in C++ through their logs: what was unknown is not reported in the same words."""
 
 
 class Surroundings(Protocol):
@@ -41,7 +41,7 @@ class Surroundings(Protocol):
         """Let the existing controller before a layer do what an action says: `ask`, `ask_call` and so on."""
 
     def take_issued(self) -> list[Issued]:
-        """What the node has asked for or told since the last time, `publish` with the topic."""
+        """Return the node's requests and reports since the last time, `publish` with the topic."""
 
     def settle(self) -> None:
         """Return when the node has handled what was sent to it and shows nothing of it."""
@@ -94,11 +94,11 @@ class NodeTarget:
     """A node as a target of the suite.
 
     Args:
-        name: For messages.
-        model: What it was made from.
-        surroundings: Where it runs.
-        folder: For its event log.
-        sight: What it tells in its log.
+        name: Name for messages.
+        model: Model that it was made from.
+        surroundings: Surroundings in which it runs.
+        folder: Folder for its event log.
+        sight: Extent of what it reports in its log.
     """
 
     def __init__(self, name: str, model: Model, surroundings: Surroundings, folder: Path, sight: Sight = FULL) -> None:
@@ -193,7 +193,7 @@ def node_parameters(scenario: Scenario, folder: Path, deployment: Deployment) ->
 
 
 def given(interface: Interface, message: Any) -> dict[str, Any]:
-    """What a message holds, given as a dict, by path; what has its default is left out."""
+    """Return the contents of a message, given as a dict, by path; parts that have their default are left out."""
     return set_parts(message.get("data") if interface.package == "std_msgs" else message)
 
 

@@ -1,4 +1,4 @@
-"""What a controller shows after each action, and the one message about what differs from the reference."""
+"""Observation of a controller after each action, and the one message about the difference from the reference."""
 
 import json
 import math
@@ -12,9 +12,11 @@ from robosc.execution.event_log import plain
 MAXIMUM_FLOAT32 = 3.4028234663852886e38
 
 Issued = tuple[str, str, Mapping[str, Any]]
-"""What was asked of the robot: `publish`, `default`, `call`, `goal` or `cancel`; of what (`default`: a topic); the data
-that was given, by path. What a layer told its caller: `pass` and `blocked` (a topic or identifier), `answer`,
-`no answer`, `accept`, `reject`, `told` (feedback) and `ended`; the caller's number of the call or goal is in the data.
+"""Request to the robot, or report of a layer to its caller.
+
+A request is `publish`, `default`, `call`, `goal` or `cancel`; then its subject (`default`: a topic); then the data
+that was given, by path. A report is `pass` and `blocked` (a topic or identifier), `answer`, `no answer`, `accept`,
+`reject`, `told` (feedback) and `ended`; the caller's number of the call or goal is in the data.
 """
 
 Entry = Mapping[str, Any]
@@ -25,16 +27,16 @@ _TIMES = frozenset({"time", "decision_us"})
 
 @dataclass(frozen=True)
 class Observation:
-    """What is seen of a controller after an action; None: this target does not show it.
+    """Observation of a controller after an action; None: this target does not show it.
 
     Attributes:
-        issued: What it asked of the world meanwhile, in order.
-        log: What it wrote into its event log meanwhile.
+        issued: Requests that it made to the world meanwhile, in order.
+        log: Entries that it wrote into its event log meanwhile.
         state: The state of each component and its variables.
         enabled: Every controllable event that is allowed.
-        locations: Where each service and action is.
-        status: What the executor is doing, and whether it is faulty.
-        counters: How much was unknown, how much unexpected, and how many faults there were.
+        locations: Location of each service and action.
+        status: Activity of the executor, and True if it is faulty.
+        counters: Counts of what was unknown, of what was unexpected, and of faults.
     """
 
     issued: tuple[Issued, ...] = ()
@@ -48,18 +50,18 @@ class Observation:
 
 @dataclass(frozen=True)
 class Sight:
-    """How much a target shows.
+    """Extent of what a target shows.
 
     Attributes:
         topics: The topic of each message, for a target that does not show which of those on a topic was sent.
-        is_exact: With `topics`: False for a target seen over a middleware. Which properties were given is not to be
-            seen then, a field may have less precision than the model's number, and topics have no order between them.
-        log_keys: Which parts of an entry of the log it tells; None: all.
-        has_log: Whether it writes a log.
-        has_readings: Whether the log tells with an event of the environment what the model reads of the data that
-            came; else it tells the data as it came, which is not compared.
-        has_requests: Whether it tells with a request what the model knows of its data; a layer on a middleware tells
-            the whole message, which is not compared.
+        is_exact: False for a target seen over a middleware, with `topics`. The given properties are not visible then,
+            a field may have less precision than the model's number, and topics have no order between them.
+        log_keys: Parts of an entry of the log that it reports; None: all.
+        has_log: True if it writes a log.
+        has_readings: True if the log reports, with an event of the environment, what the model reads of the data that
+            came; else it reports the data as it came, which is not compared.
+        has_requests: True if it reports, with a request, what the model knows of its data; a layer on a middleware
+            reports the whole message, which is not compared.
     """
 
     topics: Mapping[str, str] | None = None
@@ -99,15 +101,15 @@ def entry(found: Mapping[str, Any]) -> Entry:
 
 
 def difference(target: str, number: int, what: str, expected: Observation, found: Observation, sight: Sight) -> str:
-    """The first thing that differs, in words; empty if nothing does.
+    """Return the first difference, in words; empty if there is none.
 
     Args:
         target: Its name.
-        number: Which step.
-        what: What happened in it.
-        expected: What the reference showed.
-        found: What the target showed.
-        sight: How much it shows.
+        number: Number of the step.
+        what: Description of what happened in it.
+        expected: Observation of the reference.
+        found: Observation of the target.
+        sight: Extent of what the target shows.
     """
     pairs: list[tuple[str, Any, Any]] = [
         ("what it asks for", _seen(expected.issued, sight), _seen(found.issued, sight)),
@@ -159,7 +161,7 @@ def _told(log: Sequence[Entry], sight: Sight) -> list[Entry]:
 
 
 def _detail(left: Any, right: Any) -> str:
-    """What is expected and what is found, of the first part that differs."""
+    """Describe the expected and the found value of the first part that differs."""
     if isinstance(left, dict) and isinstance(right, dict):
         for key in [*left, *(key for key in right if key not in left)]:
             if key not in left or key not in right or left[key] != right[key]:

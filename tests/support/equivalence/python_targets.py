@@ -31,7 +31,7 @@ class Ids:
         return self._open[name].pop()
 
     def count(self, name: str) -> int:
-        """How many are under way."""
+        """Return the number of calls or goals under way."""
         return len(self._open.get(name, ()))
 
 
@@ -53,7 +53,7 @@ class Callers:
         return self._last[name]
 
     def count(self, name: str) -> int:
-        """How many there were until the last one there; 0: none."""
+        """Return the number of calls and goals up to the last one there; 0: none."""
         return self._last.get(name, 0)
 
 
@@ -89,14 +89,15 @@ class _World:
 
 
 class PythonTarget:
-    """A system and an executor in this process.
+    """System and executor in this process.
 
     Args:
-        name: For messages.
-        model: What it was made from.
+        name: Name for messages.
+        model: Model that it was made from.
         system: The controlled system.
-        runtime: Holds `Executor`, `Settings`, `ManualClock`, `MemoryLog` and `NullLog`, as a generated module does.
-        has_log: Whether it writes a log: without one it takes shorter ways.
+        runtime: Object that holds `Executor`, `Settings`, `ManualClock`, `MemoryLog` and `NullLog`, as a generated
+            module does.
+        has_log: True if it writes a log: without one it takes shorter ways.
     """
 
     def __init__(self, name: str, model: Model, system: Any, runtime: Any, *, has_log: bool = True) -> None:
@@ -215,7 +216,7 @@ class PythonLayer(PythonTarget):
 
     @property
     def is_faulty(self) -> bool:
-        """Whether it rests until it is restarted."""
+        """True if the layer rests until it is restarted."""
         return bool(self._executor.is_faulty)
 
     def do(self, action: Action, awaited: Observation | None = None) -> Observation:
@@ -264,17 +265,17 @@ def _kind(supervisor: Supervisor) -> type[PythonTarget]:
 
 
 def observe(supervisor: Supervisor, scenario: Scenario) -> list[Observation]:
-    """What the reference shows: at the start, and after each action."""
+    """Return the observations of the reference: at the start, and after each action."""
     target = reference(supervisor)
     return [target.start(scenario), *(target.do(action) for action in scenario.actions)]
 
 
 def generated_python(supervisor: Supervisor, module: Any, *, has_log: bool = True) -> PythonTarget:
-    """A generated module.
+    """Return a generated module as a target.
 
     Args:
-        supervisor: What it was generated from.
+        supervisor: Supervisor that it was generated from.
         module: The module.
-        has_log: Whether its executor writes a log.
+        has_log: True if its executor writes a log.
     """
     return _kind(supervisor)("python", supervisor.model, module.Supervisor(), module, has_log=has_log)

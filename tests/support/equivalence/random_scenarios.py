@@ -36,12 +36,12 @@ _OUTCOMES = ("succeeded", "succeeded", "rejected", "aborted", "cancelled", "lost
 
 
 class Dice:
-    """Draws data and actions.
+    """Random source of data and actions.
 
     Args:
-        model: Whose.
+        model: Model to draw for.
         dice: Source of chance.
-        is_hostile: Whether data may be missing, not a number, or too large.
+        is_hostile: True if data may be missing, not a number, or too large.
     """
 
     def __init__(self, model: Model, dice: Random, *, is_hostile: bool) -> None:
@@ -65,7 +65,7 @@ class Dice:
         return Action("message", topic, self.datum(*self._topics[topic]))
 
     def asked(self) -> Action | None:
-        """What an existing controller may ask of a layer: a message, a call, a goal."""
+        """Draw a request that an existing controller may send to a layer: a message, a call, a goal."""
         servers = [item for item in self._model.communications if item.kind in _ASKS]
         kinds = {identifier: ("ask", types) for identifier, types in self._asked.items()}
         kinds |= {item.name: (_ASKS[item.kind], [item.request or NoneType()]) for item in servers}
@@ -80,7 +80,7 @@ class Dice:
         return self.datum(getattr(self._model.communication(name), part))
 
     def datum(self, *types: Type) -> Any:
-        """What may come as something of all these types."""
+        """Draw a value that may come as something of all these types."""
         dice = self._dice
         sources = [self._source(type_) for type_ in types]
         # In C, a number that is missing is NaN.
@@ -204,7 +204,7 @@ def cancels_of(model: Model, target: PythonLayer) -> list[Action]:
 
 
 def _replies(model: Model, target: PythonTarget, dice: Random, drawn: Dice, outcomes: Sequence[str]) -> list[Action]:
-    """What servers may say now."""
+    """Return the actions that servers may take now."""
     found = []
     for item in model.communications:
         if not target.ids.count(item.name):
@@ -262,7 +262,7 @@ def node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario:
 LAYER_KINDS = frozenset(
     {"publish", "call", "goal", "cancel", "pass", "blocked", "answer", "no answer", "accept", "reject", "told", "ended"}
 )
-"""What a layer asks for and tells, all of which a random run should show."""
+"""Kinds of requests and reports of a layer, all of which a random run should show."""
 
 
 def layer_node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario:
@@ -320,7 +320,7 @@ def _spoiled(data: Any) -> Any:
 
 
 def for_layer_node(supervisor: Supervisor, scenario: Scenario) -> Scenario:
-    """What both sides send in a recorded run, for a layer that does nothing because time passes."""
+    """Return both sides' messages of a recorded run, for a layer that does nothing merely because time passes."""
     actions = tuple(action for action in scenario.actions if action.do in ("message", "ask"))
     return Scenario(actions, layer_node_settings(supervisor.model))
 
@@ -365,7 +365,7 @@ ODD_MESSAGES = tuple(
         ("/line/correction", 0.125),
     )
 )
-"""What may come to the line follower, too: numbers that are none, and too few."""
+"""Messages that may come to the line follower, too: with numbers that are NaN, and with too few numbers."""
 
 
 def follow(
@@ -374,7 +374,7 @@ def follow(
     issued: list[Issued] | None = None,
     answers: Mapping[str, Any] | None = None,
 ) -> list[Action]:
-    """What servers do at once: accept goals, end those that are cancelled; services with an answer give it.
+    """Let servers act at once: accept goals, end cancelled ones, and answer calls of services that have an answer.
 
     `issued` gets what is issued meanwhile.
     """

@@ -28,9 +28,9 @@ class StandInSurroundings:
     """A node and the test, which is everything around it.
 
     Args:
-        supervisor: What the node was generated from.
-        program: The node.
-        folder: For its output.
+        supervisor: Supervisor that the node was generated from.
+        program: Program of the node.
+        folder: Folder for its output.
     """
 
     def __init__(self, supervisor: Supervisor, program: Path, folder: Path) -> None:
@@ -96,7 +96,7 @@ class StandInSurroundings:
         raise ValueError(action.do)
 
     def take_issued(self) -> list[Issued]:
-        """What it did since the last time."""
+        """Return everything that the node issued since the last call."""
         text = self._output.read_text(encoding="utf-8")
         end = text.rfind("\n") + 1
         lines = text[self._read : end].splitlines()

@@ -36,7 +36,7 @@ def _lines(scenario: Scenario, seen: list[Observation]) -> Iterator[dict[str, An
 
 
 def read_recorded(robot: str) -> Scenario:
-    """What came to a robot, as it was recorded."""
+    """Read everything that came to a robot, as it was recorded."""
     lines = [json.loads(line) for line in (FOLDER / f"{robot}.jsonl").read_text(encoding="utf-8").splitlines()]
     actions = tuple(Action.from_json(line) for line in lines if "do" in line)
     return Scenario(actions, lines[0]["settings"])

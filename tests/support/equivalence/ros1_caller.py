@@ -17,10 +17,10 @@ _ACTIVE, _DONE = 2, 7
 
 
 class Ros1Caller:
-    """What is on the caller's side.
+    """The caller's side.
 
     Args:
-        peer: Whose node it is on.
+        peer: Peer whose node it is on.
         topics: The model's topics.
         server_types: The type of each service and action, by its name in the model.
         identifiers: The identifier of each.
@@ -78,7 +78,7 @@ class Ros1Caller:
                 raise ValueError(action.do)
 
     def take_issued(self) -> list[Issued]:
-        """What it was told since the last time."""
+        """Return everything that was reported to the caller since the last call."""
         peer = self._peer
         found: list[Issued] = []
         for item in self._topics:
@@ -104,7 +104,7 @@ class Ros1Caller:
 
 
 def _told(heard: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
-    """What a client of an action hears, in the words of the suite."""
+    """Express what a client of an action hears in the words of the suite."""
     if "feedback" in heard:
         return [("told", set_parts(heard["feedback"]))]
     if heard["state"] == _ACTIVE:

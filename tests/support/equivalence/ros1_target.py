@@ -35,11 +35,11 @@ class Ros1Surroundings:
     """A node on a master of its own, and a peer on rospy that has everything that it talks to.
 
     Args:
-        supervisor: What the node was generated from.
+        supervisor: Supervisor that the node was generated from.
         node: Name of the node.
-        command: Starts it.
-        folder: For files and output.
-        python_path: Where its modules lie, if it is in Python.
+        command: Command that starts it.
+        folder: Folder for files and output.
+        python_path: Path of its modules, if it is in Python.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Ros1Surroundings:
         return {item[4] for item in _answer(self._ask_node("getBusInfo")) if item[2] == "o"}
 
     def _has_heard_ends(self) -> bool:
-        """Whether the node has received the results of all goals that have ended, as it says itself."""
+        """Return True if the node has received the results of all goals that have ended, as it reports itself."""
         found = self._ask_node("getBusStats")
         # What it sent and what it received; roscpp says so without a code and words. Of each topic its connections,
         # and of each of these: number, bytes, messages, what was dropped.
@@ -163,7 +163,7 @@ class Ros1Surroundings:
         self._caller.ask(action)
 
     def take_issued(self) -> list[Issued]:
-        """What came since the last time."""
+        """Return everything that came since the last call."""
         peer = self._peer
         found: list[Issued] = self._caller.take_issued() if self._caller else []
         for topic in self._topics:

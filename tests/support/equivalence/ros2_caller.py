@@ -15,15 +15,15 @@ _DEPTH = 1000
 
 
 class Ros2Caller:
-    """What is on the caller's side.
+    """The caller's side.
 
     Args:
-        peer: Whose node it is on.
+        peer: Peer whose node it is on.
         topics: The model's topics.
         server_types: The type of each service and action, by its name in the model.
         identifiers: The identifier of each.
-        given: What a message holds, by path.
-        filled: A message of a class with plain data in it.
+        given: Function that returns the content of a message, by path.
+        filled: Function that returns a message of a class with plain data in it.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class Ros2Caller:
         return self._peer.node.create_client(type_, callers_name("", identifier))
 
     def is_connected(self) -> bool:
-        """Whether what is asked now reaches the layer, and what it tells comes here."""
+        """Return True if requests sent now reach the layer, and its reports come here."""
         for client in self._clients.values():
             if not (client.server_is_ready() if hasattr(client, "server_is_ready") else client.service_is_ready()):
                 return False

@@ -30,8 +30,8 @@ class Ros2Surroundings:
     """A node on a domain of its own, and everything that it talks to in this process.
 
     Args:
-        supervisor: What the node is generated from.
-        folder: For files and output.
+        supervisor: Supervisor that the node is generated from.
+        folder: Folder for files and output.
     """
 
     def __init__(self, supervisor: Supervisor, folder: Path) -> None:
@@ -161,7 +161,7 @@ class Ros2Surroundings:
         self._caller.ask(action)
 
     def take_issued(self) -> list[Issued]:
-        """What came since the last time."""
+        """Return everything that came since the last call."""
         found, self._issued = self._issued, []
         if self._caller:
             found += self._caller.issued
@@ -252,7 +252,7 @@ def _fields(message_class: Any, data: Any) -> dict[str, Any]:
 
 
 def _given(message: Any) -> dict[str, Any]:
-    """What a message holds, by path; what has its default is left out, such as the 1 of a quaternion's `w`."""
+    """Return the content of a message, by path, without defaults such as the 1 of a quaternion's `w`."""
     defaults = _parts(type(message)())
     return {path: value for path, value in _parts(message).items() if value and value != defaults.get(path)}
 

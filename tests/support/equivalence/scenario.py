@@ -1,4 +1,4 @@
-"""What happens to a controller, independent of any target: a list of actions, one line of JSON each in a file."""
+"""Scenario of a controller, independent of any target: a list of actions, one line of JSON each in a file."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -19,13 +19,13 @@ class Action:
     """One thing that happens.
 
     Attributes:
-        do: `tick`, `wait` (no period, only time), `message`, `reply`, `fail` (a call), `accept`, `feedback`, `end` (a
-            goal), `stop`, `restart`. What an existing controller does before a supervision layer: `ask` (a message),
-            `ask_call`, `ask_goal`, `ask_cancel` (its last goal there).
+        do: Kind: `tick`, `wait` (no period, only time), `message`, `reply`, `fail` (a call), `accept`, `feedback`,
+            `end` (a goal), `stop`, `restart`. Kinds for an existing controller before a supervision layer: `ask` (a
+            message), `ask_call`, `ask_goal`, `ask_cancel` (its last goal there).
         subject: The topic (`message`, `ask`), or the name of the service or action.
-        data: What comes with it, as plain values: dicts of properties, lists, numbers, texts, booleans, None.
-        how: `end`: the outcome.
-        seconds: `wait`: for how long.
+        data: Data that comes with it, as plain values: dicts of properties, lists, numbers, texts, booleans, None.
+        how: Outcome of `end`.
+        seconds: Duration of `wait`, in seconds.
     """
 
     do: str
@@ -35,7 +35,7 @@ class Action:
     seconds: float = 0.0
 
     def to_json(self) -> dict[str, Any]:
-        """What stands in a file."""
+        """Return the JSON object that stands in a file."""
         found: dict[str, Any] = {"do": self.do}
         for name, default in (("subject", ""), ("how", ""), ("seconds", 0.0)):
             if getattr(self, name) != default:
@@ -58,7 +58,7 @@ class Scenario:
     """A run of a controller, as far as the world decides it.
 
     Attributes:
-        actions: What happens, in order, after the start.
+        actions: Actions that happen, in order, after the start.
         settings: Settings of the deployment by name; the others have their default.
     """
 

@@ -1,4 +1,7 @@
-"""What the equivalence suite asks of a target: one adapter class each, and the run that compares it with another."""
+"""Interface that the equivalence suite asks of a target, and the run that compares a target with another.
+
+Each target has one adapter class.
+"""
 
 from collections.abc import Iterator
 from typing import Protocol
@@ -11,8 +14,8 @@ class Target(Protocol):
     """A controller of one robot, however it is made; a context manager around a run would end what it started.
 
     Attributes:
-        name: For messages.
-        sight: How much it shows.
+        name: Name for messages.
+        sight: Extent of what it shows.
     """
 
     name: str
@@ -22,8 +25,8 @@ class Target(Protocol):
         """Begin in the initial state.
 
         Args:
-            scenario: Has the settings.
-            awaited: What the reference showed: only for a target that must wait until so much has come.
+            scenario: Scenario that has the settings.
+            awaited: Observation of the reference: only for a target that must wait until so much has come.
         """
 
     def do(self, action: Action, awaited: Observation) -> Observation:
@@ -37,9 +40,9 @@ def compare(target: Target, scenario: Scenario, expected: list[Observation]) -> 
     """Drive a target through a scenario, step by step.
 
     Args:
-        target: Which; it is closed at the end.
-        scenario: What happens.
-        expected: What the reference showed: one for the start and one for each action.
+        target: Target to drive; it is closed at the end.
+        scenario: Scenario that happens.
+        expected: Observations of the reference: one for the start and one for each action.
 
     Raises:
         AssertionError: It differs; says which target, in which step, and what differs.

@@ -178,7 +178,7 @@ def test_a_server_that_is_lost_fails_its_calls(courier_node: Path, tmp_path: Pat
 
 
 STATES = ["wait publish /state"] * 40
-"""So many that the last of them are of what was told before: those count that came while something else was awaited."""
+"""Waits for so many states that the last ones follow earlier input: states that come during other waits count."""
 
 
 def test_the_state_tells_where_services_and_actions_are(courier: Supervisor, courier_node: Path) -> None:
@@ -203,7 +203,7 @@ def test_the_state_tells_where_services_and_actions_are(courier: Supervisor, cou
 
 
 def states_of(text: str) -> Any:
-    """What a message of `/state` holds, as the stand-in prints it."""
+    """Return the content of a message of `/state`, as the stand-in prints it."""
     inner = re.fullmatch(r'\{data: "(.*)"\}', text)
     assert inner is not None
     return json.loads(inner[1].replace('\\"', '"'))

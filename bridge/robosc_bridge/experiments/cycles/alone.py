@@ -24,7 +24,7 @@ class NullMiddleware:
         return data
 
     def is_default(self, communication: str, message: Any) -> bool:
-        """Whether there is no data."""
+        """Return True if there is no data."""
         return message is None
 
     def publish(self, communication: str, message: Any) -> None:

@@ -35,12 +35,12 @@ def measured_driving(middleware: str, experiment: str, supervisor: Supervisor, r
     Args:
         middleware: `rclpy`, `rospy` or `roscpp`.
         experiment: `maze` or `line`.
-        supervisor: Of the controller.
-        runs: How often.
-        cycles: How many cycles each time.
+        supervisor: Supervisor of the controller.
+        runs: Number of runs.
+        cycles: Number of cycles in each run.
 
     Returns:
-        Seconds of each `cycle` and of each `publish` alone; or why there are none.
+        Seconds of each `cycle` and of each `publish` alone; or the reason why there are none.
     """
     move = _mover(supervisor.model)
     if move is None:
@@ -105,7 +105,7 @@ def _compiled(experiment: str, supervisor: Supervisor, move: Communication, fold
 
 
 def _run(ros: Middleware, middleware: str, command: Sequence[str], folder: Path) -> Samples:
-    """What the last line says that the program prints, with a subscriber beside it."""
+    """Run the program with a subscriber beside it, and return the content of the last line that it prints."""
     with ros.running(folder) as variables:
         theirs: Mapping[str, str] = ros.of_nodes(variables)
         kind = "rclpy" if middleware == "rclpy" else "rospy"

@@ -17,9 +17,9 @@ def measure(experiment: str, supervisor: Supervisor, runs: int = RUNS, cycles: i
 
     Args:
         experiment: `maze` or `line`; its model has a message on `/scan`, and one beside it.
-        supervisor: Of a controller, not of a layer: a layer decides nothing by itself.
-        runs: How often.
-        cycles: How many cycles each time.
+        supervisor: Supervisor of a controller, not of a layer: a layer decides nothing by itself.
+        runs: Number of runs.
+        cycles: Number of cycles in each run.
     """
     alone = (("generated C, gcc -O2", measured_c), ("generated Python", measured_python))
     return (

@@ -14,7 +14,7 @@ FAR_M, NEAR_M = 3.0, 0.2
 BEAMS = 360
 _ASIDE_M = 0.3
 _TURNS = 50
-"""So many things come before an obstacle appears or goes."""
+"""Number of inputs before an obstacle appears or goes."""
 
 Samples = Mapping[str, Sequence[float]]
 """Seconds of each `cycle`, and with a middleware of each `publish` alone."""
@@ -31,7 +31,7 @@ OTHER: Mapping[str, tuple[str, Any, str]] = {
     "line": ("/line/correction", 0.1, "line_correction(&r, ++now_us, 0.1)"),
     "maze": ("/rotate_done", None, "rotate_done(&r, ++now_us)"),
 }
-"""What comes beside scans: its topic, its data, and the same in C."""
+"""Input beside scans: its topic, its data, and the same in C."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,13 +40,15 @@ class CycleTimes:
 
     Attributes:
         experiment: `maze` or `line`.
-        what: What was measured, in words.
-        has_middleware: Whether messages went out.
+        what: Description of what was measured, in words.
+        has_middleware: True if messages went out.
         microseconds: Mean, minimum, maximum and standard deviation; None: not measured.
-        count: How many cycles.
-        why: Why it was not measured.
-        median_us: What a machine does that has nothing else to do: others' work makes the mean and the maximum.
-        publish_us: Median of what the middleware takes of it, measured alone; None: there is none.
+        count: Number of cycles.
+        why: Reason why it was not measured.
+        median_us: Median, in microseconds: the time of a machine that has nothing else to do; others' work makes the
+            mean and the maximum.
+        publish_us: Median of the time that the middleware takes of it, in microseconds, measured alone; None: there
+            is none.
     """
 
     experiment: str
@@ -65,7 +67,7 @@ class CycleTimes:
 
 
 def cycle_times(experiment: str, what: str, found: Samples | str, *, has_middleware: bool) -> CycleTimes:
-    """What was found, or why nothing was, in figures."""
+    """Return the figures of what was found, or the reason why nothing was found."""
     if isinstance(found, str):
         return CycleTimes(experiment, what, has_middleware, None, why=found)
     us = [sample * 1e6 for sample in found["cycle"]]
@@ -77,7 +79,7 @@ def cycle_times(experiment: str, what: str, found: Samples | str, *, has_middlew
 
 
 def feed(experiment: str, number: int) -> tuple[str, Any]:
-    """What comes: every other time a scan, whose obstacle comes and goes."""
+    """Return the next input: every other time a scan, whose obstacle comes and goes."""
     if number % 2 == 0:
         identifier, data, _ = OTHER[experiment]
         return identifier, data

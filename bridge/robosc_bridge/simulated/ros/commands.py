@@ -1,4 +1,4 @@
-"""What can be done by a line of text to the twin behind ROS."""
+"""Commands, as lines of text, to the twin behind ROS."""
 
 from robosc_bridge.simulated.commands import WORLD_HELP, UnknownCommandError, obey_world
 from robosc_bridge.simulated.ros.robot import RosRobot

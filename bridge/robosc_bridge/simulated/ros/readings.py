@@ -1,4 +1,4 @@
-"""What the robot shows to other nodes, before it is a message of either ROS."""
+"""Readings that the robot shows to other nodes, before they are messages of either ROS."""
 
 from dataclasses import dataclass
 
@@ -23,11 +23,11 @@ class Scan:
 
     Attributes:
         stamp_s: World time.
-        ranges_m: Evenly over a turn, counter-clockwise from straight ahead; infinity where nothing is near enough,
-            minus infinity where something is too near (REP 117, ros.org/reps/rep-0117.html).
-        nearest_m: That can be measured.
-        farthest_m: That can be measured.
-        turn_s: Of the world, from scan to scan.
+        ranges_m: Ranges evenly over a turn, counter-clockwise from straight ahead; infinity where nothing is near
+            enough, minus infinity where something is too near (REP 117, ros.org/reps/rep-0117.html).
+        nearest_m: Shortest distance that can be measured.
+        farthest_m: Longest distance that can be measured.
+        turn_s: World time from scan to scan.
     """
 
     stamp_s: float
@@ -39,15 +39,15 @@ class Scan:
 
 @dataclass(frozen=True)
 class Odometry:
-    """Where the robot takes itself to be, by its wheels.
+    """Place where the robot takes itself to be, by its wheels.
 
     Attributes:
         stamp_s: World time.
-        x_m: From where it began.
-        y_m: The same.
-        heading_rad: Counter-clockwise from how it stood.
-        linear_m_s: Forward.
-        angular_rad_s: Counter-clockwise.
+        x_m: x from where it began.
+        y_m: y from the same.
+        heading_rad: Heading counter-clockwise from how it stood.
+        linear_m_s: Forward speed.
+        angular_rad_s: Turn rate, counter-clockwise.
     """
 
     stamp_s: float
@@ -60,14 +60,14 @@ class Odometry:
 
 @dataclass(frozen=True)
 class Picture:
-    """What the camera sees.
+    """Picture that the camera sees.
 
     Attributes:
         stamp_s: World time.
         encoding: `mono8` or `rgb8`.
-        width: In pixels.
-        height: In pixels.
-        data: Row by row from above, without padding.
+        width: Width in pixels.
+        height: Height in pixels.
+        data: Pixels row by row from above, without padding.
     """
 
     stamp_s: float
@@ -95,14 +95,14 @@ Reading = Clock | Scan | Odometry | Picture | Battery
 
 @dataclass(frozen=True)
 class Mounted:
-    """How one frame of the robot sits in another; it never moves there.
+    """Place of one frame of the robot in another; it never moves there.
 
     Attributes:
         parent: Name of the frame in which it sits.
         child: Its name.
-        x_m: Forward.
-        z_m: Up.
-        pitch_rad: Downwards.
+        x_m: Distance forward.
+        z_m: Distance up.
+        pitch_rad: Pitch downwards.
     """
 
     parent: str

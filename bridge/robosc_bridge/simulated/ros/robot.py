@@ -41,25 +41,27 @@ _EPSILON_S = 1e-9
 class RosRobot:
     """A robot in a world, without any ROS.
 
-    Two times are kept apart, as everywhere in the twin: sensors live in the world's time, and how long a velocity holds
-    is measured on the computer's clock, because the nodes that send it live by that. So that a machine that has no time
+    Two times are kept apart, as everywhere in the twin: sensors live in the world's time, and how long a velocity
+    holds
+    is measured on the computer's clock, because the nodes that send it live by that. So that a machine that has no
+    time
     for those nodes does not run a robot in a fast world into a wall, the world may wait for the next velocity.
 
     Args:
-        world: In which it is; where its scene has a line, there is a camera.
+        world: World in which it is; where its scene has a line, there is a camera.
         mount: The camera and where it sits; None: the usual one.
         lidar: Key of `LIDARS`: how far it sees, how often, and how many beams it has.
-        encoding: Of pictures, one of `ENCODINGS`.
-        command_timeout_s: How long a velocity holds on the computer's clock; 0: for ever.
-        patience_s: How many seconds the robot may go in the world after a velocity; then the world stands still until
-            the next one comes, or until this one ends. None: it never waits.
-        seed: Of the noise that the world's scene tells of.
+        encoding: Encoding of pictures, one of `ENCODINGS`.
+        command_timeout_s: Time for which a velocity holds on the computer's clock; 0: for ever.
+        patience_s: Seconds that the robot may go in the world after a velocity; then the world stands still until the
+            next one comes, or until this one ends. None: it never waits.
+        seed: Seed of the noise that the world's scene describes.
 
     Attributes:
-        world: In which it is.
-        battery_v: Its supply.
-        is_scanner_covered: Whether something covers the LiDAR: it measures nothing.
-        is_camera_covered: Whether something covers the camera: its pictures are black.
+        world: World in which it is.
+        battery_v: Voltage of its supply.
+        is_scanner_covered: True if something covers the LiDAR: it measures nothing.
+        is_camera_covered: True if something covers the camera: its pictures are black.
         commands: Velocities that it was sent.
         refused: Velocities that were no finite numbers; the wheels stand still on one.
 
@@ -126,7 +128,7 @@ class RosRobot:
 
     @property
     def frames(self) -> tuple[Mounted, ...]:
-        """How its parts sit on it."""
+        """Places of its parts on it."""
         body = self.world.body
         found = [
             Mounted(FOOTPRINT, BASE, 0.0, _BASE_Z_M),
@@ -188,7 +190,7 @@ class RosRobot:
         return min(self._due_s)
 
     def live(self) -> list[Reading]:
-        """What is due now; what was missed is not made up for."""
+        """Return the readings that are due now; missed ones are not made up for."""
         with self._time.lock:
             self.world.catch_up()
             now_s = self._time.world_s()

@@ -49,7 +49,7 @@ class RospySide:
 
     Args:
         python: Its interpreter.
-        module: What it runs, importable from its folder.
+        module: Module that it runs, importable from its folder.
         names: Other names as rospy takes them, such as `__name:=robot` or `/scan:=/front/scan`.
 
     Attributes:
@@ -126,7 +126,7 @@ class RospySide:
                 return
 
     def receive(self, longest_s: float) -> list[Frame]:
-        """What it says; comes back with the first of it, or after so long at most.
+        """Return the frames that it sends: as soon as the first comes, or after `longest_s` at most.
 
         Raises:
             ServingError: It has ended, or what it says cannot be read.
@@ -177,12 +177,12 @@ class Ros1Face:
     """The node, as the twin sees it.
 
     Args:
-        robot: That it shows.
-        pacer: Brings the world up to now before a velocity acts.
-        side: That speaks ROS.
-        is_stamped: Whether velocities come as `TwistStamped`.
-        is_sim_time: Whether the other nodes are told to live by `/clock`.
-        should_end: Whether to wait no longer for a master.
+        robot: Robot that it shows.
+        pacer: Pacer that brings the world up to now before a velocity acts.
+        side: Process that speaks ROS.
+        is_stamped: True if velocities come as `TwistStamped`.
+        is_sim_time: True if the other nodes are told to live by `/clock`.
+        should_end: Function that returns True to wait no longer for a master.
 
     Raises:
         MissingRosError: rospy or its messages are not installed.

@@ -36,10 +36,10 @@ class Ros2Face:
     """The node; use it as a context manager.
 
     Args:
-        robot: That it shows.
-        pacer: Brings the world up to now before a velocity acts.
-        is_stamped: Whether velocities come as `TwistStamped`.
-        arguments: After `--ros-args`.
+        robot: Robot that it shows.
+        pacer: Pacer that brings the world up to now before a velocity acts.
+        is_stamped: True if velocities come as `TwistStamped`.
+        arguments: Arguments after `--ros-args`.
 
     Raises:
         MissingRosError: rclpy or its messages are not installed.
@@ -223,7 +223,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parted(given: list[str]) -> tuple[list[str], list[str]]:
-    """What is ours, and what is said to ROS."""
+    """Split the arguments into ours and those for ROS."""
     if ROS_ARGUMENTS not in given:
         return given, []
     place = given.index(ROS_ARGUMENTS)

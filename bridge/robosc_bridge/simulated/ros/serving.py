@@ -103,7 +103,7 @@ class Pacer:
         self._robot.advance(lived_s)
 
     def until_s(self, world_s: float) -> float:
-        """How long it is, on the computer's clock, until the world's time is so late."""
+        """Return the time on the computer's clock until the world's time is `world_s`, in seconds."""
         return (world_s - self._time.world_s()) / self._time.factor - (self._monotonic() - self._then_s)
 
 
@@ -150,10 +150,10 @@ def run(robot: RosRobot, pacer: Pacer, face: Face, should_end: Callable[[], bool
     """Let the world go on and show it.
 
     Args:
-        robot: In the world.
-        pacer: Of its time.
+        robot: Robot in the world.
+        pacer: Pacer of its time.
         face: Its node.
-        should_end: Whether it is enough.
+        should_end: Function that returns True to end.
     """
     pacer.begin()
     while not should_end():
@@ -195,11 +195,11 @@ def _listen(robot: RosRobot) -> None:
 
 
 def parser(prog: str, description: str) -> argparse.ArgumentParser:
-    """What both commands understand.
+    """Return the parser of the arguments that both commands understand.
 
     Args:
         prog: The command.
-        description: What it does.
+        description: Description of what it does.
     """
     found = argparse.ArgumentParser(prog=prog, description=description)
     found.add_argument(

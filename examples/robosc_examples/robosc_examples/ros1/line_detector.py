@@ -63,7 +63,7 @@ class LineDetector(Node):
 
 
 def _fault(message: Any) -> str:
-    """Why a picture cannot be read; empty: it can."""
+    """Return the reason why a picture cannot be read; empty: it can."""
     if message.encoding != "mono8":
         return f"encoding {message.encoding!r:.40}; this node reads mono8, such as image_proc's image_mono"
     if message.height < 1 or message.width < 1 or message.step < message.width:

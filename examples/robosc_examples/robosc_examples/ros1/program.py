@@ -1,4 +1,4 @@
-"""What every node on ROS 1 is made of: checked parameters, an orderly end, one clear line for what goes wrong.
+"""Parts of every node on ROS 1: checked parameters, an orderly end, one clear line for what goes wrong.
 
 rospy's own shutdown lets callbacks go on while its hooks run, so that a velocity may follow the zero. So the signals
 are ours, and after the last message a node sends nothing more.

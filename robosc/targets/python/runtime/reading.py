@@ -22,13 +22,13 @@ def array(value: Any) -> Any:
 
 
 def elements(value: Any, path: str, notes: Any, convert: Any) -> Any:
-    """A received array with every element converted; None where something else came.
+    """Return a received array with every element converted; None where something else came.
 
     Args:
-        value: What was received.
-        path: Where it was, in words.
+        value: Received value.
+        path: Place of the value, in words.
         notes: A list that takes what was unknown, as texts and a flag.
-        convert: Takes an element, its path and the notes.
+        convert: Function that takes an element, its path and the notes.
     """
     found = array(value)
     if found is None:
@@ -64,7 +64,7 @@ def words_of(notes: Any) -> Any:
 
 
 def flag_of(notes: Any) -> bool:
-    """Whether an enum fell to its default past an unknown rule."""
+    """Return True if an enum fell to its default past an unknown rule."""
     return any(flag for _, flag in notes)
 
 
@@ -122,5 +122,5 @@ def numbers_of(flags: Any) -> Any:
 
 
 def stays_in_range(value: Any, low: int, high: int) -> bool:
-    """Whether assigning a value leaves a range alone; an unknown value is not assigned at all."""
+    """Return True if assigning a value does not leave a range; an unknown value is not assigned at all."""
     return value is None or not (value < low or value > high)

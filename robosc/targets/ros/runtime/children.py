@@ -32,10 +32,10 @@ def run_both(
     """Run both until one of them ends or a signal comes: 1 if the controller failed, else the layer's status.
 
     Args:
-        name: Stands before what goes wrong, on standard error.
-        layer_command: How the layer is started.
-        controller_command: How the controller is started.
-        environment: Of the layer; the controller gets this process's.
+        name: Name that stands before what goes wrong, on standard error.
+        layer_command: Command that starts the layer.
+        controller_command: Command that starts the controller.
+        environment: Environment of the layer; the controller gets this process's.
     """
     received: list[int] = []
     for number in _SIGNALS:
@@ -60,7 +60,10 @@ def run_both(
 
 
 def _end_with_parent() -> Callable[[], Any] | None:
-    """What a child does first, so that it is ended even where its parent is killed; None where that cannot be had."""
+    """Return the function that a child runs first, so that it is ended even where its parent is killed.
+
+    None where that cannot be had.
+    """
     try:
         prctl = ctypes.CDLL(None).prctl
     except (AttributeError, OSError):

@@ -1,4 +1,4 @@
-"""What comes before the executor starts: it is held, not lost, and taken in before the first decision.
+"""Messages that come before the executor starts: held, not lost, and taken in before the first decision.
 
 A node waits for its servers before its executor starts, and an executor ignores what comes before that. A stop button
 that is pressed meanwhile must not be forgotten.
@@ -19,7 +19,7 @@ class HeldMessages:
     """Messages that came too early; of each topic the last ones, as many as its subscription would keep.
 
     Args:
-        depths: How many, by identifier.
+        depths: Maximum number of messages, by identifier.
     """
 
     def __init__(self, depths: Mapping[str, int]) -> None:

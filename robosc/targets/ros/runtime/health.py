@@ -1,4 +1,4 @@
-"""What `/diagnostics` says about a controller or a supervision layer.
+"""Content of `/diagnostics` about a controller or a supervision layer.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -24,9 +24,9 @@ class Health(NamedTuple):
     """One report.
 
     Attributes:
-        level: How grave it is.
-        message: Why, in words.
-        values: More, by name.
+        level: Severity.
+        message: Reason, in words.
+        values: Further values, by name.
     """
 
     level: Level
@@ -59,7 +59,7 @@ class HealthMonitor:
         self._before = self._executor.counters
 
     def report(self) -> Health:
-        """How it is."""
+        """Return the health of the executor."""
         executor = self._executor
         counters, status = executor.counters, executor.status
         values = {"status": status.value, "reason": "; ".join(executor.reasons)}

@@ -73,7 +73,7 @@ class Server(NamedTuple):
 
     Attributes:
         name: Its name in the model.
-        is_action: Which of the two it is.
+        is_action: True for an action, False for a service.
         identifier: Service or action name in the model.
         package: Package of its type.
         type: Name of its type.
@@ -214,8 +214,8 @@ def check_shape(message_class: Any, shape: Any, subject: str) -> None:
 
     Args:
         message_class: The message's class.
-        shape: What the model says about the data.
-        subject: What it is about, for the error message, e.g. `message scan`.
+        shape: Shape of the data in the model.
+        subject: Subject of the check, for the error message, e.g. `message scan`.
 
     Raises:
         SetupError: It does not.
@@ -359,13 +359,13 @@ class Sender:
 
     Args:
         message_class: The message's class.
-        shape: What the model says about the data.
+        shape: Shape of the data in the model.
         paths: Every property that some request sets; the empty path for a basic type.
-        subject: What it is about, for error messages.
+        subject: Subject of the message, for error messages.
 
     Attributes:
         message: The message.
-        is_default: Whether it is the all-default one.
+        is_default: True if it is the all-default one.
 
     Raises:
         SetupError: The message does not fit the model.

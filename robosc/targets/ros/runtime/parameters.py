@@ -64,12 +64,12 @@ class Parameters(NamedTuple):
     """Valid values.
 
     Attributes:
-        settings: Those of the executor.
-        topic_prefix: What is put before every topic name.
+        settings: Settings of the executor.
+        topic_prefix: Prefix of every topic name.
         log_folder: Folder of the event log; empty for none.
-        publish_state: Whether the state is published on `/state`.
-        server_wait_s: How long the start waits for servers.
-        resample_scans: Whether laser scans are brought to 360 ranges.
+        publish_state: True if the state is published on `/state`.
+        server_wait_s: Time that the start waits for servers, in seconds.
+        resample_scans: True if laser scans are brought to 360 ranges.
     """
 
     settings: Settings

@@ -1,4 +1,4 @@
-"""When a server is lost.
+"""Detection of lost servers.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -13,10 +13,10 @@ made anew."""
 
 
 class Presence:
-    """Tells when a server is lost.
+    """Detector of a lost server.
 
     Args:
-        is_ready: Whether it is seen now.
+        is_ready: Function that returns True if it is seen now.
     """
 
     def __init__(self, is_ready: Callable[[], bool]) -> None:
@@ -24,7 +24,7 @@ class Presence:
         self._missed_since_s: float | None = None
 
     def is_lost(self, now_s: float) -> bool:
-        """Whether it has not been seen for `LOST_S`, asked again and again."""
+        """Return True if it has not been seen for `LOST_S`; to be called again and again."""
         if self._is_ready():
             self._missed_since_s = None
             return False

@@ -1,4 +1,4 @@
-"""What became of service calls and goals, on its way to the executor.
+"""Outcomes of service calls and goals, on their way to the executor.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -12,7 +12,7 @@ from robosc.execution.runner import Runner
 
 
 class Reports:
-    """What became of calls and goals, kept until the executor may be told."""
+    """Outcomes of calls and goals, kept until they may be reported to the executor."""
 
     def __init__(self) -> None:
         self._waiting: deque[Callable[[Runner], None]] = deque()

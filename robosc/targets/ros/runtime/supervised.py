@@ -10,16 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 BLOCKED = "/blocked"
-"""Where the identifiers of requests that are held back are published."""
+"""Topic on which the identifiers of requests that are held back are published."""
 
 SUPERVISED = "/supervised"
 
 
 def robots_name(prefix: str, identifier: str) -> str:
-    """A name on the robot's side.
+    """Return a name on the robot's side.
 
     Args:
-        prefix: What stands before every name; empty, or beginning with a slash.
+        prefix: Text that stands before every name; empty, or beginning with a slash.
         identifier: A name of the model, `/x` or `x`.
     """
     return prefix + "/" + identifier.lstrip("/")

@@ -1,4 +1,4 @@
-"""Whether a message is the all-default one, whatever its fields are: its header does not count (semantics 3.6).
+"""Test for all-default messages, whatever the fields of a message are: its header does not count (semantics 3.6).
 
 Messages are compared field by field: what was received has tuples and bytes where a new message has lists.
 
@@ -13,7 +13,7 @@ _HEADER = "std_msgs/Header"
 
 
 def is_default(message: Any) -> bool:
-    """Whether every field of a message, its header apart, has its default."""
+    """Return True if every field of a message, its header apart, has its default."""
     default = type(message)()
     return all(
         _is_same(getattr(message, name), getattr(default, name))

@@ -59,11 +59,11 @@ class _Goal:
     """A goal whose end is not known.
 
     Attributes:
-        handle: What actionlib calls it by.
-        state: How far it is, as heard last.
-        since_s: Since when.
-        is_accepted: Whether its server has received it without refusing it.
-        cancelled_s: When its cancel was asked for, until it is heard of; or None.
+        handle: Handle by which actionlib refers to it.
+        state: State of its progress, as heard last.
+        since_s: Time since which it has that state, in seconds.
+        is_accepted: True if its server has received it without refusing it.
+        cancelled_s: Time at which its cancel was asked for, in seconds, until it is heard of; or None.
     """
 
     __slots__ = ("cancelled_s", "handle", "is_accepted", "since_s", "state")
@@ -77,11 +77,11 @@ class _Goal:
 
 
 class _Abandoned:
-    """A goal that was told to be lost although it may be running.
+    """A goal that was reported lost although it may be running.
 
     Attributes:
-        handle: What actionlib calls it by.
-        is_asked: Whether its cancel was asked for since its server was seen.
+        handle: Handle by which actionlib refers to it.
+        is_asked: True if its cancel was asked for since its server was seen.
     """
 
     __slots__ = ("handle", "is_asked")
@@ -95,11 +95,11 @@ class ActionGoals:
     """The goals of one action.
 
     Args:
-        client: Has `send_goal` and `last_status_msg` as actionlib's `ActionClient`.
-        is_ready: Whether its server is connected.
+        client: Client with `send_goal` and `last_status_msg` as actionlib's `ActionClient`.
+        is_ready: Function that returns True if its server is connected.
         name: The action's name on ROS.
-        put: The inbox's.
-        reports: Where what is heard of goals goes.
+        put: The inbox's method of that name.
+        reports: Reports that take what is heard of goals.
         monotonic: The clock.
     """
 
@@ -166,7 +166,7 @@ class ActionGoals:
 
     @property
     def has_abandoned(self) -> bool:
-        """Whether a goal that was told to be lost may be running."""
+        """True if a goal that was reported lost may be running."""
         return bool(self._abandoned)
 
     def cancel_abandoned(self) -> None:

@@ -1,7 +1,7 @@
-"""What the threads of rospy hand to the one thread of the executor: in the order in which it came, and bounded.
+"""Inbox for what the threads of rospy hand to the one thread of the executor: in order of arrival, and bounded.
 
-rospy calls back in a thread of its own for each connection. Nothing of the executor runs there: a callback puts what is
-to be done here, and the node's loop takes and does it.
+rospy calls back in a thread of its own for each connection. Nothing of the executor runs there: a callback puts what
+is to be done here, and the node's loop takes and does it.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -20,8 +20,8 @@ class Inbox:
     """Things to be done by another thread.
 
     Args:
-        depths: How many may wait of each kind, such as the messages on a topic; of more the oldest are lost. What is of
-            no kind is never lost.
+        depths: Maximum number that may wait of each kind, such as the messages on a topic; of more the oldest are
+            lost. What is of no kind is never lost.
     """
 
     def __init__(self, depths: Mapping[str, int]) -> None:
@@ -35,7 +35,7 @@ class Inbox:
 
     @property
     def dropped(self) -> int:
-        """How many were lost so far."""
+        """Number lost so far."""
         return self._dropped
 
     def put(self, action: Action, kind: str | None = None) -> None:

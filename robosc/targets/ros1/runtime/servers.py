@@ -101,7 +101,7 @@ class CalledService:
 
     @property
     def is_busy(self) -> bool:
-        """Whether an answer has still to be sent."""
+        """True if an answer has still to be sent."""
         with self._lock:
             return self._handled > 0
 

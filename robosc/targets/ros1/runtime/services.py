@@ -27,10 +27,10 @@ class ServiceCalls:
 
     Args:
         name: The service's name on ROS.
-        connect: Makes what calls it once: `connection(message)` waits for the reply and raises an exception where there
-            is none; `connection.close()`, from another thread, makes it raise.
-        put: Hands something to the executor's thread.
-        reports: Where replies go.
+        connect: Function that makes a connection for one call: `connection(message)` waits for the reply and raises
+            an exception where there is none; `connection.close()`, from another thread, makes it raise.
+        put: Function that hands something to the executor's thread.
+        reports: Reports that take the replies.
     """
 
     def __init__(self, name: str, connect: Callable[[], Any], put: Callable[[Action], None], reports: Reports) -> None:

@@ -16,7 +16,7 @@ from robosc.targets.ros.runtime.presence import Presence
 from robosc.targets.ros.runtime.reports import Reports
 
 REFUSAL_S = 0.25
-"""How long after a refused cancel the goal's end may still be on its way."""
+"""Time after a refused cancel during which the goal's end may still be on its way, in seconds."""
 
 MAXIMUM_PENDING = 16
 """Calls of one service whose reply is still listened for, so that a late one is noticed."""
@@ -44,11 +44,11 @@ class ServiceCalls:
     """The calls of one service.
 
     Args:
-        client: Has `service_is_ready`, `call_async` and `remove_pending_request`.
+        client: Client with `service_is_ready`, `call_async` and `remove_pending_request`.
         name: The service's name on ROS.
-        reports: Where replies go.
+        reports: Reports that take the replies.
         monotonic: The clock.
-        timeout_s: After which the executor itself counts a call as failed, or None.
+        timeout_s: Time after which the executor itself counts a call as failed, in seconds, or None.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class ServiceCalls:
         self._calls: dict[int, _Call] = {}
 
     def is_ready(self) -> bool:
-        """Whether there is a server."""
+        """Return True if there is a server."""
         return bool(self._client.service_is_ready())
 
     def call(self, request_id: int, message: Any) -> None:
@@ -107,9 +107,9 @@ class _Goal:
     """A goal whose end is not known.
 
     Attributes:
-        handle: What rclpy calls it by, once it was accepted.
-        refused_s: When its cancel was refused although it may be running, or None.
-        is_unknown: Whether the refusal said that the server does not know it.
+        handle: Handle by which rclpy refers to it, once it was accepted.
+        refused_s: Time at which its cancel was refused although it may be running, in seconds, or None.
+        is_unknown: True if the refusal said that the server does not know it.
     """
 
     __slots__ = ("handle", "is_unknown", "refused_s")
@@ -121,11 +121,11 @@ class _Goal:
 
 
 class _Abandoned:
-    """A goal that was told to be lost although it may be running.
+    """A goal that was reported lost although it may be running.
 
     Attributes:
-        handle: What rclpy calls it by.
-        is_asked: Whether its cancel was asked for since its server was seen.
+        handle: Handle by which rclpy refers to it.
+        is_asked: True if its cancel was asked for since its server was seen.
     """
 
     __slots__ = ("handle", "is_asked")
@@ -139,9 +139,9 @@ class ActionGoals:
     """The goals of one action.
 
     Args:
-        client: Has `server_is_ready` and `send_goal_async`.
+        client: Client with `server_is_ready` and `send_goal_async`.
         name: The action's name on ROS.
-        reports: Where what is heard of goals goes.
+        reports: Reports that take what is heard of goals.
         monotonic: The clock.
     """
 
@@ -155,7 +155,7 @@ class ActionGoals:
         self._abandoned: dict[int, _Abandoned] = {}
 
     def is_ready(self) -> bool:
-        """Whether there is a server."""
+        """Return True if there is a server."""
         return bool(self._client.server_is_ready())
 
     def send(self, goal_id: int, message: Any) -> None:
@@ -194,7 +194,7 @@ class ActionGoals:
 
     @property
     def has_abandoned(self) -> bool:
-        """Whether a goal that was told to be lost may be running."""
+        """True if a goal that was reported lost may be running."""
         return bool(self._abandoned)
 
     def cancel_abandoned(self) -> None:

@@ -1,4 +1,4 @@
-"""How ROS 2 is told that a program has to call things otherwise.
+"""Remapping on ROS 2 for a program that has to call things otherwise.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """

@@ -102,7 +102,7 @@ class _Goal:
     """A goal that was accepted.
 
     Attributes:
-        handle: What rclpy calls it by, once it is known.
+        handle: Handle by which rclpy refers to it, once it is known.
         end: Outcome and result, if they came before that.
     """
 
@@ -239,5 +239,5 @@ class ServedAction:
 
     @property
     def is_ending(self) -> bool:
-        """Whether the end of a goal has still to be told."""
+        """True if the end of a goal has still to be reported."""
         return self._ending > 0

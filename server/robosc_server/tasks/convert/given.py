@@ -1,4 +1,7 @@
-"""What requests give: texts and options, as the core's values. Requests have been accepted: their names are right."""
+"""Content of requests: texts and options, as the core's values.
+
+Requests have been accepted: their names are right.
+"""
 
 from collections.abc import Iterable
 
@@ -37,7 +40,7 @@ def _sorted_files(messages: Iterable[pb.SourceFile]) -> tuple[SourceFile, ...]:
 
 
 def deployment(options: pb.SynthesisOptions) -> Deployment | None:
-    """Where a supervisor will stand, or must; None: it is not said."""
+    """Return the deployment that a supervisor will have, or must have; None: it is not given."""
     return _DEPLOYMENTS.get(options.deployment)
 
 
@@ -47,7 +50,7 @@ def engine_name(options: pb.SynthesisOptions) -> str:
 
 
 def engine(options: pb.SynthesisOptions, maximum_nodes: int) -> EngineOptions:
-    """How decision diagrams are made, with no more nodes than `maximum_nodes`."""
+    """Return the options for making decision diagrams, with no more nodes than `maximum_nodes`."""
     nodes = min(options.maximum_nodes or maximum_nodes, maximum_nodes)
     return EngineOptions(engine_name(options), options.allow_reordering, nodes)
 
@@ -58,10 +61,10 @@ def verified_states(options: pb.SynthesisOptions) -> int:
 
 
 def generation(options: pb.GenerateOptions) -> GenerateOptions:
-    """What is chosen about generated files.
+    """Return the options that are chosen for generated files.
 
     Raises:
-        OptionError: A name of the supervised controller is none.
+        OptionError: A name of the supervised controller is not a valid name.
     """
     supervised = None
     if options.HasField("supervised"):

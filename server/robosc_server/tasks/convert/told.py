@@ -1,4 +1,4 @@
-"""What responses tell: findings and figures, as messages."""
+"""Content of responses: findings and figures, as messages."""
 
 from collections.abc import Iterable
 

@@ -114,7 +114,7 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _kinds(lines: list[str]) -> Counter[str]:
-    """What happened: kinds of lines, with the reason of what was held back and how goals ended."""
+    """Count what happened: kinds of lines, with the reason of what was held back and how goals ended."""
     found: Counter[str] = Counter()
     for line in lines:
         words = line.split()
@@ -474,7 +474,7 @@ def test_names_that_are_words_of_c_work(tmp_path: Path) -> None:
 
 @needs_gcc
 def test_a_model_without_one_kind_of_communication_works(tmp_path: Path) -> None:
-    """What a model does not need leaves nothing that a compiler would call unused."""
+    """Check that parts that a model does not need leave nothing that a compiler would call unused."""
     model = model_of(EVERYTHING)
     for kind in CommunicationKind:
         only = model_of(_ONLY[kind])

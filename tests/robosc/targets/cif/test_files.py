@@ -37,7 +37,7 @@ def made(text: str, deployment: Deployment = Deployment.CONTROLLER, **libraries:
 
 
 def unsupervised(text: str) -> Supervisor:
-    """What there is without synthesis: plants and requirements."""
+    """Return a supervisor made without synthesis: plants and requirements."""
     return Supervisor(model_of(text), Deployment.CONTROLLER, (), CERTIFICATE)
 
 

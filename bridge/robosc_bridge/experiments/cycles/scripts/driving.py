@@ -32,7 +32,7 @@ class Publishing:
         return self._message
 
     def is_default(self, communication: str, message: Any) -> bool:
-        """Whether it stands for standing still."""
+        """Return True if a message stands for standing still."""
         return bool(message.linear.x == 0.0 and message.angular.z == 0.0)
 
     def publish(self, communication: str, message: Any) -> None:

@@ -25,8 +25,8 @@ class Node:
     """The node.
 
     Args:
-        send: Takes frames for the twin.
-        begin: What the twin says first: its name, and the frames of the robot.
+        send: Function that takes frames for the twin.
+        begin: First message of the twin: its name, and the frames of the robot.
     """
 
     def __init__(self, send: Callable[[Frame], None], begin: dict[str, Any]) -> None:

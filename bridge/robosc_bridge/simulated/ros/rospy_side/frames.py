@@ -1,8 +1,8 @@
-"""What goes over the pipes between the twin and its rospy side: JSON objects, each with bytes, after their lengths.
+"""Frames on the pipes between the twin and its rospy side: JSON objects, each with bytes, after their lengths.
 
     4 bytes   length of the object, big-endian
     4 bytes   length of the bytes, big-endian
-    ...       the object: JSON in UTF-8, `kind` tells what it is
+    ...       the object: JSON in UTF-8, `kind` says what it is
     ...       the bytes: numbers of a scan, pixels of a picture
 
 Both sides import this file: it stands on the standard library and Python 3.8 alone.
@@ -21,14 +21,14 @@ _LENGTHS = struct.Struct(">II")
 
 
 class FrameError(ValueError):
-    """What came is no frame."""
+    """Received data that is no frame."""
 
 
 class Frame(NamedTuple):
     """A message between the two sides.
 
     Attributes:
-        head: What it is, and its small values.
+        head: Kind of the message, and its small values.
         data: Its large ones.
     """
 
@@ -55,10 +55,10 @@ class Decoder:
         self._rest = bytearray()
 
     def feed(self, data: bytes) -> Iterator[Frame]:
-        """The frames that are complete now.
+        """Yield the frames that are complete now.
 
         Raises:
-            FrameError: What came is too large or no JSON object with a kind; nothing after it can be read.
+            FrameError: The data is too large or no JSON object with a kind; nothing after it can be read.
         """
         self._rest += data
         while len(self._rest) >= _LENGTHS.size:

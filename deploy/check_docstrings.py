@@ -1,0 +1,59 @@
+"""Check that docstrings name what they are about first: none begins with a relative clause.
+
+    python deploy/check_docstrings.py robosc server/robosc_server
+
+'Whether a job waits' leaves out the noun or the verb; 'Return True if a job waits' has both. The same holds for the
+descriptions of arguments, attributes and results. Exit status: 1 if anything is found, which is printed with its place.
+"""
+
+import ast
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+OPENINGS = "How|So|That|What|Whatever|When|Where|Whether|Which|Who|Whoever|Why"
+DOCSTRING = re.compile(rf"\s*({OPENINGS})\b")
+ITEM = re.compile(rf"\s+(?:\*{{0,2}}\w+(?: \([^)]*\))?|Returns?|Yields?):\s+({OPENINGS})\b")
+GENERATED = re.compile(r"_pb2(_grpc)?\.py$")
+
+
+def docstrings(tree: ast.Module) -> Iterator[ast.Constant]:
+    """Yield every text that stands where a docstring stands: those of attributes follow an assignment."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            for before, statement in zip([node, *node.body], node.body, strict=False):
+                if isinstance(before, ast.Assign | ast.AnnAssign) or before is node:
+                    match statement:
+                        case ast.Expr(ast.Constant(str()) as text):
+                            yield text
+
+
+def faults(text: str) -> Iterator[tuple[int, str]]:
+    """Yield the line and the opening word of each relative clause that a module's docstrings begin with."""
+    for docstring in docstrings(ast.parse(text)):
+        lines = str(docstring.value).splitlines() or [""]
+        for number, line in enumerate(lines):
+            found = ITEM.match(line) if number else DOCSTRING.match(line)
+            if found is not None:
+                yield docstring.lineno + number, found[1]
+
+
+def main(folders: list[str]) -> int:
+    """Check all modules below folders; return the exit status."""
+    missing = [folder for folder in folders if not Path(folder).is_dir()]
+    if missing or not folders:
+        print(f"{missing[0]} is no folder" if missing else "name the folders to check", file=sys.stderr)
+        return 2
+    count = 0
+    for folder in folders:
+        for file in sorted(Path(folder).rglob("*.py")):
+            if not GENERATED.search(file.name) and "node_modules" not in file.parts:
+                for line, word in faults(file.read_text("utf-8")):
+                    print(f"{file}:{line}: begins with '{word}': name the thing, or say what is returned, first")
+                    count += 1
+    return 1 if count else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -48,7 +48,7 @@ function limited(promise) {
   });
 }
 
-/** What a question is answered with, once the answer is as it is wanted. */
+/** Return the answer to a question, once the answer is as it is wanted. */
 async function once(ask, isWanted) {
   const end = Date.now() + LIMIT_MS;
   for (;;) {

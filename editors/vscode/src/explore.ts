@@ -8,11 +8,11 @@ import { type Output, reasonInJson } from "./output";
 import { runShown } from "./programs";
 import { searchArguments, setting } from "./settings";
 
-/** What `robosc explore --json` prints. */
+/** Output of `robosc explore --json`. */
 export interface Explored {
   initial: number;
   states: State[];
-  /** From which state, by which event, to which state. */
+  /** Source state, event and target state of each. */
   transitions: [number, string, number][];
 }
 
@@ -32,7 +32,7 @@ const MOST_STATES = 2000;
  * Show every state that a robot under its supervisor can be in.
  *
  * @param given the model; without it, the one that is being edited.
- * @returns how many states there are; undefined where nothing is shown.
+ * @returns the number of states; undefined where nothing is shown.
  */
 export async function explore(output: Output, given: unknown): Promise<number | undefined> {
   const model = await chosenModel(given);

@@ -22,8 +22,8 @@ interface Target {
  * Generate what runs the supervisor of a model.
  *
  * @param given the model; without it, the one that is being edited.
- * @param target what to generate, without asking.
- * @param folder where to, without asking.
+ * @param target the target to generate, without asking.
+ * @param folder the folder to generate into, without asking.
  * @returns the files; undefined where nothing was written.
  */
 export async function generate(
@@ -81,7 +81,7 @@ async function tell(output: Output, files: string[], where: vscode.Uri): Promise
   }
 }
 
-/** What can be generated, and everything of it. */
+/** The targets that can be generated, and the one for all of them. */
 export async function targets(scope: vscode.Uri): Promise<Target[]> {
   const ended = await run("robosc", ["generate", "--list-targets", "--json"], scope);
   if (ended.status !== 0) {

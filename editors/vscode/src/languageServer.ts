@@ -141,7 +141,7 @@ export class LanguageServer {
   }
 }
 
-/** What a promise becomes, if that takes no longer than a time. */
+/** The result of a promise, if that takes no longer than a time. */
 async function within<T>(promise: Promise<T>, limitMs: number): Promise<T> {
   let timer: NodeJS.Timeout | undefined;
   const late = new Promise<never>((_, reject) => {

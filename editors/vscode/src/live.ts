@@ -11,7 +11,7 @@ import { setting } from "./settings";
 const PATIENCE_MS = 5000;
 const MOST_KEPT = 20_000;
 
-/** What a panel shows. */
+/** Content that a panel shows. */
 export interface Shown {
   title: string;
   /** Arguments of `robosc view`: what is looked at. */
@@ -63,7 +63,7 @@ export class LivePanel {
     this.panel.dispose();
   }
 
-  /** Which pages are around the frame is known inside it alone; then the page may be framed by these and no others. */
+  /** Ask for the pages around the frame, known inside it alone; then the page may be framed by these and no others. */
   private ask(): void {
     const nonce = randomBytes(16).toString("hex");
     this.panel.webview.html = html(
@@ -172,7 +172,7 @@ export class LivePanel {
 }
 
 /**
- * Whether the editor's window reaches an address of the machine on which its extensions run, as it stands.
+ * Return true if the editor's window reaches an address of the machine on which its extensions run, as it stands.
  *
  * @param around origins of the pages around the frame: in a browser on that machine they are of that machine.
  */

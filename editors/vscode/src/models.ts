@@ -1,4 +1,4 @@
-// Which model a command is about.
+// The model that a command is about.
 
 import * as path from "node:path";
 import * as vscode from "vscode";
@@ -32,7 +32,7 @@ export async function chosenModel(given: unknown): Promise<vscode.Uri | undefine
 /**
  * Save everything that is open in the language, since programs read what is saved and any of it may be a library.
  *
- * @returns whether it is saved; if it is not, the user has been told.
+ * @returns true if it is saved; if it is not, the user has been told.
  */
 export async function savedAll(): Promise<boolean> {
   for (const document of vscode.workspace.textDocuments) {

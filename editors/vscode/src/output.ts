@@ -1,4 +1,4 @@
-// Where programs' own words are shown.
+// The channel where programs' own words are shown.
 
 import * as vscode from "vscode";
 import type { Ended } from "./programs";

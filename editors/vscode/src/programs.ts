@@ -5,10 +5,10 @@ import * as path from "node:path";
 import * as vscode from "vscode";
 import { program, workingFolder } from "./settings";
 
-/** How a user gets what the extension needs. */
+/** Command by which a user gets what the extension needs. */
 export const INSTALL = "pip install 'robosc[lsp,view]'";
 
-/** How a program has ended. */
+/** Outcome of a program that has ended. */
 export interface Ended {
   /** Its exit status; null where a signal or the user has ended it. */
   status: number | null;
@@ -56,7 +56,7 @@ export function start(name: string, words: string[], scope: vscode.Uri | undefin
   return child;
 }
 
-/** Why a program could not be started, in one sentence. */
+/** The reason why a program could not be started, in one sentence. */
 export function whyNot(name: string, error: Error): string {
   return `'${name}' cannot be started: ${error.message}`;
 }

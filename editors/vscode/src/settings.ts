@@ -1,4 +1,4 @@
-// What the user has set, and where the programs of RoboSC are.
+// The settings of the user, and the places of the programs of RoboSC.
 
 import { existsSync } from "node:fs";
 import { homedir } from "node:os";
@@ -17,7 +17,7 @@ export function setting<T extends string | number | string[]>(name: string, stan
   return isRight ? (found as T) : standard;
 }
 
-/** Whether a change of settings concerns one of these. */
+/** Return true if a change of settings concerns one of these. */
 export function concerns(change: vscode.ConfigurationChangeEvent, ...names: string[]): boolean {
   return names.some((name) => change.affectsConfiguration(`${SECTION}.${name}`));
 }
@@ -32,7 +32,11 @@ function folders(scope?: vscode.Uri): vscode.Uri[] {
   return holder === undefined ? all.slice(0, 1) : [holder.uri];
 }
 
-/** Where programs work: in the folder of a file; not in one that is not trusted, where Python or a shell may look for more. */
+/**
+ * The folder where programs work: that of a file.
+ *
+ * Not one that is not trusted, where Python or a shell may look for more.
+ */
 export function workingFolder(scope?: vscode.Uri): string {
   return (vscode.workspace.isTrusted ? folders(scope)[0]?.fsPath : undefined) ?? homedir();
 }

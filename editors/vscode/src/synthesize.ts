@@ -17,8 +17,8 @@ const SUFFIX = ".rsup";
  * Synthesize the supervisor of a model, and offer to keep it.
  *
  * @param given the model; without it, the one that is being edited.
- * @param target where the supervisor is kept, without asking.
- * @returns whether there is a supervisor; undefined where nothing was done.
+ * @param target the file in which the supervisor is kept, without asking.
+ * @returns true if there is a supervisor; undefined where nothing was done.
  */
 export async function synthesize(output: Output, given: unknown, target: unknown): Promise<boolean | undefined> {
   const model = await chosenModel(given);
@@ -44,7 +44,7 @@ export async function synthesize(output: Output, given: unknown, target: unknown
   return true;
 }
 
-/** What synthesis has told, and the supervisor if there is one. */
+/** The output of synthesis, and the supervisor if there is one. */
 async function made(title: string, model: vscode.Uri): Promise<{ ended: Ended; supervisor?: Uint8Array }> {
   const folder = await mkdtemp(path.join(tmpdir(), "robosc-"));
   try {

@@ -12,7 +12,7 @@ const SOURCES = {
   log: { label: "An event log", detail: "which is replayed" },
 } as const;
 
-/** What is looked at, where nobody is to be asked. */
+/** The controller that is looked at, where nobody is to be asked. */
 export type Running =
   | { source: "bridge"; address: string }
   | { source: "ros2"; namespace?: string; model?: vscode.Uri }

@@ -148,8 +148,8 @@ def _unknowns(layout: Layout) -> list[str]:
     upper = layout.upper
     return [
         *comment(
-            "What stands for unknown in received data: NaN for a double, NULL for a text or for an array's items, "
-            "and these for an integer and a boolean."
+            "Values that stand for unknown in received data: NaN for a double, NULL for a text or for an array's "
+            "items, and these for an integer and a boolean."
         ),
         f"#define {upper}_UNKNOWN_INTEGER INT64_MIN",
         f"#define {upper}_UNKNOWN ((int8_t)-1)",
@@ -335,7 +335,7 @@ def _state(layout: Layout) -> list[str]:
         if has_plant_location(item):
             body.append(f"uint8_t {layout.locations[communication_plant_name(item)]}; /* {item.kind} {item.name} */")
     return [
-        "/* Where everything is. */",
+        "/* The state: where everything is. */",
         "typedef struct {",
         *indent(body or ["char nothing;"]),
         f"}} {layout.prefix}_state_t;",

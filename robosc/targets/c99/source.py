@@ -105,7 +105,7 @@ def _prologue(layout: Layout) -> str:
     if with_data or numbers.get("WHEN"):
         lines += [
             "",
-            "/* What was unknown in received data. */",
+            "/* Notes on what was unknown in received data. */",
             "typedef struct {",
             "    bool is_unknown;",
             "    bool is_enum_unknown;",

@@ -132,7 +132,7 @@ class _Writer:
         for automaton in self._system.automata:
             yield from (*self._plants.plant_lines(automaton), "")
         for communication in self._names.provided:
-            yield comment(f"Which data could be sent with {communication}. It only observes.")
+            yield comment(f"Plant of the data that could be sent with {communication}. It only observes.")
             yield from (*self._plants.data_plant_lines(communication), "")
 
     def _requirement_lines(self) -> Iterator[str]:

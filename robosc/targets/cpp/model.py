@@ -84,7 +84,7 @@ class Writer:
             *_array("const int REQUEST_EVENTS", (self._request_event(item) for item in model.communications)),
             *comment("Of each outgoing message the number of its topic among those that are received."),
             *_array("const int SENSOR_TOPICS", (str(topic_of[item.identifier]) for item in sensors)),
-            *comment("What parameters may name."),
+            *comment("Parts of the model that parameters may name."),
             *self._nameables("REQUESTS", [(item, self._number(item)) for item in layout.requests]),
             *self._nameables("SENSORS", [(item, self._number(item)) for item in sensors]),
             *self._nameables(
@@ -94,7 +94,7 @@ class Writer:
                     for item in layout.of_kind(CommunicationKind.INCOMING_MESSAGE)
                 ],
             ),
-            *comment("What /state says about the model."),
+            *comment("Description of the model on /state."),
             "inline constexpr const char* DEFINITION =",
             *(f"    {string_literal(piece)}" for piece in pieces[:-1]),
             f"    {string_literal(pieces[-1])};",
@@ -171,7 +171,7 @@ class Writer:
         return _function(
             f"inline void put_communications(std::string& out, [[maybe_unused]] const {layout.prefix}_state_t& state)",
             [*lines, "out += '}';"],
-            comment("Where each service and action is, as JSON, for /state."),
+            comment("Location of each service and action, as JSON, for /state."),
         )
 
     def _put_taken(self) -> list[str]:
@@ -412,7 +412,7 @@ class Writer:
             f"template <class M>\nvoid {take_name(layout, event)}({layout.prefix}_t* robot, std::uint64_t now, "
             "std::uint32_t id, [[maybe_unused]] const M& message, [[maybe_unused]] Notes& notes)",
             lines,
-            comment(f"What came: {event}."),
+            comment(f"Take what came: {event}."),
         )
 
 

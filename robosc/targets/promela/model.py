@@ -74,7 +74,7 @@ class _Writer:
         yield "/* The state: where each automaton is, and the variables. */"
         yield from self._state()
         if self._added:
-            yield "/* What the supervisor allows in this state. */"
+            yield "/* Events that the supervisor allows in this state. */"
             initial = {item.event: int(evaluate(item.condition, self._read_initial)) for item in self._added}
             yield from (f"bit {name} = {initial[event]};" for event, name in self._allow.items())
         if self._used_next or self._used_data or nodes:

@@ -31,7 +31,7 @@ def allow_method(writer: Writer, event: str) -> list[str]:
     conditions = [item for item in _conditions(writer, event) if item[1] != TRUE_CODE]
     return [
         f"def {writer.layout.methods['allow', event]}(self):",
-        f"    {docstring(f'Whether {event} is allowed now.')}",
+        f"    {docstring(f'Return True if {event} is allowed now.')}",
         *indent(_return_all(conditions)),
     ]
 
@@ -43,7 +43,8 @@ def requirements_method(writer: Writer, communication: str) -> list[str]:
     for requirement in requirements:
         body += comment(requirement_text(requirement))
         body.append(f"{truth(requirement.condition, writer.scope).text},")
-    return _tuple_method(writer, ("requirements", communication), f"Which requirements on {communication} hold.", body)
+    words = f"Return for each requirement on {communication} whether it holds."
+    return _tuple_method(writer, ("requirements", communication), words, body)
 
 
 def conjuncts_method(writer: Writer, communication: str) -> list[str]:
@@ -53,7 +54,7 @@ def conjuncts_method(writer: Writer, communication: str) -> list[str]:
         for requirement in writer.model.requirements_on(communication)
         for part in conjuncts(requirement.condition)
     ]
-    words = f"Which top-level conjuncts of the requirements on {communication} hold."
+    words = f"Return for each top-level conjunct of the requirements on {communication} whether it holds."
     return _tuple_method(writer, ("conjuncts", communication), words, body)
 
 

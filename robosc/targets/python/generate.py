@@ -256,7 +256,7 @@ _PROTOCOL_METHODS = [
     for text in (
         '''\
 def enabled(self, event):
-    """Whether a controllable event is allowed now."""
+    """Return True if a controllable event is allowed now."""
     return self._allow[event]()''',
         '''\
 def read(self, event, data):
@@ -280,7 +280,7 @@ def provide(self, communication):
     return self._provide[communication]()''',
         '''\
 def matches(self, communication, data):
-    """Whether a message that a supervision layer received is an incoming message, by its condition `when`."""
+    """Tell whether a message that a supervision layer received is an incoming message, by its condition `when`."""
     return self._matches[communication](data) if communication in self._matches else MATCHES''',
         '''\
 def requirements(self, communication):

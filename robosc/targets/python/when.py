@@ -25,7 +25,7 @@ def matches_method(writer: Writer, communication: Communication) -> list[str]:
     holds = truth(condition, scope)
     return [
         f"def {writer.layout.methods['matches', communication.name]}(self, data):",
-        f"    {docstring(f'Whether a message is {communication.name}.')}",
+        f"    {docstring(f'Tell whether a message is {communication.name}.')}",
         *indent(reader.take_lines()),
         *indent(comment(f"when: {expression_text(condition)}")),
         f"    return Match({holds.text}, {reader.all_words}, {reader.all_flags})",

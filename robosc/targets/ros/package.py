@@ -144,7 +144,7 @@ def python_files(supervisor: Supervisor, package: str, modules: Mapping[str, str
     files = {
         f"{package}/__init__.py": f'{top}"""The supervisor of the robot {supervisor.model.name} and its node."""\n',
         f"{package}/supervisor.py": python_text(supervisor, f"{package}.supervisor"),
-        f"{package}/runtime/__init__.py": f'{top}"""What the node runs on: no part of it depends on the model."""\n',
+        f"{package}/runtime/__init__.py": f'{top}"""Runtime of the node: no part of it depends on the model."""\n',
     }
     for module, folder in modules.items():
         text = resources.files(folder).joinpath(f"{module}.py").read_text(encoding="utf-8")

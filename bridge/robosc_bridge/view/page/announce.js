@@ -1,4 +1,4 @@
-// What a screen reader says: the latest of what matters, never a flood.
+// Announcements of a screen reader: the latest of what matters, never a flood.
 
 import { byId, say } from "./dom.js";
 
@@ -11,8 +11,8 @@ let saidMs = -Infinity;
 /**
  * Says a sentence as soon as it is time to; a newer one about the same subject takes its place.
  *
- * @param {string} subject What it is about.
- * @param {string} sentence What to say.
+ * @param {string} subject Subject that it is about.
+ * @param {string} sentence Sentence to say.
  */
 export function announce(subject, sentence) {
   waiting.delete(subject);

@@ -108,11 +108,11 @@ function transitionsTable(graph) {
       make("table", {}, make("thead", {}, make("tr", {}, ...heads)), make("tbody", {}, ...rows))));
 }
 
-/** @returns {object} What main.js calls. */
+/** @returns {object} Functions that main.js calls. */
 export function startComponents() {
   let cards = new Map();
   let taken = new Map();
-  /** Whether the transitions that were marked as the last ones are so no more, before those in `taken`. */
+  /** True if the transitions that were marked as the last ones are so no more, before those in `taken`. */
   let isLastForgotten = false;
   const { enlarge, close } = startLarge();
   const filter = byId("components-filter");
@@ -130,7 +130,7 @@ export function startComponents() {
   };
   filter.addEventListener("input", narrow);
 
-  /** What was taken so far is not what was taken last, and what was is not known. */
+  /** Forgets what was taken so far: it is not what was taken last, and what was is not known. */
   const forget = () => {
     taken = new Map();
     isLastForgotten = true;

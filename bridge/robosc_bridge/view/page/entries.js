@@ -3,14 +3,14 @@
 export const LIMIT = 20000;
 const SLACK = 1000;
 
-/** Which entries are wanted. */
+/** Choice of the entries that are wanted. */
 export class Filter {
   constructor() {
     this.text = "";
     this.hidden = new Set();
   }
 
-  /** Whether an entry is shown; what was lost always is. */
+  /** Returns true if an entry is shown; what was lost always is. */
   takes(entry) {
     if (entry.kind === "lost") return true;
     if (this.hidden.has(groupOf(entry))) return false;
@@ -18,7 +18,7 @@ export class Filter {
   }
 }
 
-/** What an entry is switched on and off with: its kind; events by whether they are controllable. */
+/** Group by which an entry is switched on and off: its kind; events by whether they are controllable. */
 export function groupOf(entry) {
   if (entry.kind !== "event") return String(entry.kind);
   return entry.controllable ? "controllable" : "uncontrollable";

@@ -18,7 +18,7 @@ export function span(seconds) {
   return `${two(minutes)}:${rest}`;
 }
 
-/** How long ago, in words. */
+/** Time that has passed, in words. */
 export function ago(seconds) {
   if (seconds < 1) return "less than a second";
   if (seconds < 120) return `${Math.floor(seconds)} s`;

@@ -1,4 +1,4 @@
-// What has changed is drawn once a frame, however many messages have come since the last.
+// Drawing of what has changed, once a frame, however many messages have come since the last.
 
 /** [subject, paint], in the order in which they are called. */
 const painters = [];
@@ -16,8 +16,8 @@ const last = new Map();
  * Calls `place` in this frame once everything is painted, for what asks where things stand or scrolls: the document then
  * lays itself out once a frame, not once a question.
  *
- * @param {object} owner Whose it is; its newest one alone is called.
- * @param {() => void} place What to do.
+ * @param {object} owner Owner of `place`; its newest one alone is called.
+ * @param {() => void} place Function to call.
  */
 export function afterPainting(owner, place) {
   last.set(owner, place);

@@ -1,4 +1,4 @@
-// Whether what is shown is so now. If not, the whole page says so, and says how old it is.
+// Freshness of what is shown: whether it is so now. If not, the whole page says so, and says how old it is.
 
 import { announce } from "./announce.js";
 import { SILENT_MS } from "./connection.js";

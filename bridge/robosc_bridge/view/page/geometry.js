@@ -5,7 +5,7 @@ const HEAD = 8;
 
 const isInside = ([x, y], box) => Math.abs(x - box.x) < box.width / 2 - 0.01 && Math.abs(y - box.y) < box.height / 2 - 0.01;
 
-/** Where the way from a point in a box to one outside leaves it. */
+/** Point where the way from a point in a box to one outside leaves it. */
 function border([x1, y1], [x2, y2], box) {
   const dx = x2 - x1;
   const dy = y2 - y1;

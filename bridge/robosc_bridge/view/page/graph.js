@@ -62,7 +62,7 @@ export class Graph {
     return group;
   }
 
-  /** How far along the drawing the active state is, from 0 to 1; null: nowhere. */
+  /** Position of the active state along the drawing, from 0 to 1; null: nowhere. */
   get activeShare() {
     const state = this.layout.states.find(({ name }) => name === this.active);
     return state ? state.x / this.layout.width : null;

@@ -11,7 +11,7 @@ import { Viewport } from "./viewport.js";
 const MOVE_PX = 40;
 const WORDS_EVERY_MS = 1000;
 
-/** @returns {object} What main.js calls. */
+/** @returns {object} Functions that main.js calls. */
 export function startMap() {
   const canvas = byId("map");
   const view = new Viewport();

@@ -13,12 +13,12 @@ const SWITCH = "Use the switch on the robot.";
 
 /**
  * @param {() => import("./connection.js").Connection} connection The connection.
- * @param {string} token What commands need; empty: there is none.
+ * @param {string} token Token that commands need; empty: there is none.
  * @returns {{paint: () => void, answered: (message: object) => void, updated: () => void, changed: () => void}} To be
  *   called for a new definition, an answer, an update, and a change of the connection.
  */
 export function startOrders(connection, token) {
-  /** What waits for its answer: its timer by its name, null once it is late. */
+  /** Orders that wait for their answers: the timer of each by its name, null once it is late. */
   const waiting = new Map();
   let isOwed = false;
 
@@ -38,7 +38,7 @@ export function startOrders(connection, token) {
     return connection().send(message);
   };
 
-  // What was not answered in time may be later.
+  // An order that was not answered in time may be answered later.
   const unanswered = (what) => {
     waiting.set(what, null);
     answer("bad", what === "stop" ? `STOP was not confirmed within 2 s. ${SWITCH}` : `${what}: no answer within 2 s.`);

@@ -1,4 +1,4 @@
-// Where the robot was: a bounded list of points, thinned where it is full.
+// Places where the robot was: a bounded list of points, thinned where it is full.
 
 const LIMIT = 4000;
 const LEAST_M = 0.005;

@@ -35,7 +35,7 @@ class Request {
   }
 }
 
-/** @returns {{build: () => void, paint: () => void}} What main.js calls. */
+/** @returns {{build: () => void, paint: () => void}} Functions that main.js calls. */
 export function startRequests() {
   let requests = [];
   const filter = byId("requests-filter");

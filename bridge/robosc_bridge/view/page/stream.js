@@ -10,7 +10,7 @@ const OVERSCAN = 6;
 const FIRST_KINDS = ["controllable", "uncontrollable"];
 const SIGNS = { __proto__: null, controllable: "◆", uncontrollable: "○", fault: "✕", blocked: "■", stop: "■", lost: "▲", connection: "▲" };
 
-/** @returns {object} What main.js calls. */
+/** @returns {object} Functions that main.js calls. */
 export function startStream() {
   const entries = new Entries();
   const box = byId("stream");
@@ -138,8 +138,8 @@ export function startStream() {
   });
   byId("stream-save").addEventListener("click", () => save(entries.all));
 
-  // Where a recorded run is turned back, what comes again takes the place of what was there; where it is turned on, the
-  // stream begins anew with what the server tells of the time before.
+  // Jump in a recorded run: where it is turned back, what comes again takes the place of what was there; where it is
+  // turned on, the stream begins anew with what the server tells of the time before.
   const jumpTo = (first) => {
     if (first.number <= entries.highest) entries.takeBack((entry) => entry.number >= first.number);
     const before = first.number - 1 - Math.max(entries.highest, 0);

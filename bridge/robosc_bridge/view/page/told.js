@@ -1,18 +1,18 @@
-// What the server has told last. Parts of the page read it; main.js alone writes it.
+// Data that the server has sent last. Parts of the page read it; main.js alone writes it.
 
-/** Whatever is not there is as if nothing was told about it. */
+/** Data that the server has sent last; whatever is not there is as if nothing was told about it. */
 export const told = {
   /** The `definition`; null: not yet. */
   definition: null,
   /** The latest `update`; null: not yet. */
   update: null,
-  /** When it came, by performance.now(). */
+  /** Time at which it came, in milliseconds, by performance.now(). */
   updateMs: 0,
   /** The latest `scan`. */
   scan: null,
   /** The latest `position` of a replay. */
   position: null,
-  /** Why the source is lost; null: it is not. */
+  /** Reason why the source is lost; null: it is not. */
   gone: null,
 };
 
@@ -21,16 +21,16 @@ export function forget() {
   Object.assign(told, { update: null, updateMs: 0, scan: null, position: null, gone: null });
 }
 
-/** What an object that was told has under a name; undefined: nothing, whatever objects have by themselves. */
+/** Value that an object that was told has under a name; undefined: nothing, whatever objects have by themselves. */
 export const under = (object, name) => (Object.hasOwn(object, name) ? object[name] : undefined);
 
-/** Whether a recorded run is shown. */
+/** Returns true if a recorded run is shown. */
 export const isReplay = () => told.definition?.source === "log";
 
-/** Whether nothing is executed: a model in its initial state. */
+/** Returns true if nothing is executed: a model in its initial state. */
 export const isModel = () => told.definition?.source === "model";
 
-/** How old the state is that is shown, in seconds. */
+/** Age of the state that is shown, in seconds. */
 export function ageS() {
   if (told.update === null) return 0;
   return (told.update.age_s ?? 0) + (performance.now() - told.updateMs) / 1000;

@@ -1,4 +1,4 @@
-// What part of the floor a canvas shows: metres to pixels and back, moved and zoomed.
+// Part of the floor that a canvas shows: metres to pixels and back, moved and zoomed.
 
 const LEAST = 4;
 const MOST = 2000;

@@ -1,4 +1,4 @@
-/* What the caller waits for. */
+/* Answers and ends of goals that the caller waits for. */
 
 #if ROBOT_REQUEST_COUNT > 0 || ROBOT_SENSOR_COUNT > 0
 /* The caller was told something; what failed is a fault. */
@@ -11,7 +11,7 @@ static void told(robot_t *r, bool is_well)
 #endif
 
 #if ROBOT_TOPIC_COUNT > 0
-/* When the caller counts as silent on a topic. */
+/* Return the time from which the caller counts as silent on a topic, in microseconds. */
 static uint64_t silent_from(const robot_t *r, int topic)
 {
     return r->settings.command_timeout_us > 0 ? later(r->arrived_us[topic], r->settings.command_timeout_us) : FOREVER;

@@ -1,4 +1,4 @@
-/* What happens when received data leaves an enum to its default although an earlier rule was unknown. */
+/* Behaviour when received data leaves an enum to its default although an earlier rule was unknown. */
 typedef enum {
     ROBOT_ON_UNKNOWN_DEFAULT, /* the event happens with that value */
     ROBOT_ON_UNKNOWN_KEEP,    /* the message's event does not happen, as if nothing had come */
@@ -31,7 +31,7 @@ typedef enum {
     ROBOT_FAULT_CALLER          /* `robot_stop` with is_fault */
 } robot_fault_t;
 
-/* What is told to the `log` callback, and what its argument is then. */
+/* Kinds of entries reported to the `log` callback, and the argument of each. */
 typedef enum {
     ROBOT_LOG_EVENT,      /* an event was taken: the event */
     ROBOT_LOG_UNEXPECTED, /* the event that the state does not accept; ROBOT_NO_EVENT: a reply to nothing */
@@ -49,7 +49,7 @@ typedef enum {
 } robot_log_t;
 #if ROBOT_IS_LAYER
 
-/* Why something that the caller sent was held back. */
+/* Reason why something that the caller sent was held back. */
 typedef enum {
     ROBOT_REFUSAL_NOT_ALLOWED,   /* by the supervisor, in this state */
     ROBOT_REFUSAL_NOT_FINITE,    /* a NaN or an infinity is in it */
@@ -61,14 +61,15 @@ typedef enum {
     ROBOT_REFUSAL_FAULT          /* something failed while it was let through; the robot is stopped now */
 } robot_refusal_t;
 
-/* How a goal that was accepted ends for the caller. */
+/* Outcome, for the caller, of a goal that was accepted. */
 typedef enum {
     ROBOT_END_SUCCEEDED,
     ROBOT_END_ABORTED,
     ROBOT_END_CANCELLED
 } robot_end_t;
 
-/* What the caller sent. It is needed until the function that takes it returns. All zero is held back. */
+/* Message, request or goal that the caller sent. It is needed until the function that takes it returns. All zero is
+   held back. */
 typedef struct {
     const void *message; /* the message itself, for the callback that sends it on; the layer does not look at it */
     bool is_finite;      /* there is no NaN and no infinity in it, nor in fields that the model does not know */
@@ -96,8 +97,9 @@ typedef struct {
 } robot_settings_t;
 
 #if ROBOT_IS_LAYER
-/* What the layer tells the robot and the caller. None of them may call the layer back. Those that return a bool return
-   false if they failed, which is a fault. A `message` is what a function below was given, unchanged. */
+/* Callbacks by which the layer sends to the robot and the caller. None of them may call the layer back. Those that
+   return a bool return false if they failed, which is a fault. A `message` is what a function below was given,
+   unchanged. */
 typedef struct {
     void *context; /* first argument of all */
 
@@ -109,7 +111,7 @@ typedef struct {
     bool (*cancel_goal)(void *context, robot_communication_t action, uint32_t id);
 
     /* The caller's side; `caller_id` is its own number of a call or goal. */
-    bool (*pass_on)(void *context, robot_source_t source, const void *message); /* what came from the robot */
+    bool (*pass_on)(void *context, robot_source_t source, const void *message); /* message from the robot */
     bool (*blocked)(void *context, const char *identifier, robot_refusal_t why); /* something was held back */
     bool (*answer)(void *context, robot_communication_t service, uint32_t caller_id, const void *message);
     bool (*answer_default)(void *context, robot_communication_t service, uint32_t caller_id);
@@ -122,8 +124,8 @@ typedef struct {
     void (*log)(void *context, robot_log_t kind, int what); /* NULL: nothing is logged */
 } robot_callbacks_t;
 #else
-/* What the executor asks of the world. None of them may call the executor back. Those that return a bool return
-   false if they failed, which is a fault. */
+/* Callbacks by which the executor asks something of the world. None of them may call the executor back. Those that
+   return a bool return false if they failed, which is a fault. */
 typedef struct {
     void *context;                                                                   /* first argument of all */
     bool (*publish)(void *context, const robot_request_t *request);
@@ -136,7 +138,7 @@ typedef struct {
 } robot_callbacks_t;
 #endif
 
-/* How often something went wrong: one for each entry of that kind in the log. */
+/* Number of times that something went wrong: one for each entry of that kind in the log. */
 typedef struct {
     uint32_t unknown;
     uint32_t unexpected;
@@ -270,7 +272,7 @@ robot_status_t robot_status(const robot_t *r, uint64_t now_us);
 /* The fault that stopped it, or ROBOT_FAULT_NONE. */
 robot_fault_t robot_fault(const robot_t *r);
 
-/* Whether a controllable event is allowed now; false for an event of the environment. */
+/* Return true if a controllable event is allowed now; false for an event of the environment. */
 bool robot_enabled(const robot_t *r, robot_event_t event);
 
 /* Names as the model has them; NULL for a number that is none. */

@@ -1,5 +1,5 @@
 #if ROBOT_REQUEST_COUNT > 0
-/* What the caller asks for: why it is held back, or LET_THROUGH. */
+/* Requests of the caller: the reason why one is held back, or LET_THROUGH. */
 
 static void hold_back(robot_t *r, const char *identifier, int why)
 {
@@ -10,7 +10,7 @@ static void hold_back(robot_t *r, const char *identifier, int why)
     finish(r);
 }
 
-/* Why nothing at all, or not this, is let through now. */
+/* Return the reason why nothing at all, or not this, is let through now. */
 static int refusal(const robot_t *r, const robot_sent_t *sent_by_caller)
 {
     if (r->may_request) {
@@ -38,7 +38,7 @@ static int take_request(robot_t *r, int request)
 }
 
 #if ROBOT_WHEN_COUNT > 0
-/* Whether a message may be told apart by its data, although something in it is unknown. */
+/* Judge whether a message may be told apart by its data, although something in it is unknown. */
 static int judge_notes(robot_t *r, robot_event_t event, const notes_t *notes)
 {
     if (notes->is_unknown) {

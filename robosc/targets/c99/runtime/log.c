@@ -41,7 +41,7 @@ static uint64_t later(uint64_t now_us, uint64_t span_us)
 }
 
 #if ROBOT_UNCONTROLLABLE_DATA > 0
-/* Whether what came counts as having come, although something in it is unknown. */
+/* Return true if what came counts as having come, although something in it is unknown. */
 static bool notes_count(robot_t *r, robot_event_t event, const notes_t *notes, bool may_keep)
 {
     unknown(r, (int)event);

@@ -35,7 +35,7 @@ inline std::uint64_t now_us()
 /* A server that was not seen for so long is lost. */
 constexpr std::uint64_t LOST_US = 1000000;
 constexpr std::uint64_t CANCEL_WAIT_US = 500000;
-/* How often, at least, it is noticed that time has passed. */
+/* Maximum interval at which it is noticed that time has passed, in microseconds. */
 constexpr std::uint64_t WATCH_US = 50000;
 constexpr std::uint64_t DIAGNOSTICS_US = 1000000;
 
@@ -43,7 +43,8 @@ constexpr int EXIT_OK = 0;
 constexpr int EXIT_FAULT = 1;
 constexpr int EXIT_USAGE = 2;
 
-/* What became of calls and goals, kept until the engine may be told: it must not be called from within itself. */
+/* Reports of what became of calls and goals, kept until the engine may be told: it must not be called from within
+   itself. */
 class Reports {
 public:
     using Report = std::function<void(robot_t*, std::uint64_t, Notes&)>;
@@ -86,7 +87,7 @@ private:
     std::uint64_t missed_since_us_ = 0;
 };
 
-/* What the controller asks of the middleware. What fails throws. */
+/* Operations that the controller asks of the middleware. Those that fail throw. */
 class Middleware {
 public:
     virtual ~Middleware() = default;
@@ -102,7 +103,7 @@ public:
     /* Names of services and actions without a server. */
     virtual Texts missing_servers() = 0;
     virtual void check_servers(std::uint64_t now) = 0;
-    /* Whether a goal that was told to be lost may be running; ask for the cancel of each. */
+    /* Return true if a goal that was reported lost may be running; ask for the cancel of each. */
     virtual bool has_abandoned() const = 0;
     virtual void cancel_abandoned() = 0;
 
@@ -177,7 +178,7 @@ public:
         tell_reasons();
     }
 
-    /* Whatever is due: reports of calls and goals, decisions, time that has passed. */
+    /* Do whatever is due: reports of calls and goals, decisions, time that has passed. */
     void run_due()
     {
         advance();
@@ -199,7 +200,7 @@ public:
         advance();
     }
 
-    /* How long nothing will be due, in microseconds; never long, so that signals are noticed. */
+    /* Return the time during which nothing will be due, in microseconds; never long, so that signals are noticed. */
     std::uint64_t idle_us() const
     {
         const std::uint64_t now = now_us();
@@ -207,7 +208,7 @@ public:
         return next > now ? std::min(next - now, WATCH_US) : 0;
     }
 
-    /* Why a fault stopped it; NULL if none did. */
+    /* Return the reason why a fault stopped it; NULL if none did. */
     const std::string* fault() const
     {
         for (const auto& [key, reason] : reasons_) {
@@ -230,7 +231,7 @@ public:
         tell_health();
     }
 
-    /* Whether it is at rest, but the ends of cancelled goals are awaited. */
+    /* Return true if it is at rest, but the ends of cancelled goals are awaited. */
     bool is_stopping() const
     {
         return robot_status(&robot_, now_us()) == ROBOT_STATUS_STOPPING || middleware_.has_abandoned();
@@ -296,7 +297,7 @@ private:
         tell_reasons();
     }
 
-    /* What came early: nothing is decided before the last of it, and ages count from when it came. */
+    /* Take in what came early: nothing is decided before the last of it, and ages count from when it came. */
     void take_held()
     {
         const bool decides = robot_.settings.decides_after_batch;
@@ -371,7 +372,7 @@ private:
         guarded("no cancel of a lost goal", [this] { middleware_.cancel_abandoned(); });
     }
 
-    /* What must not stop the controller. */
+    /* Perform an action that must not stop the controller. */
     template <class Action>
     void guarded(const char* what, const Action& action)
     {
@@ -474,7 +475,7 @@ private:
         return text + "], \"definition\": " + model::DEFINITION + "}";
     }
 
-    /* What the engine asks for. */
+    /* Operations that the engine asks for. */
 
     static Controller& self(void* context) { return *static_cast<Controller*>(context); }
 

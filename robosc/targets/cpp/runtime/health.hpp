@@ -1,4 +1,4 @@
-/* What /diagnostics says about the controller. */
+/* Report on /diagnostics about the controller. */
 
 #pragma once
 

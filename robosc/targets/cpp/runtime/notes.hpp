@@ -1,4 +1,4 @@
-/* What the event log says about the data of events. */
+/* Notes of the event log about the data of events. */
 
 #pragma once
 

@@ -52,7 +52,7 @@ struct Parameters {
     bool resample_scans = false;
 };
 
-/* What the model has that parameters may name. */
+/* Part of the model that parameters may name. */
 struct Nameable {
     const char* name;
     const char* identifier;

@@ -83,7 +83,7 @@ decltype(auto) basic_field(M& message)
     }
 }
 
-/* That a field is of the kind that the model says. */
+/* Checks that a field is of the kind that the model says. */
 
 template <class F>
 void require_boolean(const F&)

@@ -41,10 +41,10 @@ class Parameter(NamedTuple):
 
 _OF_A_CONTROLLER = (
     Parameter("period", 0.1, "Seconds between decisions: at most one request is issued each time."),
-    Parameter("policy", "fair", "Which enabled request is issued: fair, random, priority (the list, then fair)."),
+    Parameter("policy", "fair", "Choice among enabled requests: fair, random, priority (the list, then fair)."),
     Parameter("priority", [""], "Messages in order of urgency, for the policy priority."),
     Parameter("seed", 0, "Seed of the policy random."),
-    Parameter("every", "period", "When to decide: each period, or after each event as well (event)."),
+    Parameter("every", "period", "Times of decisions: each period, or after each event as well (event)."),
 )
 
 _OF_A_LAYER = (
@@ -100,7 +100,7 @@ def declarations(release_identifiers: Sequence[str], deployment: str = CONTROLLE
         Parameter(
             "on_unknown",
             "default",
-            "What happens when received data leaves an enum unknown: default (it takes its default value), keep (as if "
+            "Behaviour when received data leaves an enum unknown: default (it takes its default value), keep (as if "
             "nothing had come), fault (stop).",
         ),
         Parameter(
@@ -122,7 +122,7 @@ def declarations(release_identifiers: Sequence[str], deployment: str = CONTROLLE
         Parameter(
             "resample_scans",
             False,
-            "Whether every received sensor_msgs/LaserScan is brought to 360 ranges, one for each degree "
+            "True if every received sensor_msgs/LaserScan is brought to 360 ranges, one for each degree "
             "counter-clockwise from straight ahead (the smallest valid one, NaN if there is none), so that ranges[270] "
             "is what stands at 270 degrees whatever the LiDAR." + (_RESAMPLED_IN_A_LAYER if is_layer else ""),
         ),
@@ -134,11 +134,11 @@ def declarations(release_identifiers: Sequence[str], deployment: str = CONTROLLE
             + ' and before /state, such as "/robot1".',
         ),
         Parameter("log_folder", "", "Folder for the event log (JSON Lines); empty for none."),
-        Parameter("publish_state", False, "Whether state and transitions are published on /state each period."),
+        Parameter("publish_state", False, "True if state and transitions are published on /state each period."),
         Parameter(
             USE_SIM_TIME,
             False,
-            "Whether the time in headers is that of /clock; periods, ages and timeouts always follow the computer's "
+            "True if the time in headers is that of /clock; periods, ages and timeouts always follow the computer's "
             "steady clock.",
         ),
     )

@@ -1,4 +1,4 @@
-/* What the node asks of roscpp: services off its thread, actions through actionlib, parameters, an orderly end. */
+/* Uses of roscpp by the node: services off its thread, actions through actionlib, parameters, an orderly end. */
 
 #pragma once
 
@@ -35,7 +35,7 @@ public:
     CallResult call() override { return Success; }
 };
 
-/* What threads that outlive the node may still touch. */
+/* Data that threads that outlive the node may still touch. */
 struct Shared {
     ros::CallbackQueue queue;
     Reports reports;
@@ -85,7 +85,7 @@ public:
         return true;
     }
 
-    /* Whether it has not been given up before it was connected. */
+    /* Return true if it has not been given up before it was connected. */
     bool connected(std::uint32_t id, const ros::ServiceServerLinkPtr& link)
     {
         const std::lock_guard<std::mutex> lock(mutex_);
@@ -128,7 +128,7 @@ public:
 
     const std::string& name() const { return name_; }
 
-    /* Whether the master knows a server. */
+    /* Return true if the master knows a server. */
     bool is_ready() const
     {
         std::string host;

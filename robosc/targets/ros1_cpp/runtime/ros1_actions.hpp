@@ -116,7 +116,7 @@ public:
 private:
     struct Sent {
         Handle handle;
-        /* When something was heard of it last. */
+        /* Time at which something was heard of it last, in microseconds. */
         std::uint64_t since_us = 0;
         bool is_accepted = false;
         /* Its cancel was asked for then, and not heard of. */

@@ -12,7 +12,7 @@ from robosc.targets.ros.runtime.parameters import Parameter, ParameterError
 AUTOSTART = Parameter(
     "autostart",
     True,
-    "Whether the node configures and activates itself at its start; if not, a lifecycle manager does so, and a fault "
+    "True if the node configures and activates itself at its start; if not, a lifecycle manager does so, and a fault "
     "leaves the node at rest until it is deactivated and activated again.",
 )
 

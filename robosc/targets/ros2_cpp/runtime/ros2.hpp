@@ -1,4 +1,4 @@
-/* What the node asks of rclcpp: qualities of service, services without waiting, parameters. */
+/* Uses of rclcpp by the node: qualities of service, services without waiting, parameters. */
 
 #pragma once
 

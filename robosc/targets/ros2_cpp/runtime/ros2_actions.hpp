@@ -14,7 +14,7 @@
 
 namespace robosc {
 
-/* How long after a refused cancel the goal's end may still be on its way. */
+/* Time after a refused cancel during which the goal's end may still be on its way, in microseconds. */
 constexpr std::uint64_t REFUSAL_US = 250000;
 
 template <class Action>

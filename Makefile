@@ -116,9 +116,10 @@ fuzz: $(TOOLS)/.ready ## fuzz the bridge's decoders; DECODERS=... chooses, SECON
 	    -max_total_time=$(SECONDS) -max_len=2000 -rss_limit_mb=256 || exit 1; \
 	done
 
-lint: $(READY) ## formatter, linter, types, import contracts, bindings
+lint: $(READY) ## formatter, linter, docstrings, types, import contracts
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/python deploy/check_docstrings.py robosc server client bridge editors proto deploy examples tests acceptance soak
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 

@@ -222,9 +222,9 @@ def main(words: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--number", type=int, default=50, help="functions that are changed, 0: every change (50)")
-    parser.add_argument("--seed", type=int, default=1, help="which functions and changes (1)")
+    parser.add_argument("--seed", type=int, default=1, help="seed of functions and changes (1)")
     parser.add_argument("--only", nargs="+", default=PACKAGES, metavar="PATH", help="folders or files of the project")
-    parser.add_argument("--tests", nargs="+", default=["tests"], help="what pytest runs (tests)")
+    parser.add_argument("--tests", nargs="+", default=["tests"], help="tests that pytest runs (tests)")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="tests at a time")
     parser.add_argument("--wanted", type=float, default=0, help="percent to be found for exit status 0 (0)")
     parser.add_argument("--root", type=Path, default=ROOT, help="project that is tried (this one)")

@@ -37,9 +37,11 @@ SYNTHESIS_TOKENS = 1500
 def main(argv: Sequence[str] | None = None) -> int:
     """Run as the arguments say."""
     parser = argparse.ArgumentParser(prog="fuzz_check.py", description=__doc__.partition("\n\n")[0])
-    parser.add_argument("--minutes", type=float, default=1.0, help="how long (default: 1)")
-    parser.add_argument("--seed", type=int, default=0, help="what is tried: the same seed tries the same (default: 0)")
-    parser.add_argument("--failures", type=Path, default=Path("out/fuzz"), metavar="DIR", help="where failures go")
+    parser.add_argument("--minutes", type=float, default=1.0, help="duration in minutes (default: 1)")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="seed of what is tried: the same tries the same (default: 0)"
+    )
+    parser.add_argument("--failures", type=Path, default=Path("out/fuzz"), metavar="DIR", help="folder for failures")
     parser.add_argument("--replay", type=Path, metavar="FILE", help="run one saved input and tell what happens")
     arguments = parser.parse_args(argv)
     if arguments.minutes <= 0:

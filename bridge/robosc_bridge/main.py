@@ -109,7 +109,9 @@ def _parser() -> argparse.ArgumentParser:
     first.add_argument("--robot", choices=TURTLEBOTS, default="burger")
     first.add_argument("--drive", choices=get_args(DriveDriver), default="opencr")
     first.add_argument("--scanner", choices=get_args(ScannerDriver), default="lds02")
-    first.add_argument("-o", "--output", metavar="FILE", type=Path, help="where to; standard output if it is left out")
+    first.add_argument(
+        "-o", "--output", metavar="FILE", type=Path, help="file to write; standard output if it is left out"
+    )
     first.set_defaults(run=_init)
 
     described = commands.add_parser("schema", help="print the JSON schema of configurations")

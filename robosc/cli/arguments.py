@@ -74,7 +74,7 @@ def add_given_supervisor_options(parser: argparse.ArgumentParser, stands: str) -
     parser.add_argument(
         "--deployment",
         choices=[str(deployment) for deployment in Deployment],
-        help=f"where the supervisor {stands} (default: as a .rsup file says; for a model: controller)",
+        help=f"deployment in which the supervisor {stands} (default: as a .rsup file says; for a model: controller)",
     )
     for short, name, what in (("-L", "library", "libraries"), ("-I", "interface", "ROS packages")):
         parser.add_argument(

@@ -88,7 +88,7 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
         action=_OneTarget,
         required=True,
         metavar="NAME",
-        help="what to generate: see --list-targets; all for everything",
+        help="target to generate: see --list-targets; all for every one",
     )
     parser.add_argument("--list-targets", action=_ListTargets, nargs=0, help="list what can be generated")
     parser.add_argument(

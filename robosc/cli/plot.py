@@ -26,7 +26,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--output",
         type=given_path,
         metavar="FILE",
-        help="where to draw: .png or .svg for a picture, .html for a page that can be zoomed and needs no network "
+        help="output file: .png or .svg for a picture, .html for a page that can be zoomed and needs no network "
         "(default: the log's name with .png, beside it)",
     )
     parser.add_argument(
@@ -45,7 +45,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         action="store_true",
         help="leave out events that say nothing new: they carry what they carried before, and change no state",
     )
-    parser.add_argument("--title", default=None, help="what stands above it (default: the log's name)")
+    parser.add_argument("--title", default=None, help="title above the plot (default: the log's name)")
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     parser.set_defaults(run=run)
 

@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="PROPERTY",
-        help="what is to hold of the robot, such as 'invariant !Base.moving or Gate.open' (may be repeated)",
+        help="property that is to hold of the robot, such as 'invariant !Base.moving or Gate.open' (may be repeated)",
     )
     parser.add_argument(
         "--properties",

@@ -26,7 +26,7 @@ key in its configuration, executes that supervisor without verifying it anew. Ve
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add both commands."""
     parser = commands.add_parser("key", help="make a key pair for signing supervisor files", description=_KEY)
-    parser.add_argument("name", type=given_path, metavar="NAME", help="what NAME.key and NAME.pub are called")
+    parser.add_argument("name", type=given_path, metavar="NAME", help="name of the files NAME.key and NAME.pub")
     parser.add_argument("--comment", default="", metavar="TEXT", help="whose key it is; stands in NAME.pub")
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     parser.set_defaults(run=run_key)

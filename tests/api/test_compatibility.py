@@ -54,7 +54,7 @@ HARMLESS = {
     "a field added": (SYNTHESIS, "string mend = 5;", "string mend = 5;\n  string more = 99;"),
     "a value added": (SYNTHESIS, "SEVERITY_NOTE = 3;", "SEVERITY_NOTE = 3;\n  SEVERITY_HINT = 4;"),
     "a method added": (JOBS, "rpc GetJob(", "rpc More(MoreRequest) returns (MoreResponse);\n  rpc GetJob("),
-    "a comment": (SYNTHESIS, "// How grave a finding is.", "// How bad a finding is."),
+    "a comment": (SYNTHESIS, "// Severity of a finding.", "// How bad a finding is."),
     "fields in another order": (JOBS, "  Job job = 1;", "  // More.\n  reserved 77;\n  Job job = 1;"),
 }
 TWICE_CHECKED = (

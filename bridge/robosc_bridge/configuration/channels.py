@@ -35,14 +35,14 @@ class RotateChannel(_Channel, frozen=True, tag="rotate"):
 
     unit: Annotated[Literal["degrees", "radians"], Meta(description="Unit of the angle.")] = "degrees"
     direction: Annotated[
-        Literal["left", "right"], Meta(description="Where angles above zero turn to: left is counter-clockwise.")
+        Literal["left", "right"], Meta(description="Direction of angles above zero: left is counter-clockwise.")
     ] = "left"
 
 
 class RotatedChannel(_Channel, frozen=True, tag="rotated"):
     """A turn that a message asked for has ended."""
 
-    outcome: Annotated[Literal["done", "failed", "any"], Meta(description="Which ends are told.")] = "done"
+    outcome: Annotated[Literal["done", "failed", "any"], Meta(description="Ends that are reported.")] = "done"
 
 
 class ScannerChannel(_Channel, frozen=True, tag="scanner"):
@@ -70,14 +70,15 @@ class ButtonChannel(_Channel, frozen=True, tag="button"):
 
     name: Annotated[_Word, Meta(description="Such as `button_1`.")]
     on: Annotated[
-        Literal["press", "release", "change"], Meta(description="When it is told: its state is true while pressed.")
+        Literal["press", "release", "change"],
+        Meta(description="Change that is reported: the state is true while pressed."),
     ] = "press"
 
 
 class BumperChannel(_Channel, frozen=True, tag="bumper"):
     """The bumpers of the drive: true while one touches something; told at each change and at the start."""
 
-    side: Annotated[Literal["any", "front", "back"], Meta(description="Which of them.")] = "any"
+    side: Annotated[Literal["any", "front", "back"], Meta(description="Side of the bumper.")] = "any"
 
 
 class KeyChannel(_Channel, frozen=True, tag="key"):
@@ -89,7 +90,7 @@ class KeyChannel(_Channel, frozen=True, tag="key"):
 class EmergencyStopChannel(_Channel, frozen=True, tag="emergency_stop"):
     """The operator stopped the robot, or lets it go on (skill `emergency_stop`)."""
 
-    event: Annotated[Literal["stop", "resume"], Meta(description="Which of the two.")]
+    event: Annotated[Literal["stop", "resume"], Meta(description="Event that is reported.")]
 
 
 class LineChannel(_Channel, frozen=True, tag="line"):
@@ -103,8 +104,8 @@ class LineLostChannel(_Channel, frozen=True, tag="line_lost"):
 class FaultChannel(_Channel, frozen=True, tag="fault"):
     """A device is lost or back again; the text says what happened."""
 
-    device: Annotated[Literal["drive", "scanner", "camera", "any"], Meta(description="Which device.")] = "any"
-    event: Annotated[Literal["lost", "back"], Meta(description="Which of the two.")] = "lost"
+    device: Annotated[Literal["drive", "scanner", "camera", "any"], Meta(description="Device that is meant.")] = "any"
+    event: Annotated[Literal["lost", "back"], Meta(description="Event that is reported.")] = "lost"
 
 
 class GrpcChannel(_Channel, frozen=True, tag="grpc"):

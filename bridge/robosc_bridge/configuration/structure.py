@@ -63,10 +63,11 @@ class Execution(_Section, frozen=True):
 
     period_s: Annotated[float, Meta(ge=0.001, le=10, description="Time between decisions, in seconds.")] = 0.02
     every: Annotated[
-        Literal["period", "event"], Meta(description="When to decide: each period, or after each message as well.")
+        Literal["period", "event"], Meta(description="Times of decisions: each period, or after each message as well.")
     ] = "period"
     policy: Annotated[
-        Literal["fair", "priority", "random"], Meta(description="Which request is issued where several may be.")
+        Literal["fair", "priority", "random"],
+        Meta(description="Choice of the request that is issued where several may be."),
     ] = "fair"
     priority: Annotated[
         tuple[_Name, ...], Meta(description="Communications, most urgent first, for the policy `priority`.")
@@ -90,7 +91,7 @@ class Execution(_Section, frozen=True):
     ] = None
     on_unknown: Annotated[
         Literal["default", "keep", "fault"],
-        Meta(description="What happens when data leaves an enum unknown: its default, the value before, or a fault."),
+        Meta(description="Reaction to data that leaves an enum unknown: its default, the value before, or a fault."),
     ] = "default"
     command_timeout_s: Annotated[
         float,
@@ -130,7 +131,7 @@ class Safety(_Section, frozen=True):
         ),
     ] = 0.05
     stops_when_blind: Annotated[
-        bool, Meta(description="Whether it may not go where the LiDAR measures nothing; else somebody is warned.")
+        bool, Meta(description="True: it may not go where the LiDAR measures nothing; else somebody is warned.")
     ] = False
     bad_frames_share: Annotated[
         float,
@@ -157,7 +158,7 @@ class Safety(_Section, frozen=True):
         Meta(description="Seconds without the operator after which the robot stops; null: it needs none."),
     ] = None
     torque_off_on_operator_stop: Annotated[
-        bool, Meta(description="Whether the motors let go, too, once the wheels stand still after an operator's stop.")
+        bool, Meta(description="True: the motors let go, too, once the wheels stand still after an operator's stop.")
     ] = False
 
 
@@ -192,7 +193,7 @@ class Remote(_Section, frozen=True):
     ] = False
     mavlink_url: Annotated[
         _Text | None,
-        Meta(description="Where the ground station is, such as udpout:192.168.1.2:14550; null: none."),
+        Meta(description="Address of the ground station, such as udpout:192.168.1.2:14550; null: none."),
     ] = None
     mavlink_system: Annotated[int, Meta(ge=1, le=255, description="Number of the vehicle.")] = 1
     mavlink_key: Annotated[
@@ -201,7 +202,7 @@ class Remote(_Section, frozen=True):
     ] = None
     mavlink_link_id: Annotated[int, Meta(ge=0, le=255, description="Number of the signed stream.")] = 0
     mavlink_unsigned_commands: Annotated[
-        bool, Meta(description="Whether unsigned commands of other computers do more than stopping.")
+        bool, Meta(description="True: unsigned commands of other computers do more than stopping.")
     ] = False
     mavlink_interval_s: Annotated[
         float, Meta(ge=0.05, le=10, description="Seconds between two messages of pose, and of obstacles.")
@@ -271,13 +272,13 @@ class Configuration(_Section, frozen=True):
     robot: Annotated[TurtleBot | Body, Meta(description="The TurtleBot3, or the body of another robot.")]
     drive: Annotated[Drive, Meta(description="The drive base.")]
     scanner: Annotated[Scanner | None, Meta(description="The LiDAR; null: there is none.")] = None
-    execution: Annotated[Execution, Meta(description="How the supervisor is executed.")] = Execution()
+    execution: Annotated[Execution, Meta(description="Execution of the supervisor.")] = Execution()
     safety: Annotated[Safety, Meta(description="Limits of the safety layer.")] = Safety()
     skills: Annotated[Skills, Meta(description="Settings of the skills.")] = Skills()
-    remote: Annotated[Remote, Meta(description="How the bridge is reached and watched.")] = Remote()
+    remote: Annotated[Remote, Meta(description="Access to the bridge from other programs and computers.")] = Remote()
     view: Annotated[View, Meta(description="The live view, a web page.")] = View()
-    supervisor: Annotated[SupervisorSource, Meta(description="Where the supervisor comes from.")] = SupervisorSource()
-    log: Annotated[Log, Meta(description="What is written down.")] = Log()
+    supervisor: Annotated[SupervisorSource, Meta(description="Source of the supervisor.")] = SupervisorSource()
+    log: Annotated[Log, Meta(description="Log of what happens.")] = Log()
     channels: Annotated[
         dict[_Text, Channel],
         Meta(description="By identifier (or name) of each communication of the model, what it is tied to."),

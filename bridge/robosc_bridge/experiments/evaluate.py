@@ -94,8 +94,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         action="append",
         choices=list(CONNECTIONS),
         default=[],
-        help="how the supervisor reaches the robot: serial lines and the bridge, or generated nodes on ROS 2 or ROS 1 "
-        "(may be repeated; default: serial)",
+        help="connection of the supervisor with the robot: serial lines and the bridge, or generated nodes on ROS 2 or "
+        "ROS 1 (may be repeated; default: serial)",
     )
     parser.add_argument(
         "--scene",

@@ -225,9 +225,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--seed", type=option(seed), default=0, metavar="N", help="of the maze and of all that comes by chance"
     )
-    parser.add_argument("--base-link", type=Path, metavar="PATH", help="where the base's port is to be")
-    parser.add_argument("--scanner-link", type=Path, metavar="PATH", help="where the LiDAR's port is to be")
-    parser.add_argument("--camera-link", type=Path, metavar="PATH", help="where the camera's socket is to be")
+    parser.add_argument("--base-link", type=Path, metavar="PATH", help="path of the base's port")
+    parser.add_argument("--scanner-link", type=Path, metavar="PATH", help="path of the LiDAR's port")
+    parser.add_argument("--camera-link", type=Path, metavar="PATH", help="path of the camera's socket")
     parser.add_argument(
         "--record", type=Path, metavar="FILE", help="write all bytes on both lines into a file, with their times"
     )

@@ -86,12 +86,14 @@ class GoalPart(_Section, frozen=True):
 class LinePart(_Section, frozen=True):
     """A line on the floor, and a camera that sees it."""
 
-    points: Annotated[tuple[_Point, ...], Meta(description="Where it goes, `[x, y]` in metres each; at least two.")]
+    points: Annotated[
+        tuple[_Point, ...], Meta(description="Points of the line, `[x, y]` in metres each; at least two.")
+    ]
     kind: Annotated[
         Literal["straight", "spline"],
         Meta(description="Straight from point to point, or a smooth curve through them (a cubic spline)."),
     ] = "straight"
-    is_closed: Annotated[bool, Meta(description="Whether it goes on from the last point to the first.")] = False
+    is_closed: Annotated[bool, Meta(description="True: it goes on from the last point to the first.")] = False
     width_m: Annotated[float, Meta(ge=0.005, le=1, description="Of the line.")] = 0.05
     shade: Annotated[int, Meta(ge=0, le=255, description="Of the line: 0 is black, 255 white.")] = 30
 
@@ -119,14 +121,14 @@ class ObstaclePart(_Section, frozen=True):
     x_m: Annotated[float, Meta(ge=-1000, le=1000, description="Of its middle.")]
     y_m: Annotated[float, Meta(ge=-1000, le=1000, description="Of its middle.")]
     radius_m: Annotated[float, Meta(ge=0.005, le=100, description="Of the thing.")]
-    is_there: Annotated[bool, Meta(description="Whether it is there from the start.")] = True
+    is_there: Annotated[bool, Meta(description="True: it is there from the start.")] = True
 
 
 class NoisePart(_Section, frozen=True):
     """Noise that makes motion and sensors less than ideal; all of it by the seed of the run."""
 
     slip_share: Annotated[
-        float, Meta(ge=0, le=0.9, description="How much of each wheel's way is lost on the floor, on average.")
+        float, Meta(ge=0, le=0.9, description="Share of each wheel's way that is lost on the floor, on average.")
     ] = 0.0
     slip_deviation: Annotated[
         float, Meta(ge=0, le=0.5, description="Standard deviation of that, drawn for each wheel every 0.1 s.")
@@ -145,9 +147,11 @@ class SceneFile(_Section, frozen=True):
 
     walls: Annotated[WallsPart, Meta(description="Walls that stand where they are.")] = WallsPart()
     maze: Annotated[MazePart | None, Meta(description="A maze with an exit, made by chance.")] = None
-    start: Annotated[PosePart, Meta(description="Where the robot starts.")] = PosePart()
-    goal: Annotated[GoalPart | None, Meta(description="Where it is to come; null: a maze's exit, or nowhere.")] = None
+    start: Annotated[PosePart, Meta(description="Pose in which the robot starts.")] = PosePart()
+    goal: Annotated[
+        GoalPart | None, Meta(description="Place that the robot is to reach; null: a maze's exit, or nowhere.")
+    ] = None
     line: Annotated[LinePart | None, Meta(description="A line on the floor.")] = None
-    floor: Annotated[FloorPart, Meta(description="What the floor looks like.")] = FloorPart()
+    floor: Annotated[FloorPart, Meta(description="Looks of the floor.")] = FloorPart()
     obstacles: Annotated[dict[Name, ObstaclePart], Meta(description="Round things that can be moved, by name.")] = {}
-    noise: Annotated[NoisePart, Meta(description="What makes motion and sensors less than ideal.")] = NoisePart()
+    noise: Annotated[NoisePart, Meta(description="Disturbances of motion and sensors.")] = NoisePart()

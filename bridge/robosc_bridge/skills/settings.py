@@ -20,9 +20,7 @@ class RotateSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     slowest_rad_s: Annotated[
         float, Meta(ge=0.01, le=1, description="Slowest turn, in rad/s: below it, wheels may stand still.")
     ] = 0.08
-    braking_rad_s2: Annotated[
-        float, Meta(ge=0.05, le=50, description="How it slows down towards the end, in rad/s².")
-    ] = 1.5
+    braking_rad_s2: Annotated[float, Meta(ge=0.05, le=50, description="Deceleration towards the end, in rad/s².")] = 1.5
     gain_per_s: Annotated[
         float,
         Meta(ge=0.1, le=10, description="Speed for what remains, in rad/s per rad; less for slower lines."),
@@ -31,7 +29,7 @@ class RotateSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         float, Meta(ge=0.002, le=0.8, description="By how much a finished turn may be off, in rad.")
     ] = 0.02
     settle_s: Annotated[
-        float, Meta(ge=0, le=5, description="How long it must stay within the tolerance to be done, in seconds.")
+        float, Meta(ge=0, le=5, description="Time within the tolerance until it is done, in seconds.")
     ] = 0.3
     patience_s: Annotated[
         float,
@@ -50,16 +48,16 @@ class LineSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
             description="Device such as /dev/video0, or a film; or `simulated:PATH`, served by a simulator.",
         ),
     ] = "/dev/video0"
-    shade: Annotated[
-        Literal["dark", "light"], Meta(description="Whether the line is darker or lighter than the floor.")
-    ] = "dark"
+    shade: Annotated[Literal["dark", "light"], Meta(description="Shade of the line, compared with the floor's.")] = (
+        "dark"
+    )
     threshold: Annotated[
         float, Meta(ge=0, le=255, description="Shade that parts line from floor: 0 is black, 255 white.")
     ] = 100.0
     top: Annotated[
-        float, Meta(ge=0, le=1, description="Where the rows that are looked at begin, as a share of the height.")
+        float, Meta(ge=0, le=1, description="Begin of the rows that are looked at, as a share of the height.")
     ] = 0.6
-    bottom: Annotated[float, Meta(ge=0, le=1, description="Where they end.")] = 1.0
+    bottom: Annotated[float, Meta(ge=0, le=1, description="End of these rows.")] = 1.0
     smallest: Annotated[
         float, Meta(ge=0, le=1, description="Smallest share of the pixels in these rows that is a line.")
     ] = 0.005

@@ -75,7 +75,7 @@ def _finish(parser: argparse.ArgumentParser, work: Callable[[Any, argparse.Names
         type=_address,
         metavar="HOST:PORT",
         default=os.environ.get(ADDRESS_VARIABLE) or ADDRESS,
-        help=f"where the bridge listens (default: ${ADDRESS_VARIABLE}, or {ADDRESS})",
+        help=f"address of the bridge (default: ${ADDRESS_VARIABLE}, or {ADDRESS})",
     )
     add_client_arguments(parser)
     parser.set_defaults(run=lambda arguments: _connected(arguments, work))

@@ -79,7 +79,7 @@ def _add_serving(parser: argparse.ArgumentParser) -> None:
         type=_address,
         default=_ADDRESS,
         metavar="HOST:PORT",
-        help="where it is served (default: %(default)s)",
+        help="address that it is served at (default: %(default)s)",
     )
     group.add_argument(
         "--name",

@@ -39,7 +39,7 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     """Add the command."""
     parser = commands.add_parser("bench", help="measure how many calls a server answers", description=_DESCRIPTION)
     add_model_arguments(parser)
-    parser.add_argument("--task", choices=list(_METHODS), default="check", help="what is asked (default: %(default)s)")
+    parser.add_argument("--task", choices=list(_METHODS), default="check", help="call to make (default: %(default)s)")
     parser.add_argument(
         "-c",
         "--concurrency",
@@ -51,7 +51,12 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     amount = parser.add_mutually_exclusive_group()
     amount.add_argument("-n", "--count", type=number_up_to(10**9), metavar="N", help="calls in all")
     amount.add_argument(
-        "-d", "--duration", type=seconds, default=10.0, metavar="SECONDS", help="how long (default: %(default)g)"
+        "-d",
+        "--duration",
+        type=seconds,
+        default=10.0,
+        metavar="SECONDS",
+        help="duration of the measurement (default: %(default)g)",
     )
     parser.add_argument(
         "--connections",

@@ -58,7 +58,7 @@ def add_connection_arguments(
     """
     parser.epilog, parser.formatter_class = epilog, argparse.RawDescriptionHelpFormatter
     server = parser.add_mutually_exclusive_group()
-    server.add_argument("--server", type=address, metavar="HOST:PORT", help="where the server listens")
+    server.add_argument("--server", type=address, metavar="HOST:PORT", help="address of the server")
     server.add_argument(
         "--profile",
         metavar="NAME",

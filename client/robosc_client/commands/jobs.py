@@ -206,7 +206,7 @@ def _add_tasks(submit: argparse.ArgumentParser) -> None:
         if name == "synth":
             add_verify_limit_argument(parser, "--verify-limit", SYNTHESIS_STATES)
         if name == "generate":
-            parser.add_argument("--target", required=True, metavar="NAME", help="what to generate: see 'targets'")
+            parser.add_argument("--target", required=True, metavar="NAME", help="target to generate: see 'targets'")
             parser.add_argument("--package", metavar="NAME", help="name of the generated package")
         if name == "explore":
             parser.add_argument(
@@ -216,7 +216,7 @@ def _add_tasks(submit: argparse.ArgumentParser) -> None:
                 metavar="N",
                 help="give up beyond N states (default: %(default)s)",
             )
-        parser.add_argument("--label", type=_label, default="", metavar="TEXT", help="what lists call the job")
+        parser.add_argument("--label", type=_label, default="", metavar="TEXT", help="name of the job in lists")
         parser.add_argument(
             "--idempotency-key",
             type=_idempotency_key,

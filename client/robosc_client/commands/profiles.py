@@ -34,8 +34,8 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     actions = parser.add_subparsers(title="commands", dest="action", required=True, metavar="COMMAND")
 
     add = actions.add_parser("add", help="keep a server")
-    add.add_argument("name", metavar="NAME", help="what it is called")
-    add.add_argument("--server", type=address, required=True, metavar="HOST:PORT", help="where it listens")
+    add.add_argument("name", metavar="NAME", help="name of the profile")
+    add.add_argument("--server", type=address, required=True, metavar="HOST:PORT", help="address of the server")
     add.add_argument("--tls", action="store_true", help="with TLS, believing the usual certificate authorities")
     for name, what in (
         ("ca", "with TLS, believing these certificates alone (PEM)"),
@@ -55,10 +55,10 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     shown = actions.add_parser("list", help="list the profiles")
     shown.set_defaults(run_alone=_list)
     show = actions.add_parser("show", help="show a profile")
-    show.add_argument("name", metavar="NAME", help="which")
+    show.add_argument("name", metavar="NAME", help="name of the profile")
     show.set_defaults(run_alone=_show)
     remove = actions.add_parser("remove", help="forget a profile, and the token that is kept for it")
-    remove.add_argument("name", metavar="NAME", help="which")
+    remove.add_argument("name", metavar="NAME", help="name of the profile")
     remove.set_defaults(run_alone=_remove)
     for command in (add, shown, show, remove):
         command.epilog, command.formatter_class = _EPILOG, argparse.RawDescriptionHelpFormatter

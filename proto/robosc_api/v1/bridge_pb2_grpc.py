@@ -72,46 +72,49 @@ class BridgeServiceServicer:
     """
 
     def GetDefinition(self, request, context):
-        """The robot and what its communications are tied to: what does not change while the bridge runs. Scope `watch`.
+        """Returns the robot and the channels that its communications are tied to: everything that does not change while the
+        bridge runs. Scope `watch`.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetStatus(self, request, context):
-        """What the bridge is doing. Scope `watch`.
+        """Returns the state of the bridge. Scope `watch`.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Stop(self, request, context):
-        """Stops the robot, whatever else goes on; it holds until a resume or reset. Any scope: whoever sees it may stop it.
+        """Stops the robot, whatever else goes on; the stop holds until a resume or reset. Any scope: everyone who sees the
+        robot may stop it.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Command(self, request, context):
-        """Wants something of the bridge; answered once it is done or refused. Scope `operate`.
+        """Gives the bridge a command; answered once the command is done or refused. Scope `operate`.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Watch(self, request, context):
-        """What the bridge is doing and what happens, until the caller ends it. Who reads too slowly is told how many events
-        it lost, never an old state. Scope `watch`.
+        """Sends the state of the bridge and its events until the caller ends the call. A caller that reads too slowly
+        receives the number of events that it lost, never an old state. Scope `watch`.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Attach(self, request_iterator, context):
-        """Is a program of the model as long as the stream lasts: serves what is tied to `grpc`, gives and takes messages,
-        and, where the supervisor is a supervision layer, is the operator or existing controller whose requests it lets
-        through or holds back. The first message is `hello`. When the stream ends, what the model asked the program for has
-        failed, and the goals it asked a layer for are cancelled. Scope `operate`.
+        """Attaches the caller as a program of the model for as long as the stream lasts: the program serves what is tied to
+        `grpc`, sends and receives messages, and, where the supervisor is a supervision layer, is the operator or existing
+        controller whose requests the layer lets through or holds back. The first message is `hello`. When the stream ends,
+        everything that the model asked the program for has failed, and the goals that the program asked a layer for are
+        cancelled. Scope `operate`.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -72,22 +72,22 @@ class JobServiceServicer:
     """
 
     def SubmitJob(self, request, context):
-        """Accepts a task; once it is answered, the job is kept.
+        """Accepts a task; once the call is answered, the job is kept.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetJob(self, request, context):
-        """Tells where a job is.
+        """Reports the state of a job.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def WatchJob(self, request, context):
-        """Tells where a job is now, and whatever changes until it has ended; the last message tells how it ended. Who loses
-        the connection asks again, with the revision that it has seen last.
+        """Reports the state of a job now, and its changes until it has ended; the last message reports how it ended. A caller
+        that loses the connection asks again, with the revision that it has seen last.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -82,9 +82,9 @@ class SynthesisServiceServicer:
     """
 
     def Check(self, request, context):
-        """Finds everything that is wrong with a model or library. What only a synthesis can tell (no supervisor at all, events
-        that can never happen, requirements that never restrict, requests that compete) is among the diagnostics of
-        Synthesize.
+        """Finds everything that is wrong with a model or library. The findings that only a synthesis can make (no supervisor
+        at all, events that can never happen, requirements that never restrict, requests that compete) are among the
+        diagnostics of Synthesize.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -129,14 +129,14 @@ class SynthesisServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def ListTargets(self, request, context):
-        """Lists what can be generated.
+        """Lists the targets that can be generated.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetVersion(self, request, context):
-        """Tells what this server is, and its limits.
+        """Returns the version, engines and limits of this server.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

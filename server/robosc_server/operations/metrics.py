@@ -85,7 +85,7 @@ class Metrics:
         )
         self._seconds = Histogram(
             "robosc_server_call_seconds",
-            "How long calls took.",
+            "Duration of calls.",
             ("method",),
             buckets=_CALL_SECONDS,
             registry=registry,
@@ -95,7 +95,7 @@ class Metrics:
         )
         self._task_seconds = Histogram(
             "robosc_server_task_seconds",
-            "How long workers were at tasks.",
+            "Time that workers were at tasks.",
             ("kind",),
             buckets=_TASK_SECONDS,
             registry=registry,

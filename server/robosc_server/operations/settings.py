@@ -277,7 +277,7 @@ class Settings(BaseModel):
     )
     tracing_endpoint: Annotated[str, AfterValidator(_endpoint)] | None = _setting(
         None,
-        "where traces are sent, with OTLP over gRPC, such as http://127.0.0.1:4317",
+        "receiver of traces, with OTLP over gRPC, such as http://127.0.0.1:4317",
         _WATCHING,
         metavar="URL",
         told="nowhere",

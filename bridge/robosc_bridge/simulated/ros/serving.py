@@ -213,7 +213,7 @@ def parser(prog: str, description: str) -> argparse.ArgumentParser:
         "--lidar",
         choices=sorted(LIDARS),
         default="lds01",
-        help="how far it sees, how often it turns, how many beams it has; default: %(default)s",
+        help="LiDAR: its range, turns and beams; default: %(default)s",
     )
     found.add_argument(
         "--encoding", choices=ENCODINGS, default="mono8", help="of the camera's pictures; default: %(default)s"
@@ -229,7 +229,7 @@ def parser(prog: str, description: str) -> argparse.ArgumentParser:
         type=option(lambda text: number(text, 0.0, 3600.0)),
         default=COMMAND_TIMEOUT_S,
         metavar="S",
-        help="how long a velocity holds, on the computer's clock; 0: for ever; default: %(default)s",
+        help="time that a velocity holds, on the computer's clock; 0: for ever; default: %(default)s",
     )
     found.add_argument(
         "--wait",

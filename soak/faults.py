@@ -14,6 +14,7 @@ Exit status: 0 at least `--wanted` percent are found, 1 fewer, 2 wrong use or te
 """
 
 import argparse
+import ast
 import json
 import os
 import random
@@ -21,7 +22,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -89,8 +90,17 @@ class Mutant:
         return "\n".join(gone + come)
 
 
-def mutants_of(root: Path, file: Path) -> Iterator[Mutant]:
-    """Yield all changes of a file's functions and methods."""
+def functions_of(file: Path) -> Iterator[str]:
+    """Yield the functions and methods of a file."""
+    for statement in ast.parse(file.read_text()).body:
+        if isinstance(statement, ast.FunctionDef):
+            yield statement.name
+        elif isinstance(statement, ast.ClassDef):
+            yield from (f"{statement.name}.{part.name}" for part in statement.body if isinstance(part, ast.FunctionDef))
+
+
+def mutants_of(root: Path, file: Path, wanted: Collection[str]) -> Iterator[Mutant]:
+    """Yield all changes of functions and methods of a file."""
     # They stand in the folder of tools alone.
     import libcst as cst
     from mutmut.mutation.file_mutation import create_mutations, deep_replace
@@ -106,7 +116,7 @@ def mutants_of(root: Path, file: Path) -> Iterator[Mutant]:
                     names[part] = f"{statement.name.value}.{part.name.value}"
     for mutation in mutations:
         function = mutation.contained_by_top_level_function
-        if function not in names:
+        if names.get(function) not in wanted:
             continue
         changed = deep_replace(function, mutation.original_node, mutation.mutated_node)
         before, after = (module.code_for_node(function), module.code_for_node(changed))
@@ -119,15 +129,17 @@ def drawn(root: Path, only: Sequence[str], number: int, seed: int) -> list[Mutan
     files = sorted(
         file for path in only for file in ([root / path] if path.endswith(".py") else (root / path).rglob("*.py"))
     )
-    by_function: dict[tuple[str, str], list[Mutant]] = {}
-    for file in files:
-        for mutant in mutants_of(root, file):
-            by_function.setdefault((mutant.file, mutant.function), []).append(mutant)
     if not number:
-        return [mutant for mutants in by_function.values() for mutant in mutants]
+        return [mutant for file in files for mutant in mutants_of(root, file, set(functions_of(file)))]
     chance = random.Random(seed)
-    chosen = chance.sample(sorted(by_function), min(number, len(by_function)))
-    return [chance.choice(by_function[function]) for function in chosen]
+    functions = [(file, name) for file in files for name in functions_of(file)]
+    chance.shuffle(functions)
+    found: list[Mutant] = []
+    for file, name in functions:
+        # Some have nothing that could be changed.
+        if len(found) < number and (mutants := list(mutants_of(root, file, {name}))):
+            found.append(chance.choice(mutants))
+    return found
 
 
 class Trial:

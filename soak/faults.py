@@ -43,26 +43,26 @@ USAGE_ERROR, NO_TESTS = 4, 5
 NOTING = '''
 """Notes which tests enter which functions: the start of every Python program below a run of `soak/faults.py`."""
 
+import contextlib
 import json
 import os
 import sys
 
-_functions = {(file, name) for file, name in json.loads(os.environ["FAULTS_FUNCTIONS"])}
-_root = os.environ["FAULTS_ROOT"] + "/"
-_notes = os.environ["FAULTS_NOTES"]
+_functions = {(file, name) for file, name in json.loads(FUNCTIONS)}
 _seen = set()
 
 
 def _enters(code, _offset):
     file = code.co_filename
-    key = (file[len(_root):], code.co_qualname) if file.startswith(_root) else None
+    key = (file[len(ROOT):], code.co_qualname) if file.startswith(ROOT) else None
     if key not in _functions:
         return sys.monitoring.DISABLE
     # A program that a test starts inherits its name.
     test = os.environ.get("PYTEST_CURRENT_TEST", "").rsplit(" ", 1)[0]
     if test and (test, key) not in _seen:
         _seen.add((test, key))
-        with open(f"{_notes}/{os.getpid()}", "a") as notes:
+        # A process that is confined may write nothing.
+        with contextlib.suppress(OSError), open(f"{NOTES}/{os.getpid()}", "a") as notes:
             notes.write(json.dumps([test, *key]) + "\\n")
     return None
 
@@ -157,15 +157,20 @@ class Trial:
             if (root / made).exists():
                 (self.copy / made).symlink_to(root / made)
 
-    def environment(self, **more: str) -> dict[str, str]:
+    def environment(self, site: Path | None) -> dict[str, str]:
         paths = [self.copy, *(self.copy / name for name in ("proto", "server", "client", "bridge", "editors"))]
         paths.append(self.copy / "examples" / "robosc_examples")
         environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-        prefix = [more.pop("PYTHONPATH")] if "PYTHONPATH" in more else []
-        return environment | {"PYTHONPATH": os.pathsep.join(prefix + [str(path) for path in paths])} | more
+        return environment | {"PYTHONPATH": os.pathsep.join(map(str, [site, *paths] if site else paths))}
 
-    def run(self, tests: Sequence[str], words: Sequence[str] = (), **more: str) -> tuple[int, str]:
-        """Run tests; return pytest's exit status and what it printed."""
+    def run(self, tests: Sequence[str], words: Sequence[str] = (), site: Path | None = None) -> tuple[int, str]:
+        """Run tests; return pytest's exit status and what it printed.
+
+        Args:
+            tests: Names of tests, or their folders.
+            words: Further words for pytest.
+            site: Folder whose `sitecustomize.py` each Python program begins with.
+        """
         chosen = self.copy / "out" / "chosen.txt"
         chosen.parent.mkdir(exist_ok=True)
         chosen.write_text("\n".join(tests) + "\n")
@@ -175,7 +180,7 @@ class Trial:
                 *("-n", str(self.workers), "--dist", "worksteal", *words, f"@{chosen}"),
             ],
             cwd=self.copy,
-            env=self.environment(**more),
+            env=self.environment(site),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -194,15 +199,12 @@ class Trial:
         notes, site = self.copy / "out" / "notes", self.copy / "out" / "site"
         for folder in (notes, site):
             folder.mkdir(parents=True, exist_ok=True)
-        (site / "sitecustomize.py").write_text(NOTING)
         functions = sorted({(mutant.file, mutant.function) for mutant in mutants})
-        status, told = self.run(
-            self.tests,
-            PYTHONPATH=str(site),
-            FAULTS_FUNCTIONS=json.dumps(functions),
-            FAULTS_ROOT=str(self.copy),
-            FAULTS_NOTES=str(notes),
-        )
+        # Not in the environment: some tests give their programs another one.
+        given = {"FUNCTIONS": json.dumps(functions), "ROOT": f"{self.copy}/", "NOTES": str(notes)}
+        values = "".join(f"{name} = {value!r}\n" for name, value in given.items())
+        (site / "sitecustomize.py").write_text(values + NOTING)
+        status, told = self.run(self.tests, site=site)
         reached: dict[tuple[str, str], set[str]] = {function: set() for function in functions}
         for file in notes.iterdir():
             for line in file.read_text().splitlines():

@@ -117,7 +117,7 @@ def test_every_setting_is_written_with_what_it_means() -> None:
     assert max(map(len, text.splitlines())) <= 120
     words = {
         "# Fastest turn, in rad/s.",
-        "# How the supervisor is executed.",
+        "# Execution of the supervisor.",
         "# Rotator.rotate_done: outgoing message",
     }
     assert words <= {line.strip() for line in text.splitlines()}

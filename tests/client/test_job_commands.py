@@ -443,16 +443,23 @@ class TestListAndCancel:
 
 class TestBench:
     def test_counted(self, capfd: pytest.CaptureFixture[str]) -> None:
-        answers = {"Check": [[pb.CheckResponse()]], "Synthesize": [[progress(), supervisor()]]}
+        peers: set[str] = set()
+
+        def note(context: grpc.ServicerContext) -> None:
+            peers.add(context.peer())
+
+        answers = {"Check": [[note, pb.CheckResponse()]], "Synthesize": [[note, progress(), supervisor()]]}
         with scripted(**answers) as (address, script):
             for task, method in (("check", "Check"), ("synth", "Synthesize")):
                 for more in ([], ["--uncached"]):
                     script.requests.clear()
+                    peers.clear()
                     options = ["--task", task, "-c", "4", "--connections", "2", "-n", "20", *more, "--server", address]
                     status, out, _ = run(capfd, "bench", MODEL, "--json", *options)
                     document = json.loads(out)
                     assert (status, document["calls"], document["errors"]) == (0, 20, {})
                     assert document["milliseconds"]["p50"] <= document["milliseconds"]["p99"]
+                    assert len(peers) == 2
                     texts = {request.bundle.main.text for request in script.of(method)}
                     assert len(script.of(method)) == 20
                     assert len(texts) == (20 if more else 1)

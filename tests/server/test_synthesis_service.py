@@ -8,6 +8,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import grpc
@@ -18,8 +19,11 @@ from grpc_reflection.v1alpha import reflection_pb2, reflection_pb2_grpc
 from grpc_status import rpc_status
 
 from robosc import __version__
+from robosc.language import load_bundle
+from robosc.signatures import make_key_pair, signer
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_api.v1 import synthesis_pb2_grpc
+from robosc_client import Client
 from robosc_server import application
 from robosc_server.application import StartError
 from robosc_server.main import main
@@ -30,6 +34,7 @@ from support.background import is_running, is_stopped
 from support.fake_tasks import TASK_FUNCTION as FAKE
 from support.held_time import HeldLoop, on_held_time
 from support.job_workers import StartedWorkers
+from support.models import EXAMPLES
 from support.service import served
 from support.strangers import strangers
 from support.waiting import PATIENCE_S, eventually
@@ -456,3 +461,12 @@ class TestStart:
         ours.remove(threading.current_thread())
         assert len(ours) > 1
         assert eventually(lambda: not any(thread.is_alive() for thread in ours))
+
+
+def test_supervisors_are_signed_and_nothing_else(tmp_path: Path) -> None:
+    key = make_key_pair(tmp_path / "site.key", tmp_path / "site.pub")
+    bundle = load_bundle(EXAMPLES / "line_follower" / "line_follower.rscd")
+    with served(signing_key=tmp_path / "site.key") as address, Client(address) as client:
+        made = client.synthesize(bundle)
+        assert signer(made.supervisor, made.signature, [key]) == key
+        assert client.check(bundle) == ()

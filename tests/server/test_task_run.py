@@ -12,6 +12,9 @@ import pytest
 import robosc_server.tasks.run as run_module
 from robosc.cli.main import main as robosc
 from robosc.json_documents import json_text
+from robosc.language import load_bundle
+from robosc.model.structure import Deployment
+from robosc.supervisor import make_supervisor
 from robosc.targets import available_targets
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.convert.pieces import CHUNK_BYTES
@@ -136,7 +139,16 @@ class TestSynthesize:
         assert findings_json(result.diagnostics) == document["diagnostics"]
         assert result.summary.text == told("synth", model, "--deployment", deployment)[1]
         assert result.summary.states == str(document["summary"]["states"])
-        assert result.statistics.state_bits > 0
+        expected = make_supervisor(load_bundle(model), deployment=Deployment(deployment)).statistics
+        assert expected is not None
+        figures = result.statistics
+        assert (figures.engine, figures.state_bits, figures.iterations) == (
+            expected.engine,
+            expected.state_bits,
+            expected.iterations,
+        )
+        assert figures.iterations > 0
+        assert figures.peak_nodes > 0
         assert (result.reason, result.explanation, result.signature) == ("", "", b"")
 
     @pytest.mark.parametrize("states", [0, 5, 200_000])

@@ -10,6 +10,7 @@ import pytest
 from robosc.execution.clock import ManualClock
 from robosc_bridge.simulated import BODIES, Timebase, Walls, World, oval, room
 from robosc_bridge.simulated.commands import UnknownCommandError
+from robosc_bridge.simulated.ros import ros1
 from robosc_bridge.simulated.ros.commands import HELP, obey
 from robosc_bridge.simulated.ros.readings import Battery, Clock, Odometry, Picture, Reading, Scan
 from robosc_bridge.simulated.ros.robot import RosRobot
@@ -270,6 +271,11 @@ def test_time_that_the_process_did_not_get_is_not_lived() -> None:
 
 def options(*arguments: str) -> argparse.Namespace:
     return parser("twin", "").parse_args(arguments)
+
+
+def test_options_of_a_node_on_ros_1() -> None:
+    found = ros1._parser().parse_args(["--sim-time", "--python", "/opt/python", "--scene", "line-oval"])
+    assert (found.sim_time, found.stamped, found.python, found.scene) == (True, False, "/opt/python", "line-oval")
 
 
 def test_a_robot_is_made_as_the_command_line_says() -> None:

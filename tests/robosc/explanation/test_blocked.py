@@ -9,13 +9,14 @@ from hypothesis import given, settings
 
 from robosc.execution.event_log import plain
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.explanation.blocked import MAXIMUM_REASONS, Requests, StateError, read_value
+from robosc.explanation.blocked import MAXIMUM_NAMES, MAXIMUM_REASONS, Requests, StateError, read_value
 from robosc.expressions import BooleanType, DoubleType, EnumType, IntegerType, StringType
-from robosc.model.structure import CommunicationKind
+from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
 from support.effort import examples
 from support.generated import example_supervisor
-from support.random_supervisors import random_data, random_supervisor
+from support.models import model_of
+from support.random_supervisors import CERTIFICATE, random_data, random_supervisor
 
 _CALLED = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 
@@ -133,3 +134,18 @@ def test_a_state_of_another_model_is_refused() -> None:
     for wrong in ({}, {**state, "Rotator": 3}, {**state, "Rotator": {"state": "flying"}}, {**state, "LidarSensor": {}}):
         with pytest.raises(StateError):
             requests.judge(wrong, {})
+
+
+def test_what_a_requirement_reads_is_listed_up_to_a_limit() -> None:
+    names = [f"v{number}" for number in range(MAXIMUM_NAMES + 1)]
+    variables = "".join(f"variable {name}: integer(0..9) = 1 " for name in names)
+    model = model_of(
+        f"robot R {{ component C {{ incoming message few with type: none incoming message many with type: none "
+        f"behaviour {{ {variables} initial marked state s {{ }} }} }} "
+        f"requirement few needs C.v0 > C.v1 requirement many needs {' + '.join(f'C.{name}' for name in names)} > 9 }}"
+    )
+    supervisor = Supervisor(model, Deployment.CONTROLLER, (), CERTIFICATE)
+    judged = Requests(model, ()).judge(InterpretedSystem(supervisor).state(), {})
+    few, many = (item.why[0] for item in judged.blocked)
+    assert few.endswith("C.v0 > C.v1, which does not hold (C.v0 is 1, C.v1 is 1)")
+    assert many.endswith(f"({', '.join(f'C.{name} is 1' for name in names[:MAXIMUM_NAMES])}, ...)")

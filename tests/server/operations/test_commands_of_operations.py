@@ -60,6 +60,7 @@ def test_a_server_without_any_settings_could_start(capsys: pytest.CaptureFixture
     assert {found["part"] for found in checked.document["findings"]} == {
         "listening", "certificates", "tokens", "signing", "database", "workers", "confinement", "metrics", "tracing",
     }  # fmt: skip
+    assert [grade for grade, _ in checked.of("listening")] == ["ok"]
     assert not (tmp_path / "robosc-server").exists(), "nothing is made"
     assert run_command(["check-config", "--port", "0"]) == 0
     assert re.search(r"^ok +certificates: no TLS$", capsys.readouterr().out, re.MULTILINE)

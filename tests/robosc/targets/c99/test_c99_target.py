@@ -314,6 +314,35 @@ def test_names_that_are_words_of_c_work(tmp_path: Path) -> None:
     assert any(line.startswith("publish") for line in lines)
 
 
+BELOW_ZERO = """
+robot BelowZero {
+    component P {
+        outgoing message seen with type: integer(-40000..40000)
+        outgoing message least with type: integer(-2147483648..2147483647)
+        incoming message told with type: integer
+        behaviour {
+            variable kept: integer(-100..100) = -100
+            variable lowest: integer(-2147483648..2147483647) = -2147483648
+            on response from seen do kept := value
+            on response from least do lowest := value
+            initial marked state fine {
+                on request to told
+            }
+        }
+    }
+    provide told with P.kept
+    requirement told needs P.kept > -90 and P.lowest > -2147483648
+}
+"""
+
+
+@needs_gcc
+def test_ranges_below_zero_are_kept(tmp_path: Path) -> None:
+    supervisor = supervisor_of_text(BELOW_ZERO)
+    lines = compare(supervisor, compiled(supervisor, tmp_path), Random(5), 5, 150)
+    assert any(line.startswith("publish") for line in lines)
+
+
 # Beginnings of names of the library and of the generated code, names of headers, of other files, of targets of CMake.
 CLASHING = """
     All Add Clean Double Equal Find Float Help Install Int32 Kleene M Main Math Notes Ptrdiff Robot Size State Stdbool

@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         UsageError: There is no such code.
     """
-    from robosc.explain import document, pages
+    from robosc.diagnostics import document, pages
 
     if arguments.list:
         if arguments.json:
@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _explain(code: str, *, as_json: bool) -> None:
-    from robosc.explain import codes, page
+    from robosc.diagnostics import codes, page
 
     # As `check` prints it, a code stands in brackets.
     wanted = code.strip("[]").lower()
@@ -64,7 +64,7 @@ def _explain(code: str, *, as_json: bool) -> None:
 
 
 def _table() -> str:
-    from robosc.explain import pages
+    from robosc.diagnostics import pages
 
     found = pages()
     width = max(len(item.code) for item in found)

@@ -23,7 +23,7 @@ NO_CODES = frozenset(
 """Texts of the source that look like codes and are none: commands, their remarks, kinds of keys and marks, targets."""
 
 # The pages themselves, and the models that a new robot begins with.
-_ELSEWHERE = ("explain", "starter")
+_ELSEWHERE = ("diagnostics", "starter")
 
 REPORTERS = {"error": 0, "warning": 0, "note": 0, "_warning": 0, "Diagnostic": 1}
 """Functions that take a code, and at which position."""

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from robosc.diagnostics import Block, Page, Stage, codes, document, page, pages, parse_page
 from robosc.errors import Diagnostic, InternalError, LanguageError, Severity
-from robosc.explain import Block, Page, Stage, codes, document, page, pages, parse_page
 from robosc.language.bundle import MAXIMUM_BYTES, decode_source
 from robosc.language.interfaces import find_interfaces, interface_folders
 from robosc.model import check

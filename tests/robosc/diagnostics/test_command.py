@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from robosc.cli.main import main
-from robosc.explain import codes, document, page
+from robosc.diagnostics import codes, document, page
 
 
 def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:

@@ -3,8 +3,185 @@
 Pipeline, one way: text -> syntax tree (`robosc.language`) -> checked model (`robosc.model`) ->
 automata (`robosc.automata`) -> symbolic supervisor (`robosc.synthesis`, `robosc.supervisor`) ->
 execution and targets (`robosc.execution`, `robosc.targets`).
+
+As a Python API, it is these functions, one for each command (`robosc.pipeline`, docs/python-api.md):
+
+    model = robosc.load("robot.rscd")
+    result = robosc.synthesize(model)
+    run = robosc.simulate(result.supervisor)
+    robosc.generate(result.supervisor, "ros2").write("out")
+
+The names are imported on use: who only reads a supervisor's file does not load the synthesizer.
 """
+
+import importlib
+from typing import TYPE_CHECKING, Any
 
 from robosc._version import __version__
 
-__all__ = ["__version__"]
+if TYPE_CHECKING:
+    from robosc.diagnostics import UnknownCodeError
+    from robosc.errors import (
+        Diagnostic,
+        InternalError,
+        InvalidSupervisorError,
+        InvalidSystemError,
+        LanguageError,
+        NodeLimitError,
+        RoboscError,
+        Severity,
+        SynthesisCancelled,
+        UnknownNameError,
+        UnsupportedModelError,
+    )
+    from robosc.explanation import RequestError
+    from robosc.model.structure import Deployment
+    from robosc.pipeline.checking import check
+    from robosc.pipeline.conditions import Condition, Conditions
+    from robosc.pipeline.explaining import Explained, explain
+    from robosc.pipeline.exploring import Exploration, explore
+    from robosc.pipeline.files import FileAccessError
+    from robosc.pipeline.findings import Findings
+    from robosc.pipeline.generating import generate
+    from robosc.pipeline.loading import LoadedModel, load
+    from robosc.pipeline.options import SynthesisOptions
+    from robosc.pipeline.results import (
+        Generation,
+        NoSupervisor,
+        NothingGeneratedError,
+        Summary,
+        SynthesisStatus,
+        Verification,
+        VerificationStatus,
+    )
+    from robosc.pipeline.simulation import DataError, EventNotPossibleError, Run, Step, UnknownEventError, simulate
+    from robosc.pipeline.supervisors import Supervisor
+    from robosc.pipeline.synthesis import Synthesis, synthesize
+    from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
+    from robosc.pipeline.verifying import verify
+    from robosc.supervisor import Progress
+    from robosc.synthesis import UnknownEngineError
+    from robosc.targets import GenerateOptions, OverwriteError, UnknownTargetError
+
+_HOMES = {
+    "Condition": "pipeline.conditions",
+    "Conditions": "pipeline.conditions",
+    "DataError": "pipeline.simulation",
+    "Deployment": "model.structure",
+    "Diagnostic": "errors",
+    "EventNotPossibleError": "pipeline.simulation",
+    "Explained": "pipeline.explaining",
+    "Exploration": "pipeline.exploring",
+    "FileAccessError": "pipeline.files",
+    "Findings": "pipeline.findings",
+    "GenerateOptions": "targets",
+    "Generation": "pipeline.results",
+    "InternalError": "errors",
+    "InvalidSupervisorError": "errors",
+    "InvalidSystemError": "errors",
+    "LanguageError": "errors",
+    "LoadedModel": "pipeline.loading",
+    "NoSupervisor": "pipeline.results",
+    "NodeLimitError": "errors",
+    "NothingGeneratedError": "pipeline.results",
+    "OverwriteError": "targets",
+    "Progress": "supervisor",
+    "RequestError": "explanation",
+    "RoboscError": "errors",
+    "Run": "pipeline.simulation",
+    "Severity": "errors",
+    "Step": "pipeline.simulation",
+    "Summary": "pipeline.results",
+    "Supervisor": "pipeline.supervisors",
+    "Synthesis": "pipeline.synthesis",
+    "SynthesisCancelled": "errors",
+    "SynthesisOptions": "pipeline.options",
+    "SynthesisStatus": "pipeline.results",
+    "SystemSupervisor": "pipeline.systems",
+    "SystemSynthesis": "pipeline.systems",
+    "UnknownCodeError": "diagnostics",
+    "UnknownEngineError": "synthesis",
+    "UnknownEventError": "pipeline.simulation",
+    "UnknownNameError": "errors",
+    "UnknownTargetError": "targets",
+    "UnsupportedModelError": "errors",
+    "Verification": "pipeline.results",
+    "VerificationStatus": "pipeline.results",
+    "check": "pipeline.checking",
+    "explain": "pipeline.explaining",
+    "explore": "pipeline.exploring",
+    "generate": "pipeline.generating",
+    "load": "pipeline.loading",
+    "simulate": "pipeline.simulation",
+    "synthesize": "pipeline.synthesis",
+    "verify": "pipeline.verifying",
+}
+
+__all__ = [
+    "Condition",
+    "Conditions",
+    "DataError",
+    "Deployment",
+    "Diagnostic",
+    "EventNotPossibleError",
+    "Explained",
+    "Exploration",
+    "FileAccessError",
+    "Findings",
+    "GenerateOptions",
+    "Generation",
+    "InternalError",
+    "InvalidSupervisorError",
+    "InvalidSystemError",
+    "LanguageError",
+    "LoadedModel",
+    "NoSupervisor",
+    "NodeLimitError",
+    "NothingGeneratedError",
+    "OverwriteError",
+    "Progress",
+    "RequestError",
+    "RoboscError",
+    "Run",
+    "Severity",
+    "Step",
+    "Summary",
+    "Supervisor",
+    "Synthesis",
+    "SynthesisCancelled",
+    "SynthesisOptions",
+    "SynthesisStatus",
+    "SystemSupervisor",
+    "SystemSynthesis",
+    "UnknownCodeError",
+    "UnknownEngineError",
+    "UnknownEventError",
+    "UnknownNameError",
+    "UnknownTargetError",
+    "UnsupportedModelError",
+    "Verification",
+    "VerificationStatus",
+    "__version__",
+    "check",
+    "explain",
+    "explore",
+    "generate",
+    "load",
+    "simulate",
+    "synthesize",
+    "verify",
+]
+
+
+if not TYPE_CHECKING:
+    # A type checker knows the names from above, and is to find every other one wrong.
+    def __getattr__(name: str) -> Any:
+        """Import a public name from its module on first use."""
+        if name not in _HOMES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    """Return the public names, loaded or not, beside what modules have."""
+    return sorted({*globals(), *__all__})

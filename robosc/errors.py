@@ -4,6 +4,8 @@
     |-- LanguageError            the model has errors; carries every Diagnostic
     |-- UnsupportedModelError    a correct model outside what a stage or target handles
     |-- InvalidSupervisorError   a supervisor file that cannot be trusted or read
+    |-- NodeLimitError           decision diagrams grew beyond what they may have
+    |-- UnknownNameError         a name that nothing has; a KeyError
     |-- SynthesisCancelled       the caller asked long work to stop
     `-- InternalError            a fault of RoboSC itself; asks for a report
 
@@ -139,6 +141,14 @@ class UnsupportedModelError(RoboscError):
 
 class InvalidSupervisorError(RoboscError):
     """A supervisor file that is malformed, of an unknown version, or inconsistent."""
+
+
+class UnknownNameError(RoboscError, KeyError):
+    """A name that nothing has; the message names the nearest one that there is."""
+
+    def __str__(self) -> str:
+        # A KeyError would show its message as a Python literal.
+        return Exception.__str__(self)
 
 
 class InvalidExpressionError(RoboscError):

@@ -17,6 +17,7 @@ from robosc.errors import UnsupportedModelError
 from robosc.expressions import Value
 from robosc.expressions.text import automaton_text
 from robosc.model.structure import CommunicationKind, Model
+from robosc.tables import html_table
 
 DEFAULT_LIMIT = 100_000
 """States beyond which exploring is given up."""
@@ -24,22 +25,22 @@ DEFAULT_LIMIT = 100_000
 
 @dataclass(frozen=True, slots=True)
 class GraphState:
-    """One state of the controlled system; all pairs in source order.
+    """One state of the controlled system; all of it in source order.
 
     Attributes:
-        components: State of every component with a behaviour.
+        components: State of every component with a behaviour, by its name.
         variables: Value of every synthesis variable, by `Component.variable`.
-        communications: Location of every service and action.
+        communications: Location of every service and action, by its name.
         enabled: Events that can happen here, sorted by name.
     """
 
-    components: tuple[tuple[str, str], ...]
-    variables: tuple[tuple[str, Value], ...]
-    communications: tuple[tuple[str, str], ...]
+    components: dict[str, str]
+    variables: dict[str, Value]
+    communications: dict[str, str]
     enabled: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Graph:
     """The controlled system.
 
@@ -56,6 +57,29 @@ class Graph:
     columns: tuple[str, ...]
     states: tuple[GraphState, ...]
     transitions: tuple[tuple[int, str, int], ...]
+
+    @property
+    def dot(self) -> str:
+        """The graph in Graphviz's language."""
+        return graph_dot(self)
+
+    def to_json(self) -> dict[str, object]:
+        """The graph as JSON values, as `robosc explore --json` prints it."""
+        return graph_json(self)
+
+    def __repr__(self) -> str:
+        return f"<graph of {self.name}: {len(self.states)} states, {len(self.transitions)} transitions>"
+
+    def __str__(self) -> str:
+        return graph_text(self)
+
+    def _repr_html_(self) -> str:
+        leaving = _leaving(self)
+        rows = (
+            (number, *_values(state), "\n".join(f"{event} -> {', '.join(map(str, to))}" for event, to in ways.items()))
+            for number, (state, ways) in enumerate(zip(self.states, leaving, strict=True))
+        )
+        return html_table(("state", *self.columns, "events"), rows, caption=_head(self))
 
 
 def explore(
@@ -111,9 +135,9 @@ def _states(system: System, model: Model, graph: ControlledGraph) -> tuple[Graph
 
     def graph_state(state: State, enabled: tuple[str, ...]) -> GraphState:
         return GraphState(
-            components=tuple((name, str(state[places[Subject(name)]])) for name in components),
-            variables=tuple((str(subject), state[places[subject]]) for subject in variables),
-            communications=tuple((name, str(state[place])) for name, place in communications),
+            components={name: str(state[places[Subject(name)]]) for name in components},
+            variables={str(subject): state[places[subject]] for subject in variables},
+            communications={name: str(state[place]) for name, place in communications},
             enabled=enabled,
         )
 
@@ -143,9 +167,9 @@ def graph_json(graph: Graph) -> dict[str, object]:
         "initial": graph.initial,
         "states": [
             {
-                "components": dict(state.components),
-                "variables": dict(state.variables),
-                "communications": dict(state.communications),
+                "components": state.components,
+                "variables": state.variables,
+                "communications": state.communications,
                 "enabled": list(state.enabled),
             }
             for state in graph.states
@@ -164,13 +188,17 @@ def graph_text(graph: Graph) -> str:
     def line(cells: list[str]) -> str:
         return "  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True)).rstrip()
 
-    counts = f"{graph.name}: {len(graph.states)} states, {len(graph.transitions)} transitions"
-    lines = [f"{counts}; it starts in state {graph.initial}", "", line(header)]
+    lines = [_head(graph), "", line(header)]
     for number, row in enumerate(rows):
         lines.append(line(row))
         for event, targets in leaving[number].items():
             lines.append(f"{'':{widths[0]}}  {event} -> {', '.join(map(str, targets))}")
     return "\n".join(lines) + "\n"
+
+
+def _head(graph: Graph) -> str:
+    counts = f"{graph.name}: {len(graph.states)} states, {len(graph.transitions)} transitions"
+    return f"{counts}; it starts in state {graph.initial}"
 
 
 def graph_dot(graph: Graph) -> str:
@@ -193,8 +221,8 @@ def graph_dot(graph: Graph) -> str:
 
 def _values(state: GraphState) -> list[str]:
     """Return what a reader wants to see of a state: the value of each column."""
-    values = (*state.components, *state.variables, *state.communications)
-    return [str(value).lower() if isinstance(value, bool) else str(value) for _, value in values]
+    values = (*state.components.values(), *state.variables.values(), *state.communications.values())
+    return [str(value).lower() if isinstance(value, bool) else str(value) for value in values]
 
 
 def _leaving(graph: Graph) -> list[dict[str, list[int]]]:

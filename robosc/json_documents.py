@@ -29,6 +29,12 @@ def counts(diagnostics: Sequence[Diagnostic]) -> dict[str, int]:
     return {f"{severity}s": sum(diagnostic.severity is severity for diagnostic in diagnostics) for severity in Severity}
 
 
+def counts_text(diagnostics: Sequence[Diagnostic]) -> str:
+    """For instance `2 errors, 1 warning`."""
+    parts = [f"{count} {name if count != 1 else name[:-1]}" for name, count in counts(diagnostics).items() if count]
+    return ", ".join(parts) or "no findings"
+
+
 def diagnostics_json(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:
     """The findings and their counts as JSON values."""
     return {**counts(diagnostics), "diagnostics": [diagnostic.to_json() for diagnostic in diagnostics]}

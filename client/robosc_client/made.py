@@ -90,7 +90,7 @@ def graph_of(found: StateGraph, bundle: Bundle, deployment: Deployment) -> Graph
     states = tuple(
         GraphState(
             components=_shown(state.components),
-            variables=tuple((visible(name), _shown_value(value)) for name, value in state.variables.items()),
+            variables={visible(name): _shown_value(value) for name, value in state.variables.items()},
             communications=_shown(state.communications),
             enabled=tuple(map(visible, state.enabled)),
         )
@@ -102,8 +102,8 @@ def graph_of(found: StateGraph, bundle: Bundle, deployment: Deployment) -> Graph
     return Graph(model.name, found.initial, columns, states, transitions)
 
 
-def _shown(items: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
-    return tuple((visible(name), visible(text)) for name, text in items.items())
+def _shown(items: Mapping[str, str]) -> dict[str, str]:
+    return {visible(name): visible(text) for name, text in items.items()}
 
 
 def _shown_value(value: Value) -> Value:

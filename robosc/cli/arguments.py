@@ -173,20 +173,10 @@ def read_bundle(arguments: argparse.Namespace) -> Bundle:
         UsageError: The model's file or a library folder is not there or cannot be read.
         LanguageError: A file's content cannot be a model.
     """
-    from robosc.language import load_bundle
-    from robosc.language.interfaces import interface_folders
+    from robosc.pipeline.files import FileAccessError
+    from robosc.pipeline.loading import read_model
 
-    model: Path = arguments.model
     try:
-        if model.is_dir():
-            raise UsageError(f"{model} is a folder, not a model's file")
-        if not model.exists():
-            raise UsageError(f"there is no file {model}")
-        for what, folders in (("library", arguments.library_path), ("interface", arguments.interface_path)):
-            for folder in folders:
-                if not folder.is_dir():
-                    raise UsageError(f"there is no {what} folder {folder}")
-        interface_paths = (*arguments.interface_path, *interface_folders())
-        return load_bundle(model, arguments.library_path, interface_paths)
-    except OSError as error:
-        raise UsageError(f"cannot read {error.filename or model}: {error.strerror or error}") from error
+        return read_model(arguments.model, arguments.library_path, arguments.interface_path)
+    except FileAccessError as error:
+        raise UsageError(str(error)) from error

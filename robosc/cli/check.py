@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from robosc.cli import synth
 from robosc.cli.arguments import add_deployment_argument, add_engine_options, add_model_arguments, read_bundle
-from robosc.cli.output import ExitCode, UsageError, counts_text, has_errors, print_diagnostics, print_json
+from robosc.cli.output import ExitCode, UsageError, has_errors, print_diagnostics, print_json
 from robosc.errors import Diagnostic, LanguageError, UnsupportedModelError
-from robosc.json_documents import diagnostics_json
+from robosc.json_documents import counts_text, diagnostics_json
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
 

@@ -46,17 +46,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _explain(code: str, *, as_json: bool) -> None:
-    from robosc.diagnostics import codes, page
+    from robosc.diagnostics import UnknownCodeError, page
 
-    # As `check` prints it, a code stands in brackets.
-    wanted = code.strip("[]").lower()
-    if wanted not in codes():
-        from robosc.model.findings import did_you_mean
-
-        near = did_you_mean(wanted, codes())
-        hint = f"did you mean '{near}'?" if near else "'robosc explain --list' lists them"
-        raise UsageError(f"there is no diagnostic code '{code}'; {hint}")
-    found = page(wanted)
+    try:
+        found = page(code)
+    except UnknownCodeError as error:
+        raise UsageError(str(error)) from error
     if as_json:
         print_json(found.to_json())
     else:

@@ -58,39 +58,33 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize and explain; 0 with a supervisor, 1 without."""
-    from robosc.explanation import document, explain_synthesis, explanation_text
-    from robosc.supervisor import Made, prepare
+    from robosc.explanation import document, explanation_text
+    from robosc.pipeline.explaining import explained
+    from robosc.supervisor import Made
 
     bundle = read_bundle(arguments)
-    deployment = Deployment(arguments.deployment)
-    prepared = prepare(bundle, deployment)
-    if isinstance(prepared, Made):
-        if arguments.json:
-            print_json(
-                {
-                    "status": str(prepared.status),
-                    **synth.reasons_json(prepared),
-                    **diagnostics_json(prepared.diagnostics),
-                }
-            )
-        else:
-            synth.report_problems(prepared, bundle)
-        return ExitCode.FAILED
     progress = ProgressLine()
     try:
-        explanation = explain_synthesis(
-            prepared.model,
-            prepared.places,
-            prepared.system,
-            deployment=deployment,
-            engine=engine_options(arguments),
+        found = explained(
+            bundle,
+            Deployment(arguments.deployment),
+            engine_options(arguments),
             event=arguments.event,
             state=arguments.state,
             after=arguments.after,
-            on_progress=lambda step: progress.show(str(step)),
+            on_progress=lambda step: progress.show(step.message),
         )
     finally:
         progress.clear()
+    if isinstance(found, Made):
+        if arguments.json:
+            print_json(
+                {"status": str(found.status), **synth.reasons_json(found), **diagnostics_json(found.diagnostics)}
+            )
+        else:
+            synth.report_problems(found, bundle)
+        return ExitCode.FAILED
+    prepared, explanation = found
     is_empty = explanation.empty is not None
     if arguments.json:
         status = "empty" if is_empty else "supervisor"

@@ -44,9 +44,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize and explore; 0 with a graph, 1 without."""
-    from robosc.automata import to_automata
-    from robosc.exploration import explore, graph_dot, graph_json, graph_text
-    from robosc.supervisor.conditions import state_predicates
+    from robosc.exploration import graph_dot, graph_json, graph_text
+    from robosc.pipeline.exploring import graph_of
 
     bundle = read_bundle(arguments)
     # The graph is of everything allowed, whatever an executor would choose.
@@ -57,9 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
         else:
             synth.report_problems(made, bundle)
         return ExitCode.FAILED
-    supervisor = made.supervisor
-    system = to_automata(supervisor.model, supervisor.deployment)
-    graph = explore(system, state_predicates(system, supervisor.added), supervisor.model, limit=arguments.limit)
+    graph = graph_of(made.supervisor, limit=arguments.limit)
     if arguments.json:
         print_json(graph_json(graph))
     else:

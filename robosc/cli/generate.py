@@ -151,16 +151,12 @@ def report_generated(
     arguments: argparse.Namespace, made: "Made", files: "GeneratedFiles | None", bundle: Bundle
 ) -> ExitCode:
     """Write the files, print the outcome as asked and return the exit status."""
-    from robosc.targets import Removal, refusals, remove_earlier, write_files
+    from robosc.targets import Written, write_generated
 
-    written: list[str] = []
-    left_out: tuple[str, ...] = ()
-    removal = Removal()
+    outcome = Written(())
     if files is not None:
-        left_out = refusals(files, arguments.target)
-        written = [str(path) for path in write_files(files, arguments.output, force=arguments.force)]
-        if left_out:
-            removal = remove_earlier(arguments.output, left_out)
+        outcome = write_generated(files, arguments.target, arguments.output, force=arguments.force)
+    written, left_out, removal = [str(path) for path in outcome.files], outcome.left_out, outcome.removal
     if arguments.json:
         print_json(
             {

@@ -6,18 +6,17 @@ goes to standard output and holds the findings too. Where a command cannot do wh
 """
 
 import codecs
-import errno
 import io
 import os
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from pathlib import Path
 from typing import TextIO
 
 from robosc.errors import Diagnostic, Severity
-from robosc.json_documents import counts, json_text
+from robosc.json_documents import counts_text, json_text
+from robosc.pipeline.files import FileAccessError, write_whole
 from robosc.source import Bundle
 
 
@@ -86,12 +85,6 @@ def print_diagnostics(diagnostics: Sequence[Diagnostic], bundle: Bundle | None) 
         sys.stderr.write(f"{counts_text(diagnostics)}{hint}\n")
 
 
-def counts_text(diagnostics: Sequence[Diagnostic]) -> str:
-    """For instance `2 errors, 1 warning`."""
-    parts = [f"{count} {name if count != 1 else name[:-1]}" for name, count in counts(diagnostics).items() if count]
-    return ", ".join(parts) or "no findings"
-
-
 def has_errors(diagnostics: Sequence[Diagnostic], *, strict: bool = False) -> bool:
     """Return True if any finding is an error; with `strict`, if any is an error or a warning."""
     grave = {Severity.ERROR, Severity.WARNING} if strict else {Severity.ERROR}
@@ -114,33 +107,10 @@ def write_bytes(path: Path, content: bytes) -> None:
     Raises:
         UsageError: The place cannot be written.
     """
-    temporary: Path | None = None
     try:
-        target = Path(os.path.realpath(path))
-        if target.is_symlink():
-            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
-        if target.exists() and not target.is_file():
-            with target.open("wb") as place:
-                place.write(content)
-            return
-        mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-        temporary = Path(name)
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        temporary.chmod(mode)
-        temporary.replace(target)
-    except OSError as error:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
-        raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
-
-
-def _umask() -> int:
-    """The permissions that this process takes from new files; it can only be read by setting it."""
-    mask = os.umask(0o077)
-    os.umask(mask)
-    return mask
+        write_whole(path, content)
+    except FileAccessError as error:
+        raise UsageError(str(error)) from error
 
 
 class ProgressLine:

@@ -81,13 +81,22 @@ def run(arguments: argparse.Namespace) -> int:
 
 def verify(arguments: argparse.Namespace, supervisor: "Supervisor") -> int:
     """Verify the properties that the arguments name in a supervisor's controlled system, and print the verdicts."""
-    from robosc.automata import to_automata
+    from robosc.pipeline.verifying import verdicts_of
 
     properties = read_properties(arguments, supervisor.model)
     if properties is None:
         return ExitCode.USAGE
-    system = to_automata(supervisor.model, supervisor.deployment)
-    return report_verdicts(arguments, _verdicts(arguments, system, supervisor, properties), system, supervisor.model)
+    progress = ProgressLine()
+    try:
+        verdicts, system = verdicts_of(
+            supervisor,
+            properties,
+            engine_options(arguments),
+            on_progress=lambda step: progress.show(f"verification: {step}"),
+        )
+    finally:
+        progress.clear()
+    return report_verdicts(arguments, verdicts, system, supervisor.model)
 
 
 def report_verdicts(
@@ -132,12 +141,13 @@ def property_file(path: Path) -> SourceFile:
         UsageError: It is not there or cannot be read.
         LanguageError: It is no text.
     """
-    from robosc.language import read_source
+    from robosc.pipeline import loading
+    from robosc.pipeline.files import FileAccessError
 
     try:
-        return SourceFile(str(path), read_source(path, str(path)))
-    except OSError as error:
-        raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
+        return loading.property_file(path)
+    except FileAccessError as error:
+        raise UsageError(str(error)) from error
 
 
 def _report_faults(arguments: argparse.Namespace, error: LanguageError, files: Sequence[SourceFile]) -> None:
@@ -147,21 +157,3 @@ def _report_faults(arguments: argparse.Namespace, error: LanguageError, files: S
         print_json(property_errors_json(error.diagnostics))
     else:
         print_diagnostics(error.diagnostics, Bundle(files[0], tuple(files[1:])) if files else None)
-
-
-def _verdicts(
-    arguments: argparse.Namespace, system: "System", supervisor: "Supervisor", properties: "Sequence[Property]"
-) -> "tuple[Verdict, ...]":
-    from robosc.model_checking import verify_properties
-
-    progress = ProgressLine()
-    try:
-        return verify_properties(
-            system,
-            supervisor.added,
-            properties,
-            engine=engine_options(arguments),
-            on_progress=lambda step: progress.show(f"verification: {step}"),
-        )
-    finally:
-        progress.clear()

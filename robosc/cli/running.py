@@ -8,9 +8,9 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
-from robosc.cli.output import CommandError, ExitCode, counts_text, prepare_streams, print_diagnostics, print_json
+from robosc.cli.output import CommandError, ExitCode, prepare_streams, print_diagnostics, print_json
 from robosc.errors import Diagnostic, LanguageError, RoboscError
-from robosc.json_documents import diagnostics_json
+from robosc.json_documents import counts_text, diagnostics_json
 from robosc.source import visible
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from robosc.cli.arguments import given_path
 from robosc.cli.output import ExitCode, UsageError, print_json, write_bytes
+from robosc.pipeline.files import FileAccessError, read_bounded
 
 if TYPE_CHECKING:
     from robosc.signatures import PublicKey
@@ -132,8 +133,6 @@ def signer_of(file: Path, content: bytes, trusted: Sequence[Path]) -> "PublicKey
 
 def _read(file: Path, most: int) -> bytes:
     try:
-        with file.open("rb") as stream:
-            # One byte more than is allowed tells that there are too many; a device could go on for ever.
-            return stream.read(most + 1)
-    except OSError as error:
-        raise UsageError(f"cannot read {file}: {error.strerror or error}") from error
+        return read_bounded(file, most)
+    except FileAccessError as error:
+        raise UsageError(str(error)) from error

@@ -17,14 +17,12 @@ from robosc.cli.output import ExitCode, ProgressLine, UsageError, print_diagnost
 from robosc.cli.sign import read_supervisor, signer_of
 from robosc.errors import Diagnostic, InvalidSupervisorError
 from robosc.model.structure import Deployment
+from robosc.pipeline.options import FOREIGN_STATES
 from robosc.signatures import SignatureError
 from robosc.source import Bundle, visible
 
 if TYPE_CHECKING:
     from robosc.signatures import PublicKey
-
-FOREIGN_STATES = 1_000_000
-"""States up to which a foreign supervisor is searched one by one: a minute or so at most."""
 
 _USAGE = """robosc verify [options] FILE.rsup MODEL
        robosc verify [options] [FILE.rsup] MODEL --property PROPERTY
@@ -170,12 +168,15 @@ def report_recheck(
         diagnostics: Reasons why the texts hold no model that the supervisor could be for.
         bundle: The texts.
     """
+    from robosc.supervisor.recheck_report import recheck_text
+
     if arguments.json:
         print_json(document)
     else:
         print_diagnostics(diagnostics, bundle)
         if diagnostics or document["method"] is not None or document["faults"]:
-            _print_report(arguments, document)
+            text = recheck_text(document, str(arguments.supervisor), str(arguments.model), is_quiet=arguments.quiet)
+            sys.stdout.write(text)
         else:
             sys.stderr.write(f"{arguments.model}: a library has no robot that a supervisor could be for\n")
     return ExitCode.OK if document["status"] == "passed" else ExitCode.FAILED
@@ -217,45 +218,3 @@ def report_malformed(arguments: argparse.Namespace, error: InvalidSupervisorErro
     else:
         sys.stderr.write(f"{arguments.supervisor}: {visible(str(error))}\n")
     return ExitCode.FAILED
-
-
-def _print_report(arguments: argparse.Namespace, document: Mapping[str, Any]) -> None:
-    from robosc.verification import Outcome
-
-    lines: list[str] = []
-    checks, is_right = document["checks"], document["status"] == "passed"
-    if document["diagnostics"]:
-        lines.append(f"{arguments.supervisor}: failed: the texts hold no model that it could be for")
-    elif document["faults"]:
-        lines.append(f"{arguments.supervisor}: failed: no right supervisor of {arguments.model}")
-    elif not is_right:
-        unchecked = [name.replace("_", " ") for name, outcome in checks.items() if outcome == Outcome.NOT_CHECKED]
-        lines.append(f"{arguments.supervisor}: not checked: {', '.join(unchecked)}")
-    else:
-        lines.append(f"{arguments.supervisor}: passed: a right supervisor of {arguments.model}")
-    if not document["diagnostics"] and not arguments.quiet:
-        lines += [f"  {name.replace('_', ' '):<21} {outcome}" for name, outcome in checks.items()]
-        if document["method"] is not None:
-            figures = [f"{document[name]} {name}" for name in ("states", "transitions") if document[name] is not None]
-            lines += [f"  {'controlled':<21} {', '.join(figures) or 'not counted'} ({document['deployment']})"]
-            lines.append(f"  {'method':<21} {document['method']}")
-    for fault in document["faults"]:
-        lines += _fault_lines(fault)
-    if not arguments.quiet:
-        lines += [f"note: {note}" for note in document["remarks"]]
-    if not (is_right and arguments.quiet):
-        sys.stdout.write("".join(f"{visible(line)}\n" for line in lines))
-
-
-def _fault_lines(fault: Mapping[str, Any]) -> list[str]:
-    from robosc.supervisor.recheck import StateInWords
-
-    name = fault["check"].replace("_", " ")
-    if "trace" not in fault:
-        return [f"{name}: {fault['message']}"]
-    run = "after" if fault["shortest"] else "after (there may be shorter runs)"
-    return [
-        f"not {name}: {fault['message']}",
-        f"  {run}: {', '.join(fault['trace']) or 'nothing: it is so at the start'}",
-        f"  in: {StateInWords(**fault['state']).text()}",
-    ]

@@ -1,5 +1,16 @@
 """Meaning of every diagnostic code, with an example of it and how to fix it."""
 
-from robosc.diagnostics.pages import MARK, Block, Page, Stage, codes, document, page, pages, parse_page
+from robosc.diagnostics.pages import (
+    MARK,
+    Block,
+    Page,
+    Stage,
+    UnknownCodeError,
+    codes,
+    document,
+    page,
+    pages,
+    parse_page,
+)
 
-__all__ = ["MARK", "Block", "Page", "Stage", "codes", "document", "page", "pages", "parse_page"]
+__all__ = ["MARK", "Block", "Page", "Stage", "UnknownCodeError", "codes", "document", "page", "pages", "parse_page"]

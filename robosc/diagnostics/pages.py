@@ -23,7 +23,8 @@ from enum import StrEnum
 from functools import cache
 from importlib.resources import files
 
-from robosc.errors import InternalError, Severity
+from robosc.errors import InternalError, Severity, UnknownNameError
+from robosc.model.findings import did_you_mean
 
 MARK = "// <- here"
 """Ends the line of an example at which the finding is reported."""
@@ -75,7 +76,7 @@ class Block:
         return {"kind": self.kind, "library": self.library, "text": self.text, "lines": list(self.marked_lines)}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Page:
     """Explanation of one code.
 
@@ -98,6 +99,15 @@ class Page:
     example: tuple[Block, ...]
     mended: tuple[Block, ...]
     see_also: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"<page about {self.code}: {self.summary}>"
+
+    def __str__(self) -> str:
+        return self.markdown
+
+    def _repr_markdown_(self) -> str:
+        return self.markdown
 
     def head_json(self) -> dict[str, object]:
         """Code, severity, stage and summary as plain JSON values."""
@@ -126,16 +136,24 @@ def codes() -> tuple[str, ...]:
     return tuple(sorted(name.removesuffix(_SUFFIX) for name in names if name.endswith(_SUFFIX)))
 
 
+class UnknownCodeError(UnknownNameError):
+    """A diagnostic code that there is not."""
+
+
 def page(code: str) -> Page:
     """The page about a code.
 
     Raises:
-        KeyError: No page is about it.
+        UnknownCodeError: No page is about it; the message names the nearest code.
     """
-    if code not in codes():
-        raise KeyError(code)
-    text = (files(__package__) / "pages" / f"{code}{_SUFFIX}").read_text(encoding="utf-8")
-    return parse_page(code, text)
+    # As `check` prints it, a code stands in brackets.
+    wanted = code.strip("[]").lower()
+    if wanted not in codes():
+        near = did_you_mean(wanted, codes())
+        hint = f"did you mean '{near}'?" if near else "'robosc explain --list' lists them"
+        raise UnknownCodeError(f"there is no diagnostic code '{code}'; {hint}")
+    text = (files(__package__) / "pages" / f"{wanted}{_SUFFIX}").read_text(encoding="utf-8")
+    return parse_page(wanted, text)
 
 
 def pages() -> tuple[Page, ...]:

@@ -10,6 +10,7 @@ import msgspec
 
 from robosc.expressions import Value
 from robosc.source import Location
+from robosc.tables import html_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +131,7 @@ class Blamed:
     suffices: bool | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class EmptyExplanation:
     """Explanation why there is no supervisor.
 
@@ -148,6 +149,17 @@ class EmptyExplanation:
     is_minimal: bool
     removal: tuple[Part, ...]
     left_out: int = 0
+
+    def __repr__(self) -> str:
+        return f"<no supervisor: {len(self.blamed) + self.left_out} parts of the model are to blame>"
+
+    def __str__(self) -> str:
+        from robosc.explanation.text import empty_text
+
+        return empty_text(self).rstrip()
+
+    def _repr_html_(self) -> str:
+        return html_text(str(self))
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,7 +227,7 @@ class Remark:
     stopped: Stopped | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Explanation:
     """Explanation of what synthesis did to a model.
 
@@ -230,6 +242,21 @@ class Explanation:
     events: tuple[EventReport, ...] = ()
     state: StateReport | None = None
     remarks: tuple[Remark, ...] = ()
+
+    def __repr__(self) -> str:
+        if self.empty is not None:
+            return repr(self.empty)
+        if self.state is not None:
+            return f"<explanation of one state: {len(self.state.events)} events>"
+        return f"<explanation: {len(self.events)} events, {len(self.remarks)} remarks>"
+
+    def __str__(self) -> str:
+        from robosc.explanation.text import explanation_text
+
+        return explanation_text(self).rstrip()
+
+    def _repr_html_(self) -> str:
+        return html_text(str(self))
 
 
 def document(explanation: Explanation | EmptyExplanation) -> dict[str, Any]:

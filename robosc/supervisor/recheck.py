@@ -45,6 +45,9 @@ class StateInWords:
     variables: dict[str, Value]
     communications: dict[str, str]
 
+    def __str__(self) -> str:
+        return self.text()
+
     def text(self) -> str:
         """In one line."""
         values = {

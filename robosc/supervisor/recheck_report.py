@@ -1,10 +1,15 @@
-"""Findings about a supervisor that was handed over, for machines."""
+"""Findings about a supervisor that was handed over, for machines and for people."""
+
+from collections.abc import Mapping
+from typing import Any
 
 from robosc.errors import InvalidSupervisorError
 from robosc.json_documents import diagnostics_json
 from robosc.signatures import SignatureError
-from robosc.supervisor.recheck import Fault, Recheck
+from robosc.source import visible
+from robosc.supervisor.recheck import Fault, Recheck, StateInWords
 from robosc.supervisor.structure import Supervisor
+from robosc.verification import Outcome
 
 
 def has_passed(found: Recheck, *, is_strict: bool) -> bool:
@@ -53,3 +58,51 @@ def _fault_json(fault: Fault) -> dict[str, object]:
             },
         }
     return document
+
+
+def recheck_text(
+    document: Mapping[str, Any], supervisor: str = "", model: str = "its model", *, is_quiet: bool = False
+) -> str:
+    """Return the findings for people, as lines.
+
+    Args:
+        document: Document as `recheck_json` makes it.
+        supervisor: Name of the supervisor; empty: the lines begin without one.
+        model: Name of the model.
+        is_quiet: True if only what is wrong is told.
+    """
+    lines: list[str] = []
+    checks, is_right = document["checks"], document["status"] == "passed"
+    subject = f"{supervisor}: " if supervisor else ""
+    if document["diagnostics"]:
+        lines.append(f"{subject}failed: the texts hold no model that it could be for")
+    elif document["faults"]:
+        lines.append(f"{subject}failed: no right supervisor of {model}")
+    elif not is_right:
+        unchecked = [name.replace("_", " ") for name, outcome in checks.items() if outcome == Outcome.NOT_CHECKED]
+        lines.append(f"{subject}not checked: {', '.join(unchecked)}")
+    else:
+        lines.append(f"{subject}passed: a right supervisor of {model}")
+    if not document["diagnostics"] and not is_quiet:
+        lines += [f"  {name.replace('_', ' '):<21} {outcome}" for name, outcome in checks.items()]
+        if document["method"] is not None:
+            figures = [f"{document[name]} {name}" for name in ("states", "transitions") if document[name] is not None]
+            lines += [f"  {'controlled':<21} {', '.join(figures) or 'not counted'} ({document['deployment']})"]
+            lines.append(f"  {'method':<21} {document['method']}")
+    for fault in document["faults"]:
+        lines += _fault_lines(fault)
+    if not is_quiet:
+        lines += [f"note: {note}" for note in document["remarks"]]
+    return "" if is_right and is_quiet else "".join(f"{visible(line)}\n" for line in lines)
+
+
+def _fault_lines(fault: Mapping[str, Any]) -> list[str]:
+    name = fault["check"].replace("_", " ")
+    if "trace" not in fault:
+        return [f"{name}: {fault['message']}"]
+    run = "after" if fault["shortest"] else "after (there may be shorter runs)"
+    return [
+        f"not {name}: {fault['message']}",
+        f"  {run}: {', '.join(fault['trace']) or 'nothing: it is so at the start'}",
+        f"  in: {StateInWords(**fault['state']).text()}",
+    ]

@@ -130,3 +130,10 @@ class Supervisor(msgspec.Struct, frozen=True):
     def added_condition(self, event: str) -> DecisionDiagram | None:
         """The condition added to an event, or None where nothing is added."""
         return next((item.condition for item in self.added if item.event == event), None)
+
+    def __repr__(self) -> str:
+        certificate = self.certificate
+        return (
+            f"<supervisor of {self.model.name}: {self.deployment}, {certificate.states} states, "
+            f"conditions added to {len(self.added)} event{'s' if len(self.added) != 1 else ''}>"
+        )

@@ -1,6 +1,7 @@
 """A supervisor in figures and words: what `synth` prints, on this machine or from a service."""
 
 import textwrap
+from collections.abc import Sequence
 
 import msgspec
 
@@ -8,7 +9,7 @@ from robosc.automata import System, to_automata
 from robosc.expressions import TRUE, Expression
 from robosc.model.structure import Model
 from robosc.supervisor.diagram import diagram_domains
-from robosc.supervisor.structure import Certificate, DecisionDiagram, Supervisor
+from robosc.supervisor.structure import AddedCondition, Certificate, DecisionDiagram, Supervisor
 from robosc.supervisor.words import Formulas, diagram_lines, in_words, size_in_words
 
 _WIDTH = 100
@@ -26,7 +27,7 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
     variables = _variables(supervisor.model)
     certificate = supervisor.certificate
     domains, components = diagram_domains(system), _components(supervisor)
-    added = _added(supervisor, system)
+    added = added_formulas(supervisor.added, system)
     return {
         "model": supervisor.model.name,
         "deployment": str(supervisor.deployment),
@@ -40,7 +41,7 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
         "requirements": len(supervisor.model.requirements),
         "states": int(certificate.states),
         "transitions": None if certificate.transitions is None else int(certificate.transitions),
-        "added": {event: _told(diagram, formula, components) for event, diagram, formula in added},
+        "added": {event: told(diagram, formula, components) for event, diagram, formula in added},
         "diagrams": {
             event: [line.json() for line in diagram_lines(diagram, domains, components)]
             for event, diagram, formula in added
@@ -91,42 +92,53 @@ def summary_text(supervisor: Supervisor) -> str:
 def added_texts(supervisor: Supervisor, system: System) -> dict[str, str]:
     """For each controllable event what the supervisor adds, in the model's words; `true` where nothing."""
     components = _components(supervisor)
-    return {event: _told(diagram, formula, components) for event, diagram, formula in _added(supervisor, system)}
+    return {
+        event: told(diagram, formula, components)
+        for event, diagram, formula in added_formulas(supervisor.added, system)
+    }
 
 
 def _components(supervisor: Supervisor) -> frozenset[str]:
     return frozenset(item.name for item in supervisor.model.components)
 
 
-def _added(supervisor: Supervisor, system: System) -> list[tuple[str, DecisionDiagram, Expression | None]]:
-    """For each controllable event what the supervisor adds, and its formula if there is one that reads well."""
+def added_formulas(
+    added: Sequence[AddedCondition], system: System
+) -> list[tuple[str, DecisionDiagram, Expression | None]]:
+    """For each controllable event what a supervisor adds, and its formula if there is one that reads well.
+
+    Args:
+        added: Conditions that the supervisor adds.
+        system: Automata that it supervises.
+    """
     formulas = Formulas(diagram_domains(system))
     events = [event.name for event in system.events if event.is_controllable]
-    diagrams = {item.event: item.condition for item in supervisor.added}
+    diagrams = {item.event: item.condition for item in added}
     return [
         (event, diagram, formulas.formula(diagram))
         for event, diagram in ((event, diagrams.get(event, _TRUE)) for event in events)
     ]
 
 
-def _told(diagram: DecisionDiagram, formula: Expression | None, components: frozenset[str]) -> str:
+def told(diagram: DecisionDiagram, formula: Expression | None, components: frozenset[str]) -> str:
+    """A condition in one line: its formula, or the size of its diagram where it has none that reads well."""
     return size_in_words(diagram) if formula is None else in_words(formula, components)
 
 
 def added_lines(supervisor: Supervisor, system: System) -> list[str]:
     """Return the added conditions for people: formulas, and the lines of diagrams as long as they are few."""
     domains, components = diagram_domains(system), _components(supervisor)
-    added = _added(supervisor, system)
+    added = added_formulas(supervisor.added, system)
     width = max((len(event) for event, _, _ in added), default=0)
     lines: list[str] = []
     left = _LINES
     for event, diagram, formula in added:
-        told = [] if formula is not None else diagram_lines(diagram, domains, components)
-        left -= sum(1 + line.operands for line in told)
-        parts = [_told(diagram, formula, components) if formula != TRUE else "nothing"]
-        if told and left >= 0:
-            parts = [f"{parts[0]}, to be read from [1] on:", *map(str, told)]
-        elif told:
+        nodes = [] if formula is not None else diagram_lines(diagram, domains, components)
+        left -= sum(1 + line.operands for line in nodes)
+        parts = [told(diagram, formula, components) if formula != TRUE else "nothing"]
+        if nodes and left >= 0:
+            parts = [f"{parts[0]}, to be read from [1] on:", *map(str, nodes)]
+        elif nodes:
             parts = [f"{parts[0]}; --json tells it node by node"]
         wrapped = [row for part in parts for row in _wrapped(part)]
         lines += [f"{name:<{width}}  {row}" for name, row in zip([event, *[""] * len(wrapped)], wrapped, strict=False)]

@@ -10,7 +10,7 @@ from robosc.targets.controller_config import (
     ControllerConfigError,
     read_controller_config,
 )
-from robosc.targets.everything import ALL, generated, refusals, require_generatable
+from robosc.targets.everything import ALL, Written, generated, refusals, require_generatable, write_generated
 from robosc.targets.files import GeneratedFiles, OverwriteError, Removal, remove_earlier, write_files
 from robosc.targets.judgement import judged_for
 from robosc.targets.registry import (
@@ -36,6 +36,7 @@ __all__ = [
     "SupervisedController",
     "TargetInfo",
     "UnknownTargetError",
+    "Written",
     "available_targets",
     "generate",
     "generated",
@@ -47,4 +48,5 @@ __all__ = [
     "require_generatable",
     "require_target",
     "write_files",
+    "write_generated",
 ]

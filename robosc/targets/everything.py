@@ -1,10 +1,13 @@
 """One target's files, or those of all targets that can do a model, each in a folder of its own."""
 
+from dataclasses import dataclass, field
+from pathlib import Path
+
 from robosc._version import __version__
 from robosc.errors import UnsupportedModelError
 from robosc.supervisor.make import Made
 from robosc.supervisor.structure import Supervisor
-from robosc.targets.files import GeneratedFiles
+from robosc.targets.files import GeneratedFiles, Removal, remove_earlier, write_files
 from robosc.targets.judgement import judged_for
 from robosc.targets.registry import (
     GENERAL_ERRORS,
@@ -117,3 +120,42 @@ def refusals(files: GeneratedFiles, target: str) -> tuple[str, ...]:
         return ()
     there = {path.partition("/")[0] for path in files}
     return tuple(info.name for info in available_targets() if info.name not in there)
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Written:
+    """Outcome of writing what was generated.
+
+    Attributes:
+        files: Path of every generated file, sorted.
+        left_out: Targets that are not among the files of all of them.
+        removal: Outcome for what an earlier run generated for those.
+    """
+
+    files: tuple[Path, ...]
+    left_out: tuple[str, ...] = ()
+    removal: Removal = field(default_factory=Removal)
+
+    def __repr__(self) -> str:
+        return f"<{len(self.files)} files written>"
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.files))
+
+
+def write_generated(files: GeneratedFiles, target: str, folder: Path, *, force: bool = False) -> Written:
+    """Write generated files into a folder; of targets that were left out, what an earlier run generated goes.
+
+    Args:
+        files: The files.
+        target: Name of their target, or `ALL`.
+        folder: The folder.
+        force: True if files are replaced even where somebody has changed them.
+
+    Raises:
+        OverwriteError: A file was changed by somebody; nothing was written.
+        UnwritableError: The place cannot be written.
+    """
+    left_out = refusals(files, target)
+    written = write_files(files, folder, force)
+    return Written(written, left_out, remove_earlier(folder, left_out) if left_out else Removal())

@@ -64,8 +64,8 @@ def test_services_and_actions_and_silent_components() -> None:
     made = model(action("go"), incoming("move"), component("Base", "on*"), needs("go", StateTest("Base", "on")))
     graph = explore(to_automata(made, Deployment.CONTROLLER), {"move.request": lambda at: False}, made)
     first = graph.states[0]
-    assert first.components == (("Base", "on"),)
-    assert first.communications == (("go", "idle"),)
+    assert first.components == {"Base": "on"}
+    assert first.communications == {"go": "idle"}
     assert first.enabled == ("go.request",)
     assert graph.transitions[0] == (0, "go.request", 1)
     # The requirement always holds, so nothing may be cancelled.
@@ -81,7 +81,7 @@ def test_states_are_numbered_breadth_first() -> None:
         ),
     )
     graph = explore(to_automata(made, Deployment.CONTROLLER), {}, made)
-    assert [item.components[0][1] for item in graph.states] == ["s", "u", "t", "v"]
+    assert [item.components["C"] for item in graph.states] == ["s", "u", "t", "v"]
     assert graph.transitions == ((0, "a.request", 1), (0, "b.request", 2), (1, "a.request", 3), (2, "a.request", 3))
 
 

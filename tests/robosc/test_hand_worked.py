@@ -62,7 +62,9 @@ def _graph(text: str, deployment: Deployment = CONTROLLER) -> Graph:
         symbolic = state_predicates(system, synthesize(system, engine=engine).added)
         assert explore(system, symbolic, model) == graph
     names = [
-        " ".join(str(value) for _, value in (*item.components, *item.variables, *item.communications))
+        " ".join(
+            str(value) for values in (item.components, item.variables, item.communications) for value in values.values()
+        )
         for item in graph.states
     ]
     result: Graph = {name: {} for name in names}

@@ -21,10 +21,10 @@ from robosc.cli.properties import add_arguments as add_property_arguments
 from robosc.cli.properties import property_file
 from robosc.cli.sign import read_supervisor
 from robosc.cli.synth import reasons_json, report_reasons
-from robosc.cli.verify import FOREIGN_STATES
 from robosc.exploration import DEFAULT_LIMIT
 from robosc.json_documents import diagnostics_json, json_text
 from robosc.model.structure import Deployment
+from robosc.pipeline.options import FOREIGN_STATES
 from robosc.source import Bundle, SourceFile, visible
 from robosc.targets import ControllerConfigError, GenerateOptions, read_controller_config, write_files
 from robosc_client import (

@@ -21,6 +21,12 @@ from robosc.model.structure import EnumDefinition, Model
 _NO_STATE: Mapping[Any, Any] = {}
 
 
+class EnumChoice(str):
+    """A value of an enum itself, instead of what it is made of: the rules of the enum leave it alone."""
+
+    __slots__ = ()
+
+
 class Reader:
     """Converts received data of one model."""
 
@@ -147,6 +153,8 @@ class _Datum:
 
     def _enum_value(self, raw: Any, enum: _CompiledEnum, path: Path) -> str:
         """The value of the first rule that is true, else the default."""
+        if isinstance(raw, EnumChoice):
+            return str(raw)
         source = _Datum(self._reader, enum.source, raw)
         value, was_unknown = enum.default, False
         for condition, result in enum.rules:

@@ -75,7 +75,7 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
 PRELOADED = ("robosc",)
 """Packages that are loaded, with all that is in them, before processes are forked that do tasks."""
 
-NOT_PRELOADED = ("robosc.cli", "robosc.event_logs", "robosc.starter")
+NOT_PRELOADED = ("robosc.cli", "robosc.event_logs", "robosc.pipeline", "robosc.starter")
 """No task needs these, and what draws pictures starts threads."""
 
 

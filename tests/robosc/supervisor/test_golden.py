@@ -40,7 +40,7 @@ def made(path: Path) -> tuple[Supervisor, System]:
 @pytest.fixture(autouse=True)
 def _searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Cache with which anything that is reported in several ways is searched for once."""
-    monkeypatch.setattr(summary, "_added", cache(summary._added))
+    monkeypatch.setattr(summary, "added_formulas", cache(summary.added_formulas))
 
 
 def words(supervisor: Supervisor, system: System) -> str:

@@ -1,0 +1,119 @@
+"""Conditions that a supervisor adds to events, in the model's words."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from robosc.automata import System
+from robosc.errors import UnknownNameError
+from robosc.expressions import TRUE, Expression
+from robosc.model.findings import did_you_mean
+from robosc.supervisor.diagram import diagram_domains
+from robosc.supervisor.structure import AddedCondition, DecisionDiagram
+from robosc.supervisor.summary import added_formulas, told
+from robosc.supervisor.words import Line, diagram_lines
+from robosc.tables import html_table, html_text
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Condition:
+    """Condition that a supervisor adds to one event.
+
+    Attributes:
+        event: The event.
+        text: The condition in one line, in the model's words; `true` where nothing is added. Of a condition without
+            a formula that reads well, the size of its diagram.
+        formula: The condition as an expression, or None where none reads well.
+        diagram: The condition as a decision diagram, which is what counts.
+        lines: The diagram's nodes in words, the root first; empty where there is a formula.
+    """
+
+    event: str
+    text: str
+    formula: Expression | None = field(hash=False)
+    diagram: DecisionDiagram
+    lines: tuple[Line, ...] = ()
+
+    @property
+    def adds_nothing(self) -> bool:
+        """True if the supervisor leaves the event as plants and requirements have it."""
+        return self.formula == TRUE
+
+    def __repr__(self) -> str:
+        return f"<{self.event} needs {self.text}>"
+
+    def __str__(self) -> str:
+        if not self.lines:
+            return self.text
+        return "\n".join([f"{self.text}, to be read from [1] on:", *map(str, self.lines)])
+
+    def _repr_html_(self) -> str:
+        return html_text(str(self))
+
+
+class Conditions(Mapping[str, Condition]):
+    """For each controllable event, in source order, what a supervisor adds to it."""
+
+    __slots__ = ("_conditions",)
+
+    def __init__(self, conditions: Sequence[Condition]) -> None:
+        self._conditions = {item.event: item for item in conditions}
+
+    def __getitem__(self, event: str) -> Condition:
+        try:
+            return self._conditions[event]
+        except KeyError:
+            raise UnknownNameError(unknown_event(event, self._conditions, "controllable event")) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._conditions)
+
+    def __len__(self) -> int:
+        return len(self._conditions)
+
+    def __contains__(self, event: object) -> bool:
+        return event in self._conditions
+
+    def __repr__(self) -> str:
+        added = sum(not item.adds_nothing for item in self._conditions.values())
+        return f"<conditions of {len(self)} controllable events; something is added to {added}>"
+
+    def __str__(self) -> str:
+        return "\n".join(f"{event} needs {condition}" for event, condition in self._conditions.items())
+
+    def _repr_html_(self) -> str:
+        return html_table(("event", "the supervisor adds"), self._conditions.items())
+
+
+def unknown_event(event: object, known: Sequence[str] | Mapping[str, object], what: str = "event") -> str:
+    """Return the message that there is no such event, with the nearest one that there is."""
+    near = did_you_mean(str(event), known)
+    hint = f"did you mean '{near}'?" if near else f"there are {', '.join(known) or 'none'}"
+    return f"there is no {what} {str(event)!r:.100}; {hint}"
+
+
+def conditions_of(added: Sequence[AddedCondition], system: System, components: frozenset[str]) -> Conditions:
+    """Return what a supervisor adds to each controllable event.
+
+    Args:
+        added: Conditions that the supervisor adds.
+        system: Automata that it supervises.
+        components: Names of the automata that go by their own names in conditions.
+    """
+    found = added_formulas(added, system)
+    return Conditions([condition_of(event, diagram, formula, system, components) for event, diagram, formula in found])
+
+
+def condition_of(
+    event: str, diagram: DecisionDiagram, formula: Expression | None, system: System, components: frozenset[str]
+) -> Condition:
+    """Return a condition in words.
+
+    Args:
+        event: Event that it is about.
+        diagram: The condition.
+        formula: The same as an expression, or None where none reads well.
+        system: Automata that it is about.
+        components: Names of the automata that go by their own names in conditions.
+    """
+    lines = () if formula is not None else diagram_lines(diagram, diagram_domains(system), components)
+    return Condition(event, told(diagram, formula, components), formula, diagram, lines)

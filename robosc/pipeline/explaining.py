@@ -1,0 +1,155 @@
+"""Explanation: of what synthesis did to a model, and of findings."""
+
+from dataclasses import dataclass
+from typing import overload
+
+from robosc.diagnostics import Page, page
+from robosc.errors import Diagnostic, UnsupportedModelError
+from robosc.explanation import Explanation, explain_synthesis
+from robosc.model.structure import Deployment
+from robosc.pipeline.findings import Findings
+from robosc.pipeline.loading import ModelLike, loaded
+from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
+from robosc.pipeline.results import NoSupervisor, Outcome, SynthesisStatus
+from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, never
+from robosc.source import Bundle
+from robosc.supervisor import Made, Prepared, Progress, prepare
+from robosc.synthesis import EngineOptions
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Explained(Outcome):
+    """Result of an explanation.
+
+    Attributes:
+        status: Outcome of the synthesis.
+        diagnostics: Every finding about the model, sorted by place.
+        reason: Reason why there is no explanation, in one sentence; empty where there is one.
+        explanation: The explanation; of a model that has errors or cannot be handled, what says so.
+    """
+
+    status: SynthesisStatus
+    diagnostics: Findings
+    reason: str
+    explanation: Explanation | NoSupervisor
+
+    def _made(self) -> object:
+        return self.explanation if isinstance(self.explanation, Explanation) else None
+
+
+@overload
+def explain(model: Diagnostic) -> Page: ...
+
+
+@overload
+def explain(*, code: str) -> Page: ...
+
+
+@overload
+def explain(
+    model: ModelLike,
+    options: SynthesisOptions = DEFAULT_OPTIONS,
+    *,
+    event: str | None = None,
+    state: str | None = None,
+    after: str | None = None,
+    on_progress: OnProgress = ignored,
+    should_stop: ShouldStop = never,
+) -> Explained: ...
+
+
+def explain(
+    model: ModelLike | Diagnostic | None = None,
+    options: SynthesisOptions = DEFAULT_OPTIONS,
+    *,
+    code: str | None = None,
+    event: str | None = None,
+    state: str | None = None,
+    after: str | None = None,
+    on_progress: OnProgress = ignored,
+    should_stop: ShouldStop = never,
+) -> Explained | Page:
+    """Explain what synthesis did to a model: what restricts its events, or what is to blame; or explain a finding.
+
+    Args:
+        model: The model, as `load` returns it, or the path of one; or a finding, whose code is explained.
+        options: Options for making the supervisor.
+        code: Code of a finding to explain, such as `unknown-name`, instead of a model.
+        event: The event to explain; None: all of them, and warnings.
+        state: Description of a state in which to explain what can happen, such as `Door.closed, Lift.n = 2`.
+        after: Run after which to explain what can happen, such as `open, jam.response`.
+        on_progress: Function called with the progress of the work.
+        should_stop: Function called before each step; once it returns true, the work ends.
+
+    Raises:
+        TypeError: Neither a model nor a code is given, or both are.
+        UnknownCodeError: There is no such code.
+        RequestError: Something that is asked about is not there: an event, a part of the model, a state, a run.
+        FileAccessError: The file is not there or cannot be read.
+        LanguageError: A file is too large or not UTF-8.
+        NodeLimitError: Decision diagrams became larger than the options allow.
+        UnknownEngineError: There is no such engine.
+        SynthesisCancelled: `should_stop` became true.
+    """
+    if (model is None) == (code is None):
+        raise TypeError("explain takes either a model or finding, or code=..., the code of a finding")
+    if isinstance(model, Diagnostic):
+        return page(model.code)
+    if model is None:
+        return page(str(code))
+    bundle = loaded(model)
+    try:
+        found = explained(
+            bundle,
+            options.deployment,
+            options.engine_options(),
+            event=event,
+            state=state,
+            after=after,
+            on_progress=on_progress,
+            should_stop=should_stop,
+        )
+    except UnsupportedModelError as error:
+        attempt = Unsupported(str(error))
+        diagnostics = findings_of(attempt, bundle)
+        return Explained(
+            SynthesisStatus.UNSUPPORTED_MODEL, diagnostics, attempt.reason, NoSupervisor(attempt.reason, diagnostics)
+        )
+    if isinstance(found, Made):
+        diagnostics = Findings(found.diagnostics, bundle)
+        return Explained(
+            SynthesisStatus.MODEL_ERRORS, diagnostics, found.reason, NoSupervisor(found.reason, diagnostics)
+        )
+    prepared, explanation = found
+    status = SynthesisStatus.SUPERVISOR if explanation.empty is None else SynthesisStatus.EMPTY
+    return Explained(status, Findings(prepared.diagnostics, bundle), "", explanation)
+
+
+def explained(
+    bundle: Bundle,
+    deployment: Deployment,
+    engine: EngineOptions,
+    *,
+    event: str | None = None,
+    state: str | None = None,
+    after: str | None = None,
+    on_progress: OnProgress = ignored,
+    should_stop: ShouldStop = never,
+) -> Made | tuple[Prepared, Explanation]:
+    """Return the prepared model and what synthesis did to it; or how it ended before synthesis."""
+    prepared = prepare(bundle, deployment)
+    if isinstance(prepared, Made):
+        return prepared
+    explanation = explain_synthesis(
+        prepared.model,
+        prepared.places,
+        prepared.system,
+        deployment=deployment,
+        engine=engine,
+        event=event,
+        state=state,
+        after=after,
+        should_stop=should_stop,
+        on_progress=lambda step: on_progress(Progress("synthesis", str(step))),
+    )
+    return prepared, explanation

@@ -1,0 +1,77 @@
+"""Files of a user, read within bounds and written whole or not at all."""
+
+import errno
+import os
+import tempfile
+from pathlib import Path
+
+from robosc.errors import RoboscError
+
+
+class FileAccessError(RoboscError, OSError):
+    """A file or folder that is not there, or cannot be read or written."""
+
+
+def given_path(name: str | os.PathLike[str]) -> Path:
+    """A file or folder that a caller names.
+
+    Raises:
+        FileAccessError: The name is empty; that is no name of the current folder.
+    """
+    text = os.fspath(name)
+    if not text:
+        raise FileAccessError("the name of a file or folder is empty")
+    return Path(text)
+
+
+def read_bounded(path: Path, most: int) -> bytes:
+    """Return the bytes of a file; of one that has more than allowed, one byte too many.
+
+    Args:
+        path: The file.
+        most: Bytes that are allowed.
+
+    Raises:
+        FileAccessError: It cannot be read.
+    """
+    try:
+        with path.open("rb") as stream:
+            # One byte more than is allowed tells that there are too many; a device could go on for ever.
+            return stream.read(most + 1)
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a result file whole or not at all; what is no plain file (a device, a pipe) is written to as it is.
+
+    Raises:
+        FileAccessError: The place cannot be written.
+    """
+    temporary: Path | None = None
+    try:
+        target = Path(os.path.realpath(path))
+        if target.is_symlink():
+            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
+        if target.exists() and not target.is_file():
+            with target.open("wb") as place:
+                place.write(content)
+            return
+        mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+        temporary = Path(name)
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        temporary.chmod(mode)
+        temporary.replace(target)
+    except OSError as error:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+        raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def _umask() -> int:
+    """The permissions that this process takes from new files; it can only be read by setting it."""
+    mask = os.umask(0o077)
+    os.umask(mask)
+    return mask

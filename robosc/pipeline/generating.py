@@ -1,0 +1,68 @@
+"""Generation of what runs a supervisor."""
+
+from dataclasses import replace
+
+from robosc.errors import UnsupportedModelError
+from robosc.pipeline.findings import Findings
+from robosc.pipeline.loading import ModelLike, loaded
+from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
+from robosc.pipeline.results import Generation, SynthesisStatus
+from robosc.pipeline.supervisors import Supervisor
+from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, make, never, status_of
+from robosc.supervisor import Made, MadeStatus, Progress
+from robosc.supervisor.structure import Supervisor as CoreSupervisor
+from robosc.targets import GenerateOptions, generated, require_generatable
+
+DEFAULT_GENERATION = GenerateOptions()
+
+
+def generate(
+    model: ModelLike | CoreSupervisor,
+    target: str,
+    generation: GenerateOptions = DEFAULT_GENERATION,
+    options: SynthesisOptions = DEFAULT_OPTIONS,
+    *,
+    on_progress: OnProgress = ignored,
+    should_stop: ShouldStop = never,
+) -> Generation:
+    """Generate the files of a target around a supervisor, which is made of a model unless it is given.
+
+    Nothing is written: that is `write` of the result.
+
+    Args:
+        model: A supervisor that was made, what `load` returns, or the path of a model.
+        target: Name of the target, or `all`.
+        generation: Choices about the files.
+        options: Options for making the supervisor of a model.
+        on_progress: Function called with the progress of the work.
+        should_stop: Function called again and again; once it returns true, the work ends.
+
+    Raises:
+        UnknownTargetError: There is no such target.
+        FileAccessError: The file is not there or cannot be read.
+        LanguageError: A file is too large or not UTF-8.
+        NodeLimitError: Decision diagrams became larger than the options allow.
+        UnknownEngineError: There is no such engine.
+        SynthesisCancelled: `should_stop` became true.
+    """
+    require_generatable(target)
+    if isinstance(model, CoreSupervisor):
+        diagnostics = model.diagnostics if isinstance(model, Supervisor) else ()
+        return _generation(Made(MadeStatus.SUPERVISOR, model, diagnostics), target, generation, on_progress)
+    bundle = loaded(model)
+    attempt = make(bundle, options, on_progress, should_stop, allow_livelock=options.allow_livelock)
+    if isinstance(attempt, Unsupported):
+        status, reason = status_of(attempt)
+        return Generation(status, findings_of(attempt, bundle), reason, None, target=target)
+    found = _generation(attempt, target, generation, on_progress)
+    return replace(found, diagnostics=Findings(found.diagnostics, bundle))
+
+
+def _generation(made: Made, target: str, generation: GenerateOptions, on_progress: OnProgress) -> Generation:
+    on_progress(Progress("generation", target))
+    try:
+        judged, files = generated(made, target, generation)
+    except UnsupportedModelError as error:
+        return Generation(SynthesisStatus.UNSUPPORTED_MODEL, made.diagnostics, str(error), None, target=target)
+    status = SynthesisStatus(str(judged.status))
+    return Generation(status, judged.diagnostics, judged.reason, files, judged.explanation, target)

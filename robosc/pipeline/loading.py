@@ -1,0 +1,178 @@
+"""Models that are loaded: from files, as the command line finds them, or from a text."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from robosc.pipeline.files import FileAccessError, given_path
+from robosc.source import Bundle, SourceFile
+
+type FileName = str | os.PathLike[str]
+"""Name of a file or folder."""
+
+TEXT_NAME = "model.rscd"
+"""Name of a model that is given as a text, in findings about it."""
+
+
+class LoadedModel(Bundle):
+    """Texts of a model and of the libraries that it imports: read, not yet checked.
+
+    It is a `robosc.source.Bundle`, so whatever takes the texts of a model takes it.
+    """
+
+    __slots__ = ()
+
+    @property
+    def name(self) -> str:
+        """Name of the model's file."""
+        return self.main.name
+
+    def __repr__(self) -> str:
+        lines = len(self.main.text.splitlines())
+        parts = [f"{lines} line{'s' if lines != 1 else ''}"]
+        if self.libraries:
+            parts.append(f"libraries {', '.join(file.name for file in self.libraries)}")
+        return f"<model {self.main.name}: {', '.join(parts)}>"
+
+    def __str__(self) -> str:
+        return self.main.text
+
+    def _repr_markdown_(self) -> str:
+        """Return the page that `robosc doc` writes; of a text that holds no robot without errors, the text."""
+        from robosc.documentation import page
+        from robosc.model import check
+
+        checked = check(self)
+        if checked.model is None:
+            return f"```robosc\n{self.main.text.rstrip()}\n```\n"
+        return page(checked.model, checked.diagnostics)
+
+
+type ModelLike = Bundle | FileName
+"""A model where one is wanted: what `load` returns, or the name of a file."""
+
+
+def load(
+    path: FileName | None = None,
+    *,
+    text: str | None = None,
+    name: str = TEXT_NAME,
+    library_paths: Sequence[FileName] = (),
+    interface_paths: Sequence[FileName] = (),
+) -> LoadedModel:
+    """Load a model or library, with the libraries that it imports; `check` tells what is wrong with it.
+
+    Libraries are looked for in the model's folder, in its sibling `../shared` and in `library_paths`; those of a text
+    as if it were a file of the current folder.
+
+    Args:
+        path: File of the model.
+        text: Text of the model, instead of a file.
+        name: Name of that text in findings.
+        library_paths: More folders with libraries, as `-L` of the command line.
+        interface_paths: Folders with ROS packages whose .msg, .srv and .action files the model is checked against, as
+            `-I` of the command line; those of an installed ROS are always searched.
+
+    Raises:
+        TypeError: Neither a file nor a text is given, or both are.
+        FileAccessError: A file or folder is not there or cannot be read.
+        LanguageError: A file is too large or not UTF-8.
+    """
+    if (path is None) == (text is None):
+        raise TypeError("load takes either the path of a model or text=..., the model itself")
+    libraries, interfaces = ([given_path(item) for item in paths] for paths in (library_paths, interface_paths))
+    if path is None:
+        bundle = read_model(given_path(name), libraries, interfaces, text)
+    else:
+        bundle = read_model(_model_path(path), libraries, interfaces)
+    return _loaded(bundle)
+
+
+def loaded(model: ModelLike) -> LoadedModel:
+    """A model that a function was given, loaded if it is the name of a file.
+
+    Raises:
+        TypeError: It is neither.
+        FileAccessError, LanguageError: As `load`.
+    """
+    if isinstance(model, LoadedModel):
+        return model
+    if isinstance(model, Bundle):
+        return _loaded(model)
+    if isinstance(model, str | os.PathLike):
+        return load(model)
+    raise TypeError(
+        f"a model is the path of a file or what robosc.load returns, not {type(model).__name__}: {model!r:.80}"
+    )
+
+
+def read_model(
+    model: Path, library_paths: Sequence[Path], interface_paths: Sequence[Path], text: str | None = None
+) -> Bundle:
+    """Read a model and its libraries, with the definitions of an installed ROS.
+
+    Args:
+        model: File of the model.
+        library_paths: More folders with libraries.
+        interface_paths: More folders with ROS packages.
+        text: Text of the model, which then need not be a file.
+
+    Raises:
+        FileAccessError: The file or a folder is not there or cannot be read.
+        LanguageError: A file is too large or not UTF-8.
+    """
+    from robosc.language import decode_source, load_bundle
+    from robosc.language.interfaces import interface_folders
+
+    try:
+        if text is None:
+            if model.is_dir():
+                raise FileAccessError(f"{model} is a folder, not a model's file")
+            if not model.exists():
+                raise FileAccessError(f"there is no file {model}")
+        for what, folders in (("library", library_paths), ("interface", interface_paths)):
+            for folder in folders:
+                if not folder.is_dir():
+                    raise FileAccessError(f"there is no {what} folder {folder}")
+        unsaved = {}
+        if text is not None:
+            # What cannot be UTF-8 is refused as in a file.
+            unsaved[os.path.realpath(model)] = decode_source(text.encode("utf-8", "surrogatepass"), model.name)
+        return load_bundle(model, library_paths, (*interface_paths, *interface_folders()), unsaved)
+    except FileAccessError:
+        raise
+    except OSError as error:
+        raise FileAccessError(f"cannot read {error.filename or model}: {error.strerror or error}") from error
+
+
+def _model_path(path: FileName) -> Path:
+    """The path of a model.
+
+    Raises:
+        FileAccessError: It is empty, or is a model's text.
+    """
+    if isinstance(path, str) and ("{" in path or "\n" in path) and not Path(path).exists():
+        raise FileAccessError("this is the text of a model, not the path of one: load it with robosc.load(text=...)")
+    return given_path(path)
+
+
+def _loaded(bundle: Bundle) -> LoadedModel:
+    return LoadedModel(bundle.main, bundle.libraries, bundle.searched, bundle.interfaces)
+
+
+def property_file(file: FileName | SourceFile) -> SourceFile:
+    """A file of properties, read unless it is at hand.
+
+    Raises:
+        FileAccessError: It is not there or cannot be read.
+        LanguageError: It is no text.
+    """
+    from robosc.language import read_source
+
+    if isinstance(file, SourceFile):
+        return file
+    path = given_path(file)
+    try:
+        return SourceFile(str(path), read_source(path, str(path)))
+    except OSError as error:
+        raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error

@@ -1,0 +1,55 @@
+"""Options for making a supervisor, on this machine or on a server."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from robosc.model.structure import Deployment
+
+if TYPE_CHECKING:
+    from robosc.synthesis import EngineOptions
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SynthesisOptions:
+    """Options for making a supervisor.
+
+    Attributes:
+        deployment: Place where the supervisor will stand.
+        engine: Name of the engine for decision diagrams, or `auto`, the fastest that is installed.
+        allow_livelock: True if a supervisor is made even if silent steps of its controller never end.
+        allow_reordering: True if the engine may change the order of its variables while it works.
+        maximum_nodes: Nodes of decision diagrams beyond which the work is given up; None: no limit of the caller's.
+        verified_states: States up to which the supervisor is verified one by one; None: 200,000.
+
+    Raises:
+        ValueError: There is no such deployment.
+    """
+
+    deployment: Deployment = Deployment.CONTROLLER
+    engine: str = "auto"
+    allow_livelock: bool = False
+    allow_reordering: bool = False
+    maximum_nodes: int | None = None
+    verified_states: int | None = None
+
+    def __post_init__(self) -> None:
+        # A text equals its deployment without being it, and would silently be taken for the other one.
+        object.__setattr__(self, "deployment", Deployment(self.deployment))
+
+    def engine_options(self) -> "EngineOptions":
+        """The same for the engine of this machine.
+
+        Raises:
+            ValueError: No diagram fits into so few nodes.
+        """
+        from robosc.synthesis import EngineOptions
+
+        if self.maximum_nodes is not None and self.maximum_nodes < 1:
+            raise ValueError(f"maximum_nodes is {self.maximum_nodes}, and must be at least 1")
+        return EngineOptions(self.engine, self.allow_reordering, self.maximum_nodes)
+
+
+DEFAULT_OPTIONS = SynthesisOptions()
+
+FOREIGN_STATES = 1_000_000
+"""States up to which a foreign supervisor is searched one by one: a minute or so at most."""

@@ -1,0 +1,241 @@
+"""Results of tasks, as values: the same whether this machine did them or a server."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from robosc.errors import Diagnostic, RoboscError
+from robosc.explanation import EmptyExplanation
+from robosc.pipeline.files import given_path
+from robosc.pipeline.findings import Findings
+from robosc.pipeline.loading import FileName
+from robosc.source import visible
+from robosc.tables import html_table, html_text
+from robosc.targets import GeneratedFiles, Written, write_generated
+
+
+class SynthesisStatus(StrEnum):
+    """Outcome of an attempt to make a supervisor."""
+
+    SUPERVISOR = "supervisor"
+    EMPTY = "empty"
+    """No supervisor exists: a result about the model, not a fault."""
+    MODEL_ERRORS = "model errors"
+    UNSUPPORTED_MODEL = "unsupported model"
+
+
+class VerificationStatus(StrEnum):
+    """Outcome of a verification."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    NOT_CHECKED = "not checked"
+    """Nothing is wrong as far as was looked, and not everything could be."""
+    PROPERTY_ERRORS = "property errors"
+    """A property cannot be understood: the diagnostics tell."""
+    NO_SUPERVISOR = "no supervisor"
+    """The model has errors, or no supervisor exists."""
+    UNSUPPORTED_MODEL = "unsupported model"
+
+
+class NothingGeneratedError(RoboscError):
+    """There are no files to write; the message says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """A supervisor in figures and words.
+
+    Attributes:
+        controllable_events: Number of controllable events.
+        uncontrollable_events: Number of uncontrollable events.
+        states: Reachable states of the controlled system.
+        transitions: Transitions between them, or None where they were not counted.
+        added: Event and what the supervisor adds to it, for each controllable event.
+        text: The summary as `robosc synth` prints it.
+    """
+
+    controllable_events: int
+    uncontrollable_events: int
+    states: int
+    transitions: int | None
+    added: tuple[tuple[str, str], ...]
+    text: str
+
+    def __str__(self) -> str:
+        return self.text.rstrip()
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class NoSupervisor:
+    """Explanation of why there is no supervisor of a model that has errors or cannot be handled.
+
+    Attributes:
+        reason: Reason in one sentence; empty where the errors say it all.
+        diagnostics: Every finding about the model.
+    """
+
+    reason: str
+    diagnostics: tuple[Diagnostic, ...]
+
+    def __repr__(self) -> str:
+        return f"<no supervisor: {self.reason or repr(Findings(self.diagnostics)).strip('<>')}>"
+
+    def __str__(self) -> str:
+        found = [str(self.diagnostics)] if isinstance(self.diagnostics, Findings) and self.diagnostics else []
+        return "\n".join([*found, *([visible(self.reason)] if self.reason else [])])
+
+    def _repr_html_(self) -> str:
+        return html_text(str(self))
+
+
+class Outcome:
+    """Appearance of a task's result: its status, the findings and the reason; a subclass adds what was made."""
+
+    __slots__ = ()
+
+    status: StrEnum
+    diagnostics: tuple[Diagnostic, ...]
+    reason: str
+
+    def _made(self) -> object:
+        """The value that was made, or None."""
+        return None
+
+    def _why(self) -> object:
+        """An explanation of why nothing was made, beyond the reason; None where there is none."""
+        return None
+
+    def __repr__(self) -> str:
+        made = self._made()
+        told = [str(self.status)] if made is None else [repr(made)]
+        if made is None and self.reason:
+            told.append(self.reason)
+        if self.diagnostics:
+            told.append(repr(Findings(self.diagnostics)).strip("<>"))
+        return visible(f"<{type(self).__name__}: {'; '.join(told)}>")
+
+    def __str__(self) -> str:
+        parts: list[object] = [Findings(self.diagnostics) if type(self.diagnostics) is tuple else self.diagnostics]
+        if not self.diagnostics:
+            parts = []
+        if self.reason:
+            parts.append(visible(self.reason))
+        made = self._made()
+        parts += [item for item in (self._why() if made is None else made,) if item is not None]
+        return "\n".join(str(part).rstrip() for part in parts) or str(self.status)
+
+    def _repr_html_(self) -> str:
+        parts = [Findings(self.diagnostics)._repr_html_()] if self.diagnostics else []
+        made = self._made()
+        shown = self._why() if made is None else made
+        if made is None:
+            parts.append(html_text(f"{self.status}: {self.reason}" if self.reason else str(self.status)))
+        if shown is not None:
+            show = getattr(shown, "_repr_html_", None)
+            parts.append(html_text(str(shown)) if show is None else show())
+        return "".join(parts)
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Generation(Outcome):
+    """Result of a generation.
+
+    Attributes:
+        status: Outcome of the synthesis.
+        diagnostics: Every finding about the model, sorted by place.
+        reason: Reason why there are no files, in one sentence; empty where there are.
+        files: The files, or None where there are none.
+        explanation: Explanation of why no supervisor exists, or None where there is nothing to explain.
+        target: Target that was asked for; empty where that is not known.
+    """
+
+    status: SynthesisStatus
+    diagnostics: tuple[Diagnostic, ...]
+    reason: str
+    files: GeneratedFiles | None
+    explanation: EmptyExplanation | None = None
+    target: str = ""
+
+    def write(self, folder: FileName, *, force: bool = False) -> Written:
+        """Write the files into a folder, as `robosc generate` does.
+
+        Args:
+            folder: The folder; it is made if it is not there.
+            force: True if files are replaced even where somebody has changed them.
+
+        Raises:
+            NothingGeneratedError: There are no files.
+            OverwriteError: Writing would lose something of the user's, or the folder cannot be written.
+        """
+        if self.files is None:
+            raise NothingGeneratedError(f"nothing was generated: {self.reason or self.status}")
+        return write_generated(self.files, self.target, given_path(folder), force=force)
+
+    def _made(self) -> object:
+        return self.files
+
+    def _why(self) -> object:
+        return self.explanation
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Verification(Outcome):
+    """Result of a verification.
+
+    Attributes:
+        status: Outcome of the verification.
+        diagnostics: Every finding about the model or the properties, sorted by place.
+        reason: Reason why there is no verdict, in one sentence; empty where there is one.
+        report: Output of `robosc verify --json`, as values.
+        text: Output of `robosc verify` for people; empty where only the report is at hand.
+    """
+
+    status: VerificationStatus
+    diagnostics: tuple[Diagnostic, ...]
+    reason: str
+    report: Mapping[str, Any] = field(hash=False)
+    text: str = field(default="", compare=False)
+
+    @property
+    def passed(self) -> bool:
+        """True if everything that was asked holds for certain."""
+        return self.status is VerificationStatus.PASSED
+
+    @property
+    def holds(self) -> tuple[bool, ...]:
+        """The verdict on each property, in their order; empty where no properties were verified."""
+        return tuple(bool(item["holds"]) for item in self.report.get("properties", ()))
+
+    def __repr__(self) -> str:
+        held = f": {sum(self.holds)} of {len(self.holds)} properties hold" if self.holds else ""
+        return visible(f"<Verification: {self.status}{held}{f'; {self.reason}' if self.reason else ''}>")
+
+    def _made(self) -> object:
+        if self.text:
+            return self.text
+        if self.holds:
+            return "\n".join(
+                f"{'holds' if item['holds'] else 'FAILS'}  {item['property']}" for item in self.report["properties"]
+            )
+        if "checks" not in self.report:
+            return None
+        from robosc.supervisor.recheck_report import recheck_text
+
+        return recheck_text(self.report)
+
+    def _repr_html_(self) -> str:
+        if not self.holds:
+            return html_text(str(self))
+        rows = [
+            ("holds" if item["holds"] else "FAILS", item["name"] or "", item["property"], _run(item["run"]))
+            for item in self.report["properties"]
+        ]
+        return html_table(("verdict", "name", "property", "run"), rows)
+
+
+def _run(run: Mapping[str, Any] | None) -> str:
+    if run is None:
+        return ""
+    return f"{run['kind']}: {', '.join(event or '(nothing can happen any more)' for event in run['events'])}"

@@ -1,0 +1,151 @@
+"""Supervisors as the Python API gives them: the value of the core, which also shows itself to people."""
+
+import os
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+from robosc.automata import System, to_automata
+from robosc.errors import Diagnostic
+from robosc.model.structure import Deployment, Model
+from robosc.pipeline.conditions import Conditions, conditions_of
+from robosc.pipeline.files import given_path, read_bounded, write_whole
+from robosc.pipeline.findings import Findings
+from robosc.pipeline.loading import FileName
+from robosc.pipeline.results import Summary
+from robosc.supervisor.codec import MAXIMUM_BYTES, decode, encode
+from robosc.supervisor.structure import AddedCondition, Certificate
+from robosc.supervisor.structure import Supervisor as CoreSupervisor
+from robosc.supervisor.summary import summary_json, summary_text
+from robosc.tables import html_table
+
+
+class Supervisor(CoreSupervisor, frozen=True, dict=True):
+    """A synthesized supervisor.
+
+    Attributes:
+        model: The checked model.
+        deployment: Deployment that it was synthesized for.
+        added: Decision diagrams that synthesis adds to events; `conditions` has them in words.
+        certificate: Record of what was checked.
+    """
+
+    @classmethod
+    def of(cls, supervisor: CoreSupervisor, diagnostics: tuple[Diagnostic, ...] = ()) -> Self:
+        """Take a supervisor of the core, with the findings about its model."""
+        made = cls(supervisor.model, supervisor.deployment, supervisor.added, supervisor.certificate)
+        # No field: a supervisor's file does not hold them.
+        made.__dict__["diagnostics"] = Findings(diagnostics)
+        return made
+
+    @classmethod
+    def read(cls, file: FileName) -> Self:
+        """Read a supervisor's file (`.rsup`); it is validated, and whether it is right for a model is not judged.
+
+        Raises:
+            FileAccessError: The file cannot be read.
+            InvalidSupervisorError: It is no supervisor.
+        """
+        return cls.of(decode(read_bounded(given_path(file), MAXIMUM_BYTES)))
+
+    def write(self, file: FileName) -> Path:
+        """Write the supervisor's file (`.rsup`), whole or not at all, and return its path.
+
+        Raises:
+            FileAccessError: The place cannot be written.
+            UnsupportedModelError: The file would become too large, or an expression is nested too deeply.
+        """
+        path = given_path(file)
+        write_whole(path, self.encode())
+        return path
+
+    def encode(self) -> bytes:
+        """Return the content of the supervisor's file; raises UnsupportedModelError as `write`."""
+        return encode(self)
+
+    @cached_property
+    def diagnostics(self) -> Findings:
+        """The findings about its model; none of a supervisor that was read from a file."""
+        return Findings()
+
+    @cached_property
+    def system(self) -> System:
+        """The automata that it supervises."""
+        return to_automata(self.model, self.deployment)
+
+    @cached_property
+    def conditions(self) -> Conditions:
+        """For each controllable event what it adds, in the model's words."""
+        components = frozenset(item.name for item in self.model.components)
+        return conditions_of(self.added, self.system, components)
+
+    @property
+    def states(self) -> int:
+        """Reachable states of the controlled system, as the certificate says."""
+        return int(self.certificate.states)
+
+    @property
+    def transitions(self) -> int | None:
+        """Transitions between them; None where they were not counted."""
+        return None if self.certificate.transitions is None else int(self.certificate.transitions)
+
+    @cached_property
+    def summary(self) -> Summary:
+        """The supervisor in figures and words."""
+        controllable = sum(event.is_controllable for event in self.system.events)
+        return Summary(
+            controllable_events=controllable,
+            uncontrollable_events=len(self.system.events) - controllable,
+            states=self.states,
+            transitions=self.transitions,
+            added=tuple((event, condition.text) for event, condition in self.conditions.items()),
+            text=summary_text(self),
+        )
+
+    def to_json(self) -> dict[str, object]:
+        """The summary as JSON values, as `robosc synth --json` prints it."""
+        return summary_json(self)
+
+    def __str__(self) -> str:
+        return str(self.summary)
+
+    def _repr_html_(self) -> str:
+        checks = ("safe", "controllable", "nonblocking", "maximally_permissive")
+        found = [(name.replace("_", " "), getattr(self.certificate, name)) for name in checks]
+        return html_table(("check", "outcome"), found, caption=repr(self).strip("<>")) + self.conditions._repr_html_()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        fields = (self.model, self.deployment, self.added, self.certificate)
+        return _restored, (type(self), fields, tuple(self.diagnostics))
+
+
+def _restored(
+    kind: type[Supervisor],
+    fields: tuple[Model, Deployment, tuple[AddedCondition, ...], Certificate],
+    diagnostics: tuple[Diagnostic, ...],
+) -> Supervisor:
+    return kind.of(CoreSupervisor(*fields), diagnostics)
+
+
+type SupervisorLike = CoreSupervisor | bytes | FileName
+"""A supervisor where one is wanted: itself, the content of its file as a server sends it, or the file's name."""
+
+
+def supervisor_of(given: SupervisorLike) -> Supervisor:
+    """A supervisor that a function was given, read if it is a file or its content.
+
+    Raises:
+        TypeError: It is none of these.
+        FileAccessError: The file cannot be read.
+        InvalidSupervisorError: It is no supervisor.
+    """
+    if isinstance(given, Supervisor):
+        return given
+    if isinstance(given, CoreSupervisor):
+        return Supervisor.of(given)
+    if isinstance(given, bytes):
+        return Supervisor.of(decode(given))
+    if isinstance(given, str | os.PathLike):
+        return Supervisor.read(given)
+    hint = ": no supervisor was made, print the result to see why" if given is None else ""
+    raise TypeError(f"a supervisor is wanted, or the path of its file, not {type(given).__name__}{hint}")

@@ -1,0 +1,185 @@
+"""Synthesis of supervisors, of models and of automata."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import overload
+
+from robosc.automata import System
+from robosc.errors import Diagnostic, UnsupportedModelError
+from robosc.explanation import EmptyExplanation
+from robosc.model import check
+from robosc.pipeline.findings import Findings
+from robosc.pipeline.loading import LoadedModel, ModelLike, loaded
+from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
+from robosc.pipeline.results import NoSupervisor, Outcome, Summary, SynthesisStatus
+from robosc.pipeline.supervisors import Supervisor
+from robosc.pipeline.systems import SystemSynthesis, synthesize_system
+from robosc.supervisor import Made, Progress, make_supervisor
+from robosc.synthesis import Statistics
+from robosc.verification import DEFAULT_STATES
+
+type OnProgress = Callable[[Progress], None]
+type ShouldStop = Callable[[], bool]
+
+
+def ignored(progress: Progress) -> None:
+    """Ignore where the work is."""
+
+
+def never() -> bool:
+    """Return False: the work goes on to its end."""
+    return False
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Synthesis(Outcome):
+    """Result of a synthesis.
+
+    Attributes:
+        status: Outcome of the synthesis.
+        diagnostics: Every finding about the model, sorted by place.
+        reason: Reason why there is no supervisor, in one sentence; empty where there is one, or where the findings
+            say it.
+        supervisor: The supervisor, or None.
+        statistics: Figures of the work, or None where there was no synthesis.
+        explanation: Explanation of why there is no supervisor; None where there is one.
+    """
+
+    status: SynthesisStatus
+    diagnostics: Findings
+    reason: str
+    supervisor: Supervisor | None
+    statistics: Statistics | None = None
+    explanation: EmptyExplanation | NoSupervisor | None = None
+
+    @property
+    def summary(self) -> Summary | None:
+        """The supervisor in figures and words, or None where there is none."""
+        return None if self.supervisor is None else self.supervisor.summary
+
+    def _made(self) -> object:
+        return self.supervisor
+
+    def _why(self) -> object:
+        return self.explanation if isinstance(self.explanation, EmptyExplanation) else None
+
+
+@overload
+def synthesize(
+    model: System,
+    options: SynthesisOptions = DEFAULT_OPTIONS,
+    *,
+    on_progress: OnProgress = ignored,
+    should_stop: ShouldStop = never,
+) -> SystemSynthesis: ...
+
+
+@overload
+def synthesize(
+    model: ModelLike,
+    options: SynthesisOptions = DEFAULT_OPTIONS,
+    *,
+    on_progress: OnProgress = ignored,
+    should_stop: ShouldStop = never,
+) -> Synthesis: ...
+
+
+def synthesize(
+    model: ModelLike | System,
+    options: SynthesisOptions = DEFAULT_OPTIONS,
+    *,
+    on_progress: OnProgress = ignored,
+    should_stop: ShouldStop = never,
+) -> Synthesis | SystemSynthesis:
+    """Synthesize, verify and certify the supervisor of a model, or synthesize that of automata.
+
+    Args:
+        model: The model, as `load` returns it, the path of one, or a `robosc.automata.System`.
+        options: Options for making the supervisor. Of automata, those about the engine count.
+        on_progress: Function called with the progress of the work.
+        should_stop: Function called again and again; once it returns true, the work ends.
+
+    Raises:
+        FileAccessError: The file is not there or cannot be read.
+        LanguageError: A file is too large or not UTF-8.
+        InvalidSystemError: The automata do not fit together.
+        NodeLimitError: Decision diagrams became larger than the options allow.
+        UnknownEngineError: There is no such engine.
+        SynthesisCancelled: `should_stop` became true.
+    """
+    if isinstance(model, System):
+        return synthesize_system(model, options, on_progress, should_stop)
+    bundle = loaded(model)
+    attempt = make(bundle, options, on_progress, should_stop, allow_livelock=options.allow_livelock)
+    return _result(attempt, bundle)
+
+
+@dataclass(frozen=True, slots=True)
+class Unsupported:
+    """Attempt at a model that is correct, but cannot be handled.
+
+    The error itself is not kept: its frames would hold predicates of an engine that has ended.
+
+    Attributes:
+        reason: Reason why not.
+    """
+
+    reason: str
+
+
+type Attempt = Made | Unsupported
+
+
+def make(
+    bundle: LoadedModel,
+    options: SynthesisOptions,
+    on_progress: OnProgress,
+    should_stop: ShouldStop,
+    *,
+    allow_livelock: bool,
+) -> Attempt:
+    """Make a supervisor as the options say."""
+    states = options.verified_states
+    try:
+        return make_supervisor(
+            bundle,
+            deployment=options.deployment,
+            engine=options.engine_options(),
+            verify_limit=DEFAULT_STATES if states is None else states,
+            allow_livelock=allow_livelock,
+            should_stop=should_stop,
+            on_progress=on_progress,
+        )
+    except UnsupportedModelError as error:
+        return Unsupported(str(error))
+
+
+def findings_of(attempt: Attempt, bundle: LoadedModel) -> Findings:
+    """Return the findings about a model of which a supervisor was to be made."""
+    found: tuple[Diagnostic, ...] = attempt.diagnostics if isinstance(attempt, Made) else check(bundle).diagnostics
+    return Findings(found, bundle)
+
+
+def status_of(attempt: Attempt) -> tuple[SynthesisStatus, str]:
+    """Return how an attempt to make a supervisor has ended, and the reason why there is none."""
+    if isinstance(attempt, Made):
+        return SynthesisStatus(str(attempt.status)), attempt.reason
+    return SynthesisStatus.UNSUPPORTED_MODEL, attempt.reason
+
+
+def why_not(attempt: Attempt, diagnostics: Findings) -> EmptyExplanation | NoSupervisor:
+    """Return the explanation of why an attempt has not made a supervisor."""
+    if isinstance(attempt, Made) and attempt.explanation is not None:
+        return attempt.explanation
+    _, reason = status_of(attempt)
+    return NoSupervisor(reason, diagnostics)
+
+
+def _result(attempt: Attempt, bundle: LoadedModel) -> Synthesis:
+    diagnostics = findings_of(attempt, bundle)
+    status, reason = status_of(attempt)
+    if isinstance(attempt, Made) and attempt.supervisor is not None:
+        supervisor = Supervisor.of(attempt.supervisor, diagnostics)
+        return Synthesis(status, diagnostics, reason, supervisor, attempt.statistics)
+    statistics = attempt.statistics if isinstance(attempt, Made) else None
+    return Synthesis(status, diagnostics, reason, None, statistics, why_not(attempt, diagnostics))

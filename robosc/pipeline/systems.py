@@ -1,0 +1,214 @@
+"""The core's second door: supervisors of automata that a program has built, without a RoboSC text."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from robosc.automata import System, check_system
+from robosc.automata.state import subjects
+from robosc.errors import UnsupportedModelError
+from robosc.pipeline.conditions import Condition, Conditions, condition_of, conditions_of
+from robosc.pipeline.options import SynthesisOptions
+from robosc.pipeline.results import Outcome, SynthesisStatus, Verification, VerificationStatus
+from robosc.supervisor import Progress
+from robosc.supervisor.conditions import state_predicate, state_predicates
+from robosc.supervisor.diagram import diagram_domains
+from robosc.supervisor.structure import AddedCondition, DecisionDiagram
+from robosc.supervisor.words import Formulas
+from robosc.synthesis import Progress as SynthesisProgress
+from robosc.synthesis import Statistics, synthesize
+from robosc.synthesis import SynthesisStatus as CoreStatus
+from robosc.tables import html_table
+from robosc.verification import Judgement, Limits, judge, verify
+from robosc.verification import Outcome as CheckOutcome
+
+_CHECKS = ("safe", "controllable", "nonblocking", "maximally_permissive")
+INITIALLY = "the initial state"
+"""Name of what a condition is about that is about no event."""
+
+
+@dataclass(frozen=True, repr=False)
+class SystemSupervisor:
+    """Supervisor of automata.
+
+    Attributes:
+        system: The automata that it supervises.
+        added: Decision diagrams that it adds to events; `conditions` has them in words.
+        initial: Condition on the initial states in which it lets the system begin; None if in all.
+        statistics: Figures of the synthesis.
+    """
+
+    system: System
+    added: tuple[AddedCondition, ...]
+    initial: DecisionDiagram | None
+    statistics: Statistics = field(compare=False)
+
+    @cached_property
+    def conditions(self) -> Conditions:
+        """For each controllable event what it adds, in words."""
+        return conditions_of(self.added, self.system, self._names())
+
+    @property
+    def initial_condition(self) -> Condition | None:
+        """Condition on the initial states in words; None where the system may begin in all of them."""
+        if self.initial is None:
+            return None
+        formula = Formulas(diagram_domains(self.system)).formula(self.initial)
+        return condition_of(INITIALLY, self.initial, formula, self.system, self._names())
+
+    @property
+    def states(self) -> int:
+        """Reachable states of the controlled system."""
+        return self.statistics.states
+
+    def _names(self) -> frozenset[str]:
+        return frozenset(automaton.name for automaton in self.system.automata)
+
+    def __repr__(self) -> str:
+        events = f"{len(self.added)} event{'s' if len(self.added) != 1 else ''}"
+        return f"<supervisor of {self.system.name}: {self.states} states, conditions added to {events}>"
+
+    def __str__(self) -> str:
+        return f"{self.system.name}: a supervisor exists ({self.states} states)\n{self.conditions}"
+
+    def _repr_html_(self) -> str:
+        return html_table(("figure", "value"), [("states", self.states)], caption=repr(self).strip("<>")) + (
+            self.conditions._repr_html_()
+        )
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class SystemSynthesis(Outcome):
+    """Result of a synthesis of automata.
+
+    Attributes:
+        status: Outcome of the synthesis.
+        reason: Reason why there is no supervisor; empty where there is one.
+        supervisor: The supervisor, or None.
+        statistics: Figures of the work; None where the automata cannot be handled.
+        diagnostics: Always empty: automata have no text that findings could be about.
+    """
+
+    status: SynthesisStatus
+    reason: str
+    supervisor: SystemSupervisor | None
+    statistics: Statistics | None
+    diagnostics: tuple[()] = ()
+
+    @property
+    def explanation(self) -> str | None:
+        """Reason why there is no supervisor, or None."""
+        return self.reason or None
+
+    def _made(self) -> object:
+        return self.supervisor
+
+
+def synthesize_system(
+    system: System,
+    options: SynthesisOptions,
+    on_progress: Callable[[Progress], None],
+    should_stop: Callable[[], bool],
+) -> SystemSynthesis:
+    """Synthesize the supervisor of automata; parameters and errors as of `robosc.synthesize`."""
+    check_system(system)
+
+    def report(progress: SynthesisProgress) -> None:
+        on_progress(Progress("synthesis", str(progress)))
+
+    try:
+        found = synthesize(system, engine=options.engine_options(), should_stop=should_stop, on_progress=report)
+    except UnsupportedModelError as error:
+        return SystemSynthesis(SynthesisStatus.UNSUPPORTED_MODEL, str(error), None, None)
+    if found.status is CoreStatus.EMPTY:
+        reason = f"no supervisor exists: {found.reason}"
+        return SystemSynthesis(SynthesisStatus.EMPTY, reason, None, found.statistics)
+    supervisor = SystemSupervisor(system, found.added, found.initial, found.statistics)
+    return SystemSynthesis(SynthesisStatus.SUPERVISOR, "", supervisor, found.statistics)
+
+
+def verify_system(
+    supervisor: SystemSupervisor,
+    options: SynthesisOptions,
+    limits: Limits,
+    on_progress: Callable[[Progress], None],
+    should_stop: Callable[[], bool],
+    *,
+    is_strict: bool,
+) -> Verification:
+    """Verify independently that a supervisor of automata is right."""
+    judgement = _judged(supervisor, options, limits, on_progress, should_stop)
+    found = judgement.verification
+    outcomes = {name: getattr(found, name) for name in _CHECKS}
+    is_complete = judgement.is_complete and not (is_strict and CheckOutcome.NOT_CHECKED in outcomes.values())
+    status = (
+        VerificationStatus.FAILED
+        if found.failures
+        else VerificationStatus.PASSED
+        if is_complete
+        else VerificationStatus.NOT_CHECKED
+    )
+    report: Mapping[str, Any] = {
+        "status": str(status),
+        "system": supervisor.system.name,
+        "checks": {name: str(outcome) for name, outcome in outcomes.items()},
+        "faults": [
+            {
+                "check": item.property.replace(" ", "_"),
+                "message": item.reason,
+                "trace": list(item.trace),
+                "shortest": item.is_shortest,
+                "state": {
+                    str(subject): value for subject, value in zip(subjects(supervisor.system), item.state, strict=True)
+                },
+            }
+            for item in found.failures
+        ],
+        "states": found.states,
+        "transitions": found.transitions,
+        "method": judgement.method,
+    }
+    lines = [f"{supervisor.system.name}: {status}"]
+    lines += [f"  {name.replace('_', ' '):<21} {outcome}" for name, outcome in outcomes.items()]
+    lines.append(f"  {'method':<21} {judgement.method}")
+    lines += [
+        f"not {item.property}: {item.message}, after {', '.join(item.trace) or 'nothing'}" for item in found.failures
+    ]
+    return Verification(status, (), "", report, "\n".join(lines) + "\n")
+
+
+def _judged(
+    supervisor: SystemSupervisor,
+    options: SynthesisOptions,
+    limits: Limits,
+    on_progress: Callable[[Progress], None],
+    should_stop: Callable[[], bool],
+) -> Judgement:
+    system, added = supervisor.system, state_predicates(supervisor.system, supervisor.added)
+
+    def report(message: str) -> None:
+        on_progress(Progress("verification", message))
+
+    if supervisor.initial is None:
+        return judge(
+            system,
+            added,
+            limits,
+            expected_states=supervisor.states,
+            engine=options.engine_options().name,
+            should_stop=should_stop,
+            on_progress=report,
+        )
+    # The symbolic search begins in every initial state: a supervisor that leaves some out is searched one by one.
+    found = verify(
+        system,
+        added,
+        initial=state_predicate(system, supervisor.initial),
+        limit=limits.states,
+        permissive_limit=limits.recomputed,
+        should_stop=should_stop,
+        on_progress=report,
+    )
+    is_done = found.states is not None
+    return Judgement(found, "explicit forward search" if is_done else f"not checked: more than {limits.states} states")

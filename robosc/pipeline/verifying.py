@@ -1,0 +1,277 @@
+"""Verification: of properties of the robot under its supervisor, and of supervisors that somebody hands over."""
+
+from collections.abc import Callable, Sequence
+from typing import overload
+
+from robosc.automata import System, to_automata
+from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
+from robosc.json_documents import diagnostics_json
+from robosc.model import check
+from robosc.model.structure import Model
+from robosc.model_checking import (
+    Property,
+    Verdict,
+    properties_of,
+    property_errors_json,
+    verdict_text,
+    verdicts_json,
+    verify_properties,
+)
+from robosc.pipeline.findings import Findings
+from robosc.pipeline.loading import FileName, LoadedModel, ModelLike, loaded, property_file
+from robosc.pipeline.options import DEFAULT_OPTIONS, FOREIGN_STATES, SynthesisOptions
+from robosc.pipeline.results import Verification, VerificationStatus
+from robosc.pipeline.supervisors import SupervisorLike, supervisor_of
+from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, make, never, status_of
+from robosc.pipeline.systems import SystemSupervisor, verify_system
+from robosc.source import Bundle, SourceFile
+from robosc.supervisor import Made, Progress
+from robosc.supervisor.recheck import recheck
+from robosc.supervisor.recheck_report import has_passed, malformed_json, recheck_json, recheck_text
+from robosc.supervisor.structure import Supervisor as CoreSupervisor
+from robosc.synthesis import EngineOptions
+from robosc.synthesis import Progress as SynthesisProgress
+from robosc.synthesis.engines import resolve_engine
+from robosc.verification import Limits
+
+type Properties = str | Sequence[str]
+"""One property, or several."""
+
+
+@overload
+def verify(
+    model: SystemSupervisor,
+    *,
+    options: SynthesisOptions | None = None,
+    maximum_states: int | None = None,
+    is_strict: bool = False,
+    on_progress: OnProgress = ignored,
+    should_stop: ShouldStop = never,
+) -> Verification: ...
+
+
+@overload
+def verify(
+    model: ModelLike | CoreSupervisor,
+    properties: Properties = (),
+    *,
+    property_files: Sequence[FileName | SourceFile] = (),
+    supervisor: SupervisorLike | None = None,
+    options: SynthesisOptions | None = None,
+    maximum_states: int | None = None,
+    is_strict: bool = False,
+    on_progress: OnProgress = ignored,
+    should_stop: ShouldStop = never,
+) -> Verification: ...
+
+
+def verify(
+    model: ModelLike | CoreSupervisor | SystemSupervisor,
+    properties: Properties = (),
+    *,
+    property_files: Sequence[FileName | SourceFile] = (),
+    supervisor: SupervisorLike | None = None,
+    options: SynthesisOptions | None = None,
+    maximum_states: int | None = None,
+    is_strict: bool = False,
+    on_progress: OnProgress = ignored,
+    should_stop: ShouldStop = never,
+) -> Verification:
+    """Verify properties of the robot under its supervisor, or check a supervisor against its model.
+
+    With `supervisor`, that is checked first, and nothing that it says of itself is believed; the properties are
+    verified if it has passed. Without, the supervisor is made of the model, or is the one given as `model`. A
+    supervisor of automata is checked against these.
+
+    Args:
+        model: The model, as `load` returns it, the path of one, or a supervisor that was made.
+        properties: A property such as `AG EF Navigator.ready`, or several.
+        property_files: Files with a property on each line.
+        supervisor: The supervisor to check: itself, the path of its file or its bytes.
+        options: Options for making the supervisor, and the deployment that one must be for; None: as it says.
+        maximum_states: States up to which a given supervisor is searched one by one; None: 1,000,000.
+        is_strict: True if a given supervisor passes only if permissiveness was checked, too.
+        on_progress: Function called with the progress of the work.
+        should_stop: Function called again and again; once it returns true, the work ends.
+
+    Raises:
+        TypeError: There is nothing to verify, or what is given does not fit together.
+        ValueError: The files hold no property, or `maximum_states` is negative.
+        FileAccessError: A file is not there or cannot be read.
+        LanguageError: A file is too large or not UTF-8.
+        NodeLimitError: Decision diagrams became larger than the options allow.
+        UnknownEngineError: There is no such engine.
+        SynthesisCancelled: `should_stop` became true.
+    """
+    texts = [properties] if isinstance(properties, str) else list(properties)
+    claims = _Claims(texts, [property_file(file) for file in property_files])
+    chosen = options or DEFAULT_OPTIONS
+    states = FOREIGN_STATES if maximum_states is None else maximum_states
+    if states < 0:
+        raise ValueError(f"maximum_states is {states}, and must not be negative")
+    limits = Limits.of(states)
+    if isinstance(model, SystemSupervisor):
+        if claims or supervisor is not None:
+            raise TypeError("a supervisor of automata is verified by itself: properties and supervisor= need a model")
+        return verify_system(model, chosen, limits, on_progress, should_stop, is_strict=is_strict)
+    try:
+        if supervisor is not None:
+            if isinstance(model, CoreSupervisor):
+                raise TypeError("supervisor= is checked against a model: give the model as the first argument")
+            given = _Given(loaded(model), supervisor, options, limits, is_strict)
+            return _checked(given, claims, on_progress, should_stop)
+        if not claims:
+            raise TypeError("nothing to verify: name properties, or a supervisor to check with supervisor=...")
+        if isinstance(model, CoreSupervisor):
+            return claims.verified(model, chosen.engine_options(), on_progress, should_stop)
+        return _made(loaded(model), claims, chosen, on_progress, should_stop)
+    except UnsupportedModelError as error:
+        return Verification(VerificationStatus.UNSUPPORTED_MODEL, (), str(error), {})
+
+
+class _Given:
+    """A supervisor to check, and how."""
+
+    def __init__(
+        self,
+        model: LoadedModel,
+        supervisor: SupervisorLike,
+        options: SynthesisOptions | None,
+        limits: Limits,
+        is_strict: bool,
+    ) -> None:
+        self.model = model
+        self.supervisor = supervisor
+        self.options = options or DEFAULT_OPTIONS
+        self.deployment = None if options is None else options.deployment
+        self.limits = limits
+        self.is_strict = is_strict
+
+
+class _Claims:
+    """Properties as texts: one each, and one on each line."""
+
+    def __init__(self, texts: Sequence[str], listings: Sequence[SourceFile]) -> None:
+        self.texts = [SourceFile(f"property {number}", text) for number, text in enumerate(texts, start=1)]
+        self.listings = listings
+
+    def __bool__(self) -> bool:
+        return bool(self.texts or self.listings)
+
+    def of(self, model: Model) -> tuple[Property, ...]:
+        """The properties of a robot.
+
+        Raises:
+            LanguageError: They have errors.
+            ValueError: There is none.
+        """
+        found = properties_of(model, self.texts, self.listings)
+        if not found:
+            raise ValueError(f"there is no property in {' and '.join(file.name for file in self.listings)}")
+        return found
+
+    def errors(self, model: Model) -> Verification | None:
+        """The result if a property cannot be understood, or None."""
+        try:
+            self.of(model)
+        except LanguageError as error:
+            first, *others = [*self.texts, *self.listings]
+            diagnostics = Findings(error.diagnostics, Bundle(first, tuple(others)))
+            report = property_errors_json(error.diagnostics)
+            return Verification(VerificationStatus.PROPERTY_ERRORS, diagnostics, "", report)
+        return None
+
+    def verified(
+        self, supervisor: CoreSupervisor, engine: EngineOptions, on_progress: OnProgress, should_stop: ShouldStop
+    ) -> Verification:
+        """The verdicts in the system that a supervisor controls."""
+        errors = self.errors(supervisor.model)
+        if errors is not None:
+            return errors
+
+        def report(progress: SynthesisProgress) -> None:
+            on_progress(Progress("verification", str(progress)))
+
+        verdicts, system = verdicts_of(
+            supervisor, self.of(supervisor.model), engine, on_progress=report, should_stop=should_stop
+        )
+        holds = all(verdict.holds for verdict in verdicts)
+        return Verification(
+            VerificationStatus.PASSED if holds else VerificationStatus.FAILED,
+            (),
+            "",
+            verdicts_json(verdicts, system, supervisor.model),
+            "".join(verdict_text(verdict, system, supervisor.model) for verdict in verdicts),
+        )
+
+
+def verdicts_of(
+    supervisor: CoreSupervisor,
+    properties: Sequence[Property],
+    engine: EngineOptions,
+    *,
+    on_progress: Callable[[SynthesisProgress], None] = lambda progress: None,
+    should_stop: ShouldStop = never,
+) -> tuple[tuple[Verdict, ...], System]:
+    """Return the verdicts on properties of the system that a supervisor controls, and its automata.
+
+    Raises:
+        NodeLimitError, UnknownEngineError, SynthesisCancelled, UnsupportedModelError: As `verify_properties`.
+    """
+    system = to_automata(supervisor.model, supervisor.deployment)
+    verdicts = verify_properties(
+        system, supervisor.added, properties, engine=engine, on_progress=on_progress, should_stop=should_stop
+    )
+    return verdicts, system
+
+
+def _checked(given: _Given, claims: _Claims, on_progress: OnProgress, should_stop: ShouldStop) -> Verification:
+    """Check the given supervisor; verify properties of its robot if it is right."""
+    engine = resolve_engine(given.options.engine)
+    try:
+        supervisor = supervisor_of(given.supervisor)
+    except InvalidSupervisorError as error:
+        return Verification(VerificationStatus.FAILED, (), str(error), malformed_json(error))
+    found = recheck(
+        supervisor,
+        given.model,
+        given.limits,
+        deployment=given.deployment,
+        engine=engine,
+        should_stop=should_stop,
+        on_progress=lambda message: on_progress(Progress("verification", message)),
+    )
+    if has_passed(found, is_strict=given.is_strict) and claims:
+        return claims.verified(supervisor, given.options.engine_options(), on_progress, should_stop)
+    report = recheck_json(found, supervisor, is_strict=given.is_strict)
+    is_library = not (found.diagnostics or found.judgement or found.faults)
+    return Verification(
+        VerificationStatus(str(report["status"])),
+        Findings(found.diagnostics, given.model),
+        "a library has no robot that a supervisor could be for" if is_library else "",
+        report,
+        recheck_text(report, supervisor.model.name, given.model.name),
+    )
+
+
+def _made(
+    model: LoadedModel, claims: _Claims, options: SynthesisOptions, on_progress: OnProgress, should_stop: ShouldStop
+) -> Verification:
+    """Make the supervisor, and verify properties of its robot."""
+    # What is wrong with a property is told before the synthesis, which may take long.
+    robot = check(model).model
+    errors = None if robot is None else claims.errors(robot)
+    if errors is not None:
+        return errors
+    attempt = make(model, options, on_progress, should_stop, allow_livelock=True)
+    if isinstance(attempt, Unsupported):
+        raise UnsupportedModelError(attempt.reason)
+    if attempt.supervisor is not None:
+        return claims.verified(attempt.supervisor, options.engine_options(), on_progress, should_stop)
+    return _without(attempt, model)
+
+
+def _without(made: Made, model: LoadedModel) -> Verification:
+    status, reason = status_of(made)
+    report = {"status": str(status), "reason": reason, **diagnostics_json(made.diagnostics)}
+    return Verification(VerificationStatus.NO_SUPERVISOR, findings_of(made, model), reason, report)

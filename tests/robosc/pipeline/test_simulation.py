@@ -1,0 +1,246 @@
+"""Runs that are led by hand: against the reference interpreter's own interface, and what is refused."""
+
+from random import Random
+from typing import Any
+
+import pytest
+
+import robosc
+from robosc.automata import to_automata
+from robosc.execution.interpreter import InterpretedSystem
+from robosc.expressions import (
+    ArrayType,
+    BooleanType,
+    DoubleType,
+    EnumType,
+    IntegerType,
+    ObjectType,
+    StringType,
+    Type,
+)
+from robosc.model.structure import EventKind, Model, is_tau
+from support.effort import seeds
+from support.models import EXAMPLES
+from support.random_supervisors import random_data, random_supervisor
+
+STEPS = 40
+EVENTS = """robot R {
+    interface range use Range from sensor_msgs
+    datatype enum Way from double to { value > 0.5 -> free  default -> blocked }
+    datatype enum Word from string to { value = "free" -> taken  default -> free }
+    datatype object Scan { front: Way  class: integer(0..3)  word: Word  rest: array(Way) }
+    component Sensor {
+        outgoing message scan with identifier: "/scan", type: Scan links range
+        outgoing message level with identifier: "/level", type: integer(0..3)
+        behaviour {
+            variable front: Way = blocked
+            variable back: Way = blocked
+            variable word: Word = taken
+            variable number: integer(0..3)
+            on response from scan do
+                front := value.front, number := value.class, word := value.word, back := value.rest[0]
+            on response from level do number := value
+            initial marked state sensing { }
+        }
+    }
+    component Base {
+        incoming message move with identifier: "/move", type: integer
+        outgoing message bump with identifier: "/bump", type: none
+    }
+    requirement move needs Sensor.front = free and Sensor.number < 2
+    provide move with Sensor.number + 1
+}"""
+
+
+@pytest.fixture(scope="module")
+def supervisor() -> robosc.Supervisor:
+    made = robosc.synthesize(robosc.load(text=EVENTS)).supervisor
+    assert made is not None
+    return made
+
+
+@pytest.fixture
+def run(supervisor: robosc.Supervisor) -> robosc.Run:
+    return robosc.simulate(supervisor)
+
+
+def fitting(dice: Random, model: Model, type_: Type | None) -> Any:
+    """Data of a type, as a sensor would send it."""
+    match type_:
+        case ObjectType(name=name):
+            parts = next(item.properties for item in model.objects if item.name == name)
+            return {part.name: fitting(dice, model, part.type) for part in parts if dice.random() < 0.9}
+        case ArrayType(element=element):
+            return [fitting(dice, model, element) for _ in range(dice.randint(0, 3))]
+        case EnumType(name=name):
+            return fitting(dice, model, next(item.source for item in model.enums if item.name == name))
+        case BooleanType():
+            return dice.random() < 0.5
+        case IntegerType():
+            return dice.choice([-1, 0, 1, 2, 3, 7, 100])
+        case DoubleType():
+            return dice.choice([0.0, 0.5, -1.5, 3, 1e9])
+        case StringType():
+            return dice.choice(["x", "other words", ""])
+        case _:
+            return None
+
+
+def received(model: Model, event: str) -> Type | None:
+    if is_tau(event):
+        return None
+    name, _, kind = event.partition(".")
+    return model.communication(name).received_type(EventKind(kind))
+
+
+@pytest.mark.random
+@pytest.mark.parametrize("seed", seeds(40))
+def test_a_random_run_is_that_of_the_interpreter(seed: int) -> None:
+    core = random_supervisor(seed)
+    dice = Random(f"run {seed}")
+    run, twin = robosc.simulate(core), InterpretedSystem(core)
+    events = to_automata(core.model, core.deployment).events
+    for _ in range(STEPS if events else 0):
+        own = tuple(item.name for item in events if item.is_controllable and twin.enabled(item.name))
+        assert run.enabled == own
+        event = dice.choice(events)
+        type_ = received(core.model, event.name)
+        before, length = str(run.state), len(run)
+        arguments: list[Any] = []
+        if type_ is not None and dice.random() < 0.95:
+            arguments = [fitting(dice, core.model, type_) if dice.random() < 0.7 else random_data(dice)]
+        try:
+            step = run.step(event.name, *arguments)
+        except robosc.DataError:
+            # What is refused has not happened; a robot would take whatever comes.
+            assert (str(run.state), len(run)) == (before, length)
+            continue
+        except robosc.EventNotPossibleError:
+            assert (str(run.state), len(run)) == (before, length)
+            blocked = event.is_controllable and not twin.enabled(event.name)
+            assert blocked or twin.step(event.name, twin.read(event.name, *arguments or [None])) is None
+            continue
+        reading = twin.read(event.name, arguments[0] if arguments else None)
+        is_request = event.name.endswith(".request")
+        provided = twin.provide(event.name.partition(".")[0])[1] if is_request else None
+        assert step.skipped == twin.step(event.name, reading)
+        assert str(step.provided) == str(provided)
+        assert str(dict(step.data)) == str(reading.data if type_ is not None else {})
+        found = twin.state()
+        assert run.state.components == {name: values["state"] for name, values in found.items()}
+        assert str(run.state.variables) == str(
+            {f"{name}.{key}": value for name, values in found.items() for key, value in values["variables"].items()}
+        )
+        calls = run.state.communications
+        assert all(twin.location(name.rpartition(" ")[2]) == place for name, place in calls.items())
+
+
+def test_a_run_step_by_step(run: robosc.Run) -> None:
+    assert run.events == ("scan.response", "level.response", "move.request", "bump.response")
+    assert not run.enabled
+    step = run.step("scan.response", {"front": 0.7, "class": 1, "rest": [0.1, 0.9]})
+    assert step.data["value.front"] == "free"
+    assert run.state.variables == {
+        "Sensor.front": "free",
+        "Sensor.back": "blocked",
+        "Sensor.word": "free",
+        "Sensor.number": 1,
+    }
+    # What was not given is unknown, as it would be to the robot.
+    assert step.unknown == ("value.word is free by default: an earlier rule is unknown",)
+    assert run.step("scan.response", {"front": 0.7, "class": 1}).skipped == ("Sensor.back",)
+    assert run.enabled == ("move.request",)
+    assert run.step("move.request").provided == 2
+    run.step("level.response", 3)
+    assert not run.enabled
+    assert run.step("bump.response").data == {}
+    assert [item.event for item in run.history] == [
+        "scan.response",
+        "scan.response",
+        "move.request",
+        "level.response",
+        "bump.response",
+    ]
+    assert repr(run) == "<run of R: 5 steps; nothing is allowed>"
+    assert str(run).splitlines()[3] == "   4  level.response (value = 3): Sensor.number = 3"
+    assert "<td" in run._repr_html_()
+    run.restart()
+    assert (len(run), run.state.variables["Sensor.number"]) == (0, 0)
+
+
+def test_values_of_enums_are_given_by_name_or_by_what_they_are_made_of(run: robosc.Run) -> None:
+    for given, expected in (("free", "free"), ("blocked", "blocked"), (0.51, "free"), (0, "blocked")):
+        run.step("scan.response", front=given)
+        assert run.state.variables["Sensor.front"] == expected
+    # A text that is a value is that value, whatever the rules would make of it; another text goes by the rules.
+    for word, expected in (("free", "free"), ("taken", "taken"), ("anything", "free")):
+        run.step("scan.response", word=word)
+        assert run.state.variables["Sensor.word"] == expected
+    run.step("scan.response", rest=("free", 0.1))
+    assert run.state.variables["Sensor.back"] == "free"
+
+
+def test_what_lies_outside_its_range_is_moved_into_it_and_told(run: robosc.Run) -> None:
+    step = run.step("level.response", 9)
+    assert run.state.variables["Sensor.number"] == 3
+    assert step.unknown == ("value is 9, outside 0..3",)
+
+
+@pytest.mark.parametrize(
+    ("event", "data", "fields", "error", "message"),
+    [
+        ("scan.respons", [], {}, robosc.UnknownEventError, "'scan.respons'; did you mean 'scan.response'?"),
+        ("xyz", [], {}, robosc.UnknownEventError, "'xyz'; there are scan.response, level.response, move.request, "),
+        ("move.request", [], {}, robosc.EventNotPossibleError, "needs Sensor.front = free and Sensor.number < 2; noth"),
+        ("bump.response", [1], {}, robosc.DataError, "'bump.response' carries no data, and was given 1"),
+        ("bump.response", [], {"x": 1}, robosc.DataError, "'bump.response' carries no data, and was given {'x': 1}"),
+        ("level.response", ["many"], {}, robosc.DataError, "is 'many', and must be integer(0..3)"),
+        ("level.response", [True], {}, robosc.DataError, "is True, and must be integer(0..3)"),
+        ("level.response", [], {"value": 1}, robosc.DataError, "is {'value': 1}, and must be integer(0..3)"),
+        ("scan.response", [3], {}, robosc.DataError, "is 3, and must be Scan with front, class, word, rest"),
+        ("scan.response", [{}], {"front": 1.0}, robosc.DataError, "given either as one value or as keywords"),
+        ("scan.response", [], {"frnt": 1.0}, robosc.DataError, "no property 'frnt'; did you mean 'front'?"),
+        ("scan.response", [], {"zzz": 1.0}, robosc.DataError, "no property 'zzz'; there are front, class, word, rest"),
+        ("scan.response", [], {"front": "fre"}, robosc.DataError, "is 'fre', which is no Way; did you mean 'free'?"),
+        ("scan.response", [], {"front": []}, robosc.DataError, "is [], and must be double, or one of free, blocked"),
+        ("scan.response", [], {"rest": "free"}, robosc.DataError, "value.rest of 'scan.response' is 'free', and must"),
+        ("scan.response", [], {"rest": 3}, robosc.DataError, "value.rest of 'scan.response' is 3, and must be"),
+        ("scan.response", [], {"rest": ["no"]}, robosc.DataError, "value.rest[0] of 'scan.response' is 'no', which is"),
+    ],
+)
+def test_what_cannot_be_is_one_clear_error_and_changes_nothing(
+    run: robosc.Run, event: str, data: list[Any], fields: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    before = run.state
+    with pytest.raises(error) as caught:
+        run.step(event, *data, **fields)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert isinstance(caught.value, KeyError if error is robosc.UnknownEventError else ValueError)
+    assert (run.state, run.history) == (before, ())
+
+
+def test_an_event_that_the_state_cannot_accept_says_where_it_is() -> None:
+    run = robosc.simulate(_navigation())
+    with pytest.raises(robosc.EventNotPossibleError, match=r"'navigate\.feedback' cannot happen now: navigate is idle"):
+        run.step("navigate.feedback", distance_remaining=1.0)
+    with pytest.raises(
+        robosc.EventNotPossibleError, match="the behaviours or the supervisor forbid it in Localisation"
+    ):
+        run.step("Localisation.tau_1")
+
+
+def test_a_supervisor_may_be_a_file_or_its_bytes(supervisor: robosc.Supervisor, tmp_path: Any) -> None:
+    file = supervisor.write(tmp_path / "r.rsup")
+    for given in (file, str(file), file.read_bytes()):
+        assert robosc.simulate(given).enabled == ()
+    with pytest.raises(robosc.InvalidSupervisorError):
+        robosc.simulate(b"{}")
+    with pytest.raises(TypeError, match="not NoneType: no supervisor was made, print the result to see why"):
+        robosc.simulate(None)  # type: ignore[arg-type]
+
+
+def _navigation() -> robosc.Supervisor:
+    made = robosc.synthesize(EXAMPLES / "navigation" / "navigation.rscd").supervisor
+    assert made is not None
+    return made

@@ -1,0 +1,104 @@
+"""The core's second door: automata that a program has built."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+
+import robosc
+from robosc.automata import Automaton, Edge, Event, System
+from robosc.expressions import Constant, StateTest
+from robosc.synthesis import synthesize
+from support.effort import examples
+from support.random_systems import any_system, explicit_supervisor, system_seeds
+from support.systems import automaton, system
+
+MACHINE = system(
+    automaton("M", ["idle -start-> busy", "busy -u_done-> idle", "busy -u_break-> down", "down -repair-> idle"],
+              marked=["idle"]),
+    automaton("B", ["empty -u_done-> full", "full -take-> empty"], marked=["empty"]),
+)  # fmt: skip
+
+
+def test_a_machine_and_a_buffer() -> None:
+    never_lost = replace(MACHINE, invariants=(), automata=(
+        MACHINE.automata[0],
+        # A full buffer loses what comes.
+        automaton("B", ["empty -u_done-> full", "full -u_done-> lost", "full -take-> empty"], marked=["empty"]),
+    ))  # fmt: skip
+    result = robosc.synthesize(never_lost)
+    assert result.status is robosc.SynthesisStatus.SUPERVISOR
+    supervisor = result.supervisor
+    assert supervisor is not None
+    assert str(supervisor.conditions["start"]) == "not B.full"
+    assert supervisor.conditions["repair"].adds_nothing
+    assert repr(result) == "<SystemSynthesis: <supervisor of by hand: 4 states, conditions added to 1 event>>"
+    assert "start needs not B.full" in str(result)
+    assert "not B.full" in result._repr_html_()
+    verification = robosc.verify(supervisor)
+    assert verification.passed
+    assert verification.report["states"] == supervisor.states == 4
+    # Nothing is believed: without its condition, the buffer is lost.
+    broken = robosc.verify(replace(supervisor, added=()))
+    assert broken.status is robosc.VerificationStatus.FAILED
+    (fault,) = broken.report["faults"]
+    assert fault["check"] == "nonblocking"
+    assert fault["state"]["B"] == "lost"
+    assert "not nonblocking: " in str(broken)
+
+
+@settings(max_examples=examples(60))
+@given(system_seeds())
+def test_random_automata(seed: int) -> None:
+    given_system = any_system(seed)
+    result, core = robosc.synthesize(given_system), synthesize(given_system)
+    assert str(result.status) == str(core.status)
+    explicit = explicit_supervisor(given_system)
+    if result.supervisor is None:
+        assert result.reason == f"no supervisor exists: {core.reason}" == result.explanation
+        return
+    assert (result.supervisor.added, result.supervisor.initial) == (core.added, core.initial)
+    assert explicit is not None
+    verification = robosc.verify(result.supervisor, is_strict=True)
+    assert verification.passed, str(verification)
+    assert verification.report["states"] == result.supervisor.states
+    assert (result.supervisor.initial is None) == (result.supervisor.initial_condition is None)
+    few = robosc.verify(result.supervisor, maximum_states=0)
+    assert few.status in (robosc.VerificationStatus.NOT_CHECKED, robosc.VerificationStatus.PASSED)
+
+
+def test_no_supervisor_and_automata_that_do_not_fit() -> None:
+    blocked = System("s", (Event("u_go", is_controllable=False),), (
+        Automaton("A", ("a", "b"), ("a",), frozenset({"a"}), frozenset({"u_go"}), (Edge("a", "u_go", "b"),)),
+    ))  # fmt: skip
+    result = robosc.synthesize(blocked)
+    assert result.status is robosc.SynthesisStatus.EMPTY
+    assert result.supervisor is None
+    assert result.explanation is not None
+    assert str(result) == result.explanation
+    with pytest.raises(robosc.InvalidSystemError, match="A: a -u_gone-> b: "):
+        robosc.synthesize(replace(blocked, automata=(replace(blocked.automata[0], edges=(Edge("a", "u_gone", "b"),)),)))
+
+
+def test_ways_to_begin_are_part_of_the_answer() -> None:
+    two = System("two", (Event("go", is_controllable=True),), (
+        Automaton("A", ("a", "b"), ("a", "b"), frozenset({"a"}), frozenset({"go"}), (Edge("a", "go", "a"),)),
+    ))  # fmt: skip
+    supervisor = robosc.synthesize(two).supervisor
+    assert supervisor is not None
+    assert str(supervisor.initial_condition) == "A.a"
+    assert repr(supervisor.initial_condition) == "<the initial state needs A.a>"
+    assert robosc.verify(supervisor).passed
+    # Searched one by one alone, it is not checked beyond the limit.
+    assert robosc.verify(supervisor, maximum_states=0).status is robosc.VerificationStatus.NOT_CHECKED
+
+
+def test_other_doors_are_closed() -> None:
+    supervisor = robosc.synthesize(replace(MACHINE, invariants=(Constant(True), StateTest("M", "idle")))).supervisor
+    assert supervisor is not None
+    with pytest.raises(TypeError, match="properties and supervisor= need a model"):
+        robosc.verify(supervisor, "invariant true")  # type: ignore[call-overload]
+    with pytest.raises(TypeError, match="a supervisor is wanted"):
+        robosc.simulate(supervisor)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="a model is the path of a file"):
+        robosc.generate(supervisor, "ros2")  # type: ignore[arg-type]

@@ -4,12 +4,18 @@ These functions are the one description of the methods of both clients, which ta
 documentation over: `robosc_client.client` has them done for threads, `robosc_client.aio` for asyncio.
 """
 
+import os
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import PurePath
 from typing import Any
 
-from robosc.errors import Diagnostic
-from robosc.source import Bundle, SourceFile
+from robosc.pipeline.files import given_path, read_bounded
+from robosc.pipeline.findings import Findings
+from robosc.pipeline.loading import FileName, ModelLike, loaded, property_file
+from robosc.source import SourceFile
+from robosc.supervisor.codec import MAXIMUM_BYTES, encode
+from robosc.supervisor.structure import Supervisor
 from robosc.targets import GenerateOptions, TargetInfo
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
@@ -50,27 +56,31 @@ from robosc_client.tasks import (
     Verify,
 )
 
+type SupervisorLike = Supervisor | bytes | FileName
+"""A supervisor, the bytes of its file or the file's name."""
+
 # Tasks that are done at once
 
 
-def check(bundle: Bundle, *, deadline_s: float | None = None) -> Operation[tuple[Diagnostic, ...]]:
+def check(bundle: ModelLike, *, deadline_s: float | None = None) -> Operation[Findings]:
     """Every finding about a model or library, sorted by place."""
-    return Operation("Check", request_of(Check(bundle)), check_assembly, deadline_s=deadline_s)
+    model = loaded(bundle)
+    return Operation("Check", request_of(Check(model)), lambda: check_assembly(model), deadline_s=deadline_s)
 
 
 def synthesize(
-    bundle: Bundle,
+    bundle: ModelLike,
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     deadline_s: float | None = None,
     on_progress: OnProgress = ignored,
 ) -> Operation[Synthesis]:
     """Synthesize and certify a supervisor."""
-    return _work("Synthesize", Synthesize(bundle, options), SynthesisAssembly, deadline_s, on_progress)
+    return _work("Synthesize", Synthesize(loaded(bundle), options), SynthesisAssembly, deadline_s, on_progress)
 
 
 def generate(
-    bundle: Bundle,
+    bundle: ModelLike,
     target: str,
     generation: GenerateOptions = DEFAULT_GENERATION,
     options: SynthesisOptions = DEFAULT_OPTIONS,
@@ -81,19 +91,19 @@ def generate(
     """Synthesize a supervisor and generate the files of a target around it.
 
     Args:
-        bundle: The model and its libraries.
+        bundle: The model and its libraries, or the path of a model.
         target: Name of the target, or `all`.
         generation: Choices about the files.
         options: Options for making the supervisor.
         deadline_s: See the class.
         on_progress: See the class.
     """
-    task = Generate(bundle, target, generation, options)
-    return _work("Generate", task, GenerationAssembly, deadline_s, on_progress)
+    task = Generate(loaded(bundle), target, generation, options)
+    return _work("Generate", task, lambda: GenerationAssembly(target), deadline_s, on_progress)
 
 
 def explore(
-    bundle: Bundle,
+    bundle: ModelLike,
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     maximum_states: int | None = None,
@@ -101,14 +111,77 @@ def explore(
     on_progress: OnProgress = ignored,
 ) -> Operation[Exploration]:
     """Everything that the robot may do under its supervisor; beyond so many states it is given up."""
-    return _work("Explore", Explore(bundle, options, maximum_states), ExplorationAssembly, deadline_s, on_progress)
+    task = Explore(loaded(bundle), options, maximum_states)
+    return _work("Explore", task, ExplorationAssembly, deadline_s, on_progress)
 
 
 def verify(
-    task: Verify, *, deadline_s: float | None = None, on_progress: OnProgress = ignored
+    task: Verify | ModelLike,
+    properties: str | Sequence[str] = (),
+    *,
+    property_files: Sequence[FileName | SourceFile] = (),
+    supervisor: SupervisorLike | None = None,
+    options: SynthesisOptions | None = None,
+    maximum_states: int | None = None,
+    is_strict: bool = False,
+    deadline_s: float | None = None,
+    on_progress: OnProgress = ignored,
 ) -> Operation[Verification]:
-    """Check a supervisor against its model, or verify properties of the robot under its supervisor."""
+    """Check a supervisor against its model, or verify properties of the robot under its supervisor.
+
+    Args:
+        task: The model and its libraries, or the path of a model; or the whole task, which says the rest.
+        properties: A property in the property language, or several.
+        property_files: Files with a property on each line.
+        supervisor: The supervisor to check: itself, the path of its file or its bytes; None: one is made of the model.
+        options: Options for making the supervisor, and the deployment that one must be for; None: as it says.
+        maximum_states: States up to which a given supervisor is searched one by one; None: 1,000,000.
+        is_strict: True if a given supervisor passes only if permissiveness was checked, too.
+        deadline_s: See the class.
+        on_progress: See the class.
+    """
+    if not isinstance(task, Verify):
+        chosen = options or DEFAULT_OPTIONS
+        task = Verify(
+            bundle=loaded(task),
+            supervisor=b"" if supervisor is None else _content_of(supervisor),
+            deployment=None if options is None else options.deployment,
+            properties=(properties,) if isinstance(properties, str) else tuple(properties),
+            property_files=tuple(map(_listing, property_files)),
+            engine=chosen.engine,
+            allow_reordering=chosen.allow_reordering,
+            maximum_nodes=chosen.maximum_nodes,
+            maximum_states=maximum_states,
+            is_strict=is_strict,
+        )
+    elif properties or property_files or supervisor is not None or options or maximum_states is not None or is_strict:
+        raise TypeError("a task says by itself what is to be verified: give either a task or a model and the rest")
     return _work("Verify", task, VerificationAssembly, deadline_s, on_progress)
+
+
+def _listing(file: FileName | SourceFile) -> SourceFile:
+    """A file of properties under a name that a server takes: no absolute one.
+
+    Raises:
+        FileAccessError: It is not there or cannot be read.
+        LanguageError: It is no text.
+    """
+    found = property_file(file)
+    path = PurePath(found.name)
+    return SourceFile(path.name, found.text) if path.is_absolute() else found
+
+
+def _content_of(supervisor: SupervisorLike) -> bytes:
+    """Return the content of a supervisor's file; the server judges whether it is one.
+
+    Raises:
+        FileAccessError: The file cannot be read.
+    """
+    if isinstance(supervisor, bytes):
+        return supervisor
+    if isinstance(supervisor, str | os.PathLike):
+        return read_bounded(given_path(supervisor), MAXIMUM_BYTES)
+    return encode(supervisor)
 
 
 def format_(file: SourceFile, *, deadline_s: float | None = None) -> Operation[Formatted]:

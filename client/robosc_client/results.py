@@ -1,26 +1,20 @@
-"""Answers of the service, as values."""
+"""Answers of the service, as values: those of the core where they mean the same."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import Any
 
 import msgspec
 
 from robosc.errors import Diagnostic
 from robosc.explanation import EmptyExplanation
 from robosc.expressions import Value
-from robosc.targets import GeneratedFiles
-
-
-class SynthesisStatus(StrEnum):
-    """Outcome of an attempt to make a supervisor."""
-
-    SUPERVISOR = "supervisor"
-    EMPTY = "empty"
-    """No supervisor exists: a result about the model, not a fault."""
-    MODEL_ERRORS = "model errors"
-    UNSUPPORTED_MODEL = "unsupported model"
+from robosc.pipeline.results import (
+    Generation,
+    Outcome,
+    Summary,
+    SynthesisStatus,
+    Verification,
+    VerificationStatus,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,27 +28,6 @@ class Progress:
 
     stage: str
     message: str
-
-
-@dataclass(frozen=True, slots=True)
-class Summary:
-    """A supervisor in figures and words.
-
-    Attributes:
-        controllable_events: Number of controllable events.
-        uncontrollable_events: Number of uncontrollable events.
-        states: Reachable states of the controlled system.
-        transitions: Transitions between them, or None where they were not counted.
-        added: Event and what the supervisor adds to it, for each controllable event.
-        text: The summary as `robosc synth` prints it.
-    """
-
-    controllable_events: int
-    uncontrollable_events: int
-    states: int
-    transitions: int | None
-    added: tuple[tuple[str, str], ...]
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +47,8 @@ class Statistics:
     peak_nodes: int
 
 
-@dataclass(frozen=True, slots=True)
-class Synthesis:
+@dataclass(frozen=True, slots=True, repr=False)
+class Synthesis(Outcome):
     """Result of a synthesis.
 
     Attributes:
@@ -100,25 +73,11 @@ class Synthesis:
     explanation: EmptyExplanation | None = None
     signature: bytes = b""
 
+    def _made(self) -> object:
+        return self.summary
 
-@dataclass(frozen=True, slots=True)
-class Generation:
-    """Result of a generation.
-
-    Attributes:
-        status: Outcome of the synthesis.
-        diagnostics: Every finding about the model, sorted by place.
-        reason: Reason why there are no files, in one sentence; empty where there are.
-        files: The files, or None where there are none; `robosc.targets.write_files` writes them. Their digests and
-            names were checked.
-        explanation: Explanation of why no supervisor exists, or None where there is nothing to explain.
-    """
-
-    status: SynthesisStatus
-    diagnostics: tuple[Diagnostic, ...]
-    reason: str
-    files: GeneratedFiles | None
-    explanation: EmptyExplanation | None = None
+    def _why(self) -> object:
+        return self.explanation
 
 
 class StateValues(msgspec.Struct, frozen=True, gc=False):
@@ -150,9 +109,12 @@ class StateGraph(msgspec.Struct, frozen=True):
     states: tuple[StateValues, ...]
     transitions: tuple[tuple[int, str, int], ...]
 
+    def __repr__(self) -> str:
+        return f"<graph: {len(self.states)} states, {len(self.transitions)} transitions>"
 
-@dataclass(frozen=True, slots=True)
-class Exploration:
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Exploration(Outcome):
     """Result of an exploration.
 
     Attributes:
@@ -169,36 +131,11 @@ class Exploration:
     graph: StateGraph | None
     explanation: EmptyExplanation | None = None
 
+    def _made(self) -> object:
+        return self.graph
 
-class VerificationStatus(StrEnum):
-    """Outcome of a verification."""
-
-    PASSED = "passed"
-    FAILED = "failed"
-    NOT_CHECKED = "not checked"
-    """Nothing is wrong as far as was looked, and not everything could be."""
-    PROPERTY_ERRORS = "property errors"
-    """A property cannot be understood: the diagnostics tell."""
-    NO_SUPERVISOR = "no supervisor"
-    """The model has errors, or no supervisor exists."""
-    UNSUPPORTED_MODEL = "unsupported model"
-
-
-@dataclass(frozen=True, slots=True)
-class Verification:
-    """Result of a verification.
-
-    Attributes:
-        status: Outcome of the verification.
-        diagnostics: Every finding about the model or the properties, sorted by place.
-        reason: Reason why there is no verdict, in one sentence; empty where there is one.
-        report: Output of `robosc verify --json`, as values.
-    """
-
-    status: VerificationStatus
-    diagnostics: tuple[Diagnostic, ...]
-    reason: str
-    report: Mapping[str, Any]
+    def _why(self) -> object:
+        return self.explanation
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,3 +197,21 @@ class ServerInfo:
 
 type TaskResult = tuple[Diagnostic, ...] | Synthesis | Generation | Exploration | Verification | Formatted
 """What a task's job gives: the findings for a check, else what the method of the client returns."""
+
+__all__ = [
+    "Exploration",
+    "Formatted",
+    "Generation",
+    "Progress",
+    "ServerInfo",
+    "ServerLimits",
+    "StateGraph",
+    "StateValues",
+    "Statistics",
+    "Summary",
+    "Synthesis",
+    "SynthesisStatus",
+    "TaskResult",
+    "Verification",
+    "VerificationStatus",
+]

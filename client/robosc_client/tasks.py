@@ -3,32 +3,10 @@
 from dataclasses import dataclass
 
 from robosc.model.structure import Deployment
+from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.source import Bundle, SourceFile
 from robosc.targets import GenerateOptions
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SynthesisOptions:
-    """Options for making a supervisor.
-
-    Attributes:
-        deployment: Place where the supervisor will stand.
-        engine: Name of the server's engine for decision diagrams, or `auto`.
-        allow_livelock: True if a supervisor is made even if silent steps of its controller never end.
-        allow_reordering: True if the engine may change the order of its variables while it works.
-        maximum_nodes: Nodes of decision diagrams beyond which the work is given up; None: the server's limit.
-        verified_states: States up to which the supervisor is verified one by one; None: 200,000.
-    """
-
-    deployment: Deployment = Deployment.CONTROLLER
-    engine: str = "auto"
-    allow_livelock: bool = False
-    allow_reordering: bool = False
-    maximum_nodes: int | None = None
-    verified_states: int | None = None
-
-
-DEFAULT_OPTIONS = SynthesisOptions()
 DEFAULT_GENERATION = GenerateOptions()
 
 
@@ -107,3 +85,16 @@ class Format:
 
 
 type Task = Check | Synthesize | Generate | Explore | Verify | Format
+
+__all__ = [
+    "DEFAULT_GENERATION",
+    "DEFAULT_OPTIONS",
+    "Check",
+    "Explore",
+    "Format",
+    "Generate",
+    "SynthesisOptions",
+    "Synthesize",
+    "Task",
+    "Verify",
+]

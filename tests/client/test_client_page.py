@@ -26,4 +26,4 @@ def test_the_example_runs(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert re.search(r"^supervisor  \d+$", done.stdout, re.MULTILINE)
     assert re.search(r"^succeeded ", done.stdout, re.MULTILINE)
-    assert done.stdout.endswith("\n()\n")
+    assert done.stdout.endswith("\nno findings\n")

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.explanation import EmptyExplanation, from_text
-from robosc.source import Location, visible
+from robosc.pipeline.findings import Findings
+from robosc.source import Bundle, Location, visible
 from robosc.targets import TargetInfo
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.errors import malformed
@@ -59,15 +60,19 @@ def require_at_most(most: int, count: int, what: str) -> None:
         raise malformed(f"it has more than {most} {what}")
 
 
-def diagnostics_of(messages: Sequence[pb.Diagnostic]) -> tuple[Diagnostic, ...]:
+def diagnostics_of(messages: Sequence[pb.Diagnostic], bundle: Bundle | None = None) -> Findings:
     """Findings as the core's values.
+
+    Args:
+        messages: The findings.
+        bundle: Texts that they are about, or None if those are not at hand.
 
     Raises:
         ServiceError: A severity is unknown, or there are too many.
     """
     require_at_most(MAXIMUM_ITEMS, len(messages), "findings")
     require_at_most(MAXIMUM_ITEMS, sum(len(message.related) for message in messages), "places")
-    return tuple(map(_diagnostic, messages))
+    return Findings(map(_diagnostic, messages), bundle)
 
 
 def progress_of(message: pb.Progress) -> Progress:

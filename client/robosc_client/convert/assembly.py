@@ -10,9 +10,10 @@ from typing import Any, Protocol
 
 import msgspec
 
-from robosc.errors import Diagnostic
 from robosc.language.tokens import tokenize
+from robosc.pipeline.findings import Findings
 from robosc.signatures import MAXIMUM_SIGNATURE_BYTES
+from robosc.source import Bundle
 from robosc.targets import GeneratedFiles
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
@@ -167,8 +168,14 @@ class GenerationAssembly(_Stream):
     _head: pb.GenerationResult
     _status: SynthesisStatus
 
-    def __init__(self) -> None:
+    def __init__(self, target: str = "") -> None:
+        """Prepare the assembly.
+
+        Args:
+            target: Target that was asked for; empty: it is not known.
+        """
         super().__init__()
+        self._target = target
         self._place = 0
         self._contents: list[bytearray] = []
 
@@ -219,7 +226,12 @@ class GenerationAssembly(_Stream):
                 raise malformed("it ended in the middle of the files")
             files = self._files()
         return Generation(
-            self._status, diagnostics_of(head.diagnostics), head.reason, files, explanation_of(head.explanation)
+            self._status,
+            diagnostics_of(head.diagnostics),
+            head.reason,
+            files,
+            explanation_of(head.explanation),
+            self._target,
         )
 
     def _files(self) -> GeneratedFiles:
@@ -320,9 +332,13 @@ class VerificationAssembly(_Stream):
         return self._found
 
 
-def check_assembly() -> Whole[pb.CheckResponse, tuple[Diagnostic, ...]]:
-    """Of Check."""
-    return Whole(lambda message: diagnostics_of(message.diagnostics))
+def check_assembly(bundle: Bundle | None = None) -> Whole[pb.CheckResponse, Findings]:
+    """Of Check.
+
+    Args:
+        bundle: Texts that were sent; None: they are not at hand.
+    """
+    return Whole(lambda message: diagnostics_of(message.diagnostics, bundle))
 
 
 def format_assembly(before: str | None) -> Whole[pb.FormatResponse, Formatted]:

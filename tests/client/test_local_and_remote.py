@@ -1,0 +1,163 @@
+"""The same nouns here and on a server: what is asked of `robosc` and of a client gives results that are alike."""
+
+import inspect
+from collections.abc import Iterator
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import robosc
+import robosc_client
+from robosc_client import Client, Verify
+from support.models import EMPTY, EXAMPLES, UNSUPPORTED
+from support.service import served
+
+NAVIGATION = EXAMPLES / "navigation" / "navigation.rscd"
+WRONG = "robot R { component C { outgoing message m with type: nothing } }"
+TEXTS = {
+    "navigation": NAVIGATION.read_text(encoding="utf-8"),
+    "empty": EMPTY,
+    "wrong": WRONG,
+    "unsupported": UNSUPPORTED,
+}
+METHODS = ("check", "synthesize", "explore", "verify", "generate")
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Client]:
+    with served() as address, Client(address) as connected:
+        yield connected
+
+
+@pytest.fixture(params=TEXTS, scope="module")
+def model(request: pytest.FixtureRequest) -> robosc.LoadedModel:
+    return robosc.load(text=TEXTS[request.param], name=f"{request.param}.rscd")
+
+
+def require_alike(local: Any, remote: Any, *, is_made: bool) -> None:
+    """The parts that every result has."""
+    assert local.status is remote.status
+    assert (local.reason, tuple(local.diagnostics)) == (remote.reason, tuple(remote.diagnostics))
+    told = None if isinstance(local.explanation, robosc.NoSupervisor) else local.explanation
+    assert told == remote.explanation
+    assert is_made == (local.status is robosc.SynthesisStatus.SUPERVISOR)
+    for result in (local, remote):
+        assert "\n" not in repr(result)
+        assert str(result)
+        assert result._repr_html_()
+
+
+def test_check(client: Client, model: robosc.LoadedModel) -> None:
+    local, remote = robosc.check(model), client.check(model)
+    assert local == remote
+    # With the lines of the text, which the server did not send back.
+    assert str(local) == str(remote)
+    assert isinstance(remote, robosc.Findings)
+
+
+def test_synthesize(client: Client, model: robosc.LoadedModel) -> None:
+    local, remote = robosc.synthesize(model), client.synthesize(model)
+    is_made = local.supervisor is not None
+    if local.status is robosc.SynthesisStatus.UNSUPPORTED_MODEL:
+        # The server stops before it has anything to say of the text.
+        assert (local.status, local.reason) == (remote.status, remote.reason)
+        return
+    require_alike(local, remote, is_made=is_made)
+    assert bool(remote.supervisor) == is_made
+    assert local.summary == remote.summary
+    if local.supervisor is not None and local.statistics is not None and remote.statistics is not None:
+        assert remote.supervisor == local.supervisor.encode()
+        assert robosc.simulate(remote.supervisor).enabled == robosc.simulate(local.supervisor).enabled
+        for item in fields(remote.statistics):
+            assert getattr(local.statistics, item.name) == getattr(remote.statistics, item.name)
+
+
+def test_explore(client: Client, model: robosc.LoadedModel) -> None:
+    local, remote = robosc.explore(model), client.explore(model)
+    if local.status is robosc.SynthesisStatus.UNSUPPORTED_MODEL:
+        assert (local.status, local.reason) == (remote.status, remote.reason)
+        return
+    require_alike(local, remote, is_made=local.graph is not None)
+    if local.graph is None or remote.graph is None:
+        assert (local.graph, remote.graph) == (None, None)
+        return
+    assert (local.graph.initial, local.graph.transitions) == (remote.graph.initial, remote.graph.transitions)
+    for ours, theirs in zip(local.graph.states, remote.graph.states, strict=True):
+        for name in ("components", "variables", "communications", "enabled"):
+            assert getattr(ours, name) == getattr(theirs, name)
+
+
+def test_verify(client: Client, model: robosc.LoadedModel, tmp_path: Path) -> None:
+    listing = tmp_path / "properties.txt"
+    listing.write_text("reachable true\n")
+    supervisor = robosc.synthesize(NAVIGATION).supervisor
+    assert supervisor is not None
+    questions: list[dict[str, Any]] = [
+        {"properties": "invariant true"},
+        {"properties": ["AG EF true", "invariant false"], "property_files": [listing]},
+        {"properties": "nonsense"},
+        {"supervisor": supervisor},
+        {"supervisor": supervisor.encode(), "properties": ["invariant true"], "is_strict": True},
+        {"supervisor": supervisor.write(tmp_path / "navigation.rsup"), "maximum_states": 1},
+        {"supervisor": b"none"},
+        {"supervisor": supervisor, "options": robosc.SynthesisOptions(deployment=robosc.Deployment.LAYER)},
+    ]
+    for question in questions:
+        local, remote = robosc.verify(model, **question), client.verify(model, **question)
+        assert (local.status, local.reason, local.holds) == (remote.status, remote.reason, remote.holds)
+        assert tuple(local.diagnostics) == tuple(remote.diagnostics)
+        # A report of the server is what `robosc verify --json` prints of it there.
+        assert local.passed == remote.passed
+        assert repr(local) == repr(remote)
+        assert local.report == remote.report
+        assert str(remote)
+
+
+def test_generate(client: Client, model: robosc.LoadedModel, tmp_path: Path) -> None:
+    local, remote = robosc.generate(model, "all"), client.generate(model, "all")
+    assert (local.status, local.reason, local.files) == (remote.status, remote.reason, remote.files)
+    if local.files is None:
+        for generation in (local, remote):
+            with pytest.raises(robosc.NothingGeneratedError):
+                generation.write(tmp_path)
+        return
+    assert local == remote
+    ours, theirs = local.write(tmp_path / "local"), remote.write(tmp_path / "remote")
+    assert ours.left_out == theirs.left_out
+    assert [path.name for path in ours.files] == [path.name for path in theirs.files]
+
+
+def test_paths_are_models(client: Client) -> None:
+    for path in (NAVIGATION, str(NAVIGATION)):
+        assert client.check(path) == robosc.check(path)
+    with pytest.raises(robosc.FileAccessError, match="there is no file nowhere"):
+        client.check("nowhere")
+    with pytest.raises(robosc.FileAccessError, match="cannot read nowhere"):
+        client.verify(NAVIGATION, supervisor="nowhere")
+
+
+def test_a_task_says_by_itself_what_is_to_be_verified(client: Client) -> None:
+    task = Verify(bundle=robosc.load(NAVIGATION), properties=("AG EF Navigator.ready",))
+    assert client.verify(task) == client.verify(NAVIGATION, "AG EF Navigator.ready")
+    with pytest.raises(TypeError, match="give either a task or a model and the rest"):
+        client.verify(task, "invariant true")
+
+
+def test_values_that_mean_the_same_are_the_same() -> None:
+    for name in (
+        *("Generation", "Summary", "SynthesisOptions", "SynthesisStatus", "Verification", "VerificationStatus"),
+    ):
+        assert getattr(robosc, name) is getattr(robosc_client, name)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_parameters_have_the_same_names(name: str) -> None:
+    local = list(inspect.signature(getattr(robosc, name)).parameters)
+    remote = list(inspect.signature(getattr(Client, name)).parameters)[1:]
+    # The first one keeps its older name; work here is stopped by a function, and there by a deadline.
+    assert remote[0] in ("bundle", "task")
+    assert [item for item in local[1:] if item not in ("should_stop", "on_progress")] == [
+        item for item in remote[1:] if item not in ("deadline_s", "on_progress")
+    ]

@@ -7,7 +7,6 @@ documentation over: `robosc_client.client` has them done for threads, `robosc_cl
 import os
 import secrets
 from collections.abc import Callable, Sequence
-from pathlib import PurePath
 from typing import Any
 
 from robosc.pipeline.files import given_path, read_bounded
@@ -147,7 +146,7 @@ def verify(
             supervisor=b"" if supervisor is None else _content_of(supervisor),
             deployment=None if options is None else options.deployment,
             properties=(properties,) if isinstance(properties, str) else tuple(properties),
-            property_files=tuple(map(_listing, property_files)),
+            property_files=tuple(map(property_file, property_files)),
             engine=chosen.engine,
             allow_reordering=chosen.allow_reordering,
             maximum_nodes=chosen.maximum_nodes,
@@ -157,18 +156,6 @@ def verify(
     elif properties or property_files or supervisor is not None or options or maximum_states is not None or is_strict:
         raise TypeError("a task says by itself what is to be verified: give either a task or a model and the rest")
     return _work("Verify", task, VerificationAssembly, deadline_s, on_progress)
-
-
-def _listing(file: FileName | SourceFile) -> SourceFile:
-    """A file of properties under a name that a server takes: no absolute one.
-
-    Raises:
-        FileAccessError: It is not there or cannot be read.
-        LanguageError: It is no text.
-    """
-    found = property_file(file)
-    path = PurePath(found.name)
-    return SourceFile(path.name, found.text) if path.is_absolute() else found
 
 
 def _content_of(supervisor: SupervisorLike) -> bytes:

@@ -10,7 +10,10 @@ import pytest
 
 import robosc
 import robosc_client
+from robosc.source import SourceFile
+from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client import Client, Verify
+from robosc_client.convert.requests import request_of
 from support.models import EMPTY, EXAMPLES, UNSUPPORTED
 from support.service import served
 
@@ -161,3 +164,11 @@ def test_parameters_have_the_same_names(name: str) -> None:
     assert [item for item in local[1:] if item not in ("should_stop", "on_progress")] == [
         item for item in remote[1:] if item not in ("deadline_s", "on_progress")
     ]
+
+
+def test_a_file_of_properties_is_sent_under_a_name_that_a_server_takes() -> None:
+    names = ("/home/somebody/properties.txt", "folder/properties.txt")
+    files = tuple(SourceFile(name, "reachable true") for name in names)
+    request = request_of(Verify(bundle=robosc.load(NAVIGATION), property_files=files))
+    assert isinstance(request, pb.VerifyRequest)
+    assert [file.name for file in request.property_files] == ["properties.txt", "folder/properties.txt"]

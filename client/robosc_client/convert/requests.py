@@ -1,5 +1,7 @@
 """Tasks to request messages."""
 
+from pathlib import PurePath
+
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, SourceFile
 from robosc.targets import GenerateOptions
@@ -136,7 +138,7 @@ def _verify_request(task: Verify) -> pb.VerifyRequest:
         options=options,
         supervisor=task.supervisor,
         properties=task.properties,
-        property_files=map(_file, task.property_files),
+        property_files=map(_listing, task.property_files),
         maximum_states=_limit(task.maximum_states, "maximum_states"),
         strict=task.is_strict,
     )
@@ -191,6 +193,12 @@ def _bundle(bundle: Bundle) -> pb.Bundle:
         searched=list(bundle.searched),
         interfaces=map(_file, bundle.interfaces),
     )
+
+
+def _listing(file: SourceFile) -> pb.SourceFile:
+    """A file of properties: a place on this machine is nothing to a server, which takes relative names only."""
+    path = PurePath(file.name)
+    return pb.SourceFile(name=path.name if path.is_absolute() else file.name, text=file.text)
 
 
 def _file(file: SourceFile) -> pb.SourceFile:

@@ -418,3 +418,15 @@ def test_what_is_no_cif_is_refused(text: str) -> None:
 
 def test_what_is_cif_is_read() -> None:
     CifSystem(f"// é comes from elsewhere\n{_DECLARED_TWICE.partition(' end ')[0]} end\n".replace("é", "e"))
+
+
+def test_a_file_that_would_grow_beyond_the_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    supervisor = example_supervisor("maze_solver/maze_solver")
+    largest = max(map(len, generate(supervisor, "cif").values()))
+    # The package gives the module's name to its function.
+    module = sys.modules["robosc.targets.cif.generate"]
+    monkeypatch.setattr(module, "MAXIMUM_BYTES", largest + 10)
+    generate(supervisor, "cif")
+    monkeypatch.setattr(module, "MAXIMUM_BYTES", largest - 10)
+    with pytest.raises(UnsupportedModelError, match="target cif: a file would have more than"):
+        generate(supervisor, "cif")

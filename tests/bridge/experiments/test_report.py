@@ -60,6 +60,8 @@ def test_a_report_of_a_recorded_run_is_complete(tmp_path: Path) -> None:
     assert rows(tmp_path / "figures.csv")[1:] == [
         ["maze", "serial", "world_s", "0.95"], ["maze", "serial", "way_m", "0.19"],
     ]  # fmt: skip
+    heads = "experiment what middleware mean_us min_us max_us sd_us median_us publish_median_us cycles by".split()
+    assert rows(tmp_path / "cycles.csv")[0] == heads
     assert [row[-1] for row in rows(tmp_path / "cycles.csv")[1:]] == ["here", "the paper", "here", "the paper"]
     assert rows(tmp_path / "lines_of_code.csv")[1:] == [
         ["maze", "model", "80", "1"], ["maze", "cif", "120", "1"], ["maze", "ros1-cpp", "", "0"],

@@ -72,8 +72,8 @@ def explore(
     if limit < 1:
         raise ValueError(f"maximum_states is {limit}, and must be at least 1")
     if isinstance(model, CoreSupervisor):
-        diagnostics = model.diagnostics if isinstance(model, Supervisor) else Findings()
-        return _explored(model, limit, diagnostics, on_progress, should_stop)
+        known = model.diagnostics if isinstance(model, Supervisor) else None
+        return _explored(model, limit, known or Findings(), on_progress, should_stop)
     bundle = loaded(model)
     # The graph is of everything allowed, whatever an executor would choose.
     attempt = make(bundle, options, on_progress, should_stop, allow_livelock=True)

@@ -14,6 +14,10 @@ from robosc.supervisor.structure import Supervisor as CoreSupervisor
 from robosc.targets import GenerateOptions, generated, require_generatable
 
 DEFAULT_GENERATION = GenerateOptions()
+UNKNOWN_FINDINGS = (
+    "the findings about the model of this supervisor are not known, and some are errors for a target: generate from "
+    "the model, or from the supervisor that robosc.synthesize returned"
+)
 
 
 def generate(
@@ -30,7 +34,8 @@ def generate(
     Nothing is written: that is `write` of the result.
 
     Args:
-        model: A supervisor that was made, what `load` returns, or the path of a model.
+        model: A supervisor that `synthesize` has made, what `load` returns, or the path of a model. Of one that was
+            read from a file nothing is generated: some findings about its model are errors for a target.
         target: Name of the target, or `all`.
         generation: Choices about the files.
         options: Options for making the supervisor of a model.
@@ -47,7 +52,9 @@ def generate(
     """
     require_generatable(target)
     if isinstance(model, CoreSupervisor):
-        diagnostics = model.diagnostics if isinstance(model, Supervisor) else ()
+        diagnostics = model.diagnostics if isinstance(model, Supervisor) else None
+        if diagnostics is None:
+            return Generation(SynthesisStatus.UNSUPPORTED_MODEL, (), UNKNOWN_FINDINGS, None, target=target)
         return _generation(Made(MadeStatus.SUPERVISOR, model, diagnostics), target, generation, on_progress)
     bundle = loaded(model)
     attempt = make(bundle, options, on_progress, should_stop, allow_livelock=options.allow_livelock)

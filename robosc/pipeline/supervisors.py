@@ -31,11 +31,11 @@ class Supervisor(CoreSupervisor, frozen=True, dict=True):
     """
 
     @classmethod
-    def of(cls, supervisor: CoreSupervisor, diagnostics: tuple[Diagnostic, ...] = ()) -> Self:
-        """Take a supervisor of the core, with the findings about its model."""
+    def of(cls, supervisor: CoreSupervisor, diagnostics: tuple[Diagnostic, ...] | None = None) -> Self:
+        """Take a supervisor of the core, with the findings about its model; None: they are not known."""
         made = cls(supervisor.model, supervisor.deployment, supervisor.added, supervisor.certificate)
         # No field: a supervisor's file does not hold them.
-        made.__dict__["diagnostics"] = Findings(diagnostics)
+        made.__dict__["diagnostics"] = None if diagnostics is None else Findings(diagnostics)
         return made
 
     @classmethod
@@ -64,9 +64,9 @@ class Supervisor(CoreSupervisor, frozen=True, dict=True):
         return encode(self)
 
     @cached_property
-    def diagnostics(self) -> Findings:
-        """The findings about its model; none of a supervisor that was read from a file."""
-        return Findings()
+    def diagnostics(self) -> Findings | None:
+        """The findings about its model; None if they are not known, as of a supervisor that was read from a file."""
+        return None
 
     @cached_property
     def system(self) -> System:
@@ -116,13 +116,13 @@ class Supervisor(CoreSupervisor, frozen=True, dict=True):
 
     def __reduce__(self) -> tuple[Any, ...]:
         fields = (self.model, self.deployment, self.added, self.certificate)
-        return _restored, (type(self), fields, tuple(self.diagnostics))
+        return _restored, (type(self), fields, None if self.diagnostics is None else tuple(self.diagnostics))
 
 
 def _restored(
     kind: type[Supervisor],
     fields: tuple[Model, Deployment, tuple[AddedCondition, ...], Certificate],
-    diagnostics: tuple[Diagnostic, ...],
+    diagnostics: tuple[Diagnostic, ...] | None,
 ) -> Supervisor:
     return kind.of(CoreSupervisor(*fields), diagnostics)
 

@@ -1,6 +1,7 @@
 """The results of the Python API are those that the command line prints, document by document and file by file."""
 
 import json
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -197,3 +198,22 @@ def test_generate(
     supervisor = robosc.synthesize(path, options).supervisor
     assert supervisor is not None
     assert robosc.generate(supervisor, "all").files == found.files
+
+
+def test_nothing_is_generated_where_findings_that_forbid_it_are_not_known(tmp_path: Path) -> None:
+    model = EXAMPLES / "maze_solver" / "maze_solver.rscd"
+    made = robosc.synthesize(model).supervisor
+    assert made is not None and made.diagnostics == ()
+    assert robosc.generate(made, "python").files
+    read = robosc.Supervisor.read(made.write(tmp_path / "made.rsup"))
+    assert (read, read.diagnostics) == (made, None)
+    for unknown in (read, pickle.loads(pickle.dumps(read))):
+        refused = robosc.generate(unknown, "python")
+        assert (refused.files, refused.status) == (None, robosc.SynthesisStatus.UNSUPPORTED_MODEL)
+        assert refused.reason.endswith(
+            "generate from the model, or from the supervisor that robosc.synthesize returned"
+        )
+        with pytest.raises(robosc.NothingGeneratedError, match="generate from the model"):
+            refused.write(tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    assert robosc.explore(read).graph == robosc.explore(made).graph

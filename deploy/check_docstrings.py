@@ -1,4 +1,4 @@
-"""Check that docstrings name what they are about first: none begins with a relative clause.
+"""Check that docstrings name their subject first: none begins with a relative clause, or with 'of' or 'by'.
 
     python deploy/check_docstrings.py robosc server/robosc_server
 
@@ -12,9 +12,9 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-OPENINGS = "How|So|That|What|Whatever|When|Where|Whether|Which|Who|Whoever|Why"
-DOCSTRING = re.compile(rf"\s*({OPENINGS})\b")
-ITEM = re.compile(rf"\s+(?:\*{{0,2}}\w+(?: \([^)]*\))?|Returns?|Yields?):\s+({OPENINGS})\b")
+CLAUSES = "How|So|That|What|Whatever|When|Where|Whether|Which|Who|Whoever|Whom|Whose|Why"
+DOCSTRING = re.compile(rf"\s*({CLAUSES}|By|Of)\b")
+ITEM = re.compile(rf"\s+(?:\*{{0,2}}\w+(?: \([^)]*\))?|Returns?|Yields?):\s+({CLAUSES})\b")
 GENERATED = re.compile(r"_pb2(_grpc)?\.py$")
 
 

@@ -38,7 +38,7 @@ def main() -> int:
 
 
 def wanted() -> dict[str, set[str]]:
-    """By lock, the packages in it."""
+    """Return the packages in each lock, by lock."""
     project = tomllib.loads((LOCK.parent / "pyproject.toml").read_text("utf-8"))["project"]
     result = {"build": closure(BUILD)}
     for name, extras in EXTRAS.items():
@@ -48,7 +48,7 @@ def wanted() -> dict[str, set[str]]:
 
 
 def locked(text: str) -> dict[str, str]:
-    """By package, its lines in a lock, without comments."""
+    """Return the lines of each package in a lock, by package, without comments."""
     entries = {}
     for block in re.split(r"\n(?=[a-z0-9])", text):
         match = re.match(r"([a-z0-9][a-z0-9._-]*)(?:\[[^\]]*\])?==", block)

@@ -57,7 +57,7 @@ class PublicKey:
 
     Attributes:
         line: As OpenSSH writes it, without the comment.
-        comment: Whose it is; decides nothing.
+        comment: Owner of the key; decides nothing.
     """
 
     line: str

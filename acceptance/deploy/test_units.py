@@ -46,7 +46,7 @@ def test_systemd_would_find_something(tmp_path: Path) -> None:
 @needs_systemd
 @pytest.mark.parametrize(("name", "exposure"), [("robosc-server.service", 15), ("robosc-bridge@.service", 20)])
 def test_a_service_is_exposed_to_little(name: str, exposure: int) -> None:
-    """Of 100, as `systemd-analyze security` counts: 20 of them are its best word, OK, anyhow."""
+    """Check the exposure, out of 100, as `systemd-analyze security` counts: 20 is still its best word, OK."""
     file = TOP / "deploy" / "systemd" / name
     command = ["systemd-analyze", "security", "--offline=true", f"--threshold={exposure}", "--no-pager", str(file)]
     done = subprocess.run(command, capture_output=True, text=True)

@@ -1,6 +1,6 @@
-"""By when the process of a task is gone whose caller has cancelled, or has waited as long as it wanted to.
+"""Time until the process of a task is gone whose caller has cancelled, or has waited as long as it wanted to.
 
-A real server, a real connection, and the moment of the process's death by the kernel's word (pidfd_open(2)).
+A real server, a real connection, and the moment of the process's death as the kernel reports it (pidfd_open(2)).
 """
 
 import contextlib

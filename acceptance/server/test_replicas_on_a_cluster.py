@@ -31,7 +31,7 @@ _BUSY_TICKS = 20
 """A process that has taken so much time of a processor is at a task: one that stands ready takes none."""
 
 _LONG_BITS = 10
-"""Of factors: their product takes some seconds, and is known then."""
+"""Number of bits of the factors: their product takes some seconds, and is known then."""
 
 
 @dataclass(frozen=True)

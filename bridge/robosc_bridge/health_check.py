@@ -12,7 +12,7 @@ from robosc_bridge.configuration import ConfigurationError, load
 from robosc_bridge.configuration.structure import Remote
 
 NAME = "health"
-"""Of the command."""
+"""Name of the command."""
 
 WELL, NOT_WELL, WRONG_USE = 0, 1, 2
 

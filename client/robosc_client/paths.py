@@ -9,10 +9,10 @@ from collections.abc import Iterable
 from pathlib import PurePosixPath
 
 MAXIMUM_NAME_BYTES = 255
-"""Of one part of a path: what the usual file systems take."""
+"""Maximum size of one part of a path, in bytes: the limit of the usual file systems."""
 
 MAXIMUM_PATH_BYTES = 1024
-"""Of a whole path."""
+"""Maximum size of a whole path, in bytes."""
 
 _DEVICES = frozenset(
     ["con", "prn", "aux", "nul", "conin$", "conout$"]

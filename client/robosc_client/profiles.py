@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tomlkit import TOMLDocument
 
 MAXIMUM_BYTES = 64 * 1024
-"""Of the file; nobody has more servers."""
+"""Maximum size of the file, in bytes; nobody has more servers."""
 
 MAXIMUM_TOKEN_BYTES = 4096
 

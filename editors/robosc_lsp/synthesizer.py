@@ -21,7 +21,7 @@ from robosc.synthesis.engines import EngineOptions
 from robosc_lsp.outcome import Asked, Finding, Outcome
 
 _MOST_NODES = 4_000_000
-"""Of decision diagrams, for which CUDD takes a gigabyte at most: who types wants to go on with other work."""
+"""Node limit of decision diagrams, for which CUDD takes a gigabyte at most: a user who types has other work to do."""
 
 
 def outcome(asked: Asked) -> Outcome:

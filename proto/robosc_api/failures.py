@@ -8,7 +8,7 @@ from google.rpc import error_details_pb2, status_pb2
 from grpc_status import rpc_status
 
 DOMAIN = "robosc"
-"""Of google.rpc.ErrorInfo."""
+"""Domain of google.rpc.ErrorInfo."""
 
 type Metadata = tuple[tuple[str, str | bytes], ...]
 

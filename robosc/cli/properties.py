@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc.model import check
 
     bundle = read_bundle(arguments)
-    # What is wrong with a property is told before the synthesis, which may take long.
+    # Errors of properties are reported before the synthesis, which may take long.
     model = check(bundle).model
     if model is not None and read_properties(arguments, model) is None:
         return ExitCode.USAGE

@@ -179,7 +179,7 @@ class _Explainer:
         )
 
     def _decisive(self, event: str, found: list[Hindrance], wanted: Any) -> list[Hindrance]:
-        """Of what keeps an event from ever happening, what is needed for that; behaviours where they alone do it."""
+        """Return the hindrances needed to keep an event from ever happening; behaviours where they alone do it."""
         candidates = [item for item in found if item.kind is not HindranceKind.BEHAVIOUR]
         if wanted == self._false:
             candidates = found or list(self._analysis.hindrances(event, self._reachable))

@@ -27,7 +27,7 @@ class ObstacleKind(StrEnum):
     CONDITION = "condition"
     """An event condition that no single requirement brings, such as the one on cancel."""
     RANGE = "range"
-    """Of a variable."""
+    """Range of a variable."""
     MARKING = "marking"
     """Need of an automaton to get back to its marked locations."""
 

@@ -136,7 +136,7 @@ def read_model(
                     raise FileAccessError(f"there is no {what} folder {folder}")
         unsaved = {}
         if text is not None:
-            # What cannot be UTF-8 is refused as in a file.
+            # Text that is not UTF-8 is refused, as in a file.
             unsaved[os.path.realpath(model)] = decode_source(text.encode("utf-8", "surrogatepass"), model.name)
         return load_bundle(model, library_paths, (*interface_paths, *interface_folders()), unsaved)
     except FileAccessError:

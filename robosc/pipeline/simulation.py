@@ -160,7 +160,7 @@ class Run:
             raise EventNotPossibleError(f"'{event}' is not allowed now: {self._obstacle(event)}; {self._allowed()}")
         name, _, kind = event.partition(".")
         is_request = not is_tau(event) and kind == EventKind.REQUEST
-        # What a request sends is made of the state before it.
+        # The data of a request is made of the state before it.
         _, provided = self._system.provide(name) if is_request else (True, None)
         skipped = self._system.step(event, reading)
         if skipped is None:

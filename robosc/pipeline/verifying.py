@@ -258,7 +258,7 @@ def _made(
     model: LoadedModel, claims: _Claims, options: SynthesisOptions, on_progress: OnProgress, should_stop: ShouldStop
 ) -> Verification:
     """Make the supervisor, and verify properties of its robot."""
-    # What is wrong with a property is told before the synthesis, which may take long.
+    # Errors of properties are reported before the synthesis, which may take long.
     robot = check(model).model
     errors = None if robot is None else claims.errors(robot)
     if errors is not None:

@@ -26,7 +26,7 @@ _SLACK = 4
 """Factor over the limit that one operation may take for what it needs on its way."""
 
 _NEARLY = 0.9
-"""Of the memory that CUDD may have: at this much it was that which stopped it, and not the machine."""
+"""Share of the memory that CUDD may have: at this much, that limit stopped it, and not the machine."""
 
 _CACHE_SLOTS = 2**14
 """Results of operations that CUDD remembers at the beginning; it takes more as they pay. Its own choice of 2^18 takes

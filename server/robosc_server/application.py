@@ -79,7 +79,7 @@ _HANDSHAKE_LIMIT_S = 10.0
 """Time for TLS, and for the first words of HTTP/2."""
 
 _METADATA_BYTES = 8 * 1024
-"""Of a call, all names and values together."""
+"""Maximum size of the metadata of a call, all names and values together, in bytes."""
 
 
 class StartError(Exception):

@@ -9,7 +9,7 @@ from robosc_server.operations.logs import tell_fault
 from robosc_server.tasks.task import Failure, Reason
 
 MAXIMUM_MESSAGE_BYTES = 1000
-"""Of a sentence for a caller, in UTF-8; percent-encoded it is up to three times as long."""
+"""Maximum size of a sentence for a caller, in bytes of UTF-8; percent-encoded it is up to three times as long."""
 
 _CODES = {
     Reason.MALFORMED_REQUEST: grpc.StatusCode.INVALID_ARGUMENT,

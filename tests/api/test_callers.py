@@ -1,4 +1,4 @@
-"""By what callers are told apart."""
+"""Distinction between callers."""
 
 from typing import Any
 

@@ -83,7 +83,7 @@ def _measured(lines: int, neighbours: int = 0) -> tuple[str, ...]:
 
 
 def _memory() -> str:
-    """Of a server with a text of 1,000 lines, after many edits."""
+    """Return the memory of a server with a text of 1,000 lines, after many edits."""
     with TemporaryDirectory() as folder, ProcessEditor(Path(folder), "--synthesis-seconds", "0") as editor:
         name = "model.rscd"
         editor.open(name, model_of(1_000))

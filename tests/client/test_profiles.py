@@ -31,7 +31,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def target(*arguments: str) -> Any:
-    """Whom a command asks, and what it shows."""
+    """Return the server that a command asks, and the credentials that it shows."""
     return target_of(make_parser().parse_args(["version", *arguments]))
 
 

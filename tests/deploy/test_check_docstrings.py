@@ -49,6 +49,7 @@ def test_what_names_its_thing_first_passes(tmp_path: Path) -> None:
         ('"""Jobs."""', '"""What jobs are."""', 1, "What"),
         ("Number of jobs", "How many jobs", 4, "How"),
         ("Job of a caller", "Who waits", 8, "Who"),
+        ("Number of jobs", "Of jobs", 4, "Of"),
         ("name: Name of the job", "name: What it is called", 11, "What"),
         ("is_over: True if", "is_over: Whether", 12, "Whether"),
         ("Return True if", "Whether", 18, "Whether"),

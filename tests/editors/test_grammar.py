@@ -35,7 +35,7 @@ COMMENT = re.compile(r"comment\.")
 FUNCTIONS = frozenset({"abs", "all", "any", "clamp", "length", "max", "min"})
 
 Scopes = list[list[str]]
-"""Of each character of a text, in its order."""
+"""Scopes of each character of a text, in its order."""
 
 
 def coloured(texts: Sequence[str]) -> list[Scopes]:

@@ -202,7 +202,7 @@ class Connected:
         return list(self.told)
 
     def of[Kind](self, kind: type[Kind]) -> list[Kind]:
-        """Of a kind, among what it was told since its last word."""
+        """Return the messages of a kind among those to the program since its last message."""
         return [item for item in self.told if isinstance(item, kind)]
 
     def leave(self) -> None:

@@ -25,7 +25,7 @@ class Instruction:
 
     @property
     def words(self) -> list[str]:
-        """Of the exec form; what is no such form is an error, since a shell would stand between."""
+        """Words of the exec form; any other form is an error, since a shell would stand between."""
         words = json.loads(self.text)
         assert isinstance(words, list) and all(isinstance(word, str) for word in words), self.text
         return words
@@ -49,7 +49,7 @@ class Stage:
         return found[-1] if found else None
 
     def words(self, name: str) -> list[str]:
-        """Of `ENTRYPOINT` or `CMD`; none: an empty list."""
+        """Return the words of `ENTRYPOINT` or `CMD`; none: an empty list."""
         found = self.last(name)
         return [] if found is None else found.words
 

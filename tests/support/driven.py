@@ -62,7 +62,7 @@ class Recorded:
 
     Args:
         device: The real one.
-        robot: Whose wheels are looked at.
+        robot: Robot with these wheels.
 
     Attributes:
         told: Time, and speeds of the left and the right wheel in m/s; each entry differs from the one before.

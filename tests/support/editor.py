@@ -66,7 +66,7 @@ def with_edits(text: str, edits: Sequence[lsp.TextEdit]) -> str:
 
 
 _converter = cache(default_converter)
-"""Of messages to what they mean: nothing is kept in it, and each new one would learn all of the protocol again."""
+"""Converter of messages to their meaning: it keeps nothing, and a new one would learn all of the protocol again."""
 
 
 class Editor:

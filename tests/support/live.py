@@ -174,7 +174,7 @@ class LiveRobot:
         )
 
     def locations(self) -> Mapping[str, str]:
-        """Of services and actions."""
+        """Return the locations of services and actions."""
         return {
             item.name: self.system.location(item.name) for item in self._model.communications if item.kind in _CALLED
         }

@@ -54,7 +54,7 @@ class StandIn:
 
     @property
     def address(self) -> str:
-        """Of the page, for whoever has no token."""
+        """Address of the page, for users without a token."""
         return f"http://127.0.0.1:{self.port}/"
 
     def __enter__(self) -> "StandIn":

@@ -73,7 +73,7 @@ class Postgresql:
 
     @property
     def url(self) -> str:
-        """Of its first database."""
+        """URL of its first database."""
         return f"postgresql://{_USER}@127.0.0.1:{self._port}/postgres"
 
     def new_database(self) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 LATE_S = 0.05
-"""By so much no thread may be late where answers are awaited for a fifth of a second at most."""
+"""Lateness that no thread may have where answers are awaited for a fifth of a second at most, in seconds."""
 
 _STEP_S = 0.005
 

@@ -21,7 +21,7 @@ STEP_S = 0.02
 
 
 def reading(time_s: float, **changes: Any) -> DriveReading:
-    """Of wheels at rest, torque on, with a full battery."""
+    """Return a reading of wheels at rest, torque on, with a full battery."""
     sound = DriveReading(time_s, Pose(), STANDSTILL, (0.0, 0.0), is_torque_on=True, battery_v=12.0)
     return replace(sound, **changes)
 

@@ -69,7 +69,7 @@ class SafetyTwin:
         return [each.value for each in self.past if each.name == "drive"]
 
     def mean_v(self) -> float:
-        """Of the last time that was long enough."""
+        """Return the mean voltage of the last time that was long enough, in volts."""
         mean_v, window = math.inf, list[tuple[float, float]]()
         for reading in self._readings():
             if reading.battery_v is None or not math.isfinite(reading.battery_v + reading.time_s):

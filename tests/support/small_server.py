@@ -66,7 +66,7 @@ class Ended:
 
     @property
     def reason(self) -> str:
-        """Of google.rpc.ErrorInfo."""
+        """Reason of google.rpc.ErrorInfo."""
         for detail in status_pb2.Status.FromString(self.trailing["grpc-status-details-bin"]).details:
             info = error_details_pb2.ErrorInfo()
             if detail.Unpack(info):
@@ -76,7 +76,7 @@ class Ended:
 
     @property
     def retry_delay_s(self) -> float | None:
-        """Of google.rpc.RetryInfo."""
+        """Retry delay of google.rpc.RetryInfo, in seconds."""
         for detail in status_pb2.Status.FromString(self.trailing["grpc-status-details-bin"]).details:
             info = error_details_pb2.RetryInfo()
             if detail.Unpack(info):

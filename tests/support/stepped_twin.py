@@ -31,11 +31,11 @@ from support.generated import example_supervisor
 from support.layers import BothSides
 
 PERIOD_S = 0.1
-"""Of decisions and of pictures."""
+"""Period of decisions and of pictures, in seconds."""
 
 SCAN_S = 0.2
 FARTHEST_M, NEAREST_M = 3.5, 0.12
-"""Of a LiDAR such as the LDS-01."""
+"""Farthest and nearest distance of a LiDAR such as the LDS-01, in metres."""
 
 _STEP_S = 0.05
 _TURN_RAD_S, _TURN_TOLERANCE_RAD = 0.6, 0.005
@@ -117,7 +117,7 @@ class SteppedTwin:
 
     @property
     def place(self) -> tuple[float, float]:
-        """Of its middle, in metres."""
+        """Position of its middle, in metres."""
         return self.world.pose[:2]
 
     def tell(self, identifier: str) -> None:

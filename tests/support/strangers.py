@@ -110,11 +110,11 @@ def strangers(address: str, count: int, **how: Any) -> Iterator[list[Stranger]]:
 
 
 def headers(path: str, metadata: Mapping[str, str]) -> bytes:
-    """Of a call, in HPACK without indexing (RFC 7541, 6.2.2).
+    """Return the headers of a call, in HPACK without indexing (RFC 7541, 6.2.2).
 
     Args:
-        path: Of its method.
-        metadata: More than it needs, each name and value shorter than 127 bytes.
+        path: Path of its method.
+        metadata: Metadata beyond what it needs, each name and value shorter than 127 bytes.
     """
     found = b""
     fields = {":method": "POST", ":scheme": "http", ":path": path, ":authority": "robot"}

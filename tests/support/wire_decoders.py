@@ -162,7 +162,7 @@ TARGETS: dict[str, Callable[[bytes], None]] = {
     "dynamixel": on_dynamixel,
     "registers": on_registers,
 }
-"""By name of the decoder."""
+"""Targets by name of the decoder."""
 
 SEEDS: dict[str, tuple[bytes, ...]] = {
     "lds01": (b"\0" + b"".join(map(_nth_lds01, range(20))),),

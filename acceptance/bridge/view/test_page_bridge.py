@@ -78,12 +78,12 @@ class Bridge:
 
     @property
     def address(self) -> str:
-        """Of its remote face."""
+        """Address of its remote face."""
         return self.said(r"the remote face listens on (\S+)\n")
 
     @property
     def url(self) -> str:
-        """Of its live view, with the token."""
+        """URL of its live view, with the token."""
         return self.said(r"the live view: (\S+)\n")
 
 

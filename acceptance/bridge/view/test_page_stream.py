@@ -192,7 +192,10 @@ COUNT_CHANGES = """() => {
   observer.observe(document.querySelector("#cards"), everything);
 }"""
 MOST_CHANGES = 16
-"""Of an event: the state in words, two boxes, two lines and their labels, the description, the steps of a light."""
+"""Maximum number of changes for one event.
+
+The state in words, two boxes, two lines and their labels, the description, the steps of a light.
+"""
 
 
 def test_sixty_components_at_fifty_events_a_second(browser: Browser) -> None:

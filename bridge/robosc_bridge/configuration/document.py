@@ -22,7 +22,7 @@ from robosc_bridge.configuration.problems import ConfigurationError, Path, Probl
 MAXIMUM_BYTES = 256 * 1024
 MAXIMUM_DEPTH = 12
 MAXIMUM_ENTRIES = 1000
-"""Of one list or mapping."""
+"""Maximum number of entries of one list or mapping."""
 
 MAXIMUM_SCALAR = 4096
 """Characters of one scalar."""

@@ -59,7 +59,7 @@ class Asking:
             self._shapes[item.name] = accepted(model, item.request, shape)
 
     def identifier(self, kind: CommunicationKind, name: str) -> str:
-        """Of a service or action that the model has."""
+        """Return the identifier of a service or action that the model has."""
         return self._others[kind, name].identifier
 
     def look(self, item: FromProgram) -> FromProgram:

@@ -35,7 +35,7 @@ def file_problems(configuration: Configuration, fastest: Velocity) -> list[str]:
 
 
 def _looks(configuration: Configuration, fastest: Velocity) -> Iterator[tuple[str, Callable[[], object]]]:
-    """By section, what reads its files."""
+    """Yield each section with the function that reads its files."""
     face = settings_of(configuration)
     if face is not None:
         security = face.security

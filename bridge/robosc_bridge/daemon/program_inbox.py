@@ -15,10 +15,10 @@ from robosc_bridge.daemon.plain_data import weight_bytes, why_not_plain
 from robosc_bridge.daemon.programs import Attached, Detached, FromProgram, Program
 
 MAXIMUM_WAITING = 200
-"""Of one program."""
+"""Maximum number of waiting messages of one program."""
 
 MAXIMUM_WAITING_BYTES = 2_000_000
-"""Of memory, for the data of one program; one message may wait whatever its size."""
+"""Maximum memory for the data of one program, in bytes; one message may wait whatever its size."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ Arrived = FromProgram | Unreadable | Overflowed
 
 @dataclass
 class _Waiting:
-    """Of one program, each with the memory that its data takes."""
+    """Waiting messages of one program, each with the memory that its data takes."""
 
     items: deque[tuple[Arrived, int]] = field(default_factory=deque)
     weight_bytes: int = 0

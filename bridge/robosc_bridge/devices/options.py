@@ -47,8 +47,8 @@ def checked_options(driver: Driver, options: Mapping[str, Any]) -> dict[str, Any
     """The options as the driver takes them.
 
     Args:
-        driver: Whose.
-        options: Of a configuration.
+        driver: Driver that takes them.
+        options: Options of a configuration.
 
     Raises:
         DriverOptionError: There is no such option, or its value is of another type; says which there are.

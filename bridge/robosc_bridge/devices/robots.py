@@ -76,7 +76,7 @@ class Body:
 
     @property
     def limits(self) -> DriveLimits:
-        """Of the body; each wheel may be as fast as both together make it."""
+        """Limits of the body; each wheel may be as fast as both together make it."""
         wheel_m_s = self.linear_m_s + self.angular_rad_s * self.wheel_separation_m / 2
         return DriveLimits(self.linear_m_s, self.angular_rad_s, wheel_m_s)
 

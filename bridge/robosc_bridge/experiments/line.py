@@ -40,7 +40,7 @@ FREE_M = 0.6
 """Distance that it drives along the line before anything happens, and in between, in metres."""
 
 HELD_S = 2.0
-"""Of the world, for which it must stand still then."""
+"""Time of the world for which it must stand still then, in seconds."""
 
 LIMIT_S = 45.0
 """For each thing that happens."""

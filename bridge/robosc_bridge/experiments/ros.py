@@ -38,13 +38,17 @@ FASTEST, SLOWEST = 25.0, 0.5
 """Fastest and slowest speed of the world, as a multiple of the clock's."""
 
 MAZE_PATIENCE_S, LINE_PATIENCE_S = 0.15, 0.06
-"""Of the world, for which a robot in motion goes on without a new velocity. A controller decides every 0.1 s, a camera
-shows a picture every 0.05 s: with not much more than one of them for each velocity, few are on their way together, and
-what follows from one is not late, however busy the machine is."""
+"""Times of the world, in seconds, for which a robot in motion goes on without a new velocity.
+
+A controller decides every 0.1 s, a camera shows a picture every 0.05 s: with not much more than one of them for each
+velocity, few are on their way together, and what follows from one is not late, however busy the machine is.
+"""
 
 REACTION_S = 0.5
-"""Of the clock, until a stop that comes from outside the world has gone from the panel through the layer: the world
-does not know of it, and passes meanwhile."""
+"""Time of the clock until a stop from outside the world has gone from the panel through the layer, in seconds.
+
+The world does not know of it, and passes meanwhile.
+"""
 
 STEP_LIMIT_S = 60.0
 _LOOK_S = 0.02
@@ -108,7 +112,7 @@ class Setting(Recorded):
 
     @property
     def settle_s(self) -> float:
-        """Of the world: how long the robot may take to stand still."""
+        """Maximum time of the world that the robot may take to stand still, in seconds."""
         return SETTLE_S + REACTION_S * self.speed
 
 

@@ -22,7 +22,7 @@ EXAMPLES = Path(__file__).parents[3] / "examples"
 """The models of the scenarios; they are part of the source tree."""
 
 PATIENCE_S = 0.5
-"""Of the world, for which it does not wait for the bridge: a robot at 0.1 m/s goes 5 cm meanwhile."""
+"""Time of the world for which it does not wait for the bridge, in seconds: a robot at 0.1 m/s goes 5 cm meanwhile."""
 
 FASTEST, SLOWEST = 25.0, 0.5
 """Fastest and slowest speed of the world, as a multiple of the clock's."""

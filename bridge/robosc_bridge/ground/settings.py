@@ -64,7 +64,7 @@ def ground_settings(configuration: Configuration, fastest: Velocity) -> GroundSe
     """The settings of a configuration; None: there is no ground station.
 
     Args:
-        configuration: Whose section `remote` says it.
+        configuration: Configuration with them in its section `remote`.
         fastest: Limits of speed and turn rate.
 
     Raises:

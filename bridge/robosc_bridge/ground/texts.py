@@ -139,7 +139,7 @@ class Texts:
             severity: The graver, the sooner it is told.
             text: Of any length.
             again_s: Seconds.
-            asked_by: Whose asking it answers, system and component; None: it is news of the robot, which goes first.
+            asked_by: Asker that it answers, system and component; None: it is news of the robot, which goes first.
         """
         text = plain_text(text)
         told_s = self._recent.get(text)

@@ -19,7 +19,7 @@ from robosc_bridge.ground.telemetry import Make
 
 NAME_BYTES = 10
 MOST_VALUES = 500
-"""Of a model with more, the others are not told."""
+"""Maximum number of values; the others of a model with more are not reported."""
 
 SUPERVISOR_STATE, BLOCKED = "sup_state", "blocked"
 """The daemon's state as its place in `State`; how many requests were held back so far."""

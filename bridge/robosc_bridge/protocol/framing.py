@@ -53,7 +53,7 @@ class FrameDecoder[Frame](ABC):
 
     @abstractmethod
     def _length(self, data: bytes, at: int) -> int:
-        """Of the frame whose `header_length` bytes are there; 0: this is no header."""
+        """Return the length of the frame whose `header_length` bytes are there; 0: this is no header."""
 
     @abstractmethod
     def _frame(self, data: bytes, at: int, length: int) -> Frame | None:

@@ -67,7 +67,7 @@ class Codec:
 
     @property
     def timestamp(self) -> int:
-        """Of the next signed packet; what is heard may move it forward."""
+        """Timestamp of the next signed packet; received packets may move it forward."""
         return int(self._codec.signing.timestamp)
 
     def not_before(self, timestamp: int) -> None:

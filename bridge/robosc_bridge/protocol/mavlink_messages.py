@@ -29,7 +29,7 @@ CHUNK = 50
 
 
 class Mode(IntEnum):
-    """Of ArduPilot Rover."""
+    """Mode of ArduPilot Rover."""
 
     MANUAL = 0
     ACRO = 1

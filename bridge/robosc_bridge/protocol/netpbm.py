@@ -9,7 +9,7 @@ import re
 from dataclasses import dataclass
 
 MAXIMUM_PIXELS = 4_194_304
-"""Of one picture: more than any camera that follows a line has."""
+"""Maximum number of pixels of one picture: more than any camera that follows a line has."""
 
 _HEADER = re.compile(rb"P5\s{1,8}(\d{1,5})\s{1,8}(\d{1,5})\s{1,8}255\s")
 _LONGEST_HEADER = 2 + 8 + 5 + 8 + 5 + 8 + 3 + 1

@@ -21,7 +21,7 @@ MOST_LOST_DEG = 90.0
 """A turn of which more is missing is no full turn."""
 
 MOST_POINTS = 2048
-"""Of one turn; the slowest of the three LiDARs has 800 at half its speed."""
+"""Maximum number of points of one turn; the slowest of the three LiDARs has 800 at half its speed."""
 
 
 @dataclass(frozen=True, slots=True)

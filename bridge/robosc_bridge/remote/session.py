@@ -18,7 +18,7 @@ MAXIMUM_WAITING = 1000
 """Messages that wait for a program to read them."""
 
 MAXIMUM_WAITING_BYTES = 4_000_000
-"""Of memory, for their data; one message may wait whatever its size."""
+"""Maximum memory for the data of waiting messages, in bytes; one message may wait whatever its size."""
 
 MESSAGES_A_TURN = 64
 """Number of messages that a program may send to the loop before the loop has shown its next snapshot.
@@ -27,7 +27,7 @@ The rest waits at the program's end.
 """
 
 BYTES_A_TURN = 128 * 1024
-"""Of these messages as they arrive; what goes beyond is the last one."""
+"""Maximum size of these messages as they arrive, in bytes; the message that exceeds it is the last one."""
 
 _LOOK_S = 0.005
 
@@ -171,5 +171,5 @@ class Session:
 
 
 def _weight_bytes(item: ToProgram | str) -> int:
-    """Of the data of a message; what has none is small."""
+    """Return the size of the data of a message, in bytes; a message that has none is small."""
     return int(getattr(item, "weight_bytes", 0))

@@ -17,7 +17,7 @@ MAXIMUM_EVENTS = 1000
 """Events that wait for a watcher."""
 
 MAXIMUM_BYTES = 1024 * 1024
-"""Of the events that wait for a watcher."""
+"""Maximum size of the events that wait for a watcher, in bytes."""
 
 
 class Watcher:

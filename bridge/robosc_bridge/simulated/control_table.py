@@ -162,7 +162,7 @@ class ControlTable:
     """The memory of a servo.
 
     Args:
-        model: Whose items it has.
+        model: Servo model with these items.
     """
 
     def __init__(self, model: Model) -> None:

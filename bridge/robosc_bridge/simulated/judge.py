@@ -21,7 +21,7 @@ STILL_RAD_S = 0.02
 """Largest turn rate that counts as standing still, in rad/s."""
 
 SETTLE_S = 1.0
-"""Of the world: how long a robot may take to stand still when it has to."""
+"""Maximum time of the world that a robot may take to stand still when it has to, in seconds."""
 
 # Places are rounded, and a body that touches is let a hair into what it touches by nobody.
 _SLACK_M = 1e-4

@@ -6,7 +6,7 @@ from robosc_bridge.simulated.motion import Motion
 from robosc_bridge.simulated.scene import Scene
 
 SUFFIXES = (".png", ".svg", ".pdf")
-"""Of the files that can be drawn."""
+"""Suffixes of the files that can be drawn."""
 
 _WIDTH_IN = 6.0
 _TALLEST_IN = 12.0

@@ -24,7 +24,7 @@ class Mishaps:
 
     @property
     def status(self) -> int:
-        """Of the program at its end: 1 if anything went wrong."""
+        """Status of the program at its end: 1 if anything went wrong."""
         return int(self._is_any)
 
     def tell(self, sentence: str) -> None:

@@ -21,10 +21,10 @@ from robosc_bridge.simulated.output import Sink
 from robosc_bridge.simulated.world import STEP_S, Happening, World
 
 SAMPLE_S = 0.05
-"""Of the world, between two samples."""
+"""Time of the world between two samples, in seconds."""
 
 MOST_BYTES = 512 * 1024 * 1024
-"""Of a file: a day of the world has some 350 MB."""
+"""Maximum size of a file, in bytes: a day of the world has some 350 MB."""
 
 MOST_LINE_BYTES = 4096
 

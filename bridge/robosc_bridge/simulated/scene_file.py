@@ -10,20 +10,20 @@ from msgspec import Meta, Struct
 from robosc_bridge.simulated.values import FARTHEST_M, MOST_SEED
 
 MOST_SEGMENTS = 5_000
-"""Of all walls of a scene."""
+"""Maximum number of segments of all walls of a scene."""
 
 MOST_CELLS = 30
-"""Of a maze, along each side."""
+"""Maximum number of cells of a maze, along each side."""
 
 WALL_HEIGHT_M, WALL_SHADE = 0.3, 130
-"""Of walls and obstacles where nothing is said: a grey between the floors and the lines."""
+"""Default height of walls and obstacles, in metres, and their shade: a grey between the floors and the lines."""
 
 _Metres = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
 _Seed = Annotated[int, Meta(ge=0, le=MOST_SEED)]
 _Point = tuple[_Metres, ...]
 # Where a text ends: Python's `$` takes a line feed after it.
 Name = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]{0,39}(?![\s\S])", title="box or box_2")]
-"""Of an obstacle, as it is told on standard input."""
+"""Name of an obstacle, as it is given on standard input."""
 
 
 class _Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -289,7 +289,7 @@ class Servo:
         return Error.NONE
 
     def _sign(self) -> int:
-        """Of the forward direction, in what the servo calls positive."""
+        """Return the sign of the forward direction, relative to the servo's positive direction."""
         return -self._direction if self.table["drive mode"] & _REVERSE else self._direction
 
     def _drive(self) -> None:

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from robosc_bridge.simulated.walls import Floats, Walls
 
 _EDGEWAYS = 1e-12
-"""Of a wall in line with the camera, in square metres: it shows no side."""
+"""Area of a wall in line with the camera, in square metres: it shows no side."""
 
 Mask = npt.NDArray[np.bool_]
 

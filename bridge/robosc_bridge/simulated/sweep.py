@@ -17,7 +17,7 @@ from robosc_bridge.simulated.rounds import Rounds
 from robosc_bridge.simulated.walls import Floats, Walls
 
 BEAMS = 360
-"""Of a turn, counter-clockwise; the first one straight ahead."""
+"""Number of beams of a turn, counter-clockwise; the first one straight ahead."""
 
 _HALF = BEAMS // 2
 _PER_RAD = BEAMS / math.tau

@@ -150,12 +150,12 @@ class SimulatedTurtleBot3:
 
     @property
     def base_faults(self) -> Faults:
-        """Of the base's line."""
+        """Faults of the base's line."""
         return self.base_line.faults
 
     @property
     def scanner_faults(self) -> Faults:
-        """Of the LiDAR's line."""
+        """Faults of the LiDAR's line."""
         return self.scanner_line.faults
 
     def advance(self, seconds: float) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 MOST_SEED = 2**31 - 1
 FARTHEST_M = 1000.0
-"""Of any coordinate."""
+"""Maximum magnitude of any coordinate, in metres."""
 
 _HIGHEST_V = 60.0
 _MOST_RAD = 1000.0
@@ -59,7 +59,7 @@ def voltage(text: str) -> float:
 
 
 def seed(text: str) -> int:
-    """Of what comes by chance, within the bounds of a scene file."""
+    """Return the seed of all that comes by chance, within the bounds of a scene file."""
     return whole(text, 0, MOST_SEED)
 
 

@@ -30,7 +30,7 @@ _WISHES = {
     "reset": "forget faults whose cause is gone; standby follows",
 }
 NAMES = ("stop", *_WISHES, "status", "watch", "teleop", "token")
-"""Of the commands."""
+"""Names of the commands."""
 
 
 def add_commands(commands: Any) -> None:

@@ -159,7 +159,7 @@ def drive(terminal: Terminal, client: BridgeClient, topic: DriveTopic) -> None:
         with suppress(RefusedError, UnreachableError):
             operator.drive(topic, 0.0, 0.0)
         operator.close()
-        # What the terminal has still to answer is not for the shell.
+        # Answers that the terminal still owes are not for the shell.
         terminal.read(_ANSWER_S)
         with suppress(OSError):
             terminal.write("\r\n")

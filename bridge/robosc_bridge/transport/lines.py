@@ -13,7 +13,7 @@ def open_line(address: str, baud: int, host: Host = SYSTEM_HOST) -> Line:
     Args:
         address: Of `transport.network_line`, or a serial port's path.
         baud: Of a serial port.
-        host: Whose serial ports and network they are.
+        host: Host with these serial ports and this network.
 
     Raises:
         LineError: It cannot be used.

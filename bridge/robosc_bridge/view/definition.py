@@ -19,12 +19,12 @@ from robosc_bridge.view.graphs import Arrow, Node, drawn
 
 MAXIMUM_COMPONENTS = 2000
 MAXIMUM_STATES = 100_000
-"""Of one component."""
+"""Maximum number of states of one component."""
 
 _Name = Annotated[str, msgspec.Meta(max_length=600)]
 _Names = Annotated[tuple[_Name, ...], msgspec.Meta(max_length=100_000)]
 Table = Mapping[str, Mapping[str, Mapping[str, int]]]
-"""By event and component, the number of the transition by the state that it is taken in."""
+"""Number of the transition by event, component and the state that it is taken in."""
 
 _CONTROLLABLE = frozenset({"request", "cancel", "reset"})
 

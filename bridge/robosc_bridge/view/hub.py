@@ -21,7 +21,7 @@ MAXIMUM_EVENTS = 2000
 """Entries that wait for one who looks."""
 
 MAXIMUM_BYTES = 2 * 1024 * 1024
-"""Of the entries that wait for one who looks."""
+"""Maximum size of the entries that wait for a viewer, in bytes."""
 
 MAXIMUM_ANSWERS = 50
 """Answers that wait for one who asks; the oldest are forgotten."""

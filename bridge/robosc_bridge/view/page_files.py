@@ -8,7 +8,7 @@ from robosc_bridge.view.sources import ViewError
 FOLDER = Path(__file__).parent / "page"
 INDEX = "index.html"
 MAXIMUM_BYTES = 2 * 1024 * 1024
-"""Of one file."""
+"""Maximum size of one file, in bytes."""
 
 TOKEN_PLACE = '<meta name="robosc-token" content="">'
 """Place in the page where the token is put, once."""

@@ -8,7 +8,7 @@ from robosc_bridge.daemon.states import Command
 from robosc_bridge.view.sources import Pause, Play, RefusedError, Seek, Wish
 
 MAXIMUM_BYTES = 4096
-"""Of one request."""
+"""Maximum size of one request, in bytes."""
 
 SLOWEST, FASTEST = 0.01, 1000.0
 """Speeds of a replay."""

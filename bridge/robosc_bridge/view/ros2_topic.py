@@ -45,7 +45,7 @@ SILENCE_S = 5.0
 """After so long without a message the node is taken for gone."""
 
 MAXIMUM_CHARACTERS = 8 * 2**20
-"""Of one message."""
+"""Maximum length of one message, in characters."""
 
 MAXIMUM_TRANSITIONS = 100_000
 """In one message."""

@@ -39,7 +39,7 @@ MAXIMUM_WAITING = 4
 """Commands of one page that wait for their answer; stops are not counted."""
 
 REQUESTS_A_S, BURST = 20.0, 60
-"""Of one page, beside stops; one that sends more is cut off."""
+"""Maximum requests of one page per second, and at once, besides stops; a page that sends more is cut off."""
 
 REQUEST_LIMIT_S = 10.0
 """For a request to be sent, and for a WebSocket to be asked for."""

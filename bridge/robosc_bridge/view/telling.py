@@ -20,7 +20,7 @@ NOT_EXECUTED = "nothing is executed now"
 NOT_KNOWN = "the executor does not allow it; why is not known here"
 
 _MAXIMUM_DEPTH = 20
-"""Of what stands in an entry; what lies deeper is not told."""
+"""Maximum depth of the values in an entry; deeper ones are not reported."""
 
 _SHOWN_APART = ("time", "kind", "event", "controllable", "state", "decision_us", "transitions")
 

@@ -27,7 +27,7 @@ the concurrent callers has one call under way at any time. The server answers wh
 _EPILOG = exit_statuses("every call was answered", "the model's file is no text", "a call was not answered")
 
 _RUN = secrets.token_hex(8)
-"""Of this process: what another one has asked is no request of this one."""
+"""Identifier of this process: a request of another process is no request of this one."""
 
 _METHODS = {
     "check": ("/robosc_api.v1.SynthesisService/Check", False),

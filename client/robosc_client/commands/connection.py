@@ -37,7 +37,7 @@ EPILOG = exit_statuses(
     "     its result has failed or was cancelled",
     SIGNED_SERVICE,
 )
-"""Of all commands together."""
+"""Epilog of all commands together."""
 
 MODEL_EPILOG = exit_statuses("done; the model has no errors", "the model has errors, or no supervisor exists")
 

@@ -42,13 +42,13 @@ from robosc_client.results import (
 )
 
 MAXIMUM_BYTES = 64 * 2**20
-"""Of one result, and of one message: what a server gives unless its settings say otherwise."""
+"""Maximum size of one result, and of one message, in bytes: a server's limit unless its settings say otherwise."""
 
 MAXIMUM_FILES = 10_000
-"""Of one result."""
+"""Maximum number of files of one result."""
 
 MAXIMUM_CHUNK_BYTES = 64 * 1024
-"""Of a piece of a file or graph."""
+"""Maximum size of a piece of a file or graph, in bytes."""
 
 MAXIMUM_PROGRESS = 1_000_000
 """Messages that tell where the work is: many days of them, from a server that is one."""
@@ -73,7 +73,7 @@ class Assembly[Result](Protocol):
 
 
 class Whole[Message, Result]:
-    """Of a method that answers with one message."""
+    """Assembly of the answer of a method that answers with one message."""
 
     def __init__(self, convert: Callable[[Message], Result]) -> None:
         self._convert = convert
@@ -132,7 +132,7 @@ class _Stream:
 
 
 class SynthesisAssembly(_Stream):
-    """Of Synthesize."""
+    """Assembly of the answer to Synthesize."""
 
     _found: Synthesis
 
@@ -163,7 +163,7 @@ class SynthesisAssembly(_Stream):
 
 
 class GenerationAssembly(_Stream):
-    """Of Generate: files, each from its beginning to its end."""
+    """Assembly of the answer to Generate: files, each from its beginning to its end."""
 
     _head: pb.GenerationResult
     _status: SynthesisStatus
@@ -262,7 +262,7 @@ def _files_digest(message: pb.GenerationResult) -> bytes:
 
 
 class ExplorationAssembly(_Stream):
-    """Of Explore: one document in pieces."""
+    """Assembly of the answer to Explore: one document in pieces."""
 
     _head: pb.ExplorationResult
     _status: SynthesisStatus
@@ -313,7 +313,7 @@ class ExplorationAssembly(_Stream):
 
 
 class VerificationAssembly(_Stream):
-    """Of Verify."""
+    """Assembly of the answer to Verify."""
 
     _found: Verification
 
@@ -333,7 +333,7 @@ class VerificationAssembly(_Stream):
 
 
 def check_assembly(bundle: Bundle | None = None) -> Whole[pb.CheckResponse, Findings]:
-    """Of Check.
+    """Return the assembly of the answer to Check.
 
     Args:
         bundle: Texts that were sent; None: they are not at hand.
@@ -342,10 +342,10 @@ def check_assembly(bundle: Bundle | None = None) -> Whole[pb.CheckResponse, Find
 
 
 def format_assembly(before: str | None) -> Whole[pb.FormatResponse, Formatted]:
-    """Of Format.
+    """Return the assembly of the answer to Format.
 
     Args:
-        before: The text that was given: only its layout may be another afterwards; None: it is not at hand.
+        before: Text that was given: only its layout may differ afterwards; None: it is not at hand.
     """
 
     def convert(message: pb.FormatResponse) -> Formatted:
@@ -367,7 +367,7 @@ def _differ_in_layout_alone(before: str, after: str) -> bool:
 
 
 class JobResultAssembly:
-    """Of GetJobResult: the messages of one of the others, each in an envelope."""
+    """Assembly of the answer to GetJobResult: the messages of one of the others, each in an envelope."""
 
     def __init__(self, expected: TaskKind | None = None) -> None:
         """Prepare the assembly.

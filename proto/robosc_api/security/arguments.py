@@ -81,7 +81,7 @@ def _from_environment(name: str) -> Path | None:
 def add_token_arguments(
     parser: argparse.ArgumentParser, scopes: tuple[Scope, ...], *, has_quotas: bool = False
 ) -> None:
-    """Whose token it is, and what it is for; where the service has quotas, how much it may ask for, too."""
+    """Add the arguments for a token's owner and scopes, and where the service has quotas, for its quotas."""
     parser.add_argument("name", metavar="NAME", help="whose token it is, for the log")
     parser.add_argument(
         "--scope",

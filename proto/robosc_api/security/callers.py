@@ -11,17 +11,17 @@ from robosc_api.security.tokens import Entry, Scope
 _NETWORK_BITS = 64
 
 CALLER: ContextVar[str] = ContextVar("caller", default="")
-"""Whose token the call under way came with; empty: none was asked for."""
+"""Name of the owner of the token that the call under way came with; empty: none was asked for."""
 
 ENTRY: ContextVar[Entry | None] = ContextVar("entry", default=None)
 """The token itself, as it stands in the file."""
 
 
 def caller_of(context: Any) -> str:
-    """By what a caller is told from others: its token's name, else its certificate's, else its host.
+    """Return the name that tells a caller from others: its token's, else its certificate's, else its host.
 
     Args:
-        context: Of the call under way.
+        context: Context of the call under way.
     """
     return CALLER.get() or _certificate_name(context) or host_of(context.peer())
 
@@ -46,9 +46,9 @@ def host_of(peer: str) -> str:
 
 @lru_cache(maxsize=4096)
 def network_of(caller: str) -> str:
-    """By what a caller is bounded: where it is known by its address alone, by the network that one customer is given.
+    """Return the name by which a caller is bounded: the network of one customer if only its address is known.
 
-    Whoever has an IPv6 address has 2^64 of them (RFC 6177); other names are what they are.
+    A holder of an IPv6 address has 2^64 of them (RFC 6177); other names stay as they are.
     """
     try:
         address = ip_address(caller.partition("%")[0])

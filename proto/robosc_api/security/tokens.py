@@ -23,7 +23,7 @@ from robosc_api.security.errors import SecurityError
 _log = logging.getLogger(__name__)
 
 MAXIMUM_BYTES = 64 * 1024
-"""Of a file of tokens."""
+"""Maximum size of a file of tokens, in bytes."""
 
 MAXIMUM_TOKEN = 512
 """Characters of a token that is looked at."""
@@ -181,7 +181,7 @@ class TokenFile:
         self._looked_s = clock()
 
     def find(self, token: str) -> Entry | None:
-        """Whose token it is; None: nobody's. Takes as long whichever it is."""
+        """Return the entry of a token; None: it is nobody's. Takes as long for any token."""
         digest = _digest(token[:MAXIMUM_TOKEN])
         found = None
         for entry in self._current():

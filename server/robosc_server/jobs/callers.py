@@ -1,4 +1,4 @@
-"""Whose jobs somebody sees."""
+"""Owners of the jobs that a caller sees."""
 
 from dataclasses import dataclass
 from typing import Any

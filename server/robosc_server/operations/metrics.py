@@ -35,7 +35,7 @@ _CONNECTIONS = 16
 
 
 class MethodMetrics:
-    """Of one method, looked up once and not for each call.
+    """Metrics of one method, looked up once and not for each call.
 
     Attributes:
         under_way: Calls that have begun and not ended.
@@ -126,7 +126,7 @@ class Metrics:
         self._methods: dict[str, MethodMetrics] = {}
 
     def method(self, name: str) -> MethodMetrics:
-        """Of one method; only for methods that there are, since each stays."""
+        """Return the metrics of one method; only for methods that exist, since each stays."""
         found = self._methods.get(name)
         if found is None:
             found = self._methods[name] = MethodMetrics(name, self._calls, self._refusals, self._seconds)

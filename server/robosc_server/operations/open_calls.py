@@ -98,7 +98,7 @@ class _Places:
         """Take one, until the call is over.
 
         Args:
-            caller: Whose it is.
+            caller: Name of its caller.
             context: Of the call.
 
         Raises:

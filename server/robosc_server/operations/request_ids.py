@@ -9,7 +9,7 @@ HEADER = "x-request-id"
 """Metadata that a caller may send, and that comes back behind the answer."""
 
 REQUEST_ID: ContextVar[str] = ContextVar("request_id", default="")
-"""Of the call under way; empty: no call."""
+"""Identifier of the call under way; empty: no call."""
 
 _ID = re.compile(r"[A-Za-z0-9._:/+=@-]{1,128}\Z")
 

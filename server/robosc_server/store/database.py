@@ -29,10 +29,10 @@ _PENDING = 2048
 """Transactions that may wait for a thread."""
 
 _TRIES = 3
-"""Of a change that meets another one of the same rows."""
+"""Number of tries of a change that meets another one of the same rows."""
 
 _STEPS = 100_000
-"""Of SQLite's machine, some milliseconds, after which a statement asks whether its transaction was given up."""
+"""Steps of SQLite's machine, some milliseconds, after which a statement asks if its transaction was given up."""
 
 _PAUSE_S = 0.5
 """After a connection has failed: for how long nothing is tried."""

@@ -27,7 +27,7 @@ from sqlalchemy import (
 from robosc_server.store.errors import StoreError
 
 VERSION = 2
-"""Of the tables below. Those of an earlier version are brought up to it; a database of a later one is not touched."""
+"""Version of the tables below. Earlier tables are brought up to it; a database of a later version is not touched."""
 
 _LOCK = 0x726F626F7363
 """PostgreSQL's advisory lock while tables are made: replicas may start at the same time."""
@@ -146,12 +146,12 @@ def prepare(connection: Connection) -> None:
 
 
 def version_of(connection: Connection) -> int | None:
-    """Of the tables that are there, which this server can use or bring up to its own; None: there are none.
+    """Return the version of the existing tables, usable here or after an upgrade; None: there are no tables.
 
-    Only looks.
+    Only reads.
 
     Raises:
-        StoreError: There are others.
+        StoreError: There are other tables.
     """
     names = set(inspect(connection).get_table_names())
     if SCHEMA.name not in names:

@@ -44,7 +44,7 @@ QUICK_BYTES = 16 * 1024
 
 _REMEMBERED_BYTES = 64 * 1024
 _ALL_REMEMBERED_BYTES = 4 * 2**20
-"""Of requests that are known again; a longer one is looked at each time."""
+"""Maximum size of all remembered requests, in bytes; one longer than `_REMEMBERED_BYTES` is looked at each time."""
 
 _ENTRY_BYTES = 500
 """Bytes that a remembered request takes besides its own."""
@@ -73,17 +73,17 @@ class RequestLimits:
 
     @property
     def request_bytes(self) -> int:
-        """Of a whole message: no longer one is parsed."""
+        """Maximum size of a whole message, in bytes: no longer one is parsed."""
         return self.bundle_bytes + _FRAMING_BYTES
 
     @property
     def submission_bytes(self) -> int:
-        """Of a whole submission of a job."""
+        """Maximum size of a whole submission of a job, in bytes."""
         return self.request_bytes + _SUBMISSION_BYTES
 
     @property
     def fields(self) -> int:
-        """Of a whole message, those of messages in it included."""
+        """Maximum number of fields of a whole message, those of messages in it included."""
         return _FIELDS_A_FILE * self.bundle_files + _OTHER_FIELDS
 
 

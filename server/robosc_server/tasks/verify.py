@@ -86,7 +86,7 @@ def _no_robot(found: Recheck) -> str:
 
 def _made(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) -> pb.VerificationResult:
     """Properties of the robot under the supervisor that is made for it."""
-    # What is wrong with a property is told before the synthesis, which may take long.
+    # Errors of properties are reported before the synthesis, which may take long.
     model = check(given.bundle(request.bundle)).model
     errors = None if model is None else _property_errors(request, model)
     if errors is not None:

@@ -25,7 +25,7 @@ from robosc_server.workers.child import TaskFunction
 from robosc_server.workers.sandbox import Sandbox
 
 PACKET_BYTES = 4096
-"""Of one packet on the line."""
+"""Maximum size of one packet on the line, in bytes."""
 
 MUST_BE_CONFINED = "required"
 """Given to it where workers are not to be without a part of their confinement."""

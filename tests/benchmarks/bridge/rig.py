@@ -135,6 +135,6 @@ class Machine:
 
 
 def _ticks() -> tuple[int, int]:
-    """Of all processors: taken away by the host, and in all."""
+    """Return the ticks of all processors: those taken away by the host, and the total."""
     fields = [int(word) for word in Path("/proc/stat").read_text().splitlines()[0].split()[1:9]]
     return fields[7], sum(fields)

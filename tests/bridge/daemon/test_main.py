@@ -114,7 +114,7 @@ def test_silent_steps_that_never_end_are_refused_unless_they_are_allowed(bridge:
     file.write_text("robot: burger\ndrive: {driver: opencr, port: /dev/none}\nchannels: {/go: {channel: log}}\n")
     assert robosc(["synth", str(model), "--allow-livelock", "-o", str(supervisor)]) == 0
     for path in (model, supervisor):
-        # Where they are allowed, the next thing that is wrong is told.
+        # If they are allowed, the next fault is reported.
         command_line = ("run", "--standby", "--model", str(path), "--config", str(file))
         refused, allowed = bridge(*command_line), bridge(*command_line, "--allow-livelock")
         assert (refused.returncode, allowed.returncode) == (2, 2)

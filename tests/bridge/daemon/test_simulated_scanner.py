@@ -115,7 +115,7 @@ def test_damaged_frames_are_warned_of_until_they_are_sound(scene: Scene, caplog:
 
 
 def test_one_that_sees_nothing_ahead_is_warned_of() -> None:
-    """Of two walls at its sides, it sees nothing within 30 degrees of its way."""
+    """Check a scanner with two walls at its sides: it sees nothing within 30 degrees of its way."""
     far = Walls(((-9.0, 2.0, 9.0, 2.0), (-9.0, -2.0, 9.0, -2.0)))
     with VirtualHost() as time, SimulatedTurtleBot3(lidar="lds01", walls=far, clock=time) as robot:
         scene = Scene(robot, time)

@@ -40,7 +40,7 @@ class Scene:
         return found
 
     def expected(self) -> list[tuple[float, float]]:
-        """Of each bin, the nearest and the farthest that may be seen in it."""
+        """Return the nearest and the farthest distance that may be seen in each bin."""
         return self._expected_from(self.robot.world.pose)
 
     @cache  # noqa: B019

@@ -17,7 +17,7 @@ from robosc_bridge.experiments.scenario import Outcome, ScenarioError
 from support.models import EXAMPLES
 from support.recorded_runs import recorded
 
-# What is generated of a model to be counted is the same each time.
+# The code of a model that is counted is the same each time.
 _sizes = cache(evaluate._sizes)
 
 

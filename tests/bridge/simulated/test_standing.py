@@ -39,7 +39,7 @@ Ray = tuple[float, float, float]
 
 
 def pixel_rays(mount: Mount, heading_rad: float) -> Iterator[Ray]:
-    """Of each pixel, row by row: its way in the world's x, y and z."""
+    """Yield the ray of each pixel, row by row: its direction in the world's x, y and z."""
     focal = mount.width / 2 / math.tan(mount.field_of_view_rad / 2)
     for row in range(mount.height):
         for column in range(mount.width):

@@ -18,7 +18,7 @@ from support.effort import examples
 @settings(max_examples=examples(60))
 @given(st.lists(st.lists(st.integers(0, 5), min_size=1, max_size=6), min_size=1, max_size=5))
 def test_whoever_sleeps_wakes_in_the_order_of_time(naps: list[list[int]]) -> None:
-    """By a twin that sorts: each thread's wake-ups, and of equal ones, who began to sleep first."""
+    """Compare with a twin that sorts: each thread's wake-ups, and of equal ones, the first to begin to sleep."""
     woken: list[tuple[float, int]] = []
     with VirtualHost(0.0) as host:
 

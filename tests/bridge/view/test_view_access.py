@@ -51,7 +51,7 @@ def got(url: str, path: str, **headers: str) -> tuple[int, str, dict[str, str]]:
 
 
 def refused_status(url: str, **headers: str) -> int:
-    """Of a stream that is not opened."""
+    """Return the HTTP status of a stream that is not opened."""
 
     async def ask() -> int:
         try:

@@ -55,7 +55,7 @@ class Written:
 
 
 def slowly_last(recording: Recording, number: int) -> dict[str, int]:
-    """Of each component the transition taken last, by going through all entries from the beginning."""
+    """Return the transition of each component taken last, by going through all entries from the beginning."""
     robot = recording.robot
     initial = {
         component.name: next(state.name for state in component.behaviour.states if state.initial)

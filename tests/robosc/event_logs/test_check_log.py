@@ -20,7 +20,7 @@ STEPS = 50
 
 
 def random_supervisor_of(dice: Random) -> Supervisor:
-    """Of a controller, synthesized or not, or of a layer."""
+    """Return a supervisor of a controller, synthesized or not, or of a layer."""
     match dice.randrange(3):
         case 0:
             return random_layer(dice)

@@ -125,7 +125,7 @@ def test_hindrances_in_reachable_states() -> None:
 
 @pytest.mark.random
 def test_what_would_follow_runs_into_trouble() -> None:
-    """Of every event that the supervisor forbids: the states that it would lead to, and that they are lost."""
+    """Check for every event that the supervisor forbids the states that it would lead to, and that they are lost."""
     met: Counter[str] = Counter()
     for seed in seeds(EXAMPLES):
         twin = Twin(seed)

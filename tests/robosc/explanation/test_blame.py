@@ -56,7 +56,7 @@ def is_empty(system: System) -> bool:
 
 @pytest.mark.random
 def test_the_blamed_set_is_minimal_and_the_removal_too() -> None:
-    """By explicit synthesis of what is left: alone it leaves no supervisor, and with any one less there is one."""
+    """Check by explicit synthesis: the set alone leaves no supervisor, and with any one less there is one."""
     met: Counter[object] = Counter()
     for seed in seeds(EXAMPLES):
         system = empty_system(seed)
@@ -206,7 +206,7 @@ def test_trouble_is_real_and_the_run_is_shortest() -> None:
 
 @pytest.mark.random
 def test_trouble_without_some_obstacles_speaks_of_the_others_alone() -> None:
-    """Of what is blamed alone: the run is one of the system that is left, and whole in what it names."""
+    """Check the blamed obstacles alone: the run is one of the system that is left, and complete in what it names."""
     met: Counter[str] = Counter()
     for seed in seeds(3 * EXAMPLES):
         system = empty_system(seed)

@@ -17,7 +17,7 @@ from support.mutate import mutated
 from support.random_models import models, random_bundle, relaid
 
 TEXTS = [(EXAMPLES / f"{name}.rscd").read_text(encoding="utf-8") for name in EXAMPLE_NAMES]
-"""Of a processor: a busy machine says nothing about the text."""
+"""Texts of the examples."""
 
 
 @settings(max_examples=examples(100))

@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -118,6 +119,8 @@ def test_explain(capsys: pytest.CaptureFixture[str], given: tuple[Path, robosc.S
     found = robosc.explain(path, options)
     if found.status is robosc.SynthesisStatus.UNSUPPORTED_MODEL:
         assert found.reason == expected["error"]["message"]
+        assert isinstance(found.explanation, robosc.NoSupervisor)
+        assert found.explanation.reason == found.reason
         return
     assert (str(found.status), found.reason) == (expected["status"], expected.get("reason", ""))
     assert through_json(diagnostics_json(found.diagnostics)) == {
@@ -125,6 +128,7 @@ def test_explain(capsys: pytest.CaptureFixture[str], given: tuple[Path, robosc.S
     }
     if isinstance(found.explanation, robosc.NoSupervisor):
         assert expected["explanation"] is None
+        assert found.explanation.reason == found.reason
     else:
         assert through_json(document(found.explanation)) == expected["explanation"]
         assert main(["explain-synthesis", str(path), "--deployment", options.deployment]) == status
@@ -217,3 +221,13 @@ def test_nothing_is_generated_where_findings_that_forbid_it_are_not_known(tmp_pa
             refused.write(tmp_path / "out")
     assert not (tmp_path / "out").exists()
     assert robosc.explore(read).graph == robosc.explore(made).graph
+
+
+def test_a_file_is_made_beside_the_one_that_it_becomes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = robosc.synthesize(EXAMPLES / "maze_solver" / "maze_solver.rscd").supervisor
+    assert made is not None
+    # Elsewhere it could be on another disk, from which nothing is moved at once.
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))
+    file = made.write(tmp_path / "made.rsup")
+    assert file.read_bytes() == made.encode()
+    assert list(tmp_path.iterdir()) == [file]

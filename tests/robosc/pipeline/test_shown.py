@@ -1,6 +1,7 @@
 """Results show themselves: on one line, as a text, in a notebook; and nobody changes them."""
 
 import pickle
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
@@ -190,3 +191,15 @@ def test_tables_escape_and_end() -> None:
     assert table.count("<tr>") == 1 + MAXIMUM_ROWS + 1
     assert "... and 5 more" in table
     assert html_text("<") == "<pre>&lt;</pre>\n"
+
+
+def test_cells_of_a_table_hold_their_values_and_nothing_else() -> None:
+    table = html_table(("name", "value"), [("a<b", 1), ("c", "d")])
+    assert re.sub(r' style="[^"]*"', "", table).split("\n")[1:-1] == [
+        "<thead><tr><th>name</th><th>value</th></tr></thead>",
+        "<tbody>",
+        "<tr><td>a&lt;b</td><td>1</td></tr>",
+        "<tr><td>c</td><td>d</td></tr>",
+        "</tbody>",
+        "</table>",
+    ]

@@ -112,7 +112,7 @@ def test_a_random_run_is_that_of_the_interpreter(seed: int) -> None:
         try:
             step = run.step(event.name, *arguments)
         except robosc.DataError:
-            # What is refused has not happened; a robot would take whatever comes.
+            # A refused event has not happened; a robot would take whatever comes.
             assert (str(run.state), len(run)) == (before, length)
             continue
         except robosc.EventNotPossibleError:

@@ -43,13 +43,13 @@ class Callers:
         self._last: dict[str, int] = {}
 
     def next(self, name: str) -> int:
-        """Of one more."""
+        """Return the number of one more call or goal."""
         self._count += 1
         self._last[name] = self._count
         return self._count
 
     def last(self, name: str) -> int:
-        """Of the last one there."""
+        """Return the number of the last call or goal there."""
         return self._last[name]
 
     def count(self, name: str) -> int:

@@ -120,7 +120,7 @@ class StandInSurroundings:
         assert self._process.poll() is None, self._errors.read_text(errors="replace")
 
     def stop(self) -> None:
-        """By a signal; it does not wait long for the ends of goals."""
+        """Stop by a signal; the node does not wait long for the ends of goals."""
         self._tell("signal", str(int(signal.SIGTERM)))
         assert self._process.wait(LIMIT_S) == 0, self._errors.read_text(errors="replace")
 

@@ -197,7 +197,7 @@ class Ros1Surroundings:
         assert self._node.is_running, self._node.stderr
 
     def stop(self) -> None:
-        """By a signal."""
+        """Stop by a signal."""
         self._node.signal(signal.SIGTERM)
         assert self._node.wait() == 0, self._node.stderr
         published = [topic.identifier for topic in self._topics if topic.published]

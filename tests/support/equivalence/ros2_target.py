@@ -187,7 +187,7 @@ class Ros2Surroundings:
         assert self._node.is_running, self._node.stderr
 
     def stop(self) -> None:
-        """By a signal."""
+        """Stop by a signal."""
         self._node.signal(signal.SIGTERM)
         assert self._node.wait() == 0, self._node.stderr
         self._peer.spin_for(0.1)

@@ -22,7 +22,7 @@ from robosc_bridge.experiments.scenario import ScenarioError
 
 VELOCITIES = "/cmd_vel"
 TOPIC = "/robosc_evaluation/cmd_vel"
-"""Of its own: no robot listens there."""
+"""Topic of its own: no robot listens there."""
 
 _HEADER = Path("/usr/include/ros/ros.h")
 _LIBRARIES = ("roscpp", "rosconsole", "roscpp_serialization", "rostime", "xmlrpcpp", "boost_system", "pthread", "m")

@@ -123,7 +123,7 @@ lint: $(READY) ## formatter, linter, docstrings, types, import contracts
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-format: $(READY) ## format and mend what can be mended by itself
+format: $(READY) ## format and fix what can be fixed by itself
 	$(BIN)/ruff check --fix-only .
 	$(BIN)/ruff format .
 

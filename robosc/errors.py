@@ -45,7 +45,7 @@ class Diagnostic:
         code: Stable, documented code such as `unknown-name`.
         message: Description of what is wrong, one sentence without a full stop.
         location: Place in the text, or None where no text is at hand (a missing file).
-        mend: One sentence on how to fix it.
+        fix: One sentence on how to fix it.
         related: Other places that explain the finding.
     """
 
@@ -53,7 +53,7 @@ class Diagnostic:
     code: str
     message: str
     location: Location | None
-    mend: str
+    fix: str
     related: tuple[RelatedPlace, ...] = ()
 
     def __str__(self) -> str:
@@ -61,8 +61,8 @@ class Diagnostic:
         return visible(f"{place}{self.severity}: {self.message} [{self.code}]")
 
     def render(self, bundle: Bundle | None = None) -> str:
-        """The finding for a terminal: text, source line, caret, how to mend it, related places."""
-        lines = [str(self), *_excerpt(self.location, bundle), visible(f"  = mend: {self.mend}")]
+        """The finding for a terminal: text, source line, caret, how to fix it, related places."""
+        lines = [str(self), *_excerpt(self.location, bundle), visible(f"  = fix: {self.fix}")]
         for place in self.related:
             lines.append(visible(f"{place.location}: note: {place.message}"))
             lines.extend(_excerpt(place.location, bundle))
@@ -74,7 +74,7 @@ class Diagnostic:
             "severity": str(self.severity),
             "code": self.code,
             "message": self.message,
-            "mend": self.mend,
+            "fix": self.fix,
             **_place_to_json(self.location),
             "related": [{"message": place.message, **_place_to_json(place.location)} for place in self.related],
         }

@@ -268,7 +268,7 @@ def main(words: Sequence[str] | None = None) -> int:
     status, told, reached = trial.reach(mutants)
     print("\n".join(told.splitlines()[-20:]), file=sys.stderr)
     if status:
-        print("Tests fail without a change: mend them first.", file=sys.stderr)
+        print("Tests fail without a change: fix them first.", file=sys.stderr)
         return 2
     outcome: list[dict[str, Any]] = []
     for mutant in mutants:

@@ -213,7 +213,7 @@ def try_one(text: str) -> str:
         assert place.length >= 1
         assert item.code
         assert item.message
-        assert item.mend
+        assert item.fix
         json.dumps(item.to_json())
         item.render(bundle)
     if parsed.tree is not None:

@@ -211,7 +211,7 @@ def test_a_text_is_formatted(emacs: Emacs) -> None:
 
 
 @needs_eglot
-def test_a_name_that_is_nearly_right_is_mended(emacs: Emacs) -> None:
+def test_a_name_that_is_nearly_right_is_fixed(emacs: Emacs) -> None:
     emacs.go("Base.|calm")
     emacs.type("\x1bdclam")
     assert finds(emacs, "clam", "clam")

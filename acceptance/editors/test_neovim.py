@@ -180,7 +180,7 @@ def test_a_text_is_formatted(nvim: Neovim) -> None:
 
 
 @needs_neovim
-def test_a_name_that_is_nearly_right_is_mended(nvim: Neovim) -> None:
+def test_a_name_that_is_nearly_right_is_fixed(nvim: Neovim) -> None:
     nvim.go("Base.|calm")
     nvim.type("cwclam<Esc>")
     assert finds(nvim, "unknown-name", "clam")

@@ -40,7 +40,7 @@ WORKDIR /var/lib/robosc-bridge
 VOLUME ["/var/lib/robosc-bridge"]
 EXPOSE 50061
 STOPSIGNAL SIGTERM
-# Any answer will do: a robot that waits for its operator after a fault is no container that a restart would mend.
+# Any answer will do: a robot that waits for its operator after a fault is no container that a restart would fix.
 HEALTHCHECK --interval=30s --timeout=6s --start-period=20s --retries=3 \
     CMD ["robosc-bridge", "health", "--alive", "--config", "/etc/robosc/robot.yaml"]
 ENTRYPOINT ["robosc-bridge"]

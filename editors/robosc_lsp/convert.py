@@ -87,7 +87,7 @@ _TOKENS = {
 
 
 def diagnostics(analysis: Analysis, project: Project, found: Iterable[Diagnostic]) -> list[lsp.Diagnostic]:
-    """The findings of a file, each with how to mend it; one of another file stands at the begin of this one."""
+    """The findings of a file, each with how to fix it; one of another file stands at the begin of this one."""
     return [_diagnostic(analysis, project, item) for item in found]
 
 
@@ -103,7 +103,7 @@ def _diagnostic(analysis: Analysis, project: Project, item: Diagnostic) -> lsp.D
     ]
     return lsp.Diagnostic(
         where,
-        f"{message}\n{item.mend}",
+        f"{message}\n{item.fix}",
         severity=SEVERITIES[item.severity],
         code=item.code,
         source="robosc",

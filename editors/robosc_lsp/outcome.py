@@ -11,7 +11,7 @@ class Finding(msgspec.Struct, frozen=True):
     severity: str
     code: str
     message: str
-    mend: str
+    fix: str
     location: Location | None
     related: tuple[tuple[str, Location], ...] = ()
 

@@ -22,8 +22,8 @@ from pygls.uris import to_fs_path
 from robosc import __version__
 from robosc.editing.completion import Candidate, complete
 from robosc.editing.definitions import Definition, DefinitionKind
+from robosc.editing.fixes import fixes
 from robosc.editing.hover import holder_of, hover_text
-from robosc.editing.mends import mends
 from robosc.editing.outline import folds, parts
 from robosc.errors import Diagnostic, LanguageError, RelatedPlace, Severity
 from robosc.formatting import format_text
@@ -199,15 +199,15 @@ class Server(LanguageServer):
                 item.code,
                 item.message,
                 item.location,
-                item.mend,
+                item.fix,
                 tuple(RelatedPlace(*place) for place in item.related),
             )
             for item in found.findings
         ]
         if found.reason and analysis.whole is not None:
             place = analysis.whole.definition.location
-            mend = "`robosc synth` tells what is to blame."
-            items.append(Diagnostic(Severity.WARNING, "no-supervisor", found.reason.rstrip("."), place, mend))
+            fix = "`robosc synth` tells what is to blame."
+            items.append(Diagnostic(Severity.WARNING, "no-supervisor", found.reason.rstrip("."), place, fix))
         return tuple(items)
 
     def _begin_synthesis(self, uri: str, analysis: Analysis) -> None:
@@ -396,7 +396,7 @@ class Server(LanguageServer):
         return lsp.CompletionList(is_incomplete=False, items=items)
 
     def actions(self, uri: str, where: lsp.Range, kinds: Sequence[str] | None = None) -> list[lsp.CodeAction]:
-        """The mends of the findings in a range, as many as can be tried in a moment.
+        """The fixes of the findings in a range, as many as can be tried in a moment.
 
         Args:
             uri: Of the file.
@@ -417,13 +417,13 @@ class Server(LanguageServer):
             if is_tried and time.monotonic() > until_s:
                 break
             is_tried = is_first = True
-            for mend in mends(item, analysis.text.line_of(item.location)):
-                edit = lsp.TextEdit(analysis.text.range_of(mend.location), mend.text)
-                if not self._is_mended(analysis, item, edit):
+            for fix in fixes(item, analysis.text.line_of(item.location)):
+                edit = lsp.TextEdit(analysis.text.range_of(fix.location), fix.text)
+                if not self._is_fixed(analysis, item, edit):
                     continue
                 actions.append(
                     lsp.CodeAction(
-                        mend.title,
+                        fix.title,
                         kind=lsp.CodeActionKind.QuickFix,
                         diagnostics=[shown],
                         is_preferred=is_first,
@@ -433,7 +433,7 @@ class Server(LanguageServer):
                 is_first = False
         return actions
 
-    def _is_mended(self, analysis: Analysis, found: Diagnostic, edit: lsp.TextEdit) -> bool:
+    def _is_fixed(self, analysis: Analysis, found: Diagnostic, edit: lsp.TextEdit) -> bool:
         """Return True if an edit removes a finding, and brings no more than one for it."""
         after = self.project.with_edits({analysis.uri: [edit]}).analysis(analysis.uri)
         if after is None:

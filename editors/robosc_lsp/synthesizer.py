@@ -40,7 +40,7 @@ def outcome(asked: Asked) -> Outcome:
             str(item.severity),
             item.code,
             item.message,
-            item.mend,
+            item.fix,
             item.location,
             tuple((place.message, place.location) for place in item.related),
         )

@@ -25,7 +25,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser = commands.add_parser(
         "check",
         help="find everything that is wrong with a model",
-        description="Check a model or library and print every finding with its place and how to mend it.",
+        description="Check a model or library and print every finding with its place and how to fix it.",
     )
     add_model_arguments(parser)
     parser.add_argument("--strict", action="store_true", help="exit with 1 for warnings too")

@@ -1,4 +1,4 @@
-"""`robosc explain`: what a diagnostic code means, with an example of it and how to mend it."""
+"""`robosc explain`: what a diagnostic code means, with an example of it and how to fix it."""
 
 import argparse
 import sys
@@ -12,7 +12,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "explain",
         help="explain a diagnostic code",
         description="Explain a code such as unknown-name, which 'robosc check' prints in brackets: what is wrong, "
-        "why it matters for the robot, an example, and how to mend it.",
+        "why it matters for the robot, an example, and how to fix it.",
     )
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("code", nargs="?", metavar="CODE", help="the code to explain, e.g. unknown-name")

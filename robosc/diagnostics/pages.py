@@ -8,7 +8,7 @@ There is one Markdown file a code in the folder `pages`, of one shape:
     What is wrong, and why it matters for the robot; its first sentence stands for the whole in lists.
     ## Example
     Fenced texts that are reported with exactly this code, at the line that ends in `// <- here`.
-    ## Mend
+    ## Fix
     A sentence or two and fenced texts that are free of it.
     ## See also
     - `another-code`
@@ -30,7 +30,7 @@ MARK = "// <- here"
 """Ends the line of an example at which the finding is reported."""
 
 _SUFFIX = ".md"
-_SECTIONS = ("Example", "Mend", "See also")
+_SECTIONS = ("Example", "Fix", "See also")
 _FENCE = re.compile(r"^```(\S[^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _FENCED_OR_HEADING = re.compile(r"^```.*?^```$|^(?=#)", re.MULTILINE | re.DOTALL)
 _REFERENCE = re.compile(r"^- `([a-z0-9-]+)`$", re.MULTILINE)
@@ -87,7 +87,7 @@ class Page:
         summary: Description of what is wrong, in one sentence.
         markdown: The whole page.
         example: Texts that are reported with this code.
-        mended: Texts that are not.
+        fixed: Texts that are not.
         see_also: Other codes.
     """
 
@@ -97,7 +97,7 @@ class Page:
     summary: str
     markdown: str
     example: tuple[Block, ...]
-    mended: tuple[Block, ...]
+    fixed: tuple[Block, ...]
     see_also: tuple[str, ...]
 
     def __repr__(self) -> str:
@@ -124,7 +124,7 @@ class Page:
             **self.head_json(),
             "markdown": self.markdown,
             "example": [block.to_json() for block in self.example],
-            "mended": [block.to_json() for block in self.mended],
+            "fixed": [block.to_json() for block in self.fixed],
             "see_also": list(self.see_also),
         }
 
@@ -182,7 +182,7 @@ def parse_page(code: str, markdown: str) -> Page:
         summary=_first_sentence(text),
         markdown=markdown,
         example=_blocks(sections["Example"]),
-        mended=_blocks(sections["Mend"]),
+        fixed=_blocks(sections["Fix"]),
         see_also=tuple(_REFERENCE.findall(sections.get("See also", ""))),
     )
 

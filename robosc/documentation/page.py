@@ -258,4 +258,4 @@ def _findings(findings: Sequence[Diagnostic]) -> str:
 
 def _finding(finding: Diagnostic) -> str:
     place = f", line {finding.location.line}" if finding.location else ""
-    return f"{finding.severity} ({finding.code}{place}): {entities(finding.message)}. {entities(finding.mend)}"
+    return f"{finding.severity} ({finding.code}{place}): {entities(finding.message)}. {entities(finding.fix)}"

@@ -86,8 +86,8 @@ def decode_source(content: bytes, name: str) -> str:
         ) from error
 
 
-def _refused(code: str, name: str, message: str, mend: str, *, line: int = 1, column: int = 1) -> LanguageError:
-    return LanguageError([Diagnostic(Severity.ERROR, code, message, Location(name, line, column), mend)])
+def _refused(code: str, name: str, message: str, fix: str, *, line: int = 1, column: int = 1) -> LanguageError:
+    return LanguageError([Diagnostic(Severity.ERROR, code, message, Location(name, line, column), fix)])
 
 
 def read_source(path: Path, name: str) -> str:

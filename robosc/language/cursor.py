@@ -15,7 +15,7 @@ from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.language import syntax
 from robosc.language.limits import MAXIMUM_NAME, MAXIMUM_NESTING, MAXIMUM_SYNTAX_ERRORS
 from robosc.language.tokens import Kind, Places, Tokens
-from robosc.language.words import STARTS, expected_words, mend_syntax, unescape
+from robosc.language.words import STARTS, expected_words, fix_syntax, unescape
 from robosc.source import Location, SourceFile
 
 _NAME, _WORD, _NUMBER, _STRING, _END = (
@@ -89,9 +89,9 @@ class Cursor:
 
     # Faults
 
-    def report(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
+    def report(self, code: str, message: str, location: Location, fix: str, *related: RelatedPlace) -> None:
         """An error that does not keep the parser from reading on."""
-        self.diagnostics.append(Diagnostic(Severity.ERROR, code, message, location, mend, related))
+        self.diagnostics.append(Diagnostic(Severity.ERROR, code, message, location, fix, related))
 
     def possible(self, *words: str, ahead: int = 0) -> None:
         """Remember what could have stood here, or some tokens ahead, for the error that the token may become."""
@@ -117,8 +117,8 @@ class Cursor:
         message = f"{met} does not fit here; expected {expected_words(expected)}"
         if token == ")":
             message = "this ')' closes nothing"
-        mend = mend_syntax(self.texts[index - 1] if index else "", token, expected)
-        self.report("syntax-error", message, self.at(index), mend, *related)
+        fix = fix_syntax(self.texts[index - 1] if index else "", token, expected)
+        self.report("syntax-error", message, self.at(index), fix, *related)
         return self.told()
 
     def expect(self, *words: str) -> None:

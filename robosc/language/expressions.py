@@ -175,8 +175,8 @@ class ExpressionParser(Cursor):
         self.shallower()
         if self.texts[self.place] in (":", "in") and name.text in _QUANTIFIERS:
             message = f"'{name.text}' needs a name for the elements before its array"
-            mend = f"Write '{name.text}(x in array: condition)', with a name that is not reserved."
-            self.report("syntax-error", message, self.at(self.place), mend)
+            fix = f"Write '{name.text}(x in array: condition)', with a name that is not reserved."
+            self.report("syntax-error", message, self.at(self.place), fix)
             raise self.told()
         if self.texts[self.place] != ")":
             raise self._unclosed(opening)

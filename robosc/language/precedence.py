@@ -25,7 +25,7 @@ LEVELS: tuple[frozenset[str], ...] = (
 """Binary operators, loosest first."""
 
 Report = Callable[[str, str, Location, str], None]
-"""Takes code, message, place and mend."""
+"""Takes code, message, place and fix."""
 
 Operator = tuple[str, Location]
 

@@ -165,8 +165,8 @@ def obstacle(file: SourceFile, tokens: Tokens, places: Places) -> Diagnostic | N
     """
     text = file.text
 
-    def found(code: str, message: str, offset: int, mend: str) -> Diagnostic:
-        return Diagnostic(Severity.ERROR, code, message, places.location(offset, offset + 1), mend)
+    def found(code: str, message: str, offset: int, fix: str) -> Diagnostic:
+        return Diagnostic(Severity.ERROR, code, message, places.location(offset, offset + 1), fix)
 
     if not text or text.isspace():
         return found("empty-file", "the file is empty", 0, "Write a robot or a library.")

@@ -104,7 +104,7 @@ def unescape(token: str) -> str:
     return re.sub(r"\\([\s\S])", lambda match: special.get(match.group(1), match.group(1)), token[1:-1])
 
 
-def mend_syntax(before: str, token: str, expected: Sequence[str]) -> str:
+def fix_syntax(before: str, token: str, expected: Sequence[str]) -> str:
     """Return advice on how to fix a syntax error.
 
     Args:

@@ -287,7 +287,7 @@ class _RobotChecker:
                             f"the request of '{name}' makes this requirement false in '{component}', so it never "
                             "cancels it",
                             place,
-                            "Nothing needs mending if that is meant.",
+                            "Nothing needs fixing if that is meant.",
                         )
 
     def _check_empty(self, communications: Mapping[str, Communication]) -> None:

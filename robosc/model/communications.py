@@ -162,16 +162,16 @@ def _check_link(
     findings: Findings,
 ) -> None:
     """Objects, enums made from objects, services and actions need `links`."""
-    mend = "Define 'interface x use Type from ros_package' and write 'links x'."
+    fix = "Define 'interface x use Type from ros_package' and write 'links x'."
     if kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
         message = f"the {kind} '{tree.name.text}' needs a middleware type"
-        findings.error("links-required", message, tree.name.location, mend)
+        findings.error("links-required", message, tree.name.location, fix)
         return
     for type_, type_tree in parts:
         crossing = types.sources[type_.name] if isinstance(type_, EnumType) else type_
         if isinstance(crossing, ObjectType):
             reason = "an enum made from an object" if isinstance(type_, EnumType) else "an object"
-            findings.error("links-required", f"{reason} needs a middleware type", type_tree.location, mend)
+            findings.error("links-required", f"{reason} needs a middleware type", type_tree.location, fix)
 
 
 def middleware_type(communication: Communication, types: Types) -> str:

@@ -87,8 +87,8 @@ class Constants:
         elif len(self._open) >= _MAXIMUM_CHAIN and key not in self._found:
             if not self._has_told_depth:
                 message = f"constants need each other in a chain of more than {_MAXIMUM_CHAIN}"
-                mend = "Define them before they are used."
-                self._findings.error("nesting-too-deep", message, tree.name.location, mend)
+                fix = "Define them before they are used."
+                self._findings.error("nesting-too-deep", message, tree.name.location, fix)
             self._has_told_depth = True
             self._found[key] = None
         if key not in self._found:

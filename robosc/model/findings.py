@@ -47,17 +47,17 @@ class Findings:
         """Return True if a file is a library with errors of its grammar."""
         return file in self._broken_files
 
-    def error(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
+    def error(self, code: str, message: str, location: Location, fix: str, *related: RelatedPlace) -> None:
         """Add an error."""
-        self._add(Severity.ERROR, code, message, location, mend, related)
+        self._add(Severity.ERROR, code, message, location, fix, related)
 
-    def warning(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
+    def warning(self, code: str, message: str, location: Location, fix: str, *related: RelatedPlace) -> None:
         """Add a warning."""
-        self._add(Severity.WARNING, code, message, location, mend, related)
+        self._add(Severity.WARNING, code, message, location, fix, related)
 
-    def note(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
+    def note(self, code: str, message: str, location: Location, fix: str, *related: RelatedPlace) -> None:
         """Add a note."""
-        self._add(Severity.NOTE, code, message, location, mend, related)
+        self._add(Severity.NOTE, code, message, location, fix, related)
 
     def _add(
         self,
@@ -65,11 +65,11 @@ class Findings:
         code: str,
         message: str,
         location: Location,
-        mend: str,
+        fix: str,
         related: tuple[RelatedPlace, ...],
     ) -> None:
         if not self.is_broken(location.file):
-            self.diagnostics.append(Diagnostic(severity, code, message, location, mend, related))
+            self.diagnostics.append(Diagnostic(severity, code, message, location, fix, related))
 
     def unknown(
         self,
@@ -77,7 +77,7 @@ class Findings:
         name: str,
         location: Location,
         known: Iterable[str],
-        mend: str = "",
+        fix: str = "",
         words: Collection[str] = (),
     ) -> None:
         """Add an `unknown-name` error with the nearest known name, if one is near.
@@ -87,7 +87,7 @@ class Findings:
             name: The name as it is written.
             location: Place of the name.
             known: The names of such things.
-            mend: Advice on what to do instead of writing the nearest one.
+            fix: Advice on what to do instead of writing the nearest one.
             words: Words that the language itself has there.
         """
         if name in self._broken_words:
@@ -98,7 +98,7 @@ class Findings:
             "unknown-name",
             f"unknown {what} '{name}'" + (f"; did you mean '{near}'?" if near else ""),
             location,
-            mend or (f"Write '{written}'." if near else f"Define the {what} '{name}' or use one that exists."),
+            fix or (f"Write '{written}'." if near else f"Define the {what} '{name}' or use one that exists."),
         )
 
     def communications_are_broken(self, names: Iterable[str]) -> None:

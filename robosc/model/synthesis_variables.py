@@ -83,16 +83,16 @@ def check_synthesis_variables(
             continue
         match variable.type:
             case IntegerType():
-                code, mend = "integer-range-required", "Give it a range: 'integer(0..10)'."
+                code, fix = "integer-range-required", "Give it a range: 'integer(0..10)'."
             case DoubleType():
-                code, mend = "double-in-synthesis", "Use an integer with a range, or an enum made from the double."
+                code, fix = "double-in-synthesis", "Use an integer with a range, or an enum made from the double."
             case _:
-                code, mend = "string-in-synthesis", "Use an enum made from the string."
+                code, fix = "string-in-synthesis", "Use an enum made from the string."
         findings.error(
             code,
             f"'{variable.name}' decides about requests, so it cannot be of type {type_text(variable.type)}",
             places[variable.name],
-            mend,
+            fix,
         )
     _check_sources(tree, behaviour, finite, communications, types, findings)
 

@@ -100,9 +100,9 @@ class Types:
         definition = unit.types.get(name.text)
         if definition is None:
             meant = _FOREIGN_TYPES.get(name.text)
-            mend = f"Write '{meant}'." if meant else ""
+            fix = f"Write '{meant}'." if meant else ""
             words = [*syntax.BasicTypeName]
-            self._findings.unknown("data type", name.text, name.location, unit.types, mend, words)
+            self._findings.unknown("data type", name.text, name.location, unit.types, fix, words)
             return None
         self._findings.bindings.bind(name, definition.name.location)
         key = unit.type_name(name.text)

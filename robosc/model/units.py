@@ -186,8 +186,8 @@ class Libraries:
 
     def _unknown(self, name: syntax.Name) -> None:
         looked = ", ".join(self._bundle.searched) or "the files that came with the model"
-        mend = f"Put the library into one of the folders looked at ({looked}) or name its folder with -L."
-        self._findings.unknown("library", name.text, name.location, self._declaring, mend)
+        fix = f"Put the library into one of the folders looked at ({looked}) or name its folder with -L."
+        self._findings.unknown("library", name.text, name.location, self._declaring, fix)
 
 
 def parts_of(unit: Unit, libraries: Libraries, findings: Findings) -> tuple[Part, ...]:

@@ -109,10 +109,10 @@ class _PropertyParser(ExpressionParser):
         self._text = file.text
         self._offsets = tokens.starts
 
-    def report(self, code: str, message: str, location: Location, mend: str, *related: RelatedPlace) -> None:
+    def report(self, code: str, message: str, location: Location, fix: str, *related: RelatedPlace) -> None:
         """An error; a property ends where its text does."""
         message = message.replace("the end of the file", "the end of the property")
-        self.diagnostics.append(Diagnostic(Severity.ERROR, code, message, location, mend, related))
+        self.diagnostics.append(Diagnostic(Severity.ERROR, code, message, location, fix, related))
 
     def property(self) -> WrittenProperty:
         """The whole text: perhaps a name, perhaps a claim, and a formula."""

@@ -60,8 +60,8 @@ class Findings(tuple[Diagnostic, ...]):
         return "".join(f"{item.render(self._bundle)}\n" for item in self) + counts_text(self)
 
     def _repr_html_(self) -> str:
-        rows = [(item.severity, item.code, item.location or "", item.message, item.mend) for item in self]
-        return html_table(("severity", "code", "place", "message", "mend"), rows, caption=counts_text(self))
+        rows = [(item.severity, item.code, item.location or "", item.message, item.fix) for item in self]
+        return html_table(("severity", "code", "place", "message", "fix"), rows, caption=counts_text(self))
 
     def _of(self, severity: Severity) -> "Findings":
         return Findings((item for item in self if item.severity is severity), self._bundle)

@@ -97,10 +97,8 @@ def findings(model: Model, places: Places, answers: Answers) -> tuple[Diagnostic
     )
 
 
-def _warning(
-    code: str, message: str, location: Location, mend: str, related: Iterable[RelatedPlace] = ()
-) -> Diagnostic:
-    return Diagnostic(Severity.WARNING, code, message, location, mend, tuple(related))
+def _warning(code: str, message: str, location: Location, fix: str, related: Iterable[RelatedPlace] = ()) -> Diagnostic:
+    return Diagnostic(Severity.WARNING, code, message, location, fix, tuple(related))
 
 
 # Events that can never happen
@@ -153,9 +151,9 @@ def _never_requested(model: Model, places: Places, never: Mapping[str, Never]) -
         found = [event for event in item.events if event in never and (event != cancel or event in reactions)]
         for event in found[:1] if request in never else found:
             what = f"'{item.name}' can never be requested" if event == request else f"'{event}' can never happen"
-            why, mend = _EXPLANATIONS[never[event].cause, never[event].is_reached]
+            why, fix = _EXPLANATIONS[never[event].cause, never[event].is_reached]
             related = _blamed(model, places, item.name, never[event])
-            yield _warning("never-enabled", f"{what}: {why}", places.communications[item.name], mend, related)
+            yield _warning("never-enabled", f"{what}: {why}", places.communications[item.name], fix, related)
 
 
 def _blamed(model: Model, places: Places, communication: str | None, never: Never) -> tuple[RelatedPlace, ...]:
@@ -185,9 +183,9 @@ def _never_taken(model: Model, places: Places, never: Mapping[str, Never]) -> It
             event = transition.event
             if is_tau(event) and event in never:
                 found = never[event]
-                why, mend = _NEVER_TAKEN if found.cause is Cause.PLANT else _EXPLANATIONS[found.cause, found.is_reached]
+                why, fix = _NEVER_TAKEN if found.cause is Cause.PLANT else _EXPLANATIONS[found.cause, found.is_reached]
                 related = _blamed(model, places, None, found)
-                yield _warning("never-enabled", f"'{event}' can never happen: {why}", location, mend, related)
+                yield _warning("never-enabled", f"'{event}' can never happen: {why}", location, fix, related)
 
 
 def _transitions(component: Component) -> tuple[Transition, ...]:

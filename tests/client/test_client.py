@@ -621,7 +621,7 @@ class TestConversion:
                 code=item.code,
                 message=item.message,
                 location=location(item.location),
-                mend=item.mend,
+                mend=item.fix,
                 related=[pb.RelatedPlace(message=at.message, location=location(at.location)) for at in item.related],
             )
             for item in FINDINGS

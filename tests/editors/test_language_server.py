@@ -479,14 +479,14 @@ def test_a_text_is_formatted_as_by_the_command(editor: Editor) -> None:
 
 
 def actions(editor: Editor, name: str, words: str, *kinds: str) -> list[lsp.CodeAction]:
-    """The mends at the `|` of some words; of some kinds alone if these are told."""
+    """The fixes at the `|` of some words; of some kinds alone if these are told."""
     place = editor.at(name, words)
     where = lsp.Range(place.position, place.position)
     parameters = lsp.CodeActionParams(place.text_document, where, lsp.CodeActionContext([], only=list(kinds) or None))
     return list(editor.run(editor.client.text_document_code_action_async(parameters)))
 
 
-def test_a_name_that_is_nearly_right_is_mended(editor: Editor) -> None:
+def test_a_name_that_is_nearly_right_is_fixed(editor: Editor) -> None:
     editor.replace("walker.rscd", ROBOT.replace("Base.calm", "Base.clam"))
     editor.findings("walker.rscd", bool)
     action, *_ = actions(editor, "walker.rscd", "Base.cl|am")
@@ -496,7 +496,7 @@ def test_a_name_that_is_nearly_right_is_mended(editor: Editor) -> None:
     assert actions(editor, "walker.rscd", "provide wa|lk") == []
 
 
-def test_mends_are_of_the_text_as_it_is(editor: Editor) -> None:
+def test_fixes_are_of_the_text_as_it_is(editor: Editor) -> None:
     editor.replace("walker.rscd", ROBOT.replace("goto on_", "goto onn_"))
     editor.findings("walker.rscd", bool)
     at = editor.texts["walker.rscd"].index("on response from power goto onn_")
@@ -525,7 +525,7 @@ def test_a_name_that_is_a_word_is_written_as_a_name(editor: Editor) -> None:
     assert action.title == "Write '^request'"
 
 
-def test_syntax_of_other_languages_is_mended(editor: Editor) -> None:
+def test_syntax_of_other_languages_is_fixed(editor: Editor) -> None:
     editor.open("other.rscd", "robot R {\n  requirement A && B disables c // 🤖\n}")
     editor.findings("other.rscd", bool)
     (action,) = actions(editor, "other.rscd", "A |&& B")
@@ -534,7 +534,7 @@ def test_syntax_of_other_languages_is_mended(editor: Editor) -> None:
     assert changed == "robot R {\n  requirement A and B disables c // 🤖\n}"
 
 
-def test_a_mend_that_brings_more_errors_is_not_offered(editor: Editor) -> None:
+def test_a_fix_that_brings_more_errors_is_not_offered(editor: Editor) -> None:
     messages = "incoming message m with type: none incoming message n with type: none"
     editor.open("lamps.rscd", f"library Lamps {{ component Lamp {{ {messages} }} component Other {{ }} }}")
     editor.open("double.rscd", f"robot R {{ component Own {{ {messages} }} component L from Lamps import Othr }}")
@@ -545,7 +545,7 @@ def test_a_mend_that_brings_more_errors_is_not_offered(editor: Editor) -> None:
     assert actions(editor, "double.rscd", "import Lm|p") == []
 
 
-def test_a_wrong_preposition_is_mended(editor: Editor) -> None:
+def test_a_wrong_preposition_is_fixed(editor: Editor) -> None:
     editor.replace("walker.rscd", ROBOT.replace("response from pressed", "response to pressed"))
     editor.findings("walker.rscd", bool)
     (action,) = actions(editor, "walker.rscd", "response t|o pressed")

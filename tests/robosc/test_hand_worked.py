@@ -350,13 +350,13 @@ def test_what_the_environment_alone_can_ruin_has_no_supervisor() -> None:
     model = _model("""
         component Glass {
             hear drop
-            say mend
+            say fix
             behaviour {
                 initial marked state whole { on response from drop goto broken }
-                state broken { on request to mend goto whole }
+                state broken { on request to fix goto whole }
             }
         }
-        requirement mend needs Glass.whole
+        requirement fix needs Glass.whole
     """)
     assert _synthesize(to_automata(model, CONTROLLER)).is_empty
 

@@ -85,7 +85,7 @@ def findings_json(diagnostics: Any) -> list[dict[str, Any]]:
             "severity": severities[item.severity],
             "code": item.code,
             "message": item.message,
-            "mend": item.mend,
+            "fix": item.mend,
             **(place(item.location) if item.HasField("location") else dict.fromkeys(place(item.location))),
             "related": [{"message": other.message, **place(other.location)} for other in item.related],
         }

@@ -172,7 +172,7 @@ def _diagnostic(message: pb.Diagnostic) -> Diagnostic:
         code=message.code,
         message=message.message,
         location=_location(message.location) if message.HasField("location") else None,
-        mend=message.mend,
+        fix=message.mend,
         related=tuple(RelatedPlace(place.message, _location(place.location)) for place in message.related),
     )
 

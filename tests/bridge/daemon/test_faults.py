@@ -414,8 +414,8 @@ def _forbidden(robot: SimulatedTurtleBot3) -> Callable[[], object]:
 def test_a_base_that_cannot_be_opened_is_told_once_and_tried_until_it_can(
     base: str, happens: Callable[[SimulatedTurtleBot3], Callable[[], object]], message: str
 ) -> None:
-    mended: list[Callable[[], object]] = []
-    with driven(base, before=lambda robot: mended.append(happens(robot))) as bridge:
+    fixed: list[Callable[[], object]] = []
+    with driven(base, before=lambda robot: fixed.append(happens(robot))) as bridge:
         try:
             bridge.was_told(message)
             # Two attempts more, at least, which nobody is told of.
@@ -423,7 +423,7 @@ def test_a_base_that_cannot_be_opened_is_told_once_and_tried_until_it_can(
             bridge.was_told(message)
             assert bridge.state is State.STARTING
         finally:
-            mended[0]()
+            fixed[0]()
         bridge.moves()
 
 

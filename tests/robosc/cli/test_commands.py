@@ -52,7 +52,7 @@ def test_check_prints_every_finding_with_its_place(capsys: pytest.CaptureFixture
     lines = captured.err.splitlines()
     assert lines[0] == "broken.rscd:2:15: error: unknown communication 'go' [unknown-name]"
     assert lines[1:3] == ["  |   requirement go needs", "  |               ^^"]
-    assert lines[3].startswith("  = mend: ")
+    assert lines[3].startswith("  = fix: ")
     assert lines[-1] == "2 errors"
 
 

@@ -210,7 +210,7 @@ def test_a_broken_file_is_left_alone_and_the_others_are_formatted(
         "b.rscd:2:13: error: '{' does not fit here; expected a name [syntax-error]\n"
         "  |   component {}\n"
         "  |             ^\n"
-        "  = mend: Write one of the expected words here, or look for a bracket or comma missing before.\n"
+        "  = fix: Write one of the expected words here, or look for a bracket or comma missing before.\n"
         "1 error\n"
     )
     assert [content(name) for name in ("a.rscd", "b.rscd", "c.rscd")] == [TIDY, BROKEN, TIDY]

@@ -38,7 +38,7 @@ def test_all_is_the_document(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_json(capsys: pytest.CaptureFixture[str]) -> None:
     one = json.loads(printed(capsys, "import-cycle", "--json"))
-    assert list(one) == ["code", "severity", "stage", "summary", "markdown", "example", "mended", "see_also"]
+    assert list(one) == ["code", "severity", "stage", "summary", "markdown", "example", "fixed", "see_also"]
     assert (one["code"], one["severity"], one["stage"]) == ("import-cycle", "error", "model")
     assert [block["library"] for block in one["example"]] == [None, "Platforms", "Wheels"]
     assert [block["lines"] for block in one["example"]] == [[], [2], []]

@@ -1,4 +1,4 @@
-"""Every code has a page, every page's example is reported as it says, and what it mends is sound."""
+"""Every code has a page, every page's example is reported as it says, and what it fixes is sound."""
 
 import os
 import re
@@ -74,11 +74,11 @@ def test_a_page_has_its_shape(item: Page) -> None:
     assert len(item.summary) <= 100
     assert not item.markdown.endswith("\n\n")
     assert max(map(len, item.markdown.splitlines())) <= 120
-    assert item.mended
-    assert {block.kind for block in (*item.example, *item.mended)} <= {"robosc", "console"}
+    assert item.fixed
+    assert {block.kind for block in (*item.example, *item.fixed)} <= {"robosc", "console"}
     assert set(item.see_also) <= set(codes()) - {item.code}
     assert len(set(item.see_also)) == len(item.see_also)
-    assert not any(block.marked_lines for block in item.mended)
+    assert not any(block.marked_lines for block in item.fixed)
     prose = re.sub(r"```.*?```", "", item.markdown, flags=re.DOTALL)
     assert len(prose.split()) > 40, "too little is said"
 
@@ -96,17 +96,17 @@ def test_all_examples_bear_a_mark_where_there_is_a_place() -> None:
 
 
 @pytest.mark.parametrize("item", PAGES, ids=lambda item: item.code)
-def test_what_is_mended_is_sound(item: Page) -> None:
-    if item.mended[0].kind == "robosc":
-        found = findings(item, item.mended)
-        # A note tells no fault, and what is mended may well be worth one.
+def test_what_is_fixed_is_sound(item: Page) -> None:
+    if item.fixed[0].kind == "robosc":
+        found = findings(item, item.fixed)
+        # A note tells no fault, and what is fixed may well be worth one.
         assert [one for one in found if one.severity is not Severity.NOTE or one.code == item.code] == []
 
 
 @pytest.mark.parametrize("item", TYPED, ids=lambda item: item.code)
 def test_a_session_goes_as_it_is_shown(item: Page, tmp_path: Path) -> None:
     """Everything that is typed runs in one folder; each expected line is printed, in that order."""
-    sessions = [*item.example, *(block for block in item.mended if block.kind == "console")]
+    sessions = [*item.example, *(block for block in item.fixed if block.kind == "console")]
     for number, block in enumerate(sessions):
         lines = block.text.splitlines()
         commands = "\n".join(line.removeprefix("$ ") for line in lines if line.startswith("$ "))
@@ -148,7 +148,7 @@ def test_the_index_of_the_document_leads_to_a_chapter_for_each_code() -> None:
 def test_what_is_fenced_stays_as_it_is_in_the_document() -> None:
     text = document()
     for item in PAGES:
-        for block in (*item.example, *item.mended):
+        for block in (*item.example, *item.fixed):
             assert block.text in text
 
 
@@ -166,7 +166,7 @@ Bad. Very.
 x // <- here
 ```
 
-## Mend
+## Fix
 
 Do.
 """
@@ -177,7 +177,7 @@ def test_a_page_is_read() -> None:
     assert (found.severity, found.stage, found.summary) == (Severity.NOTE, Stage.MODEL, "Bad")
     assert found.example == (Block("robosc", None, "x // <- here\n"),)
     assert found.example[0].marked_lines == (1,)
-    assert found.mended == (Block("robosc", "Lib", "y\n"),)
+    assert found.fixed == (Block("robosc", "Lib", "y\n"),)
     assert found.see_also == ("c-d", "e-f")
 
 
@@ -188,7 +188,7 @@ def test_a_page_is_read() -> None:
         ("severity: note", "severity: fatal"),
         ("stage: model", "stage: never"),
         ("stage: model\n", ""),
-        ("## Mend", "## Repair"),
+        ("## Fix", "## Repair"),
         ("## Example", "## Examples"),
     ],
 )

@@ -275,9 +275,9 @@ def test_what_extends_a_communication_has_columns_of_its_own() -> None:
 
 def test_findings_are_told_with_their_line() -> None:
     place = Location("/somewhere/robot.rscd", 7, 3)
-    finding = Diagnostic(Severity.NOTE, "partial-update", "<b> *can* | be", place, "Mend `it`.")
+    finding = Diagnostic(Severity.NOTE, "partial-update", "<b> *can* | be", place, "Fix `it`.")
     lines = section(read_page(page(model_of("robot R { }"), [finding])), "Findings").lines
-    assert lines == ["note (partial-update, line 7): <b> *can* | be. Mend `it`."]
+    assert lines == ["note (partial-update, line 7): <b> *can* | be. Fix `it`."]
 
 
 def test_an_empty_robot_has_a_page() -> None:

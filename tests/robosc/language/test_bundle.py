@@ -44,7 +44,7 @@ def test_an_unknown_library_says_where_it_was_looked_for(model: Path, tmp_path: 
     assert found.code == "unknown-name"
     assert found.location is not None
     assert found.location.column == len("robot R { component C from ") + 1
-    assert "., ../shared" in found.mend
+    assert "., ../shared" in found.fix
 
 
 def test_libraries_of_libraries_are_found(model: Path, tmp_path: Path) -> None:

@@ -220,7 +220,7 @@ def test_parentheses_of_arrays_are_matched(text: str, column: int, words: str) -
 
 
 @pytest.mark.parametrize(
-    ("text", "mend"),
+    ("text", "fix"),
     [
         ("robot R { requirement r needs a && b }", "Write 'and' for '&&'."),
         ("robot R { requirement r needs a || b }", "Write 'or' for '||'."),
@@ -232,9 +232,9 @@ def test_parentheses_of_arrays_are_matched(text: str, column: int, words: str) -
         ("robot R { component C { incomming message m with type: none } }", "Did you mean 'incoming'?"),
     ],
 )
-def test_common_slips_are_mended(text: str, mend: str) -> None:
+def test_common_slips_are_fixed(text: str, fix: str) -> None:
     (found,) = faults(text)
-    assert found.mend == mend
+    assert found.fix == fix
 
 
 def test_both_readings_of_a_mixed_implication_are_shown() -> None:
@@ -305,7 +305,7 @@ def test_broken_texts(text: str, code: str, line: int, column: int, words: str) 
 
 def test_a_reserved_word_as_a_name_is_explained() -> None:
     (found,) = faults("robot R { component state { } }")
-    assert found.mend == "If 'state' is meant as a name, write '^state'."
+    assert found.fix == "If 'state' is meant as a name, write '^state'."
 
 
 EXAMPLE_TEXTS = [(EXAMPLES / f"{name}.rscd").read_text(encoding="utf-8") for name in EXAMPLE_NAMES]

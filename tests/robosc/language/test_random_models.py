@@ -58,7 +58,7 @@ def assert_told_well(bundle: Bundle) -> None:
         assert 1 <= item.location.column <= len(lines[item.location.line - 1]) + 1
         assert re.fullmatch(r"[a-z][a-z0-9-]*", item.code)
         assert item.message
-        assert item.mend.endswith((".", "?"))
+        assert item.fix.endswith((".", "?"))
         assert json.loads(json.dumps(item.to_json()))["line"] == item.location.line
         assert item.render(bundle)
 

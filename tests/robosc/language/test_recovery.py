@@ -53,7 +53,7 @@ def test_one_mistake_is_one_error(sound: str, broken: str, place: tuple[int, int
     (found,) = faults(text)
     assert found.location is not None
     assert (found.location.line, found.location.column) == place
-    assert told in f"{found.message} {found.mend} {' '.join(item.message for item in found.related)}"
+    assert told in f"{found.message} {found.fix} {' '.join(item.message for item in found.related)}"
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_what_stands_in_or_behind_a_broken_definition_is_read(broken: str) -> No
 
 
 @pytest.mark.parametrize(
-    ("written", "mend"),
+    ("written", "fix"),
     [
         ("interface i ues T from p", "Did you mean 'use'?"),
         ("datatype enum E form boolean to { value -> a default -> b }", "Did you mean 'from'?"),
@@ -81,9 +81,9 @@ def test_what_stands_in_or_behind_a_broken_definition_is_read(broken: str) -> No
         ("component C { behaviour { variable v: integer(0..1) initial state s { transition fi v goto s } } }", "'if'?"),
     ],
 )
-def test_the_word_that_was_meant(written: str, mend: str) -> None:
+def test_the_word_that_was_meant(written: str, fix: str) -> None:
     (found,) = faults(f"robot R {{ {written} }}")
-    assert mend in found.mend
+    assert fix in found.fix
 
 
 def damaged(kind: str, text: str) -> list[str]:

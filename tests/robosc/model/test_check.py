@@ -344,7 +344,7 @@ def test_the_type_decides_between_imported_enums_of_one_name() -> None:
         "Lib.Level",
     ]
     (first, _) = checked(IMPORTER.format(condition="high = high"), lib=LIBRARY, copy=COPY).diagnostics
-    assert (first.code, first.mend) == ("ambiguous-name", "Compare it with a variable of its type.")
+    assert (first.code, first.fix) == ("ambiguous-name", "Compare it with a variable of its type.")
 
 
 def test_a_broken_library_that_nothing_imports_is_nobodys_error() -> None:
@@ -421,7 +421,7 @@ def test_models_with_swapped_words_never_raise(name: str, random: Random) -> Non
         tokens[place] = random.choice([token for token in tokens if kind_of(token) == kind_of(tokens[place])])
     found = checked("".join(tokens))
     assert (found.model is None) == found.has_errors
-    assert all(item.location is not None and item.mend for item in found.diagnostics)
+    assert all(item.location is not None and item.fix for item in found.diagnostics)
 
 
 def test_a_library_can_be_checked_by_itself() -> None:
@@ -534,7 +534,7 @@ def test_a_printed_expression_reads_back_as_itself(condition: Expression) -> Non
 )
 def test_words_of_the_language_that_are_misspelt(text: str, meant: str) -> None:
     found = checked(f"robot R {{ {text} component Z {{ incoming message m with type: none }} }}").diagnostics
-    assert any(f"'{meant}'" in item.mend for item in found if item.code == "unknown-name")
+    assert any(f"'{meant}'" in item.fix for item in found if item.code == "unknown-name")
 
 
 def test_a_communication_that_is_there_but_broken_is_not_unknown() -> None:

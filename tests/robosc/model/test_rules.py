@@ -532,7 +532,7 @@ def test_rule(code: str, severity: str, broken: str, sound: str) -> None:
     places = [(item.location.line, item.location.column) for item in found if item.location]
     assert [(item.code, str(item.severity)) for item in found] == [(code, severity)]
     assert places == [(line, column)]
-    assert found[0].mend.endswith(".")
+    assert found[0].fix.endswith(".")
     assert code not in {item.code for item in checked(sound).diagnostics}
     assert not checked(sound).has_errors, checked(sound).diagnostics
 

@@ -156,7 +156,7 @@ def test_a_request_that_would_break_what_must_always_hold() -> None:
         "'shut' can never be requested: what must always hold keeps the behaviours from the states that allow it",
     ]
     assert [(place.message, place.location.line) for place in both[0].related] == [("this would not hold after it", 11)]
-    assert [item.mend[:11] for item in both[:2]] == ["Relax what "] * 2
+    assert [item.fix[:11] for item in both[:2]] == ["Relax what "] * 2
 
 
 def test_a_request_after_which_what_must_always_hold_could_not_be_kept() -> None:
@@ -202,7 +202,7 @@ def test_a_request_in_states_that_synthesis_keeps_from() -> None:
         "'smash' can never be requested: synthesis keeps the behaviours from the states that allow it, because of what "
         "could follow there",
     )
-    assert "robosc explain-synthesis" in smash.mend
+    assert "robosc explain-synthesis" in smash.fix
 
 
 def test_of_a_call_that_is_never_made_only_the_request_is_told() -> None:
@@ -319,7 +319,7 @@ def test_two_requests_on_one_identifier() -> None:
     item = only(robot(LIGHTS, SWITCH, "requirement green needs Switch.on_"))
     assert item.message == "'green' and 'red' can both be requested on '/light' after up.response"
     assert [(place.message, place.location.line) for place in item.related] == [("the other one is here", 4)]
-    assert "priority list" in item.mend
+    assert "priority list" in item.fix
     exclusive = (
         LIGHTS.replace("§", ""),
         SWITCH,

@@ -31,7 +31,7 @@ def findings(diagnostics: Iterable[Diagnostic]) -> list[pb.Diagnostic]:
             code=item.code,
             message=item.message,
             location=_location(item.location) if item.location else None,
-            mend=item.mend,
+            mend=item.fix,
             related=map(_related, item.related),
         )
         for item in diagnostics

@@ -1,8 +1,8 @@
-"""Mends of findings: each makes the text right that somebody meant."""
+"""Fixes of findings: each makes the text right that somebody meant."""
 
 import pytest
 
-from robosc.editing.mends import mends
+from robosc.editing.fixes import fixes
 from robosc.model.check import inspect
 from robosc.source import Bundle, SourceFile
 
@@ -33,10 +33,10 @@ def titles_and_texts(text: str) -> dict[str, str]:
     results = {}
     for item in found[:1]:
         assert item.location is not None
-        for mend in mends(item, lines[item.location.line - 1]):
-            place = mend.location
+        for fix in fixes(item, lines[item.location.line - 1]):
+            place = fix.location
             begin = sum(len(line) + 1 for line in lines[: place.line - 1]) + place.column - 1
-            results[mend.title] = text[:begin] + mend.text + text[begin + place.length :]
+            results[fix.title] = text[:begin] + fix.text + text[begin + place.length :]
     return results
 
 

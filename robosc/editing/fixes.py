@@ -1,4 +1,4 @@
-"""Mends that can be made by a machine: the same that findings tell in words."""
+"""Fixes that can be made by a machine: the same that findings tell in words."""
 
 import re
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ _RANGE = re.compile(r"(integer\s*\()([^.]+?)(\s*\.\.\s*)([^.]+?)(\s*\))")
 
 
 @dataclass(frozen=True, slots=True)
-class Mend:
+class Fix:
     """One change of a text.
 
     Attributes:
@@ -28,14 +28,14 @@ class Mend:
     text: str
 
 
-def mends(found: Diagnostic, line: str) -> tuple[Mend, ...]:
+def fixes(found: Diagnostic, line: str) -> tuple[Fix, ...]:
     """Return the changes that would fix a finding, the likeliest first; empty where a person has to think.
 
     Args:
         found: The finding.
         line: The line of the text that it is in.
     """
-    return () if found.location is None else tuple(_Line(found.location, line).mends(found))
+    return () if found.location is None else tuple(_Line(found.location, line).fixes(found))
 
 
 class _Line:
@@ -49,53 +49,53 @@ class _Line:
         self._covered = line[self._begin : self._end]
         self._before = line[: self._begin]
 
-    def mends(self, found: Diagnostic) -> Iterator[Mend]:
+    def fixes(self, found: Diagnostic) -> Iterator[Fix]:
         match found.code:
             case "unknown-name":
-                for name in _WRITE.findall(found.mend):
+                for name in _WRITE.findall(found.fix):
                     yield self._written(name)
             case "ambiguous-name":
-                for name in re.findall(r"'([^']+\.[^']+)'", found.mend):
+                for name in re.findall(r"'([^']+\.[^']+)'", found.fix):
                     yield self._written(name)
             case "wrong-preposition":
                 for right in re.findall(r"goes with '(from|to)'", found.message):
                     yield self._written(right)
             case "wrong-result-kind":
-                yield from self._other_results(found.mend)
+                yield from self._other_results(found.fix)
             case "type-mismatch":
-                yield from self._types(found.mend)
+                yield from self._types(found.fix)
             case "syntax-error":
-                yield from self._syntax(found.mend)
+                yield from self._syntax(found.fix)
 
-    def _written(self, text: str) -> Mend:
-        return Mend(f"Write '{text}'", self._location, text)
+    def _written(self, text: str) -> Fix:
+        return Fix(f"Write '{text}'", self._location, text)
 
-    def _changed(self, title: str, begin: int, end: int, text: str) -> Iterator[Mend]:
+    def _changed(self, title: str, begin: int, end: int, text: str) -> Iterator[Fix]:
         """Another text for a stretch of the line, which may not be empty."""
         if end > begin:
-            yield Mend(title, Location(self._location.file, self._location.line, begin + 1, end - begin), text)
+            yield Fix(title, Location(self._location.file, self._location.line, begin + 1, end - begin), text)
 
-    def _other_results(self, mend: str) -> Iterator[Mend]:
+    def _other_results(self, fix: str) -> Iterator[Fix]:
         """`on response from x`, of what has no response."""
         given = re.match(r"(on\s+)\w+(\s+)\w+\b(.*)", self._covered)
         if given is None:
             return
-        for kind in re.findall(r"\w+", mend.removeprefix("Use ")):
+        for kind in re.findall(r"\w+", fix.removeprefix("Use ")):
             right = f"{kind}{given[2]}{_PREPOSITIONS.get(kind, 'from')}"
-            yield Mend(f"Write 'on {kind}'", self._location, f"{given[1]}{right}{given[3]}")
+            yield Fix(f"Write 'on {kind}'", self._location, f"{given[1]}{right}{given[3]}")
 
-    def _types(self, mend: str) -> Iterator[Mend]:
-        if mend == "Write the smaller bound first.":
+    def _types(self, fix: str) -> Iterator[Fix]:
+        if fix == "Write the smaller bound first.":
             bounds = _RANGE.fullmatch(self._covered)
             if bounds is not None:
                 opening, first, points, second, closing = bounds.groups()
                 yield self._written(f"{opening}{second}{points}{first}{closing}")
-        elif mend in ("Remove the property: only objects have properties.", "Remove what follows the name."):
+        elif fix in ("Remove the property: only objects have properties.", "Remove what follows the name."):
             point = re.search(r"\s*\.\s*\Z", self._before)
             if point is not None:
                 yield from self._changed(f"Remove '.{self._covered}'", point.start(), self._end, "")
 
-    def _syntax(self, mend: str) -> Iterator[Mend]:
+    def _syntax(self, fix: str) -> Iterator[Fix]:
         token = self._covered
         if token in _WORDS:
             end = self._end + self._line[self._end : self._end + 1].count(token)
@@ -103,18 +103,18 @@ class _Line:
             left = " " * self._before[-1:].isidentifier()
             right = " " * bool(re.match(r"\w", self._line[end : end + 1]))
             yield from self._changed(f"Write '{_WORDS[token]}'", self._begin, end, f"{left}{_WORDS[token]}{right}")
-        elif mend == "Write '!' for 'not'.":
+        elif fix == "Write '!' for 'not'.":
             word = re.search(r"\bnot\s*\Z", self._before)
             if word is not None:
                 yield from self._changed("Write '!'", word.start(), self._begin, "!")
-        elif mend.startswith(("Remove ", "Write '=' once")):
+        elif fix.startswith(("Remove ", "Write '=' once")):
             yield from self._changed(f"Remove '{token}'", self._begin, self._end, "")
-        elif mend.startswith("Write 'incoming message' or"):
+        elif fix.startswith("Write 'incoming message' or"):
             yield from (self._written(f"{direction} {token}") for direction in ("incoming", "outgoing"))
-        elif meant := re.fullmatch(r"(?:If '.*' is meant as a name, write|Did you mean) '([^']+)'[.?]", mend):
+        elif meant := re.fullmatch(r"(?:If '.*' is meant as a name, write|Did you mean) '([^']+)'[.?]", fix):
             yield self._written(meant[1])
-        elif missing := re.match(r"Write '([^']+)' before it, or", mend):
+        elif missing := re.match(r"Write '([^']+)' before it, or", fix):
             yield from self._changed(f"Write '{missing[1]}' before it", self._begin, self._end, f"{missing[1]} {token}")
 
 
-__all__ = ["Mend", "mends"]
+__all__ = ["Fix", "fixes"]

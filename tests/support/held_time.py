@@ -44,7 +44,8 @@ class HeldLoop(asyncio.SelectorEventLoop):
 
     def _pass(self, until_s: float, done: Callable[[], None]) -> None:
         ours: Any = self
-        for handle in ours._ready:
+        # A copy, made in one step: other threads put callbacks there at any time.
+        for handle in ours._ready.copy():
             if isinstance(handle, asyncio.TimerHandle):
                 # It is called a rounding error too early, and might put itself off for ever.
                 self._now_s = max(self._now_s, handle.when())

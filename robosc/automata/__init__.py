@@ -6,6 +6,7 @@ means, one state at a time.
 
 from robosc.automata.check import check_system
 from robosc.automata.environment import EnvironmentVariable, environment_variable
+from robosc.automata.executable import ExecutableSystem
 from robosc.automata.lowering import to_automata
 from robosc.automata.semantics import Semantics
 from robosc.automata.structure import (
@@ -29,6 +30,7 @@ __all__ = [
     "EnvironmentVariable",
     "Event",
     "EventCondition",
+    "ExecutableSystem",
     "InputVariable",
     "Role",
     "Semantics",

@@ -5,7 +5,6 @@ services and actions, then its own behaviour. Events follow the same order: thos
 communications, then its taus. Data plants only observe and are left out.
 """
 
-from collections import deque
 from collections.abc import Iterator
 
 from robosc.automata.plants import communication_plant, component_plant
@@ -25,8 +24,8 @@ from robosc.expressions import (
     type_text,
 )
 from robosc.model.structure import (
-    CONTROLLABLE_KINDS,
     EVENT_KINDS,
+    ISSUED_KINDS,
     Communication,
     CommunicationKind,
     Component,
@@ -35,9 +34,6 @@ from robosc.model.structure import (
     Model,
     is_tau,
 )
-
-_recent: deque[tuple[Model, Deployment, System]] = deque(maxlen=2)
-"""Systems made last: several stages ask for the same system of a robot in progress, or for its executed form."""
 
 
 def to_automata(model: Model, deployment: Deployment) -> System:
@@ -50,11 +46,7 @@ def to_automata(model: Model, deployment: Deployment) -> System:
     Raises:
         UnsupportedModelError: A synthesis variable takes received data with infinitely many values.
     """
-    # Compared by identity, which takes no time; none of the three ever changes.
-    for known, where, system in tuple(_recent):
-        if known is model and where is deployment:
-            return system
-    system = System(
+    return System(
         name=model.name,
         events=tuple(_events(model, deployment)),
         automata=tuple(_automata(model)),
@@ -62,8 +54,6 @@ def to_automata(model: Model, deployment: Deployment) -> System:
         conditions=(*_request_conditions(model), *_cancel_conditions(model, deployment)),
         invariants=tuple(item.condition for item in model.invariants),
     )
-    _recent.append((model, deployment, system))
-    return system
 
 
 def _communications(model: Model) -> Iterator[tuple[Component, tuple[Communication, ...]]]:
@@ -88,7 +78,7 @@ def _events(model: Model, deployment: Deployment) -> Iterator[Event]:
 def _is_controllable(kind: EventKind, deployment: Deployment) -> bool:
     if kind is EventKind.CANCEL and deployment is Deployment.LAYER:
         return False
-    return kind in CONTROLLABLE_KINDS
+    return kind in ISSUED_KINDS
 
 
 def _automata(model: Model) -> Iterator[Automaton]:

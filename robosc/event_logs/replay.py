@@ -6,32 +6,24 @@ are computed by the slow evaluator, as far as the log tells what they are made o
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
-import msgspec
-
-from robosc.automata import Semantics, to_automata
+from robosc.automata import ExecutableSystem, Semantics
 from robosc.automata.compile import Carried, State
-from robosc.automata.plants import communication_plant, communication_plant_name
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.event_logs.data import MISFIT, NOT_TOLD, Misfit, NotTold, Received, is_same, path_text, value_of
 from robosc.expressions import DoubleType, IntegerType, PathStep, Value
 from robosc.expressions.evaluate import evaluate
 from robosc.expressions.values import assignable_double, assignable_integer
 from robosc.model.structure import (
-    Behaviour,
     Communication,
     CommunicationKind,
-    Component,
     Deployment,
     EventKind,
     Model,
     ObjectValue,
     ProvidedValue,
-    Transition,
     Variable,
-    is_tau,
 )
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import Supervisor
@@ -44,24 +36,17 @@ class _NotToldError(Exception):
     """A value depends on something that the log leaves out."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Stored:
-    """A variable that synthesis leaves out: it decides nothing, but its value goes out with requests."""
-
-    component: str
-    variable: Variable
-
-    def assigned(self, value: Any) -> Value | None:
-        """Return the value that the variable takes, or None if it keeps what it has."""
-        found: Value | None
-        match self.variable.type:
-            case IntegerType(low=int(low), high=int(high)):
-                found = assignable_integer(value, low, high)
-            case DoubleType():
-                found = assignable_double(value)
-            case _:
-                found = value
-        return found
+def _assigned(variable: Variable, value: Any) -> Value | None:
+    """Return the value that a variable takes, or None if it keeps what it has."""
+    found: Value | None
+    match variable.type:
+        case IntegerType(low=int(low), high=int(high)):
+            found = assignable_integer(value, low, high)
+        case DoubleType():
+            found = assignable_double(value)
+        case _:
+            found = value
+    return found
 
 
 class Replay:
@@ -82,9 +67,9 @@ class Replay:
     """
 
     def __init__(self, supervisor: Supervisor, deployment: Deployment) -> None:
-        model = _own_transitions_first(supervisor.model)
-        system = to_automata(model, deployment)
-        self.model = model
+        model = self.model = supervisor.model
+        self._executable = ExecutableSystem(model, deployment)
+        system = self._executable.executed_automata
         self._semantics = Semantics(system)
         self._added = state_predicates(system, supervisor.added)
         self._events = {event.name: event.is_controllable for event in system.events}
@@ -97,14 +82,6 @@ class Replay:
         }
         self._behaviours = {item.name: item.behaviour for item in model.components if item.behaviour}
         self._received = Received(model)
-        self._updates = _stored_updates(model)
-        self._silent = _silent_events(model)
-        self._plants = {
-            event: (self._places[Subject(plant.name)], {edge.target for edge in plant.edges if edge.event == event})
-            for item in model.communications
-            for plant in (communication_plant(item),)
-            for event in item.events
-        }
         self.requests: Mapping[str, tuple[Communication, ...]] = _requests(model)
         self.state: State = ()
         self.stored: dict[tuple[str, str], Value] = {}
@@ -150,25 +127,18 @@ class Replay:
         return ""
 
     def _blocked_by(self, event: str) -> str:
-        name, _, kind = event.rpartition(".")
-        if not is_tau(event):
-            communication = self.model.communication(name)
-            location = self._location(communication)
-            moves = communication_plant(communication).edges
-            if location is not None and not any(e.source == location and e.event == event for e in moves):
-                return f"the {communication.kind} is {location}"
-        if kind == EventKind.REQUEST or is_tau(event):
+        found = self._executable.events[event]
+        if found.moves and found.communication:
+            location = str(self.state[self._places[Subject(found.moves.plant)]])
+            if location not in found.moves.targets:
+                return f"the {found.communication.kind} is {location}"
+        if found.kind in (None, EventKind.REQUEST):
             return "a component has no transition for it in its state, or a variable would leave its range"
         return "the robot cannot do it in this state"
 
-    def _location(self, communication: Communication) -> str | None:
-        if communication.kind not in _WITH_RESET:
-            return None
-        return str(self.state[self._places[Subject(communication_plant_name(communication))]])
-
     def pending(self) -> str | None:
         """A silent step that is still to be taken before any request: a reset, or a tau that changes something."""
-        for event in self._silent:
+        for event in self._executable.resets_and_taus:
             if not self.refusal(event):
                 (target,) = self._semantics.targets(self.state, event)
                 if target != self.state:
@@ -239,11 +209,10 @@ class Replay:
 
     def adopt(self, event: str, logged: Mapping[str, Mapping[str, Any]]) -> None:
         """An event that is not possible has happened, says the log: its service or action is where that leads."""
-        if event in self._plants:
-            place, targets = self._plants[event]
-            if len(targets) == 1:
-                (target,) = targets
-                self._put(place, target)
+        moves = self._executable.events[event].moves
+        targets = set(moves.targets.values()) if moves else set()
+        if moves and len(targets) == 1:
+            self._put(self._places[Subject(moves.plant)], targets.pop())
         self._trust_all(logged)
 
     def _trust_all(self, logged: Mapping[str, Mapping[str, Any]]) -> None:
@@ -274,25 +243,21 @@ class Replay:
         """Update what synthesis leaves out, before the state changes; the variables whose value is not known."""
         new: dict[tuple[str, str], Value] = {}
         unknown: list[tuple[str, str]] = []
-        for component, transitions in self._updates.get(event, ()):
-            taken = next((item for item, _ in transitions if self._is_taken(component, item)), None)
-            updates = next((updates for item, updates in transitions if item is taken), ())
-            for stored, expression in updates:
-                try:
-                    value = stored.assigned(self._value(expression, event, data))
-                except _NotToldError:
-                    unknown.append((stored.component, stored.variable.name))
-                else:
-                    if value is not None:
-                        new[stored.component, stored.variable.name] = value
+        for participant in self._executable.events[event].participants:
+            component = participant.component
+            taken = participant.taken.get(str(self.state[self._places[Subject(component)]]))
+            for update in () if taken is None else taken.updates:
+                if (component, update.variable) in self.stored:
+                    variable = next(v for v in participant.behaviour.variables if v.name == update.variable)
+                    try:
+                        value = _assigned(variable, self._value(update.expression, event, data))
+                    except _NotToldError:
+                        unknown.append((component, update.variable))
+                    else:
+                        if value is not None:
+                            new[component, update.variable] = value
         self.stored.update(new)
         return tuple(unknown)
-
-    def _is_taken(self, component: str, transition: Transition) -> bool:
-        location = self.state[self._places[Subject(component)]]
-        if transition.source not in (None, location):
-            return False
-        return transition.guard is None or self._value(transition.guard, "", None) is True
 
     def _value(self, expression: Any, event: str, data: Any) -> Any:
         def received(path: tuple[PathStep, ...]) -> Any:
@@ -339,46 +304,6 @@ def _short(value: object) -> str:
 
 def _initial(variable: Variable) -> Value:
     return float(variable.initial) if isinstance(variable.type, DoubleType) else variable.initial
-
-
-def _own_transitions_first(model: Model) -> Model:
-    """The model with the transitions in the order in which an executor looks at them: a state's own come first."""
-    return msgspec.structs.replace(model, components=tuple(map(_sorted, model.components)))
-
-
-def _sorted(component: Component) -> Component:
-    behaviour: Behaviour | None = component.behaviour
-    if behaviour is None:
-        return component
-    transitions = tuple(sorted(behaviour.transitions, key=lambda item: item.source is None))
-    return msgspec.structs.replace(component, behaviour=msgspec.structs.replace(behaviour, transitions=transitions))
-
-
-_StoredUpdates = tuple[tuple[_Stored, Any], ...]
-
-
-def _stored_updates(model: Model) -> dict[str, list[tuple[str, list[tuple[Transition, _StoredUpdates]]]]]:
-    """For each event that stores something: the components that do, with all their transitions on it."""
-    found: dict[str, list[tuple[str, list[tuple[Transition, _StoredUpdates]]]]] = {}
-    for component in model.components:
-        if component.behaviour is None:
-            continue
-        stored = {
-            item.name: _Stored(component.name, item) for item in component.behaviour.variables if not item.is_synthesis
-        }
-        by_event: dict[str, list[tuple[Transition, _StoredUpdates]]] = {}
-        for transition in component.behaviour.transitions:
-            updates = tuple((stored[u.variable], u.expression) for u in transition.updates if u.variable in stored)
-            by_event.setdefault(transition.event, []).append((transition, updates))
-        for event, transitions in by_event.items():
-            if any(updates for _, updates in transitions):
-                found.setdefault(event, []).append((component.name, transitions))
-    return found
-
-
-def _silent_events(model: Model) -> tuple[str, ...]:
-    resets = (item.event(EventKind.RESET) for item in model.communications if item.kind in _WITH_RESET)
-    return (*resets, *model.taus)
 
 
 def _requests(model: Model) -> dict[str, tuple[Communication, ...]]:

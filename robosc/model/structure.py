@@ -60,8 +60,9 @@ EVENT_KINDS: dict[CommunicationKind, tuple[EventKind, ...]] = {
 }
 """The events of each kind of communication (semantics part 1)."""
 
-CONTROLLABLE_KINDS = frozenset({EventKind.REQUEST, EventKind.CANCEL, EventKind.RESET})
-"""The kinds that a supervisor may disable. (As a layer, cancel is the caller's: see `to_automata`.)"""
+ISSUED_KINDS = frozenset({EventKind.REQUEST, EventKind.CANCEL, EventKind.RESET})
+"""The kinds that an executor issues and a supervisor may disable. (As a layer, cancel is the caller's: see
+`to_automata`.)"""
 
 
 class Deployment(StrEnum):
@@ -357,8 +358,8 @@ def _named[Item: Component | Communication | EnumDefinition | ObjectDefinition](
 
 
 __all__ = [
-    "CONTROLLABLE_KINDS",
     "EVENT_KINDS",
+    "ISSUED_KINDS",
     "Behaviour",
     "Communication",
     "CommunicationKind",

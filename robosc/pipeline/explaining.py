@@ -143,7 +143,7 @@ def explained(
     explanation = explain_synthesis(
         prepared.model,
         prepared.places,
-        prepared.system,
+        prepared.system.automata,
         deployment=deployment,
         engine=engine,
         event=event,

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from robosc.automata import to_automata
 from robosc.errors import UnsupportedModelError
 from robosc.explanation import EmptyExplanation
 from robosc.exploration import DEFAULT_LIMIT, Graph
@@ -104,6 +103,6 @@ def graph_of(supervisor: CoreSupervisor, *, limit: int = DEFAULT_LIMIT, should_s
         UnsupportedModelError: There are more than `limit` states.
         SynthesisCancelled: `should_stop` became true.
     """
-    system = to_automata(supervisor.model, supervisor.deployment)
+    system = supervisor.executable.automata
     added = state_predicates(system, supervisor.added)
     return explore_system(system, added, supervisor.model, limit=limit, should_stop=should_stop)

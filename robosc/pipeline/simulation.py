@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from robosc.automata import to_automata
 from robosc.automata.plants import communication_plant_name
 from robosc.errors import RoboscError, UnknownNameError
 from robosc.execution.interpreter import InterpretedSystem
@@ -94,7 +93,7 @@ class Run:
         given = supervisor_of(supervisor)
         self._model = given.model
         self._system = InterpretedSystem(given)
-        events = to_automata(given.model, given.deployment).events
+        events = given.executable.automata.events
         self._events = {event.name: event.is_controllable for event in events}
         components = {item.name for item in given.model.components}
         self._calls = {

@@ -5,7 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
-from robosc.automata import System, to_automata
+from robosc.automata import System
 from robosc.errors import Diagnostic
 from robosc.model.structure import Deployment, Model
 from robosc.pipeline.conditions import Conditions, conditions_of
@@ -33,7 +33,7 @@ class Supervisor(CoreSupervisor, frozen=True, dict=True):
     @classmethod
     def of(cls, supervisor: CoreSupervisor, diagnostics: tuple[Diagnostic, ...] | None = None) -> Self:
         """Take a supervisor of the core, with the findings about its model; None: they are not known."""
-        made = cls(supervisor.model, supervisor.deployment, supervisor.added, supervisor.certificate)
+        made = cls.supervising(supervisor.executable, supervisor.added, supervisor.certificate)
         # No field: a supervisor's file does not hold them.
         made.__dict__["diagnostics"] = None if diagnostics is None else Findings(diagnostics)
         return made
@@ -71,7 +71,7 @@ class Supervisor(CoreSupervisor, frozen=True, dict=True):
     @cached_property
     def system(self) -> System:
         """The automata that it supervises."""
-        return to_automata(self.model, self.deployment)
+        return self.executable.automata
 
     @cached_property
     def conditions(self) -> Conditions:

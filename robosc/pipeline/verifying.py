@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import overload
 
-from robosc.automata import System, to_automata
+from robosc.automata import System
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.json_documents import diagnostics_json
 from robosc.model import check
@@ -218,7 +218,7 @@ def verdicts_of(
     Raises:
         NodeLimitError, UnknownEngineError, SynthesisCancelled, UnsupportedModelError: As `verify_properties`.
     """
-    system = to_automata(supervisor.model, supervisor.deployment)
+    system = supervisor.executable.automata
     verdicts = verify_properties(
         system, supervisor.added, properties, engine=engine, on_progress=on_progress, should_stop=should_stop
     )

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Iterable
 
+from robosc.automata.executable import ExecutableSystem
 from robosc.automata.semantics import Semantics, TooManyChoicesError
-from robosc.model.structure import Deployment, Model
 from robosc.properties.controller import Controller
 from robosc.properties.orders import Orders
 from robosc.properties.outcome import Properties
@@ -19,8 +19,7 @@ HOPELESS = 1_000
 
 
 def check_controller(
-    model: Model,
-    deployment: Deployment,
+    system: ExecutableSystem,
     added: Iterable[AddedCondition],
     *,
     is_nonblocking: bool,
@@ -34,25 +33,24 @@ def check_controller(
     Only what is proved is 'passed', and only what a trace shows is 'failed'.
 
     Args:
-        model: The checked robot.
-        deployment: Deployment of the supervisor.
+        system: Executable system of the robot.
         added: The conditions that synthesis adds.
         is_nonblocking: True if it is certain that the controlled system is nonblocking.
         states: States of the controlled system, as far as is known: where there are `HOPELESS` times as many as
             `limit` allows, nothing is searched for nonblocking alone, which only a whole search can decide.
         limit: Stable states beyond which a search is given up.
-        semantics: Semantics of the model's automata there, if it was made already.
+        semantics: Semantics of its automata, if it was made already.
         should_stop: Function called now and then; once it returns true, the work ends.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
     """
     conditions = tuple(added)
-    controller = Controller(model, deployment, conditions, semantics)
+    controller = Controller(system, conditions, semantics)
     ends = always_end(controller.system, should_stop)
     is_confluent = ends and never_conflict(controller, conditions, should_stop)
     # Not without an end of silent steps: what comes after them would not.
-    is_live = ends and is_nonblocking and stays_nonblocking(model, controller, conditions)
+    is_live = ends and is_nonblocking and stays_nonblocking(system.model, controller, conditions)
     proved = (ends, is_confluent, is_live)
     if all(proved):
         return Properties("passed", "passed", "passed", "by the structure of silent steps")

@@ -21,21 +21,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product
 
-import msgspec
-
-from robosc.automata import System, to_automata
+from robosc.automata import ExecutableSystem, System
 from robosc.automata.compile import NO_DATA, Function, State, compile_expression, subjects_read
-from robosc.automata.plants import communication_plant, is_blocking
 from robosc.automata.semantics import Semantics
 from robosc.automata.state import Subject, subjects
 from robosc.model.structure import (
-    Behaviour,
     CommunicationKind,
-    Component,
-    Deployment,
     EventKind,
-    Model,
-    Transition,
 )
 from robosc.properties.messages import Choice, choices_together
 from robosc.supervisor.conditions import state_predicates
@@ -46,40 +38,6 @@ Held = tuple[int, ...]
 
 Node = tuple[State, Held]
 """A state of the controller automaton."""
-
-
-def executed(model: Model) -> Model:
-    """The model with those transitions only that an executor takes: at most one on an event in a state."""
-    components = tuple(
-        item
-        if item.behaviour is None
-        else Component(item.name, msgspec.structs.replace(item.behaviour, transitions=_taken(item.behaviour)))
-        for item in model.components
-    )
-    return msgspec.structs.replace(model, components=components)
-
-
-def _taken(behaviour: Behaviour) -> tuple[Transition, ...]:
-    """A behaviour's transitions: of several on one event in a state, the state's own first, then source order."""
-    states = [state.name for state in behaviour.states]
-    owner: dict[tuple[str, str], int] = {}
-    for is_own in (True, False):
-        for number, item in enumerate(behaviour.transitions):
-            if (item.source is not None) is is_own and not is_blocking(item.event):
-                for state in states if item.source is None else [item.source]:
-                    owner.setdefault((state, item.event), number)
-    result: list[Transition] = []
-    for number, item in enumerate(behaviour.transitions):
-        if is_blocking(item.event):
-            result.append(item)
-            continue
-        wanted = states if item.source is None else [item.source]
-        kept = [state for state in wanted if owner[state, item.event] == number]
-        if len(kept) == len(wanted):
-            result.append(item)
-        else:
-            result.extend(msgspec.structs.replace(item, source=state) for state in kept)
-    return tuple(result)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,10 +89,9 @@ class Controller:
     """The controller automaton of a supervisor.
 
     Args:
-        model: The checked robot.
-        deployment: Deployment of the supervisor.
+        executable: Executable system of the robot.
         added: The conditions that synthesis adds.
-        semantics: Semantics of the model's automata there, if it was made already.
+        semantics: Semantics of its automata, if it was made already.
 
     Attributes:
         is_deterministic: True if no two transitions apply to one event in one state, whatever a model may say.
@@ -148,28 +105,23 @@ class Controller:
 
     def __init__(
         self,
-        model: Model,
-        deployment: Deployment,
+        executable: ExecutableSystem,
         added: Iterable[AddedCondition],
         semantics: Semantics | None = None,
     ) -> None:
-        alone = executed(model)
-        self.is_deterministic = alone == model
-        if not self.is_deterministic:
-            # What is executed has other automata than those that were given a meaning.
-            model, semantics = alone, None
-        self._semantics = semantics or Semantics(to_automata(model, deployment))
-        self.system: System = self._semantics.system
+        self.system: System = executable.executed_automata
+        self.is_deterministic = self.system is executable.automata
+        # What is executed may have other automata than those that were given a meaning.
+        self._semantics = semantics if semantics and self.is_deterministic else Semantics(self.system)
+        model = executable.model
         self._added = state_predicates(self.system, added)
         places = {subject: place for place, subject in enumerate(subjects(self.system))}
-        self.goals = tuple(_goals(model, places))
+        self.goals = tuple(_goals(executable, places))
         self.width = len(places)
         self._start: Node = (self._semantics.initial, (0,) * len(self.goals))
-        with_reset = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
-        resets = [item.event(EventKind.RESET) for item in model.communications if item.kind in with_reset]
         moving = {edge.event for item in self.system.automata for edge in item.edges if edge.source != edge.target}
-        self.silent: tuple[str, ...] = (*resets, *(event for event in model.taus if event in moving))
-        self.batches = tuple(_batches(model, deployment))
+        self.silent: tuple[str, ...] = tuple(event for event in executable.resets_and_taus if event in moving)
+        self.batches = tuple(_batches(executable))
         messages = {item.event(EventKind.RESPONSE): item for item in model.communications}
         together = (
             (batch, choices_together(model, self.system, [messages[event] for event in batch]))
@@ -360,36 +312,33 @@ def _sources(system: System, event: str, places: dict[Subject, int]) -> Iterator
                 yield places[Subject(automaton.name)], sources
 
 
-def _goals(model: Model, places: dict[Subject, int]) -> Iterator[Goal]:
+def _goals(executable: ExecutableSystem, places: dict[Subject, int]) -> Iterator[Goal]:
     index = 0
-    for item in model.communications:
-        requirements = model.requirements_on(item.name)
-        if item.kind is CommunicationKind.ACTION and requirements:
-            plant = communication_plant(item)
-            request = item.event(EventKind.REQUEST)
-            yield Goal(
-                index=index,
-                cancel=item.event(EventKind.CANCEL),
-                place=places[Subject(plant.name)],
-                running=next(edge.target for edge in plant.edges if edge.event == request),
-                requirements=tuple(compile_expression(rule.condition, places) for rule in requirements),
-                reads=frozenset().union(*(subjects_read(rule.condition) for rule in requirements)),
-            )
-            index += 1
+    for event in executable.events.values():
+        if event.kind is EventKind.CANCEL and event.moves and event.communication:
+            requirements = executable.model.requirements_on(event.communication.name)
+            if requirements:
+                (running,) = event.moves.targets
+                yield Goal(
+                    index=index,
+                    cancel=event.name,
+                    place=places[Subject(event.moves.plant)],
+                    running=running,
+                    requirements=tuple(compile_expression(rule.condition, places) for rule in requirements),
+                    reads=frozenset().union(*(subjects_read(rule.condition) for rule in requirements)),
+                )
+                index += 1
 
 
-def _batches(model: Model, deployment: Deployment) -> Iterable[tuple[str, ...]]:
+def _batches(executable: ExecutableSystem) -> Iterable[tuple[str, ...]]:
     """Messages on one identifier together; every other event of the environment alone."""
     topics: dict[str, tuple[str, ...]] = {}
     others: list[tuple[str, ...]] = []
-    kinds = [EventKind.RESPONSE, EventKind.FEEDBACK, EventKind.ERROR]
-    if deployment is Deployment.LAYER:
-        # There a caller may cancel its own goal.
-        kinds.append(EventKind.CANCEL)
-    for item in model.communications:
-        if item.kind is CommunicationKind.OUTGOING_MESSAGE:
-            event = item.event(EventKind.RESPONSE)
-            topics[item.identifier] = (*topics.get(item.identifier, ()), event)
-        else:
-            others.extend((event,) for event in map(item.event, kinds) if event in item.events)
+    uncontrollable = {event.name for event in executable.automata.events if not event.is_controllable}
+    for event in executable.events.values():
+        if event.communication and event.communication.kind is CommunicationKind.OUTGOING_MESSAGE:
+            identifier = event.communication.identifier
+            topics[identifier] = (*topics.get(identifier, ()), event.name)
+        elif event.name in uncontrollable:
+            others.append((event.name,))
     return (*topics.values(), *others)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from robosc import explanation as explanations
-from robosc.automata import Semantics, System, to_automata
+from robosc.automata import ExecutableSystem, Semantics
 from robosc.errors import Diagnostic, NodeLimitError, sorted_diagnostics
 from robosc.model import check
 from robosc.model.layers import layer_findings
@@ -91,13 +91,13 @@ class Prepared:
     Attributes:
         model: The model.
         places: Source locations of its parts.
-        system: Its automata.
+        system: All that it does.
         diagnostics: Every finding about it.
     """
 
     model: Model
     places: Places
-    system: System
+    system: ExecutableSystem
     diagnostics: tuple[Diagnostic, ...]
 
 
@@ -115,7 +115,10 @@ def prepare(bundle: Bundle, deployment: Deployment) -> Prepared | Made:
         ambiguous = layer_findings(checked.model, checked.places)
         if ambiguous:
             return Made(MadeStatus.MODEL_ERRORS, None, sorted_diagnostics((*checked.diagnostics, *ambiguous)))
-    return Prepared(checked.model, checked.places, to_automata(checked.model, deployment), checked.diagnostics)
+    system = ExecutableSystem(checked.model, deployment)
+    # A model that synthesis cannot handle is refused here.
+    _ = system.automata
+    return Prepared(checked.model, checked.places, system, checked.diagnostics)
 
 
 def make_supervisor(
@@ -149,7 +152,7 @@ def make_supervisor(
     prepared = prepare(bundle, deployment)
     if isinstance(prepared, Made):
         return prepared
-    model, places, system = prepared.model, prepared.places, prepared.system
+    model, places, system = prepared.model, prepared.places, prepared.system.automata
 
     def report(progress: SynthesisProgress) -> None:
         on_progress(Progress("synthesis", str(progress)))
@@ -189,8 +192,7 @@ def make_supervisor(
     )
     on_progress(Progress("controller", "finite response, confluence, nonblocking under control"))
     properties = check_controller(
-        model,
-        deployment,
+        prepared.system,
         result.added,
         is_nonblocking=certificate.nonblocking == "passed",
         states=result.statistics.states,
@@ -207,5 +209,5 @@ def make_supervisor(
     if properties.livelock is not None and not allow_livelock:
         return Made(MadeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, LIVELOCK_REASON)
     certificate = msgspec.structs.replace(certificate, controller=properties.certified())
-    supervisor = Supervisor(model, deployment, result.added, certificate)
+    supervisor = Supervisor.supervising(prepared.system, result.added, certificate)
     return Made(MadeStatus.SUPERVISOR, supervisor, diagnostics, result.statistics)

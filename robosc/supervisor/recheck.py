@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from robosc._version import __version__
-from robosc.automata import Semantics, System, to_automata
+from robosc.automata import ExecutableSystem, Semantics, System
 from robosc.automata.compile import State
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import subjects
@@ -151,7 +151,8 @@ def recheck(
     notes = tuple(_notes(supervisor.certificate, bundle))
     if faults:
         return Recheck((), tuple(faults), notes, None)
-    system = to_automata(checked.model, supervisor.deployment)
+    executable = ExecutableSystem(checked.model, supervisor.deployment)
+    system = executable.automata
     semantics = Semantics(system)
 
     def judged(expected_states: int) -> Judgement:
@@ -176,8 +177,7 @@ def recheck(
     claimed = supervisor.certificate.controller
     if claimed is not None:
         properties = check_controller(
-            checked.model,
-            supervisor.deployment,
+            executable,
             supervisor.added,
             is_nonblocking=found.nonblocking is Outcome.PASSED,
             states=found.states or told,

@@ -4,10 +4,12 @@ It is the checked model, the conditions that synthesis adds to controllable even
 certificate of what was checked. Its JSON form (`robosc.supervisor.codec`) is untrusted input.
 """
 
-from typing import Annotated, Literal
+from functools import cached_property
+from typing import Annotated, Literal, Self
 
 import msgspec
 
+from robosc.automata.executable import ExecutableSystem
 from robosc.expressions import Name
 from robosc.model.structure import Deployment, EventName, Model
 
@@ -112,7 +114,7 @@ class Certificate(msgspec.Struct, frozen=True, omit_defaults=True):
     controller: ControllerProperties | None = None
 
 
-class Supervisor(msgspec.Struct, frozen=True):
+class Supervisor(msgspec.Struct, frozen=True, dict=True):
     """A synthesized supervisor.
 
     Attributes:
@@ -126,6 +128,19 @@ class Supervisor(msgspec.Struct, frozen=True):
     deployment: Deployment
     added: tuple[AddedCondition, ...]
     certificate: Certificate
+
+    @classmethod
+    def supervising(cls, system: ExecutableSystem, added: tuple[AddedCondition, ...], certificate: Certificate) -> Self:
+        """The supervisor of a system that is built already."""
+        made = cls(system.model, system.deployment, added, certificate)
+        # No field: a supervisor's file does not hold it.
+        made.__dict__["executable"] = system
+        return made
+
+    @cached_property
+    def executable(self) -> ExecutableSystem:
+        """Executable system that it supervises, built once."""
+        return ExecutableSystem(self.model, self.deployment)
 
     def added_condition(self, event: str) -> DecisionDiagram | None:
         """The condition added to an event, or None where nothing is added."""

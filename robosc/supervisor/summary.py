@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import msgspec
 
-from robosc.automata import System, to_automata
+from robosc.automata import System
 from robosc.expressions import TRUE, Expression
 from robosc.model.structure import Model
 from robosc.supervisor.diagram import diagram_domains
@@ -23,7 +23,7 @@ _TRUE = DecisionDiagram((), 1)
 
 def summary_json(supervisor: Supervisor) -> dict[str, object]:
     """The summary as JSON values."""
-    system = to_automata(supervisor.model, supervisor.deployment)
+    system = supervisor.executable.automata
     variables = _variables(supervisor.model)
     certificate = supervisor.certificate
     domains, components = diagram_domains(system), _components(supervisor)
@@ -59,7 +59,7 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
 
 def summary_text(supervisor: Supervisor) -> str:
     """The summary for people."""
-    system = to_automata(supervisor.model, supervisor.deployment)
+    system = supervisor.executable.automata
     certificate = supervisor.certificate
     controllable = sum(event.is_controllable for event in system.events)
     synthesis, code_only = _variables(supervisor.model)

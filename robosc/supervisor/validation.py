@@ -10,7 +10,6 @@ from collections.abc import Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-from robosc.automata import to_automata
 from robosc.errors import InvalidExpressionError, InvalidSupervisorError
 from robosc.expressions import (
     ArrayType,
@@ -477,7 +476,7 @@ def _validate_added(supervisor: Supervisor) -> None:
     """Conditions are added to controllable events, each once, by diagrams over what there is."""
     if not supervisor.added:
         return
-    system = to_automata(supervisor.model, supervisor.deployment)
+    system = supervisor.executable.automata
     controllable = {event.name for event in system.events if event.is_controllable}
     domains = diagram_domains(system)
     seen: set[str] = set()

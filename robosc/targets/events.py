@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from robosc.model.structure import (
-    CONTROLLABLE_KINDS,
+    ISSUED_KINDS,
     Behaviour,
     Communication,
     CommunicationKind,
@@ -27,7 +27,7 @@ def split(event: str) -> tuple[str, str]:
 
 def is_controllable(event: str) -> bool:
     """Return True if an event is caused by the executor rather than the environment."""
-    return is_tau(event) or split(event)[1] in CONTROLLABLE_KINDS
+    return is_tau(event) or split(event)[1] in ISSUED_KINDS
 
 
 def has_plant_location(communication: Communication) -> bool:

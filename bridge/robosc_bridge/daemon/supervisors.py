@@ -225,8 +225,7 @@ def _response(supervisor: Supervisor, place: str) -> PropertyResult:
     certificate = supervisor.certificate
     try:
         found = check_controller(
-            supervisor.model,
-            supervisor.deployment,
+            supervisor.executable,
             supervisor.added,
             is_nonblocking=certificate.nonblocking == "passed",
             states=int(certificate.states),

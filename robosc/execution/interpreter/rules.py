@@ -18,7 +18,7 @@ from robosc.execution.interpreter.functions import (
 from robosc.expressions import DoubleType, IntegerType, Type, Value, domain, values
 from robosc.model.received import converted_paths, received_paths
 from robosc.model.structure import (
-    CONTROLLABLE_KINDS,
+    ISSUED_KINDS,
     Behaviour,
     Communication,
     Component,
@@ -168,7 +168,7 @@ def _event(
     model = supervisor.model
     diagram = supervisor.added_condition(event)
     return EventRule(
-        is_controllable=kind is None or kind in CONTROLLABLE_KINDS,
+        is_controllable=kind is None or kind in ISSUED_KINDS,
         plant=None if communication is None else _moves(communication, event),
         participants=tuple(
             _participant(component, component.behaviour, event)

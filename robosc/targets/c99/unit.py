@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from robosc.automata import System, to_automata
+from robosc.automata import System
 from robosc.errors import InternalError
 from robosc.expressions import (
     ArrayPart,
@@ -295,4 +295,4 @@ class Reading:
 
 def make_unit(supervisor: Supervisor, prefix: str | None) -> Unit:
     """An empty unit for one supervisor."""
-    return Unit(make_layout(supervisor, prefix), to_automata(supervisor.model, supervisor.deployment))
+    return Unit(make_layout(supervisor, prefix), supervisor.executable.automata)

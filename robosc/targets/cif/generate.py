@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 from robosc._version import __version__
-from robosc.automata import System, to_automata
+from robosc.automata import System
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import Expression, Unary
 from robosc.model.structure import CommunicationKind, Deployment
@@ -49,7 +49,7 @@ class _Writer:
     def __init__(self, supervisor: Supervisor) -> None:
         self._supervisor = supervisor
         self._model = supervisor.model
-        self._system: System = to_automata(supervisor.model, supervisor.deployment)
+        self._system: System = supervisor.executable.automata
         self._names = Names(self._model, self._system)
         self._translator = Translator(Reader(self._system, self._names))
         self._plants = Plants(self._model, self._system, self._translator)

@@ -1,6 +1,5 @@
 """The files of the target `promela`: the model, and how to check it."""
 
-from robosc.automata import to_automata
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.promela.model import promela_model
@@ -47,7 +46,7 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
     Raises:
         UnsupportedModelError: The model is outside what the target handles.
     """
-    system = to_automata(supervisor.model, supervisor.deployment)
+    system = supervisor.executable.automata
     name = supervisor.model.name if options.package is None else package_name(supervisor, options, "")
     file = f"{name}.pml"
     head = (

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from robosc.automata import System, to_automata
+from robosc.automata import System
 from robosc.errors import InternalError
 from robosc.expressions import PathStep, Type
 from robosc.model.structure import Model
@@ -64,4 +64,4 @@ class Writer:
 
 def make_writer(supervisor: Supervisor) -> Writer:
     """A writer for one supervisor."""
-    return Writer(make_layout(supervisor), to_automata(supervisor.model, supervisor.deployment))
+    return Writer(make_layout(supervisor), supervisor.executable.automata)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from robosc.automata import to_automata
+from robosc.automata import ExecutableSystem, to_automata
 from robosc.errors import Severity, SynthesisCancelled
 from robosc.model.structure import Deployment
 from robosc.properties import Properties, check_controller
@@ -56,7 +56,9 @@ def properties(
     """The properties of a model's supervisor."""
     model = model_of(text)
     result = synthesize(to_automata(model, deployment))
-    return check_controller(model, deployment, result.added, is_nonblocking=True, limit=limit, states=states)
+    return check_controller(
+        ExecutableSystem(model, deployment), result.added, is_nonblocking=True, limit=limit, states=states
+    )
 
 
 def outcomes(found: Properties) -> tuple[str, str, str]:
@@ -271,7 +273,9 @@ def test_a_cancel_that_was_forbidden_when_it_was_due_comes_later() -> None:
     )
     model = model_of(robot(INTERFACE, EYE, gate, AGAIN, "requirement reach needs !Eye.dark"))
     if_opened = DecisionDiagram((DecisionNode("Gate", None, (0, 1), (0, 1)),), 2)
-    controller = Controller(model, Deployment.CONTROLLER, (AddedCondition("reach.cancel", if_opened),))
+    controller = Controller(
+        ExecutableSystem(model, Deployment.CONTROLLER), (AddedCondition("reach.cancel", if_opened),)
+    )
     node = controller.run(controller.start).end
     taken: list[str] = []
     for wanted in ("reach.request", "dusk.response", "open.response"):
@@ -423,15 +427,19 @@ def test_a_large_robot_is_proved_to_end_by_its_parts() -> None:
         }}"""
         for n in range(60)
     ]
-    found = check_controller(model_of(robot(*parts)), Deployment.CONTROLLER, (), is_nonblocking=True, states=10**30)
+    found = check_controller(
+        ExecutableSystem(model_of(robot(*parts)), Deployment.CONTROLLER), (), is_nonblocking=True, states=10**30
+    )
     assert outcomes(found) == ("passed", "passed", "not checked")
 
 
 def test_it_can_be_stopped() -> None:
     model = model_of(RACE)
     with pytest.raises(SynthesisCancelled):
-        check_controller(model, Deployment.CONTROLLER, (), is_nonblocking=True, should_stop=lambda: True)
-    controller = Controller(model, Deployment.CONTROLLER, ())
+        check_controller(
+            ExecutableSystem(model, Deployment.CONTROLLER), (), is_nonblocking=True, should_stop=lambda: True
+        )
+    controller = Controller(ExecutableSystem(model, Deployment.CONTROLLER), ())
     with pytest.raises(SynthesisCancelled):
         search(controller, limit=9, orders=None, should_stop=lambda: True)
 
@@ -441,7 +449,7 @@ def test_too_many_orders_are_not_called_confluent() -> None:
         component(f"A{n}", "initial marked state a { transition if Eye.dark goto b } marked state b { }")
         for n in range(12)
     ]
-    controller = Controller(model_of(robot(EYE, *parts)), Deployment.CONTROLLER, ())
+    controller = Controller(ExecutableSystem(model_of(robot(EYE, *parts)), Deployment.CONTROLLER), ())
     few, all_ = Orders(controller, 100), Orders(controller, 10_000)
     assert search(controller, limit=100, orders=few).conflict is None
     assert few.is_exhausted

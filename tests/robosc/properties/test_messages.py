@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from robosc.automata import to_automata
+from robosc.automata import ExecutableSystem, to_automata
 from robosc.model.structure import Deployment
 from robosc.properties import check_controller
 from robosc.synthesis import synthesize
@@ -43,7 +43,7 @@ def spins(first: str, second: str, *types: str, topic: str = "sample") -> bool:
     values = {"first": first, "second": second, "first_type": first_type, "second_type": second_type}
     model = model_of(ROBOT % {**values, "topic": topic, "links": links})
     added = synthesize(to_automata(model, Deployment.CONTROLLER)).added
-    found = check_controller(model, Deployment.CONTROLLER, added, is_nonblocking=True)
+    found = check_controller(ExecutableSystem(model, Deployment.CONTROLLER), added, is_nonblocking=True)
     assert found.finite_response in ("passed", "failed")
     return found.finite_response == "failed"
 
@@ -140,7 +140,7 @@ def test_an_integer_that_may_be_too_large(field: str, types: str, can_be: bool) 
         )
     )
     added = synthesize(to_automata(model, Deployment.CONTROLLER)).added
-    found = check_controller(model, Deployment.CONTROLLER, added, is_nonblocking=True)
+    found = check_controller(ExecutableSystem(model, Deployment.CONTROLLER), added, is_nonblocking=True)
     assert found.finite_response == ("failed" if can_be else "passed")
 
 
@@ -166,5 +166,5 @@ def test_a_field_that_is_taken_as_it_is(limit: int, can_be: bool) -> None:
         }} }}
     }}""")
     added = synthesize(to_automata(model, Deployment.CONTROLLER)).added
-    found = check_controller(model, Deployment.CONTROLLER, added, is_nonblocking=True)
+    found = check_controller(ExecutableSystem(model, Deployment.CONTROLLER), added, is_nonblocking=True)
     assert (found.finite_response == "failed") is can_be

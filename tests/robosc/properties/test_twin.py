@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from robosc.automata import Semantics, to_automata
+from robosc.automata import ExecutableSystem, Semantics
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.structure import Deployment
 from robosc.properties import Properties, check_controller
@@ -26,7 +26,9 @@ DATA = (None, False, True, {"n": 1, "m": 1}, {"n": 1, "m": 6}, {"n": 6, "m": 1},
 
 
 def checked(supervisor: Supervisor) -> Properties:
-    return check_controller(supervisor.model, supervisor.deployment, supervisor.added, is_nonblocking=True)
+    return check_controller(
+        ExecutableSystem(supervisor.model, supervisor.deployment), supervisor.added, is_nonblocking=True
+    )
 
 
 def failures(found: Properties) -> tuple[bool, bool, bool]:
@@ -46,7 +48,7 @@ def test_the_executor_shows_what_the_automaton_has(record_property: Callable[[st
         if supervisor is None or twin is None:
             shares["no supervisor" if supervisor is None else "too large"] += 1
             continue
-        controller = Controller(supervisor.model, Deployment.CONTROLLER, supervisor.added)
+        controller = Controller(ExecutableSystem(supervisor.model, Deployment.CONTROLLER), supervisor.added)
         found = search(controller, limit=LIMIT, orders=Orders(controller, LIMIT))
         assert found.is_complete
         assert found.states == len(twin.states), seed
@@ -75,7 +77,7 @@ def test_enums_of_one_field_agree(record_property: Callable[[str, object], None]
         twin = twin_of(supervisor, TWIN_LIMIT)
         if twin is None:
             continue
-        controller = Controller(supervisor.model, Deployment.CONTROLLER, supervisor.added)
+        controller = Controller(ExecutableSystem(supervisor.model, Deployment.CONTROLLER), supervisor.added)
         found = search(controller, limit=LIMIT, orders=Orders(controller, LIMIT))
         assert found.states == len(twin.states), seed
         shown = (twin.has_livelock, twin.has_conflict, twin.is_blocking)
@@ -122,7 +124,9 @@ def test_traces_tell_the_truth() -> None:
     kinds: Counter[str] = Counter()
     for seed in range(150):
         supervisor = random_robot(seed)
-        found = check_controller(supervisor.model, Deployment.CONTROLLER, (), is_nonblocking=False, limit=LIMIT)
+        found = check_controller(
+            ExecutableSystem(supervisor.model, Deployment.CONTROLLER), (), is_nonblocking=False, limit=LIMIT
+        )
         if found.livelock is not None:
             system, states = _replayed(supervisor, found.livelock.trace)
             kinds["livelock"] += 1
@@ -193,7 +197,7 @@ def test_the_way_to_where_no_task_is_completed_is_a_shortest_one() -> None:
     lengths: Counter[int | None] = Counter()
     for seed in range(150):
         supervisor = random_robot(seed)
-        controller = Controller(supervisor.model, Deployment.CONTROLLER, ())
+        controller = Controller(ExecutableSystem(supervisor.model, Deployment.CONTROLLER), ())
         found = search(controller, limit=LIMIT, orders=None)
         length = _shortest_blocking(controller)
         assert (None if found.blocking is None else len(found.blocking.trace)) == length, seed
@@ -205,7 +209,7 @@ def test_what_is_proved_by_structure_is_true(record_property: Callable[[str, obj
     proved: Counter[str] = Counter()
     for seed in range(250):
         supervisor = random_robot(seed)
-        controller = Controller(supervisor.model, Deployment.CONTROLLER, ())
+        controller = Controller(ExecutableSystem(supervisor.model, Deployment.CONTROLLER), ())
         found = search(controller, limit=LIMIT, orders=Orders(controller, LIMIT))
         if always_end(controller.system):
             proved["ends"] += 1
@@ -218,7 +222,7 @@ def test_what_is_proved_by_structure_is_true(record_property: Callable[[str, obj
     for seed in range(70):
         made = random_controller(seed, is_plain=True)
         if made is not None:
-            controller = Controller(made.model, Deployment.CONTROLLER, made.added)
+            controller = Controller(ExecutableSystem(made.model, Deployment.CONTROLLER), made.added)
             if stays_nonblocking(made.model, controller, made.added):
                 proved["nonblocking"] += 1
                 assert search(controller, limit=LIMIT, orders=None).blocking is None, seed
@@ -232,13 +236,12 @@ def test_what_is_proved_by_structure_is_true(record_property: Callable[[str, obj
 def test_any_supervisor_is_judged(seed: int) -> None:
     """Supervisors that nobody synthesized, with everything that the language has; the same whatever came before."""
     supervisor = random_supervisor(seed)
-    used = Semantics(to_automata(supervisor.model, supervisor.deployment))
+    used = Semantics(supervisor.executable.automata)
     before = verify(used.system, {}, limit=150, semantics=used)
     assert before == verify(used.system, {}, limit=150)
     first, second, third = (
         check_controller(
-            supervisor.model,
-            supervisor.deployment,
+            supervisor.executable,
             supervisor.added,
             is_nonblocking=False,
             limit=150,

@@ -1,0 +1,211 @@
+"""The executable system: everything that a model does, event by event, as one value.
+
+The automata of synthesis leave out what decides nothing there: code-only variables, and the order in which an executor
+looks at transitions (language A.7). Here both are there, worked out once: which transition each component takes in
+each of its states, how services and actions move, and which requirements an event needs. Generators, the explanation
+of blocked requests, the replay of logs and the properties of the controller read it; the interpreter in
+`robosc.execution` does not, since it is what they are held against.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import msgspec
+
+from robosc.automata.lowering import to_automata
+from robosc.automata.plants import communication_plant, is_blocking
+from robosc.automata.structure import System
+from robosc.expressions import Type
+from robosc.model.structure import (
+    EVENT_KINDS,
+    ISSUED_KINDS,
+    Behaviour,
+    Communication,
+    CommunicationKind,
+    Component,
+    Deployment,
+    EventKind,
+    Model,
+    Requirement,
+    Transition,
+)
+
+CALLED_KINDS = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+"""The kinds of communication whose plant has more than one location."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moves:
+    """Moves of the plant of a service or an action on one event.
+
+    Attributes:
+        plant: Name of the plant, such as `service calibrate`.
+        targets: The location that each location leads to; those from which the event is impossible are left out.
+    """
+
+    plant: str
+    targets: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Participant:
+    """A component whose behaviour mentions an event.
+
+    Attributes:
+        component: The component.
+        behaviour: Its behaviour.
+        may_block: True if the event is impossible in the states where no transition is taken.
+        taken: The transition that an executor takes, by state: the state's own before the behaviour's, then source
+            order. States without one are left out. A tau is taken only where its guard is true.
+    """
+
+    component: str
+    behaviour: Behaviour
+    may_block: bool
+    taken: Mapping[str, Transition]
+
+    @property
+    def branches(self) -> tuple[tuple[tuple[str, ...], Transition], ...]:
+        """The states in which each transition is taken, and the transition."""
+        found: dict[int, tuple[list[str], Transition]] = {}
+        for state, transition in self.taken.items():
+            found.setdefault(id(transition), ([], transition))[0].append(state)
+        return tuple((tuple(states), transition) for states, transition in found.values())
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutableEvent:
+    """An event, with all that happens on it.
+
+    Attributes:
+        name: The event's name.
+        communication: Its communication; None for a tau.
+        kind: Its kind; None for a tau.
+        is_issued: True if the executor issues it (a request, cancel, reset or tau); the rest is received. In a layer
+            a cancel is issued on the caller's behalf, which makes it uncontrollable there.
+        received: Type of the data that it carries to the controller, or None.
+        moves: How its service or action moves; None for a message or tau.
+        participants: The components whose behaviours mention it, in source order.
+        requirements: The requirements on its communication: a request needs all of them, a cancel of the executor's
+            own that one of them does not hold. Empty for any other event, and for the cancel of a layer.
+    """
+
+    name: str
+    communication: Communication | None
+    kind: EventKind | None
+    is_issued: bool
+    received: Type | None
+    moves: Moves | None
+    participants: tuple[Participant, ...]
+    requirements: tuple[Requirement, ...]
+
+
+class ExecutableSystem:
+    """Executable system of a model in a deployment.
+
+    Args:
+        model: A checked robot.
+        deployment: Deployment of its supervisor.
+    """
+
+    def __init__(self, model: Model, deployment: Deployment) -> None:
+        self.model = model
+        self.deployment = deployment
+
+    @cached_property
+    def automata(self) -> System:
+        """The plants and requirements of synthesis (UnsupportedModelError as `to_automata`)."""
+        return to_automata(self.model, self.deployment)
+
+    @cached_property
+    def executed_automata(self) -> System:
+        """The same with those transitions only that an executor takes; `automata` itself if that is all of them."""
+        components = tuple(map(self._executed, self.model.components))
+        if all(mine is given for mine, given in zip(components, self.model.components, strict=True)):
+            return self.automata
+        return to_automata(msgspec.structs.replace(self.model, components=components), self.deployment)
+
+    @cached_property
+    def events(self) -> Mapping[str, ExecutableEvent]:
+        """Every event by name: of the communications in source order, then the taus."""
+        found: dict[str, ExecutableEvent] = {}
+        for communication in self.model.communications:
+            plant = communication_plant(communication)
+            for kind in EVENT_KINDS[communication.kind]:
+                name = communication.event(kind)
+                targets = {edge.source: edge.target for edge in plant.edges if edge.event == name}
+                found[name] = ExecutableEvent(
+                    name,
+                    communication,
+                    kind,
+                    kind in ISSUED_KINDS,
+                    communication.received_type(kind),
+                    Moves(plant.name, targets) if communication.kind in CALLED_KINDS else None,
+                    self._participants.get(name, ()),
+                    self._requirements(communication, kind),
+                )
+        for name in self.model.taus:
+            participants = self._participants[name]
+            found[name] = ExecutableEvent(name, None, None, True, None, None, participants, ())
+        return found
+
+    @cached_property
+    def resets_and_taus(self) -> tuple[str, ...]:
+        """The silent steps that an executor takes whenever they are enabled, in its order (semantics 3.3)."""
+        resets = (item.event(EventKind.RESET) for item in self.model.communications if item.kind in CALLED_KINDS)
+        return (*resets, *self.model.taus)
+
+    @cached_property
+    def _participants(self) -> Mapping[str, tuple[Participant, ...]]:
+        found: dict[str, list[Participant]] = {}
+        for component in self.model.components:
+            if component.behaviour:
+                for event, taken in _taken(component.behaviour).items():
+                    participant = Participant(component.name, component.behaviour, is_blocking(event), taken)
+                    found.setdefault(event, []).append(participant)
+        return {event: tuple(participants) for event, participants in found.items()}
+
+    def _requirements(self, communication: Communication, kind: EventKind) -> tuple[Requirement, ...]:
+        is_own_cancel = kind is EventKind.CANCEL and self.deployment is Deployment.CONTROLLER
+        if kind is EventKind.REQUEST or is_own_cancel:
+            return self.model.requirements_on(communication.name)
+        return ()
+
+    def _executed(self, component: Component) -> Component:
+        """The component with those transitions only that an executor takes."""
+        behaviour = component.behaviour
+        if behaviour is None:
+            return component
+        states = [state.name for state in behaviour.states]
+        taken = {
+            event: next(item.taken for item in self._participants[event] if item.component == component.name)
+            for event in {item.event for item in behaviour.transitions}
+        }
+        kept: list[Transition] = []
+        for item in behaviour.transitions:
+            stands = states if item.source is None else [item.source]
+            where = [state for state in stands if taken[item.event].get(state) is item]
+            if len(where) == len(stands):
+                kept.append(item)
+            else:
+                kept.extend(msgspec.structs.replace(item, source=state) for state in where)
+        if len(kept) == len(behaviour.transitions) and all(
+            mine is given for mine, given in zip(kept, behaviour.transitions, strict=True)
+        ):
+            return component
+        return Component(component.name, msgspec.structs.replace(behaviour, transitions=tuple(kept)))
+
+
+def _taken(behaviour: Behaviour) -> dict[str, dict[str, Transition]]:
+    """For each event that a behaviour mentions, the transition that is taken in each state, in the states' order."""
+    states = [state.name for state in behaviour.states]
+    found: dict[str, dict[str, Transition]] = {}
+    for item in sorted(behaviour.transitions, key=lambda item: item.source is None):
+        by_state = found.setdefault(item.event, {})
+        for state in states if item.source is None else [item.source]:
+            by_state.setdefault(state, item)
+    order = {state: place for place, state in enumerate(states)}
+    return {
+        event: dict(sorted(by_state.items(), key=lambda entry: order[entry[0]])) for event, by_state in found.items()
+    }

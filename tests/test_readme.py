@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from robosc.cli.main import make_parser
-from robosc.supervisor import MadeStatus, make_supervisor
+from robosc.supervisor import OutcomeStatus, make_supervisor
 from robosc_bridge import main as bridge
 from robosc_bridge.simulated import __main__ as simulated
 from robosc_client.main import make_parser as client_parser
@@ -25,7 +25,7 @@ SHOWN = [line.removeprefix("$ ").partition("#")[0] for line in BRIDGE.splitlines
 def test_the_model_has_no_findings_and_a_supervisor() -> None:
     (model,) = [block for block in BLOCKS if block.startswith("robot ")]
     made = make_supervisor(bundle_of(model))
-    assert (made.status, made.diagnostics) == (MadeStatus.SUPERVISOR, ())
+    assert (made.status, made.diagnostics) == (OutcomeStatus.SUPERVISOR, ())
 
 
 @pytest.mark.parametrize("command", [line for line in COMMANDS if re.match(r"robosc(-client)? ", line)])

@@ -17,12 +17,12 @@ from robosc.model.structure import Deployment, Model
 from robosc.model_checking import Property, Verdict, properties_of
 from robosc.model_checking.outcome import Remainder, Run, RunKind
 from robosc.source import Bundle, SourceFile, visible
-from robosc.supervisor import Made, MadeStatus, Supervisor, decode
+from robosc.supervisor import OutcomeStatus, Supervisor, SynthesisOutcome, decode
 from robosc_client.errors import ServiceError, malformed
 from robosc_client.results import Exploration, Generation, StateGraph, Synthesis, SynthesisStatus
 
 
-def made_of(result: Synthesis | Generation | Exploration, content: bytes = b"") -> Made:
+def made_of(result: Synthesis | Generation | Exploration, content: bytes = b"") -> SynthesisOutcome:
     """Return what the server made.
 
     Args:
@@ -35,8 +35,8 @@ def made_of(result: Synthesis | Generation | Exploration, content: bytes = b"") 
     """
     if result.status is SynthesisStatus.UNSUPPORTED_MODEL:
         raise UnsupportedModelError(result.reason)
-    return Made(
-        MadeStatus(str(result.status)),
+    return SynthesisOutcome(
+        OutcomeStatus(str(result.status)),
         decoded(content) if content else None,
         result.diagnostics,
         reason=visible(result.reason),

@@ -17,7 +17,7 @@ from robosc.source import Bundle
 
 if TYPE_CHECKING:
     from robosc.explanation import EmptyExplanation
-    from robosc.supervisor import Made
+    from robosc.supervisor import SynthesisOutcome
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
 def run_with(
     arguments: argparse.Namespace,
     check: Callable[[Bundle], tuple[Diagnostic, ...]],
-    make: "Callable[[Bundle], Made]",
+    make: "Callable[[Bundle], SynthesisOutcome]",
 ) -> int:
     """Check the model wherever that is done.
 
@@ -105,11 +105,11 @@ class _Synthesized:
     explanation: "EmptyExplanation | None" = None
 
 
-def _synthesized(made: "Made") -> _Synthesized:
-    from robosc.supervisor import MadeStatus
+def _synthesized(outcome: "SynthesisOutcome") -> _Synthesized:
+    from robosc.supervisor import OutcomeStatus
 
-    has_failed = made.status is MadeStatus.EMPTY
-    return _Synthesized(made.diagnostics, str(made.status), made.reason, has_failed, made.explanation)
+    has_failed = outcome.status is OutcomeStatus.EMPTY
+    return _Synthesized(outcome.diagnostics, str(outcome.status), outcome.reason, has_failed, outcome.explanation)
 
 
 def _report_synthesized(arguments: argparse.Namespace, found: _Synthesized, bundle: Bundle) -> ExitCode:

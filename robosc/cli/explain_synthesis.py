@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Synthesize and explain; 0 with a supervisor, 1 without."""
     from robosc.explanation import document, explanation_text
     from robosc.pipeline.explaining import explained
-    from robosc.supervisor import Made
+    from robosc.supervisor import SynthesisOutcome
 
     bundle = read_bundle(arguments)
     progress = ProgressLine()
@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     finally:
         progress.clear()
-    if isinstance(found, Made):
+    if isinstance(found, SynthesisOutcome):
         if arguments.json:
             print_json(
                 {"status": str(found.status), **synth.reasons_json(found), **diagnostics_json(found.diagnostics)}
@@ -84,11 +84,11 @@ def run(arguments: argparse.Namespace) -> int:
         else:
             synth.report_problems(found, bundle)
         return ExitCode.FAILED
-    prepared, explanation = found
+    problem, explanation = found
     is_empty = explanation.empty is not None
     if arguments.json:
         status = "empty" if is_empty else "supervisor"
-        print_json({"status": status, "explanation": document(explanation), **diagnostics_json(prepared.diagnostics)})
+        print_json({"status": status, "explanation": document(explanation), **diagnostics_json(problem.diagnostics)})
     else:
         if is_empty:
             sys.stdout.write(f"{bundle.main.name}: no supervisor exists\n")

@@ -49,14 +49,16 @@ def run(arguments: argparse.Namespace) -> int:
 
     bundle = read_bundle(arguments)
     # The graph is of everything allowed, whatever an executor would choose.
-    made = synth.make(arguments, bundle, allow_livelock=True)
-    if made.supervisor is None:
+    outcome = synth.make(arguments, bundle, allow_livelock=True)
+    if outcome.supervisor is None:
         if arguments.json:
-            print_json({"status": str(made.status), **synth.reasons_json(made), **diagnostics_json(made.diagnostics)})
+            print_json(
+                {"status": str(outcome.status), **synth.reasons_json(outcome), **diagnostics_json(outcome.diagnostics)}
+            )
         else:
-            synth.report_problems(made, bundle)
+            synth.report_problems(outcome, bundle)
         return ExitCode.FAILED
-    graph = graph_of(made.supervisor, limit=arguments.limit)
+    graph = graph_of(outcome.supervisor, limit=arguments.limit)
     if arguments.json:
         print_json(graph_json(graph))
     else:

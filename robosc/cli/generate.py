@@ -19,7 +19,7 @@ from robosc.json_documents import diagnostics_json
 from robosc.source import Bundle
 
 if TYPE_CHECKING:
-    from robosc.supervisor import Made
+    from robosc.supervisor import SynthesisOutcome
     from robosc.targets import GeneratedFiles, GenerateOptions
 
 WRITTEN = "the files are written"
@@ -148,7 +148,7 @@ def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
 
 
 def report_generated(
-    arguments: argparse.Namespace, made: "Made", files: "GeneratedFiles | None", bundle: Bundle
+    arguments: argparse.Namespace, made: "SynthesisOutcome", files: "GeneratedFiles | None", bundle: Bundle
 ) -> ExitCode:
     """Write the files, print the outcome as asked and return the exit status."""
     from robosc.targets import Written, write_generated

@@ -32,10 +32,14 @@ def given_supervisor(arguments: argparse.Namespace, *, is_json: bool = False) ->
     bundle = read_bundle(arguments)
     deployment = arguments.deployment or str(Deployment.CONTROLLER)
     # What it is held up to has happened, however it would have gone on.
-    made = synth.make(argparse.Namespace(**{**vars(arguments), "deployment": deployment}), bundle, allow_livelock=True)
-    if made.supervisor is None:
+    outcome = synth.make(
+        argparse.Namespace(**{**vars(arguments), "deployment": deployment}), bundle, allow_livelock=True
+    )
+    if outcome.supervisor is None:
         if is_json:
-            print_json({"status": str(made.status), **synth.reasons_json(made), **diagnostics_json(made.diagnostics)})
+            print_json(
+                {"status": str(outcome.status), **synth.reasons_json(outcome), **diagnostics_json(outcome.diagnostics)}
+            )
         else:
-            synth.report_problems(made, bundle)
-    return made.supervisor
+            synth.report_problems(outcome, bundle)
+    return outcome.supervisor

@@ -69,14 +69,16 @@ def run(arguments: argparse.Namespace) -> int:
     model = check(bundle).model
     if model is not None and read_properties(arguments, model) is None:
         return ExitCode.USAGE
-    made = synth.make(arguments, bundle, allow_livelock=True)
-    if made.supervisor is None:
+    outcome = synth.make(arguments, bundle, allow_livelock=True)
+    if outcome.supervisor is None:
         if arguments.json:
-            print_json({"status": str(made.status), "reason": made.reason, **diagnostics_json(made.diagnostics)})
+            print_json(
+                {"status": str(outcome.status), "reason": outcome.reason, **diagnostics_json(outcome.diagnostics)}
+            )
         else:
-            synth.report_problems(made, bundle)
+            synth.report_problems(outcome, bundle)
         return ExitCode.FAILED
-    return verify(arguments, made.supervisor)
+    return verify(arguments, outcome.supervisor)
 
 
 def verify(arguments: argparse.Namespace, supervisor: "Supervisor") -> int:

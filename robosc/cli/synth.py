@@ -22,7 +22,7 @@ from robosc.source import Bundle
 
 if TYPE_CHECKING:
     from robosc.explanation import EmptyExplanation
-    from robosc.supervisor import Made
+    from robosc.supervisor import SynthesisOutcome
 
 
 class Reasons(Protocol):
@@ -65,13 +65,13 @@ def run(arguments: argparse.Namespace) -> int:
     require_other_file(arguments.output, arguments.model)
     bundle = read_bundle(arguments)
     allow_livelock, verify_limit = arguments.allow_livelock, arguments.verify_limit
-    made = make(arguments, bundle, allow_livelock=allow_livelock, verify_limit=verify_limit)
-    return report_synthesis(arguments, made, bundle)
+    outcome = make(arguments, bundle, allow_livelock=allow_livelock, verify_limit=verify_limit)
+    return report_synthesis(arguments, outcome, bundle)
 
 
 def make(
     arguments: argparse.Namespace, bundle: Bundle, *, allow_livelock: bool, verify_limit: int = SYNTHESIS_STATES
-) -> "Made":
+) -> "SynthesisOutcome":
     """Synthesize as the arguments say, with a progress line on a terminal."""
     from robosc.supervisor import make_supervisor
 
@@ -89,56 +89,56 @@ def make(
         progress.clear()
 
 
-def report_synthesis(arguments: argparse.Namespace, made: "Made", bundle: Bundle) -> ExitCode:
+def report_synthesis(arguments: argparse.Namespace, outcome: "SynthesisOutcome", bundle: Bundle) -> ExitCode:
     """Write the supervisor's file, print the outcome as asked and return the exit status."""
     from robosc.supervisor import encode
 
-    if made.supervisor is not None and arguments.output is not None:
-        write_bytes(arguments.output, encode(made.supervisor))
-    return report_written(arguments, made, bundle)
+    if outcome.supervisor is not None and arguments.output is not None:
+        write_bytes(arguments.output, encode(outcome.supervisor))
+    return report_written(arguments, outcome, bundle)
 
 
-def report_written(arguments: argparse.Namespace, made: "Made", bundle: Bundle) -> ExitCode:
+def report_written(arguments: argparse.Namespace, outcome: "SynthesisOutcome", bundle: Bundle) -> ExitCode:
     """Print the outcome as asked and return the exit status: of a supervisor whose file is there, if it has one."""
     from robosc.supervisor import summary_json, summary_text
 
     if arguments.json:
         print_json(
             {
-                "status": str(made.status),
-                **reasons_json(made),
-                "summary": summary_json(made.supervisor) if made.supervisor else None,
-                "file": str(arguments.output) if made.supervisor and arguments.output else None,
-                **diagnostics_json(made.diagnostics),
+                "status": str(outcome.status),
+                **reasons_json(outcome),
+                "summary": summary_json(outcome.supervisor) if outcome.supervisor else None,
+                "file": str(arguments.output) if outcome.supervisor and arguments.output else None,
+                **diagnostics_json(outcome.diagnostics),
             }
         )
     else:
-        report_problems(made, bundle)
-        if made.supervisor is not None:
-            sys.stdout.write(summary_text(made.supervisor))
+        report_problems(outcome, bundle)
+        if outcome.supervisor is not None:
+            sys.stdout.write(summary_text(outcome.supervisor))
             if arguments.output is not None:
                 sys.stdout.write(f"written to {arguments.output}\n")
-    return ExitCode.OK if made.supervisor is not None else ExitCode.FAILED
+    return ExitCode.OK if outcome.supervisor is not None else ExitCode.FAILED
 
 
-def report_problems(made: "Made", bundle: Bundle) -> None:
+def report_problems(outcome: "SynthesisOutcome", bundle: Bundle) -> None:
     """Findings and, where there is no supervisor, why, on standard error."""
-    print_diagnostics(made.diagnostics, bundle)
-    report_reasons(made, bundle)
+    print_diagnostics(outcome.diagnostics, bundle)
+    report_reasons(outcome, bundle)
 
 
-def report_reasons(made: Reasons, bundle: Bundle) -> None:
+def report_reasons(outcome: Reasons, bundle: Bundle) -> None:
     """Write the reason why there is no supervisor to standard error, if there is none."""
     from robosc.explanation import empty_text
 
-    if made.reason:
-        sys.stderr.write(f"{bundle.main.name}: {made.reason}\n")
-    if made.explanation is not None:
-        sys.stderr.write(empty_text(made.explanation))
+    if outcome.reason:
+        sys.stderr.write(f"{bundle.main.name}: {outcome.reason}\n")
+    if outcome.explanation is not None:
+        sys.stderr.write(empty_text(outcome.explanation))
 
 
-def reasons_json(made: Reasons) -> dict[str, object]:
+def reasons_json(outcome: Reasons) -> dict[str, object]:
     """Return the reason why there is no supervisor, as JSON values."""
     from robosc.explanation import document
 
-    return {"reason": made.reason, "explanation": document(made.explanation) if made.explanation else None}
+    return {"reason": outcome.reason, "explanation": document(outcome.explanation) if outcome.explanation else None}

@@ -13,7 +13,7 @@ from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, Outcome, SynthesisStatus
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, never
 from robosc.source import Bundle
-from robosc.supervisor import Made, Prepared, Progress, prepare
+from robosc.supervisor import Progress, SynthesisOutcome, SynthesisProblem, prepare
 from robosc.synthesis import EngineOptions
 
 
@@ -115,14 +115,14 @@ def explain(
         return Explained(
             SynthesisStatus.UNSUPPORTED_MODEL, diagnostics, attempt.reason, NoSupervisor(attempt.reason, diagnostics)
         )
-    if isinstance(found, Made):
+    if isinstance(found, SynthesisOutcome):
         diagnostics = Findings(found.diagnostics, bundle)
         return Explained(
             SynthesisStatus.MODEL_ERRORS, diagnostics, found.reason, NoSupervisor(found.reason, diagnostics)
         )
-    prepared, explanation = found
+    problem, explanation = found
     status = SynthesisStatus.SUPERVISOR if explanation.empty is None else SynthesisStatus.EMPTY
-    return Explained(status, Findings(prepared.diagnostics, bundle), "", explanation)
+    return Explained(status, Findings(problem.diagnostics, bundle), "", explanation)
 
 
 def explained(
@@ -135,15 +135,15 @@ def explained(
     after: str | None = None,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
-) -> Made | tuple[Prepared, Explanation]:
-    """Return the prepared model and what synthesis did to it; or how it ended before synthesis."""
-    prepared = prepare(bundle, deployment)
-    if isinstance(prepared, Made):
-        return prepared
+) -> SynthesisOutcome | tuple[SynthesisProblem, Explanation]:
+    """Return the synthesis problem and what synthesis did to it; or how it ended before synthesis."""
+    problem = prepare(bundle, deployment)
+    if isinstance(problem, SynthesisOutcome):
+        return problem
     explanation = explain_synthesis(
-        prepared.model,
-        prepared.places,
-        prepared.system.automata,
+        problem.model,
+        problem.places,
+        problem.system.automata,
         deployment=deployment,
         engine=engine,
         event=event,
@@ -152,4 +152,4 @@ def explained(
         should_stop=should_stop,
         on_progress=lambda step: on_progress(Progress("synthesis", str(step))),
     )
-    return prepared, explanation
+    return problem, explanation

@@ -12,7 +12,7 @@ from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, Outcome, SynthesisStatus
 from robosc.pipeline.supervisors import Supervisor
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, findings_of, ignored, make, never, status_of, why_not
-from robosc.supervisor import Made, Progress
+from robosc.supervisor import Progress, SynthesisOutcome
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import Supervisor as CoreSupervisor
 
@@ -77,7 +77,7 @@ def explore(
     # The graph is of everything allowed, whatever an executor would choose.
     attempt = make(bundle, options, on_progress, should_stop, allow_livelock=True)
     diagnostics = findings_of(attempt, bundle)
-    if isinstance(attempt, Made) and attempt.supervisor is not None:
+    if isinstance(attempt, SynthesisOutcome) and attempt.supervisor is not None:
         return _explored(attempt.supervisor, limit, diagnostics, on_progress, should_stop)
     status, reason = status_of(attempt)
     return Exploration(status, diagnostics, reason, None, why_not(attempt, diagnostics))

@@ -9,7 +9,7 @@ from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import Generation, SynthesisStatus
 from robosc.pipeline.supervisors import Supervisor
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, make, never, status_of
-from robosc.supervisor import Made, MadeStatus, Progress
+from robosc.supervisor import OutcomeStatus, Progress, SynthesisOutcome
 from robosc.supervisor.structure import Supervisor as CoreSupervisor
 from robosc.targets import GenerateOptions, generated, require_generatable
 
@@ -55,7 +55,9 @@ def generate(
         diagnostics = model.diagnostics if isinstance(model, Supervisor) else None
         if diagnostics is None:
             return Generation(SynthesisStatus.UNSUPPORTED_MODEL, (), UNKNOWN_FINDINGS, None, target=target)
-        return _generation(Made(MadeStatus.SUPERVISOR, model, diagnostics), target, generation, on_progress)
+        return _generation(
+            SynthesisOutcome(OutcomeStatus.SUPERVISOR, model, diagnostics), target, generation, on_progress
+        )
     bundle = loaded(model)
     attempt = make(bundle, options, on_progress, should_stop, allow_livelock=options.allow_livelock)
     if isinstance(attempt, Unsupported):
@@ -65,7 +67,9 @@ def generate(
     return replace(found, diagnostics=Findings(found.diagnostics, bundle))
 
 
-def _generation(made: Made, target: str, generation: GenerateOptions, on_progress: OnProgress) -> Generation:
+def _generation(
+    made: SynthesisOutcome, target: str, generation: GenerateOptions, on_progress: OnProgress
+) -> Generation:
     on_progress(Progress("generation", target))
     try:
         judged, files = generated(made, target, generation)

@@ -14,7 +14,7 @@ from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, Outcome, Summary, SynthesisStatus
 from robosc.pipeline.supervisors import Supervisor
 from robosc.pipeline.systems import SystemSynthesis, synthesize_system
-from robosc.supervisor import Made, Progress, make_supervisor
+from robosc.supervisor import Progress, SynthesisOutcome, make_supervisor
 from robosc.synthesis import Statistics
 from robosc.verification import DEFAULT_STATES
 
@@ -127,7 +127,7 @@ class Unsupported:
     reason: str
 
 
-type Attempt = Made | Unsupported
+type Attempt = SynthesisOutcome | Unsupported
 
 
 def make(
@@ -156,20 +156,22 @@ def make(
 
 def findings_of(attempt: Attempt, bundle: LoadedModel) -> Findings:
     """Return the findings about a model of which a supervisor was to be made."""
-    found: tuple[Diagnostic, ...] = attempt.diagnostics if isinstance(attempt, Made) else check(bundle).diagnostics
+    found: tuple[Diagnostic, ...] = (
+        attempt.diagnostics if isinstance(attempt, SynthesisOutcome) else check(bundle).diagnostics
+    )
     return Findings(found, bundle)
 
 
 def status_of(attempt: Attempt) -> tuple[SynthesisStatus, str]:
     """Return how an attempt to make a supervisor has ended, and the reason why there is none."""
-    if isinstance(attempt, Made):
+    if isinstance(attempt, SynthesisOutcome):
         return SynthesisStatus(str(attempt.status)), attempt.reason
     return SynthesisStatus.UNSUPPORTED_MODEL, attempt.reason
 
 
 def why_not(attempt: Attempt, diagnostics: Findings) -> EmptyExplanation | NoSupervisor:
     """Return the explanation of why an attempt has not made a supervisor."""
-    if isinstance(attempt, Made) and attempt.explanation is not None:
+    if isinstance(attempt, SynthesisOutcome) and attempt.explanation is not None:
         return attempt.explanation
     _, reason = status_of(attempt)
     return NoSupervisor(reason, diagnostics)
@@ -178,8 +180,8 @@ def why_not(attempt: Attempt, diagnostics: Findings) -> EmptyExplanation | NoSup
 def _result(attempt: Attempt, bundle: LoadedModel) -> Synthesis:
     diagnostics = findings_of(attempt, bundle)
     status, reason = status_of(attempt)
-    if isinstance(attempt, Made) and attempt.supervisor is not None:
+    if isinstance(attempt, SynthesisOutcome) and attempt.supervisor is not None:
         supervisor = Supervisor.of(attempt.supervisor, diagnostics)
         return Synthesis(status, diagnostics, reason, supervisor, attempt.statistics)
-    statistics = attempt.statistics if isinstance(attempt, Made) else None
+    statistics = attempt.statistics if isinstance(attempt, SynthesisOutcome) else None
     return Synthesis(status, diagnostics, reason, None, statistics, why_not(attempt, diagnostics))

@@ -25,7 +25,7 @@ from robosc.pipeline.supervisors import SupervisorLike, supervisor_of
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, make, never, status_of
 from robosc.pipeline.systems import SystemSupervisor, verify_system
 from robosc.source import Bundle, SourceFile
-from robosc.supervisor import Made, Progress
+from robosc.supervisor import Progress, SynthesisOutcome
 from robosc.supervisor.recheck import recheck
 from robosc.supervisor.recheck_report import has_passed, malformed_json, recheck_json, recheck_text
 from robosc.supervisor.structure import Supervisor as CoreSupervisor
@@ -271,7 +271,7 @@ def _made(
     return _without(attempt, model)
 
 
-def _without(made: Made, model: LoadedModel) -> Verification:
-    status, reason = status_of(made)
-    report = {"status": str(status), "reason": reason, **diagnostics_json(made.diagnostics)}
-    return Verification(VerificationStatus.NO_SUPERVISOR, findings_of(made, model), reason, report)
+def _without(outcome: SynthesisOutcome, model: LoadedModel) -> Verification:
+    status, reason = status_of(outcome)
+    report = {"status": str(status), "reason": reason, **diagnostics_json(outcome.diagnostics)}
+    return Verification(VerificationStatus.NO_SUPERVISOR, findings_of(outcome, model), reason, report)

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from robosc.supervisor.codec import decode, encode
-    from robosc.supervisor.make import Made, MadeStatus, Prepared, Progress, make_supervisor, prepare
+    from robosc.supervisor.make import (
+        OutcomeStatus,
+        Progress,
+        SynthesisOutcome,
+        SynthesisProblem,
+        make_supervisor,
+        prepare,
+    )
     from robosc.supervisor.structure import (
         AddedCondition,
         Certificate,
@@ -23,9 +30,9 @@ _HOMES = {
     "Certificate": "structure",
     "DecisionDiagram": "structure",
     "DecisionNode": "structure",
-    "Made": "make",
-    "MadeStatus": "make",
-    "Prepared": "make",
+    "SynthesisOutcome": "make",
+    "OutcomeStatus": "make",
+    "SynthesisProblem": "make",
     "Progress": "make",
     "Supervisor": "structure",
     "decode": "codec",
@@ -41,11 +48,11 @@ __all__ = [
     "Certificate",
     "DecisionDiagram",
     "DecisionNode",
-    "Made",
-    "MadeStatus",
-    "Prepared",
+    "OutcomeStatus",
     "Progress",
     "Supervisor",
+    "SynthesisOutcome",
+    "SynthesisProblem",
     "decode",
     "encode",
     "make_supervisor",

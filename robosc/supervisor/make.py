@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 LIVELOCK_REASON = "no supervisor is made, because silent steps never end (--allow-livelock overrides this)"
 
 
-class MadeStatus(StrEnum):
+class OutcomeStatus(StrEnum):
     """Outcome of an attempt to make a supervisor."""
 
     SUPERVISOR = "supervisor"
@@ -63,7 +63,7 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
+class SynthesisOutcome:
     """The outcome of `make_supervisor`.
 
     Attributes:
@@ -76,7 +76,7 @@ class Made:
         explanation: Explanation of what is to blame where no supervisor exists.
     """
 
-    status: MadeStatus
+    status: OutcomeStatus
     supervisor: Supervisor | None
     diagnostics: tuple[Diagnostic, ...]
     statistics: Statistics | None = None
@@ -85,7 +85,7 @@ class Made:
 
 
 @dataclass(frozen=True, slots=True)
-class Prepared:
+class SynthesisProblem:
     """A model without errors, ready for synthesis.
 
     Attributes:
@@ -101,7 +101,7 @@ class Prepared:
     diagnostics: tuple[Diagnostic, ...]
 
 
-def prepare(bundle: Bundle, deployment: Deployment) -> Prepared | Made:
+def prepare(bundle: Bundle, deployment: Deployment) -> SynthesisProblem | SynthesisOutcome:
     """The automata of a bundle's model, or how the attempt to make a supervisor of it ends before synthesis.
 
     Raises:
@@ -110,15 +110,17 @@ def prepare(bundle: Bundle, deployment: Deployment) -> Prepared | Made:
     checked = check(bundle)
     if checked.model is None or checked.places is None:
         reason = "" if checked.has_errors else "a library has no robot to make a supervisor for"
-        return Made(MadeStatus.MODEL_ERRORS, None, checked.diagnostics, reason=reason)
+        return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, checked.diagnostics, reason=reason)
     if deployment is Deployment.LAYER:
         ambiguous = layer_findings(checked.model, checked.places)
         if ambiguous:
-            return Made(MadeStatus.MODEL_ERRORS, None, sorted_diagnostics((*checked.diagnostics, *ambiguous)))
+            return SynthesisOutcome(
+                OutcomeStatus.MODEL_ERRORS, None, sorted_diagnostics((*checked.diagnostics, *ambiguous))
+            )
     system = ExecutableSystem(checked.model, deployment)
     # A model that synthesis cannot handle is refused here.
     _ = system.automata
-    return Prepared(checked.model, checked.places, system, checked.diagnostics)
+    return SynthesisProblem(checked.model, checked.places, system, checked.diagnostics)
 
 
 def make_supervisor(
@@ -130,7 +132,7 @@ def make_supervisor(
     allow_livelock: bool = False,
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[Progress], None] = lambda progress: None,
-) -> Made:
+) -> SynthesisOutcome:
     """Check a bundle, synthesize its supervisor, verify it independently and certify it.
 
     Args:
@@ -149,10 +151,10 @@ def make_supervisor(
         InternalError: The verifier found fault with the result.
     """
     on_progress(Progress("check", bundle.main.name))
-    prepared = prepare(bundle, deployment)
-    if isinstance(prepared, Made):
-        return prepared
-    model, places, system = prepared.model, prepared.places, prepared.system.automata
+    problem = prepare(bundle, deployment)
+    if isinstance(problem, SynthesisOutcome):
+        return problem
+    model, places, system = problem.model, problem.places, problem.system.automata
 
     def report(progress: SynthesisProgress) -> None:
         on_progress(Progress("synthesis", str(progress)))
@@ -178,7 +180,7 @@ def make_supervisor(
                 should_stop=should_stop,
                 on_progress=report,
             )
-        return Made(MadeStatus.EMPTY, None, prepared.diagnostics, result.statistics, reason, explanation)
+        return SynthesisOutcome(OutcomeStatus.EMPTY, None, problem.diagnostics, result.statistics, reason, explanation)
     on_progress(Progress("verification", f"{result.statistics.states} states"))
     semantics = Semantics(system)
     certificate = certify(
@@ -192,7 +194,7 @@ def make_supervisor(
     )
     on_progress(Progress("controller", "finite response, confluence, nonblocking under control"))
     properties = check_controller(
-        prepared.system,
+        problem.system,
         result.added,
         is_nonblocking=certificate.nonblocking == "passed",
         states=result.statistics.states,
@@ -201,13 +203,13 @@ def make_supervisor(
     )
     diagnostics = sorted_diagnostics(
         (
-            *prepared.diagnostics,
+            *problem.diagnostics,
             *findings(model, places, result.answers),
             *controller_findings(model, system, places, properties, allow_livelock=allow_livelock),
         )
     )
     if properties.livelock is not None and not allow_livelock:
-        return Made(MadeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, LIVELOCK_REASON)
+        return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, LIVELOCK_REASON)
     certificate = msgspec.structs.replace(certificate, controller=properties.certified())
-    supervisor = Supervisor.supervising(prepared.system, result.added, certificate)
-    return Made(MadeStatus.SUPERVISOR, supervisor, diagnostics, result.statistics)
+    supervisor = Supervisor.supervising(problem.system, result.added, certificate)
+    return SynthesisOutcome(OutcomeStatus.SUPERVISOR, supervisor, diagnostics, result.statistics)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from robosc._version import __version__
 from robosc.errors import UnsupportedModelError
-from robosc.supervisor.make import Made
+from robosc.supervisor.make import SynthesisOutcome
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.files import GeneratedFiles, Removal, remove_earlier, write_files
 from robosc.targets.judgement import judged_for
@@ -47,7 +47,9 @@ def require_generatable(name: str) -> None:
         require_target(name)
 
 
-def generated(made: Made, target: str, options: GenerateOptions | None = None) -> tuple[Made, GeneratedFiles | None]:
+def generated(
+    made: SynthesisOutcome, target: str, options: GenerateOptions | None = None
+) -> tuple[SynthesisOutcome, GeneratedFiles | None]:
     """Return the files of a target, or of all of them; and the outcome as the target sees it.
 
     Where all are asked for, one that refuses the model is left out, and the bundle's `README.md` says why.
@@ -74,7 +76,7 @@ def generated(made: Made, target: str, options: GenerateOptions | None = None) -
     return made, _of_all(made, made.supervisor, options)
 
 
-def _of_all(made: Made, supervisor: Supervisor, options: GenerateOptions | None) -> GeneratedFiles:
+def _of_all(made: SynthesisOutcome, supervisor: Supervisor, options: GenerateOptions | None) -> GeneratedFiles:
     texts: dict[str, str] = {}
     executables: set[str] = set()
     rows: list[str] = []
@@ -101,7 +103,9 @@ def _of_all(made: Made, supervisor: Supervisor, options: GenerateOptions | None)
     return GeneratedFiles(texts, frozenset(executables))
 
 
-def _of_one(made: Made, supervisor: Supervisor, name: str, options: GenerateOptions | None) -> GeneratedFiles:
+def _of_one(
+    made: SynthesisOutcome, supervisor: Supervisor, name: str, options: GenerateOptions | None
+) -> GeneratedFiles:
     codes = errors_for(name) - GENERAL_ERRORS
     against = [item for item in made.diagnostics if item.code in codes]
     if against:

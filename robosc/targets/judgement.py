@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 from robosc.errors import Severity
-from robosc.supervisor.make import Made, MadeStatus
+from robosc.supervisor.make import OutcomeStatus, SynthesisOutcome
 from robosc.targets.registry import errors_for
 
 
-def judged_for(made: Made, target: str) -> Made:
+def judged_for(made: SynthesisOutcome, target: str) -> SynthesisOutcome:
     """The outcome of `make_supervisor` with a target's own errors; without a supervisor where there are any.
 
     Raises:
@@ -19,4 +19,4 @@ def judged_for(made: Made, target: str) -> Made:
     diagnostics = tuple(
         replace(item, severity=Severity.ERROR) if item.code in codes else item for item in made.diagnostics
     )
-    return replace(made, status=MadeStatus.MODEL_ERRORS, supervisor=None, diagnostics=diagnostics)
+    return replace(made, status=OutcomeStatus.MODEL_ERRORS, supervisor=None, diagnostics=diagnostics)

@@ -53,7 +53,7 @@ from robosc_client.errors import malformed
 
 if TYPE_CHECKING:
     from robosc.signatures import PublicKey
-    from robosc.supervisor import Made
+    from robosc.supervisor import SynthesisOutcome
 
 _MAXIMUM_SENDABLE = 2**64 - 1
 
@@ -163,7 +163,7 @@ def verify_task(arguments: argparse.Namespace, bundle: Bundle, supervisor: bytes
 def _check(arguments: argparse.Namespace, client: Client) -> int:
     from robosc_client.made import made_of
 
-    def make(bundle: Bundle) -> "Made":
+    def make(bundle: Bundle) -> "SynthesisOutcome":
         options = replace(synthesis_options(arguments), allow_livelock=False)
         with Shown() as shown:
             found = client.synthesize(bundle, options, deadline_s=arguments.deadline, on_progress=shown.tell)

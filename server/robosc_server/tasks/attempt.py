@@ -7,7 +7,7 @@ from typing import Any, Protocol, Self
 from robosc.errors import UnsupportedModelError
 from robosc.explanation import to_text
 from robosc.model.structure import Deployment
-from robosc.supervisor import Made, make_supervisor
+from robosc.supervisor import SynthesisOutcome, make_supervisor
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.convert import given, told
 from robosc_server.tasks.task import Report
@@ -36,7 +36,7 @@ class Attempt:
     """
 
     def __init__(self) -> None:
-        self.made: Made | None = None
+        self.made: SynthesisOutcome | None = None
         self.error: UnsupportedModelError | None = None
 
     def __enter__(self) -> Self:
@@ -50,7 +50,9 @@ class Attempt:
             return True
         return False
 
-    def make(self, request: Request, maximum_nodes: int, on_report: OnReport, *, allow_livelock: bool) -> Made:
+    def make(
+        self, request: Request, maximum_nodes: int, on_report: OnReport, *, allow_livelock: bool
+    ) -> SynthesisOutcome:
         """Make the supervisor that a request is about."""
         options = request.options
         self.made = make_supervisor(

@@ -10,7 +10,7 @@ from robosc.execution.interpreter import InterpretedSystem
 from robosc.expressions.text import expression_text
 from robosc.model.structure import Deployment
 from robosc.supervisor import make_supervisor
-from robosc.supervisor.make import MadeStatus
+from robosc.supervisor.make import OutcomeStatus
 from support.generated import load_system, same
 from support.models import bundle_of, checked, model_of
 
@@ -189,7 +189,7 @@ def test_a_state_invariant_keeps_out_of_its_states(invariant: str) -> None:
 
 def test_an_invariant_that_the_initial_state_breaks_leaves_no_supervisor() -> None:
     made = make_supervisor(bundle_of(f"robot R {{ {SWITCHES} requirement always A.on_ }}"))
-    assert made.status is MadeStatus.EMPTY
+    assert made.status is OutcomeStatus.EMPTY
     assert "invariant" in made.reason
 
 
@@ -211,7 +211,7 @@ def test_an_invariant_that_is_unknown_does_not_hold() -> None:
     )
     text = text.replace("requirement {}", "requirement never 1 / C.n > 3")
     made = make_supervisor(bundle_of(text))
-    assert made.status is MadeStatus.EMPTY  # Any o can set n to 0, where the quotient is unknown.
+    assert made.status is OutcomeStatus.EMPTY  # Any o can set n to 0, where the quotient is unknown.
 
 
 def test_constants_are_their_values() -> None:

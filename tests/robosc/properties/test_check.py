@@ -9,7 +9,7 @@ from robosc.properties import Properties, check_controller
 from robosc.properties.controller import Controller
 from robosc.properties.orders import Orders
 from robosc.properties.search import search
-from robosc.supervisor import MadeStatus, decode, encode, make_supervisor, summary_json, summary_text
+from robosc.supervisor import OutcomeStatus, decode, encode, make_supervisor, summary_json, summary_text
 from robosc.supervisor.structure import AddedCondition, DecisionDiagram, DecisionNode
 from robosc.synthesis import synthesize
 from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle, marked_place, model_of
@@ -465,7 +465,7 @@ def test_a_livelock_is_an_error_unless_it_is_allowed() -> None:
         BLINKING.replace("transition if Eye.dark goto b", "§transition if Eye.dark goto b")
     )
     made = make_supervisor(bundle_of(text))
-    assert (made.status, made.supervisor) == (MadeStatus.MODEL_ERRORS, None)
+    assert (made.status, made.supervisor) == (OutcomeStatus.MODEL_ERRORS, None)
     assert "--allow-livelock" in made.reason
     (found,) = [item for item in made.diagnostics if item.code == "livelock"]
     assert found.severity is Severity.ERROR

@@ -9,7 +9,7 @@ from robosc.language.words import RESERVED_WORDS
 from robosc.model import check
 from robosc.source import Bundle, SourceFile
 from robosc.starter import MAXIMUM_STEM, InvalidNameError, Starter, make_starter
-from robosc.supervisor import MadeStatus
+from robosc.supervisor import OutcomeStatus
 from robosc.supervisor.make import make_supervisor
 from robosc.targets import generate
 
@@ -50,7 +50,7 @@ def test_the_files_are_in_canonical_layout(name: str) -> None:
 @pytest.mark.parametrize("name", ["Courier", "_", "class", "X" * MAXIMUM_STEM])
 def test_there_is_a_supervisor_without_findings_and_packages(name: str) -> None:
     made = make_supervisor(bundle_of(make_starter(name)))
-    assert (made.status, made.diagnostics) == (MadeStatus.SUPERVISOR, ())
+    assert (made.status, made.diagnostics) == (OutcomeStatus.SUPERVISOR, ())
     assert made.supervisor is not None
     for target in ("python", "ros2"):
         assert generate(made.supervisor, target)

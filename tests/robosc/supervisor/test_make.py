@@ -7,7 +7,7 @@ import pytest
 from robosc.automata import System, to_automata
 from robosc.errors import InternalError, SynthesisCancelled
 from robosc.model.structure import Deployment
-from robosc.supervisor import MadeStatus, Progress, encode, make_supervisor, summary_json, summary_text
+from robosc.supervisor import OutcomeStatus, Progress, encode, make_supervisor, summary_json, summary_text
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import AddedCondition, Certificate, DecisionDiagram
 from robosc.synthesis import SynthesisResult, synthesize
@@ -31,31 +31,33 @@ COUNTER = """robot Counter {
 @pytest.mark.parametrize(("name", "deployment"), EXAMPLE_DEPLOYMENTS)
 def test_the_examples_get_a_certified_supervisor(name: str, deployment: Deployment) -> None:
     bundle = example_bundle(name)
-    made = make_supervisor(bundle, deployment=deployment)
-    assert made.status is MadeStatus.SUPERVISOR
-    assert made.supervisor is not None
-    certificate = made.supervisor.certificate
+    outcome = make_supervisor(bundle, deployment=deployment)
+    assert outcome.status is OutcomeStatus.SUPERVISOR
+    assert outcome.supervisor is not None
+    certificate = outcome.supervisor.certificate
     assert (certificate.deployment, certificate.bundle_sha256) == (deployment, bundle.digest)
     checks = (certificate.safe, certificate.controllable, certificate.nonblocking, certificate.maximally_permissive)
     assert set(checks) == {"passed"}
-    system = to_automata(made.supervisor.model, deployment)
-    found = verify(system, state_predicates(system, made.supervisor.added))
+    system = to_automata(outcome.supervisor.model, deployment)
+    found = verify(system, state_predicates(system, outcome.supervisor.added))
     assert (str(found.states), str(found.transitions)) == (certificate.states, certificate.transitions)
-    assert summary_json(made.supervisor)["states"] == found.states
-    assert f"{found.states} states, {found.transitions} transitions" in summary_text(made.supervisor)
+    assert summary_json(outcome.supervisor)["states"] == found.states
+    assert f"{found.states} states, {found.transitions} transitions" in summary_text(outcome.supervisor)
 
 
 def test_the_same_bundle_gives_the_same_bytes() -> None:
-    made = [make_supervisor(example_bundle("navigation/navigation"), engine=engine) for engine in ("cudd", "autoref")]
-    contents = {encode(item.supervisor) for item in made if item.supervisor}
+    outcome = [
+        make_supervisor(example_bundle("navigation/navigation"), engine=engine) for engine in ("cudd", "autoref")
+    ]
+    contents = {encode(item.supervisor) for item in outcome if item.supervisor}
     assert len(contents) == 1
 
 
 def test_a_count_that_nobody_could_stop_is_stopped_in_time() -> None:
     """A response cannot be forbidden, so the request before it must be, at the last value."""
-    made = make_supervisor(bundle_of(COUNTER))
-    assert made.supervisor is not None
-    assert summary_json(made.supervisor)["added"] == {
+    outcome = make_supervisor(bundle_of(COUNTER))
+    assert outcome.supervisor is not None
+    assert summary_json(outcome.supervisor)["added"] == {
         "count.request": "C.n <= 98",
         "count.reset": "true",
     }
@@ -63,9 +65,9 @@ def test_a_count_that_nobody_could_stop_is_stopped_in_time() -> None:
 
 def test_what_is_too_large_to_search_is_not_called_checked() -> None:
     def certificate(limit: int) -> Certificate:
-        made = make_supervisor(bundle_of(COUNTER), verify_limit=limit)
-        assert made.supervisor is not None
-        return made.supervisor.certificate
+        outcome = make_supervisor(bundle_of(COUNTER), verify_limit=limit)
+        assert outcome.supervisor is not None
+        return outcome.supervisor.certificate
 
     whole, fewer, symbolic, none = certificate(2000), certificate(400), certificate(300), certificate(1)
     assert (whole.safe, whole.maximally_permissive) == ("passed", "passed")
@@ -82,22 +84,22 @@ def test_what_is_too_large_to_search_one_by_one_is_searched_symbolically(monkeyp
     monkeypatch.setattr(Limits, "of", lambda states: Limits(10, 10, 10**6))
     contents = set()
     for engine in ("cudd", "autoref"):
-        made = make_supervisor(bundle_of(COUNTER), engine=engine)
-        assert made.supervisor is not None
-        certificate = made.supervisor.certificate
+        outcome = make_supervisor(bundle_of(COUNTER), engine=engine)
+        assert outcome.supervisor is not None
+        certificate = outcome.supervisor.certificate
         assert certificate.method == "symbolic search (more than 10 states); permissiveness not recomputed"
         assert certificate.safe == certificate.controllable == certificate.nonblocking == "passed"
         assert (certificate.maximally_permissive, certificate.transitions) == ("not checked", None)
-        contents.add(encode(made.supervisor))
+        contents.add(encode(outcome.supervisor))
     assert len(contents) == 1
 
 
 def test_a_model_with_errors_and_a_library_have_none() -> None:
     broken = make_supervisor(bundle_of("robot R { requirement x needs true }"))
-    assert (broken.status, broken.supervisor) == (MadeStatus.MODEL_ERRORS, None)
+    assert (broken.status, broken.supervisor) == (OutcomeStatus.MODEL_ERRORS, None)
     assert [item.code for item in broken.diagnostics] == ["unknown-name"]
     library = make_supervisor(bundle_of("library L { component C { incoming message m with type: none } }"))
-    assert library.status is MadeStatus.MODEL_ERRORS
+    assert library.status is OutcomeStatus.MODEL_ERRORS
     assert "no robot" in library.reason
 
 
@@ -147,8 +149,8 @@ def test_wide_integers_are_synthesized_and_searched_honestly(inputs: str, outcom
         " component G { incoming message go with type: none }"
         " requirement go needs S.x < 5000 and S.y < 5 or S.b }"
     )
-    made = make_supervisor(bundle_of(text))
-    assert made.supervisor is not None
-    certificate = made.supervisor.certificate
+    found = make_supervisor(bundle_of(text))
+    assert found.supervisor is not None
+    certificate = found.supervisor.certificate
     assert (certificate.safe, certificate.maximally_permissive) == (outcome, "not checked")
     assert certificate.method.startswith("symbolic search" if outcome == "passed" else "not checked: more than ")

@@ -15,7 +15,7 @@ from robosc.exploration import explore
 from robosc.model import Places
 from robosc.model.structure import CommunicationKind, Deployment, EventKind, Model
 from robosc.source import Location
-from robosc.supervisor import MadeStatus, make_supervisor
+from robosc.supervisor import OutcomeStatus, make_supervisor
 from robosc.supervisor.conditions import state_predicates
 from robosc.synthesis import SynthesisStatus, findings, questions_about, synthesize
 from robosc.verification import ExplicitSupervisor, synthesize_explicit
@@ -87,7 +87,7 @@ def robot(*parts: str) -> str:
 def found(text: str, deployment: Deployment = Deployment.CONTROLLER) -> tuple[Diagnostic, ...]:
     """The findings of a model that has a supervisor; the two engines agree on them."""
     made = [make_supervisor(bundle_of(text), deployment=deployment, engine=name) for name in ("auto", "autoref")]
-    assert made[0].status is MadeStatus.SUPERVISOR
+    assert made[0].status is OutcomeStatus.SUPERVISOR
     assert made[0].diagnostics == made[1].diagnostics
     return tuple(item for item in made[0].diagnostics if item.code in CODES)
 
@@ -375,7 +375,7 @@ def test_a_long_run_is_cut(height: int) -> None:
 @pytest.mark.parametrize(("name", "deployment"), EXAMPLE_DEPLOYMENTS)
 def test_the_examples_have_none_of_these(name: str, deployment: Deployment) -> None:
     made = make_supervisor(example_bundle(name), deployment=deployment)
-    assert made.status is MadeStatus.SUPERVISOR
+    assert made.status is OutcomeStatus.SUPERVISOR
     assert not [item for item in made.diagnostics if item.code in CODES]
 
 
@@ -384,7 +384,7 @@ def test_without_a_supervisor_there_is_nothing_to_tell() -> None:
         LIGHTS, "component C { behaviour { initial state a { transition if false goto b } marked state b { } } }"
     )
     made = make_supervisor(bundle_of(text.replace("§", "")))
-    assert (made.status, made.diagnostics) == (MadeStatus.EMPTY, ())
+    assert (made.status, made.diagnostics) == (OutcomeStatus.EMPTY, ())
 
 
 def test_findings_stand_among_the_others_by_place() -> None:

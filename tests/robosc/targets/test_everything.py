@@ -8,7 +8,7 @@ import pytest
 from robosc.cli.main import main
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Deployment
-from robosc.supervisor import Made, make_supervisor
+from robosc.supervisor import SynthesisOutcome, make_supervisor
 from robosc.targets import (
     ALL,
     GeneratedFiles,
@@ -42,7 +42,7 @@ def own_registry(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "_registered", {})
 
 
-def made_of(text: str) -> Made:
+def made_of(text: str) -> SynthesisOutcome:
     return make_supervisor(bundle_of(text), deployment=Deployment.CONTROLLER)
 
 

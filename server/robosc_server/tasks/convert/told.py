@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from robosc.automata import to_automata
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.source import Location
-from robosc.supervisor import MadeStatus, Supervisor
+from robosc.supervisor import OutcomeStatus, Supervisor
 from robosc.supervisor.summary import added_texts, summary_text
 from robosc.synthesis import Statistics
 from robosc_api.v1 import synthesis_pb2 as pb
@@ -17,9 +17,9 @@ _SEVERITIES = {
 }
 
 STATUSES = {
-    MadeStatus.SUPERVISOR: pb.SYNTHESIS_STATUS_SUPERVISOR,
-    MadeStatus.EMPTY: pb.SYNTHESIS_STATUS_EMPTY,
-    MadeStatus.MODEL_ERRORS: pb.SYNTHESIS_STATUS_MODEL_ERRORS,
+    OutcomeStatus.SUPERVISOR: pb.SYNTHESIS_STATUS_SUPERVISOR,
+    OutcomeStatus.EMPTY: pb.SYNTHESIS_STATUS_EMPTY,
+    OutcomeStatus.MODEL_ERRORS: pb.SYNTHESIS_STATUS_MODEL_ERRORS,
 }
 
 

@@ -119,8 +119,8 @@ def run_with(
 
 def _verify_supervisor(arguments: argparse.Namespace) -> int:
     from robosc.supervisor.codec import decode
-    from robosc.supervisor.recheck import recheck
-    from robosc.supervisor.recheck_report import has_passed, recheck_json
+    from robosc.supervisor.recheck import verify_supervisor_file
+    from robosc.supervisor.recheck_report import file_verification_json, has_passed
     from robosc.synthesis.engines import resolve_engine
     from robosc.verification import Limits
 
@@ -135,7 +135,7 @@ def _verify_supervisor(arguments: argparse.Namespace) -> int:
         return report_malformed(arguments, error)
     progress = ProgressLine()
     try:
-        found = recheck(
+        found = verify_supervisor_file(
             supervisor,
             bundle,
             Limits.of(arguments.limit),
@@ -150,7 +150,7 @@ def _verify_supervisor(arguments: argparse.Namespace) -> int:
         # Of a supervisor that passed only the verdicts are asked for.
         return properties.verify(arguments, supervisor)
     return report_recheck(
-        arguments, recheck_json(found, supervisor, is_strict=arguments.strict), found.diagnostics, bundle
+        arguments, file_verification_json(found, supervisor, is_strict=arguments.strict), found.diagnostics, bundle
     )
 
 
@@ -164,18 +164,20 @@ def report_recheck(
 
     Args:
         arguments: Arguments of the command.
-        document: Document as `recheck_json` makes it.
+        document: Document as `file_verification_json` makes it.
         diagnostics: Reasons why the texts hold no model that the supervisor could be for.
         bundle: The texts.
     """
-    from robosc.supervisor.recheck_report import recheck_text
+    from robosc.supervisor.recheck_report import file_verification_text
 
     if arguments.json:
         print_json(document)
     else:
         print_diagnostics(diagnostics, bundle)
         if diagnostics or document["method"] is not None or document["faults"]:
-            text = recheck_text(document, str(arguments.supervisor), str(arguments.model), is_quiet=arguments.quiet)
+            text = file_verification_text(
+                document, str(arguments.supervisor), str(arguments.model), is_quiet=arguments.quiet
+            )
             sys.stdout.write(text)
         else:
             sys.stderr.write(f"{arguments.model}: a library has no robot that a supervisor could be for\n")

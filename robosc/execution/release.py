@@ -58,7 +58,7 @@ class Releases:
         self._acting: Dict[str, _Acting] = {}
         self.waiting: Tuple[str, ...] = ()
 
-    def judge(self, issuing: Optional[str] = None) -> List[str]:
+    def due(self, issuing: Optional[str] = None) -> List[str]:
         """The identifiers to release now, in this stable state; the caller does it and tells `released`.
 
         Args:
@@ -80,7 +80,7 @@ class Releases:
         return now
 
     def _observe(self, acting: _Acting) -> None:
-        """Judge one message in a stable state."""
+        """Observe one message in a stable state."""
         is_enabled = self._system.enabled(acting.event)
         holds = self._system.conjuncts(acting.request)
         if (acting.was_enabled and not is_enabled) or have_fallen(acting.held, holds):

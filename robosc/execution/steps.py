@@ -173,7 +173,7 @@ class Steps:
             self._stable = self._system.changes
             if self._goals:
                 self._goals.observe_stable_state()
-            for identifier in self._releases.judge(issuing):
+            for identifier in self._releases.due(issuing):
                 self.release(identifier)
         if self._pending is not None:
             pending, self._pending = self._pending, None

@@ -84,13 +84,13 @@ class Blocked:
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class RequestAvailability:
     """The requests of a model in one state, each in one of these, in the model's order.
 
     Attributes:
         enabled: Requests that may be made.
         blocked: Requests that may not be made.
-        unknown: Requests that cannot be judged, since the location of a service or action is not known.
+        unknown: Requests that cannot be decided, since the location of a service or action is not known.
     """
 
     enabled: tuple[str, ...]
@@ -168,7 +168,7 @@ class _Rule:
 
 
 class Requests:
-    """Judge of the requests of one supervisor.
+    """Requests of one supervisor: those that may be made in a state, and why others may not.
 
     Args:
         model: The checked model.
@@ -198,7 +198,7 @@ class Requests:
         """Every request, in the model's order."""
         return tuple(rule.event for rule in self._rules)
 
-    def judge(self, components: Mapping[str, Any], communications: Mapping[str, str]) -> Judged:
+    def availability(self, components: Mapping[str, Any], communications: Mapping[str, str]) -> RequestAvailability:
         """Return the requests that may be made in a state, and the reasons why the rest may not.
 
         Args:
@@ -225,7 +225,7 @@ class Requests:
                 unknown.append(rule.event)
             else:
                 enabled.append(rule.event)
-        return Judged(tuple(enabled), tuple(blocked), tuple(unknown))
+        return RequestAvailability(tuple(enabled), tuple(blocked), tuple(unknown))
 
     # Taking the model apart
 

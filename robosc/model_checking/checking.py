@@ -65,7 +65,7 @@ def verify_properties(
 
 
 class _Checker:
-    """Judges one property."""
+    """Checker of one property."""
 
     def __init__(self, structure: KripkeStructure) -> None:
         self._structure = structure

@@ -221,9 +221,9 @@ class Verification(Outcome):
             )
         if "checks" not in self.report:
             return None
-        from robosc.supervisor.recheck_report import recheck_text
+        from robosc.supervisor.recheck_report import file_verification_text
 
-        return recheck_text(self.report)
+        return file_verification_text(self.report)
 
     def _repr_html_(self) -> str:
         if not self.holds:

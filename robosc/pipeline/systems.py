@@ -20,7 +20,7 @@ from robosc.synthesis import Progress as SynthesisProgress
 from robosc.synthesis import Statistics, synthesize
 from robosc.synthesis import SynthesisStatus as CoreStatus
 from robosc.tables import html_table
-from robosc.verification import Judgement, Limits, judge, verify
+from robosc.verification import Limits, VerificationReport, verify, verify_explicitly
 from robosc.verification import Outcome as CheckOutcome
 
 _CHECKS = ("safe", "controllable", "nonblocking", "maximally_permissive")
@@ -138,10 +138,10 @@ def verify_system(
     is_strict: bool,
 ) -> Verification:
     """Verify independently that a supervisor of automata is right."""
-    judgement = _judged(supervisor, options, limits, on_progress, should_stop)
-    found = judgement.verification
+    verified = _verified(supervisor, options, limits, on_progress, should_stop)
+    found = verified.verification
     outcomes = {name: getattr(found, name) for name in _CHECKS}
-    is_complete = judgement.is_complete and not (is_strict and CheckOutcome.NOT_CHECKED in outcomes.values())
+    is_complete = verified.is_complete and not (is_strict and CheckOutcome.NOT_CHECKED in outcomes.values())
     status = (
         VerificationStatus.FAILED
         if found.failures
@@ -167,31 +167,31 @@ def verify_system(
         ],
         "states": found.states,
         "transitions": found.transitions,
-        "method": judgement.method,
+        "method": verified.method,
     }
     lines = [f"{supervisor.system.name}: {status}"]
     lines += [f"  {name.replace('_', ' '):<21} {outcome}" for name, outcome in outcomes.items()]
-    lines.append(f"  {'method':<21} {judgement.method}")
+    lines.append(f"  {'method':<21} {verified.method}")
     lines += [
         f"not {item.property}: {item.message}, after {', '.join(item.trace) or 'nothing'}" for item in found.failures
     ]
     return Verification(status, (), "", report, "\n".join(lines) + "\n")
 
 
-def _judged(
+def _verified(
     supervisor: SystemSupervisor,
     options: SynthesisOptions,
     limits: Limits,
     on_progress: Callable[[Progress], None],
     should_stop: Callable[[], bool],
-) -> Judgement:
+) -> VerificationReport:
     system, added = supervisor.system, state_predicates(supervisor.system, supervisor.added)
 
     def report(message: str) -> None:
         on_progress(Progress("verification", message))
 
     if supervisor.initial is None:
-        return judge(
+        return verify(
             system,
             added,
             limits,
@@ -201,7 +201,7 @@ def _judged(
             on_progress=report,
         )
     # The symbolic search begins in every initial state: a supervisor that leaves some out is searched one by one.
-    found = verify(
+    found = verify_explicitly(
         system,
         added,
         initial=state_predicate(system, supervisor.initial),
@@ -211,4 +211,6 @@ def _judged(
         on_progress=report,
     )
     is_done = found.states is not None
-    return Judgement(found, "explicit forward search" if is_done else f"not checked: more than {limits.states} states")
+    return VerificationReport(
+        found, "explicit forward search" if is_done else f"not checked: more than {limits.states} states"
+    )

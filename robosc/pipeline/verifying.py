@@ -26,8 +26,8 @@ from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findi
 from robosc.pipeline.systems import SystemSupervisor, verify_system
 from robosc.source import Bundle, SourceFile
 from robosc.supervisor import Progress, SynthesisOutcome
-from robosc.supervisor.recheck import recheck
-from robosc.supervisor.recheck_report import has_passed, malformed_json, recheck_json, recheck_text
+from robosc.supervisor.recheck import verify_supervisor_file
+from robosc.supervisor.recheck_report import file_verification_json, file_verification_text, has_passed, malformed_json
 from robosc.supervisor.structure import Supervisor as CoreSupervisor
 from robosc.synthesis import EngineOptions
 from robosc.synthesis import Progress as SynthesisProgress
@@ -232,7 +232,7 @@ def _checked(given: _Given, claims: _Claims, on_progress: OnProgress, should_sto
         supervisor = supervisor_of(given.supervisor)
     except InvalidSupervisorError as error:
         return Verification(VerificationStatus.FAILED, (), str(error), malformed_json(error))
-    found = recheck(
+    found = verify_supervisor_file(
         supervisor,
         given.model,
         given.limits,
@@ -243,14 +243,14 @@ def _checked(given: _Given, claims: _Claims, on_progress: OnProgress, should_sto
     )
     if has_passed(found, is_strict=given.is_strict) and claims:
         return claims.verified(supervisor, given.options.engine_options(), on_progress, should_stop)
-    report = recheck_json(found, supervisor, is_strict=given.is_strict)
-    is_library = not (found.diagnostics or found.judgement or found.faults)
+    report = file_verification_json(found, supervisor, is_strict=given.is_strict)
+    is_library = not (found.diagnostics or found.report or found.faults)
     return Verification(
         VerificationStatus(str(report["status"])),
         Findings(found.diagnostics, given.model),
         "a library has no robot that a supervisor could be for" if is_library else "",
         report,
-        recheck_text(report, supervisor.model.name, given.model.name),
+        file_verification_text(report, supervisor.model.name, given.model.name),
     )
 
 

@@ -19,24 +19,24 @@ _Step = tuple[str, Node]
 
 
 class Orders:
-    """Judge of the orders of silent steps, each state once.
+    """Comparison of the orders of silent steps, each state once.
 
     Args:
         controller: The automaton.
         limit: States on the way of silent steps beyond which to give up.
 
     Attributes:
-        is_exhausted: True if the limit is passed: then nothing more is judged.
+        is_exhausted: True if the limit is passed: then nothing more is compared.
     """
 
     def __init__(self, controller: Controller, limit: int) -> None:
         self._controller = controller
         self._limit = limit
-        # The only outcome of every state that was judged so far.
+        # The only outcome of every state that was compared so far.
         self._only: dict[Node, _Outcome] = {}
         self.is_exhausted = False
 
-    def judge(self, start: Node, trace: Callable[[], tuple[str, ...]]) -> Conflict | None:
+    def conflict(self, start: Node, trace: Callable[[], tuple[str, ...]]) -> Conflict | None:
         """Two orders of the silent steps from a state whose outcomes differ, or None if there are none.
 
         Args:

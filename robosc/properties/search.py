@@ -97,7 +97,7 @@ def search(
     Args:
         controller: The automaton.
         limit: Stable states beyond which to give up; also beyond `MAXIMUM_EFFORT`.
-        orders: Judges the silent steps of every state that is met, or None if nobody asks.
+        orders: Compares the orders of the silent steps of every state that is met, or None if nobody asks.
         should_stop: Asked now and then; once true, the work ends.
 
     Raises:
@@ -121,7 +121,7 @@ def search(
                 if run.is_marked and is_sure and parent is not None:
                     graph.good.add(parent)
             if orders is not None and found.conflict is None:
-                found.conflict = orders.judge(node, lambda: (*graph.trace(parent), *events))
+                found.conflict = orders.conflict(node, lambda: (*graph.trace(parent), *events))
         if run.end is None:
             return
         number, is_nearer = graph.meet(run.end, parent, (*events, *run.events))

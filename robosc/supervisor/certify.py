@@ -10,7 +10,7 @@ from robosc.source import Bundle
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import Certificate, CheckResult
 from robosc.synthesis import SynthesisResult
-from robosc.verification import Limits, Outcome, judge
+from robosc.verification import Limits, Outcome, verify
 
 
 def certify(
@@ -23,7 +23,7 @@ def certify(
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> Certificate:
-    """Let the independent verifier judge the result; a fault it finds is an internal error.
+    """Let the independent verifier check the result; a fault it finds is an internal error.
 
     Args:
         semantics: Semantics of plants and event conditions.
@@ -39,7 +39,7 @@ def certify(
         InternalError: The verifier found fault with the result.
     """
     system = semantics.system
-    judgement = judge(
+    report = verify(
         system,
         state_predicates(system, result.added),
         limits,
@@ -49,7 +49,7 @@ def certify(
         should_stop=should_stop,
         on_progress=on_progress,
     )
-    found = judgement.verification
+    found = report.verification
     if found.failures or found.states not in (None, result.statistics.states):
         raise InternalError(
             f"the verifier refuses the supervisor: {found.message or 'another number of states'}"
@@ -59,7 +59,7 @@ def certify(
         engine_version=__version__,
         bundle_sha256=bundle.digest,
         deployment=deployment,
-        method=judgement.method,
+        method=report.method,
         safe=_result(found.safe),
         controllable=_result(found.controllable),
         nonblocking=_result(found.nonblocking),

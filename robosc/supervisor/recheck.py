@@ -1,7 +1,7 @@
 """Check that a supervisor that is handed over is right for a model, whoever made it and whatever it claims.
 
 Nothing in the file is believed: its model is compared with the one that is read anew from the texts, its added
-conditions are judged on that one, and its certificate is compared with what is found. A digest in a file proves
+conditions are verified on that one, and its certificate is compared with what is found. A digest in a file proves
 nothing, since whoever changes the file can change the digest: a difference is reported, but decides nothing.
 """
 
@@ -24,7 +24,7 @@ from robosc.source import Bundle
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.differences import model_differences
 from robosc.supervisor.structure import Certificate, ControllerProperties, Supervisor
-from robosc.verification import Judgement, Limits, Outcome, Verification, judge
+from robosc.verification import Limits, Outcome, Verification, VerificationReport, verify
 
 PROPERTIES = ("safe", "controllable", "nonblocking", "maximally_permissive")
 """The four properties, as certificates call them."""
@@ -78,41 +78,41 @@ class Fault:
 
 
 @dataclass(frozen=True, slots=True)
-class Recheck:
+class FileVerification:
     """The outcome of checking a supervisor anew.
 
     Attributes:
         diagnostics: Reasons why the texts hold no model that the supervisor could be for; empty where they do.
         faults: Faults of the supervisor; a right one has none.
         notes: Remarks that are worth knowing, but decide nothing.
-        judgement: The verifier's, or None where the supervisor is for another model or deployment.
+        report: The verifier's, or None where the supervisor is for another model or deployment.
     """
 
     diagnostics: tuple[Diagnostic, ...]
     faults: tuple[Fault, ...]
     notes: tuple[str, ...]
-    judgement: Judgement | None
+    report: VerificationReport | None
 
     def outcomes(self) -> dict[str, Outcome]:
         """Return the outcome of each check, in order."""
         faulty = {fault.check for fault in self.faults}
         found = {name: Outcome.FAILED if name in faulty else Outcome.PASSED for name in ("deployment", "model")}
-        if self.judgement is None:
+        if self.report is None:
             return found | dict.fromkeys(("certificate", *PROPERTIES), Outcome.NOT_CHECKED)
         found["certificate"] = Outcome.FAILED if "certificate" in faulty else Outcome.PASSED
-        return found | {name: getattr(self.judgement.verification, name) for name in PROPERTIES}
+        return found | {name: getattr(self.report.verification, name) for name in PROPERTIES}
 
     @property
     def has_passed(self) -> bool:
         """True if it is safe, controllable and nonblocking for certain, and nothing is wrong with it."""
-        return not self.faults and self.judgement is not None and self.judgement.is_complete
+        return not self.faults and self.report is not None and self.report.is_complete
 
     def unchecked(self) -> tuple[str, ...]:
         """Return the names of the checks that were not made."""
         return tuple(name for name, outcome in self.outcomes().items() if outcome is Outcome.NOT_CHECKED)
 
 
-def recheck(
+def verify_supervisor_file(
     supervisor: Supervisor,
     bundle: Bundle,
     limits: Limits,
@@ -121,7 +121,7 @@ def recheck(
     engine: str = "auto",
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[str], None] = lambda message: None,
-) -> Recheck:
+) -> FileVerification:
     """Check a supervisor against the texts of its model.
 
     Args:
@@ -139,24 +139,24 @@ def recheck(
     """
     checked = check(bundle)
     if checked.model is None or checked.places is None:
-        return Recheck(checked.diagnostics, (), (), None)
+        return FileVerification(checked.diagnostics, (), (), None)
     if (deployment or supervisor.deployment) is Deployment.LAYER:
         ambiguous = layer_findings(checked.model, checked.places)
         if ambiguous:
-            return Recheck(sorted_diagnostics((*checked.diagnostics, *ambiguous)), (), (), None)
+            return FileVerification(sorted_diagnostics((*checked.diagnostics, *ambiguous)), (), (), None)
     faults = [Fault("model", text) for text in model_differences(supervisor.model, checked.model)]
     has_actions = any(item.kind is CommunicationKind.ACTION for item in checked.model.communications)
     if deployment not in (None, supervisor.deployment) and has_actions:
         faults.append(Fault("deployment", f"it was made for the deployment {supervisor.deployment}, not {deployment}"))
     notes = tuple(_notes(supervisor.certificate, bundle))
     if faults:
-        return Recheck((), tuple(faults), notes, None)
+        return FileVerification((), tuple(faults), notes, None)
     executable = ExecutableSystem(checked.model, supervisor.deployment)
     system = executable.automata
     semantics = Semantics(system)
 
-    def judged(expected_states: int) -> Judgement:
-        return judge(
+    def verified_with(expected_states: int) -> VerificationReport:
+        return verify(
             system,
             state_predicates(system, supervisor.added),
             limits,
@@ -169,10 +169,10 @@ def recheck(
 
     # What the file says of its size decides only what is tried first: a false figure must not prevent the search.
     told = int(supervisor.certificate.states)
-    judgement = judged(told)
-    if told > limits.states and not judgement.is_complete:
-        judgement = judged(0)
-    found = judgement.verification
+    report = verified_with(told)
+    if told > limits.states and not report.is_complete:
+        report = verified_with(0)
+    found = report.verification
     faults += [Fault("certificate", text) for text in _false_claims(supervisor.certificate, found)]
     claimed = supervisor.certificate.controller
     if claimed is not None:
@@ -195,7 +195,7 @@ def recheck(
         )
         for item in found.failures
     ]
-    return Recheck((), tuple(faults), (*notes, *_beliefs(supervisor.certificate, found)), judgement)
+    return FileVerification((), tuple(faults), (*notes, *_beliefs(supervisor.certificate, found)), report)
 
 
 def _notes(certificate: Certificate, bundle: Bundle) -> list[str]:

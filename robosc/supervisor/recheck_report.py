@@ -7,12 +7,12 @@ from robosc.errors import InvalidSupervisorError
 from robosc.json_documents import diagnostics_json
 from robosc.signatures import SignatureError
 from robosc.source import visible
-from robosc.supervisor.recheck import Fault, Recheck, StateInWords
+from robosc.supervisor.recheck import Fault, FileVerification, StateInWords
 from robosc.supervisor.structure import Supervisor
 from robosc.verification import Outcome
 
 
-def has_passed(found: Recheck, *, is_strict: bool) -> bool:
+def has_passed(found: FileVerification, *, is_strict: bool) -> bool:
     """Return True if a supervisor has passed.
 
     Args:
@@ -22,9 +22,9 @@ def has_passed(found: Recheck, *, is_strict: bool) -> bool:
     return found.has_passed and not (is_strict and found.unchecked())
 
 
-def recheck_json(found: Recheck, supervisor: Supervisor, *, is_strict: bool) -> dict[str, object]:
+def file_verification_json(found: FileVerification, supervisor: Supervisor, *, is_strict: bool) -> dict[str, object]:
     """Return the findings as JSON values; `status` is `passed`, `failed` or `not checked`."""
-    judgement = found.judgement
+    report = found.report
     is_right = has_passed(found, is_strict=is_strict)
     return {
         "status": "passed" if is_right else "failed" if found.faults or found.diagnostics else "not checked",
@@ -33,9 +33,9 @@ def recheck_json(found: Recheck, supervisor: Supervisor, *, is_strict: bool) -> 
         "checks": {name: str(outcome) for name, outcome in found.outcomes().items()},
         "faults": [_fault_json(fault) for fault in found.faults],
         "remarks": list(found.notes),
-        "states": judgement.verification.states if judgement else None,
-        "transitions": judgement.verification.transitions if judgement else None,
-        "method": judgement.method if judgement else None,
+        "states": report.verification.states if report else None,
+        "transitions": report.verification.transitions if report else None,
+        "method": report.method if report else None,
         **diagnostics_json(found.diagnostics),
     }
 
@@ -60,13 +60,13 @@ def _fault_json(fault: Fault) -> dict[str, object]:
     return document
 
 
-def recheck_text(
+def file_verification_text(
     document: Mapping[str, Any], supervisor: str = "", model: str = "its model", *, is_quiet: bool = False
 ) -> str:
     """Return the findings for people, as lines.
 
     Args:
-        document: Document as `recheck_json` makes it.
+        document: Document as `file_verification_json` makes it.
         supervisor: Name of the supervisor; empty: the lines begin without one.
         model: Name of the model.
         is_quiet: True if only what is wrong is told.

@@ -1,21 +1,21 @@
-"""Independent judgement of a supervisor.
+"""Independent verification of a supervisor.
 
 Shares nothing with synthesis but the automata and their explicit meaning (an import contract says so).
 """
 
 from robosc.verification.explicit import ExplicitSupervisor, synthesize_explicit
-from robosc.verification.judge import DEFAULT_STATES, Judgement, Limits, judge
-from robosc.verification.verify import Failure, Outcome, Verification, verify
+from robosc.verification.explicit_check import Failure, Outcome, Verification, verify_explicitly
+from robosc.verification.verify import DEFAULT_STATES, Limits, VerificationReport, verify
 
 __all__ = [
     "DEFAULT_STATES",
     "ExplicitSupervisor",
     "Failure",
-    "Judgement",
     "Limits",
     "Outcome",
     "Verification",
-    "judge",
+    "VerificationReport",
     "synthesize_explicit",
     "verify",
+    "verify_explicitly",
 ]

@@ -1,112 +1,77 @@
-"""Judges a supervisor by explicit forward search of the controlled system.
+"""Verification of a supervisor of any size: state by state as far as that goes, on sets of states beyond."""
 
-The controlled system is searched state by state under the plants, the requirements and the conditions
-that the supervisor adds. What is checked is what a supervisor promises, one property after the other:
-safe, controllable, nonblocking; maximally permissive by synthesizing anew, explicitly, and comparing.
-"""
-
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 
-from robosc.automata.compile import State
-from robosc.automata.controlled import Added
+from robosc.automata.controlled import TRANSITIONS_PER_STATE
+from robosc.automata.decision import Decision
 from robosc.automata.semantics import Semantics
-from robosc.automata.state import subjects
 from robosc.automata.structure import System
-from robosc.verification.packing import CodeTest, Packing
-from robosc.verification.permissive import Allowed, allowed
-from robosc.verification.search import Effort, Reached, blocking_state, search
+from robosc.verification.explicit_check import Outcome, Verification, verify_explicitly
 
-DEFAULT_LIMIT = 200_000
-"""States up to which the controlled system is searched."""
-
-DEFAULT_PERMISSIVE_LIMIT = 100_000
-"""States up to which the supervisor is recomputed."""
-
-
-class Outcome(StrEnum):
-    """Outcome of the check of one property."""
-
-    PASSED = "passed"
-    FAILED = "failed"
-    NOT_CHECKED = "not checked"
+DEFAULT_STATES = 200_000
+"""States up to which the controlled system is searched one by one: some seconds."""
 
 
 @dataclass(frozen=True, slots=True)
-class Failure:
-    """Reason why a property does not hold.
+class Limits:
+    """Limits of a check; all is counted, so that it ends alike on every machine.
 
     Attributes:
-        property: `safe`, `controllable`, `nonblocking` or `maximally permissive`.
-        trace: Events of a shortest run from an initial state into the trouble.
-        state: The state that it leads to, in the order of `subjects`.
-        reason: Fault in that state, in words.
-        message: The same, and the state.
-        is_shortest: True if there is certainly no shorter run; a symbolic search may have to do with any run.
+        states: States up to which the controlled system is searched one by one.
+        recomputed: States of the uncontrolled system up to which the supervisor is recomputed.
+        work: Nodes of decision diagrams up to which larger systems are searched symbolically.
     """
 
-    property: str
-    trace: tuple[str, ...]
-    state: State
-    reason: str
-    message: str
-    is_shortest: bool = True
+    states: int
+    recomputed: int
+    work: int
+
+    @classmethod
+    def of(cls, states: int) -> "Limits":
+        """Limits under which each part takes about as long as searching so many states."""
+        return cls(states, states // 4, 25 * states)
 
 
 @dataclass(frozen=True, slots=True)
-class Verification:
-    """The judgement.
+class VerificationReport:
+    """Findings of a check, and their method.
 
     Attributes:
-        states: Reachable states of the controlled system, or None where the search was given up.
-        transitions: Transitions between them, or None.
-        safe: No reachable bad state.
-        controllable: No uncontrollable event that the plant enables is disabled.
-        nonblocking: From every reachable state a marked state is reachable.
-        maximally_permissive: Nothing more is disabled than needed.
-        failures: For each property that failed the first trouble found, in the order above.
+        verification: The outcomes.
+        method: Description of what was done, in one line.
     """
 
-    states: int | None
-    transitions: int | None
-    safe: Outcome
-    controllable: Outcome
-    nonblocking: Outcome
-    maximally_permissive: Outcome
-    failures: tuple[Failure, ...] = ()
+    verification: Verification
+    method: str
 
     @property
-    def trace(self) -> tuple[str, ...]:
-        """Events into the first trouble; none if nothing failed."""
-        return self.failures[0].trace if self.failures else ()
-
-    @property
-    def message(self) -> str:
-        """The first trouble in words; empty if nothing failed."""
-        return f"not {self.failures[0].property}: {self.failures[0].message}" if self.failures else ""
+    def is_complete(self) -> bool:
+        """True if all was checked but permissiveness."""
+        found = self.verification
+        return Outcome.NOT_CHECKED not in (found.safe, found.controllable, found.nonblocking)
 
 
 def verify(
     system: System,
-    added: Added,
+    added: Mapping[str, Decision],
+    limits: Limits,
     *,
-    initial: Callable[[State], bool] | None = None,
-    limit: int = DEFAULT_LIMIT,
-    permissive_limit: int = DEFAULT_PERMISSIVE_LIMIT,
+    expected_states: int = 0,
+    engine: str = "auto",
     semantics: Semantics | None = None,
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[str], None] = lambda message: None,
-) -> Verification:
-    """Check that a supervisor is safe, controllable, nonblocking and maximally permissive.
+) -> VerificationReport:
+    """Check whether a supervisor is safe, controllable, nonblocking and, where feasible, maximally permissive.
 
     Args:
         system: Plants and event conditions.
-        added: For each event to which the supervisor adds a condition, that condition over states.
-        initial: Test for the initial states in which the supervisor lets the system begin; None: in all of them.
-        limit: Number of states of the controlled system beyond which nothing is checked.
-        permissive_limit: Number of states that the plants reach under the event conditions beyond which
-            permissiveness is not checked. Both count `TRANSITIONS_PER_STATE` transitions as a state, too.
+        added: For each event to which the supervisor adds a condition, that condition.
+        limits: Limits of the check.
+        expected_states: States that the controlled system is said to have: where these are too many, the search one
+            by one is not even begun.
+        engine: Engine of the symbolic search: see `verify_symbolically`.
         semantics: Semantics of the system, if it was made already.
         should_stop: Function called now and then; once it returns true, the work ends.
         on_progress: Function called now and then with the progress of the work, in one short line.
@@ -115,117 +80,40 @@ def verify(
         SynthesisCancelled: `should_stop` became true.
         ValueError: A condition is added to something that is no event of the system.
     """
-    require_known(system, added)
-    packing = Packing(semantics or Semantics(system))
-    begins = (lambda code: True) if initial is None else packing.condition(initial)
-    found = search(packing, added, Effort(limit, should_stop, on_progress, "states"), begins)
-    if found is None:
-        skipped = Outcome.NOT_CHECKED
-        return Verification(None, None, skipped, skipped, skipped, skipped)
-    judge = _Judge(found)
-    failures = {"safe": judge.unsafe(), "controllable": judge.uncontrollable(), "nonblocking": judge.blocking()}
-    # The controlled system's states are among those that a supervisor is recomputed on.
-    if len(found.codes) <= permissive_limit:
-        effort = Effort(permissive_limit, should_stop, on_progress, "states of the uncontrolled system")
-        recomputed = allowed(packing, found.tables, effort)
-        if recomputed is not None:
-            failures["maximally permissive"] = judge.restrictive(recomputed, begins)
-    return verification(len(found.codes), len(found.targets), failures)
+    if expected_states <= limits.states:
+        found = verify_explicitly(
+            system,
+            added,
+            limit=limits.states,
+            permissive_limit=limits.recomputed,
+            semantics=semantics,
+            should_stop=should_stop,
+            on_progress=on_progress,
+        )
+        if found.states is not None:
+            return VerificationReport(found, f"explicit forward search; {_permissiveness(found, limits)}")
+        reason = f"more than {limits.states} states, or {TRANSITIONS_PER_STATE * limits.states} transitions"
+    else:
+        reason = f"more than {limits.states} states"
+    # Most systems are small: who only searches them one by one need not load what works on sets of states.
+    from robosc.verification.symbolic import verify_symbolically
 
-
-def require_known(system: System, added: Iterable[str]) -> None:
-    """Do nothing if conditions are added to events of the system only.
-
-    Raises:
-        ValueError: They are not.
-    """
-    unknown = sorted(set(added) - {event.name for event in system.events})
-    if unknown:
-        raise ValueError(f"conditions are added to events that the system does not have: {', '.join(unknown)}")
-
-
-def verification(states: int | None, transitions: int | None, found: Mapping[str, Failure | None]) -> Verification:
-    """The judgement, from the first trouble (or None) of each property that was checked."""
-
-    def outcome(name: str) -> Outcome:
-        if name not in found:
-            return Outcome.NOT_CHECKED
-        return Outcome.PASSED if found[name] is None else Outcome.FAILED
-
-    return Verification(
-        states=states,
-        transitions=transitions,
-        safe=outcome("safe"),
-        controllable=outcome("controllable"),
-        nonblocking=outcome("nonblocking"),
-        maximally_permissive=outcome("maximally permissive"),
-        failures=tuple(failure for failure in found.values() if failure is not None),
+    found = verify_symbolically(
+        system, added, limit=limits.work, engine=engine, should_stop=should_stop, on_progress=on_progress
     )
+    if found.states is None:
+        method = f"not checked: {reason}, and the symbolic search takes more than {limits.work} nodes"
+    elif Outcome.NOT_CHECKED in (found.safe, found.controllable, found.nonblocking):
+        method = f"symbolic search ({reason}), given up after {limits.work} nodes; permissiveness not recomputed"
+    else:
+        method = f"symbolic search ({reason}); permissiveness not recomputed"
+    return VerificationReport(found, method)
 
 
-def failure(
-    system: System, property_: str, trace: tuple[str, ...], state: State, reason: str, *, is_shortest: bool = True
-) -> Failure:
-    """The failure of a property in a state."""
-    where = ", ".join(f"{subject} = {value}" for subject, value in zip(subjects(system), state, strict=True))
-    return Failure(property_, trace, state, reason, f"{reason} in {where}", is_shortest)
-
-
-@dataclass(frozen=True, slots=True)
-class _Judge:
-    """Looks for the first trouble of each kind, nearest to the initial state."""
-
-    found: Reached
-
-    def unsafe(self) -> Failure | None:
-        """A reachable bad state."""
-        packing = self.found.packing
-        broken = packing.broken_invariants()
-        # Each table has seen every state, so most have no trouble at all.
-        tables = [table for table in self.found.tables if table.trouble]
-        if not broken and not tables:
-            return None
-        for number, code in enumerate(self.found.codes):
-            if any(test(code) for test in broken) or any(table.is_bad(code) for table in tables):
-                trouble = packing.semantics.trouble(packing.decode(code))
-                return self._failure("safe", number, str(trouble))
-        return None
-
-    def uncontrollable(self) -> Failure | None:
-        """A reachable state where the supervisor stands in the way of an uncontrollable event."""
-        for table in self.found.tables:
-            if table.event.is_controllable or table.condition is None:
-                continue
-            for number, code in enumerate(self.found.codes):
-                if not table.condition(code) and table.enabled(code):
-                    return self._failure("controllable", number, f"the uncontrollable {table.event.name} is disabled")
-        return None
-
-    def blocking(self) -> Failure | None:
-        """A reachable state from which no marked one is reachable."""
-        number = blocking_state(self.found)
-        return None if number is None else self._failure("nonblocking", number, "no marked state can be reached")
-
-    def restrictive(self, recomputed: Allowed, begins: CodeTest) -> Failure | None:
-        """A reachable state where a controllable event, or an initial one, is disabled that could be allowed."""
-        packing = self.found.packing
-        for code in packing.initial():
-            if not begins(code) and recomputed.good[recomputed.numbers[code]]:
-                reason = "the system may not begin here although it could"
-                return failure(packing.system, "maximally permissive", (), packing.decode(code), reason)
-        limited = [
-            (place, table.event.name, table.condition)
-            for place, table in enumerate(self.found.tables)
-            if table.event.is_controllable and table.condition is not None
-        ]
-        for number, code in enumerate(self.found.codes):
-            for place, event, condition in limited:
-                if not condition(code) and recomputed.allows(code, place):
-                    message = f"{event} is disabled although it could be allowed"
-                    return self._failure("maximally permissive", number, message)
-        return None
-
-    def _failure(self, property_: str, number: int, reason: str) -> Failure:
-        packing = self.found.packing
-        state = packing.decode(self.found.codes[number])
-        return failure(packing.system, property_, self.found.trace(number), state, reason)
+def _permissiveness(found: Verification, limits: Limits) -> str:
+    if found.maximally_permissive is Outcome.NOT_CHECKED:
+        return (
+            f"permissiveness not recomputed: more than {limits.recomputed} states, or "
+            f"{TRANSITIONS_PER_STATE * limits.recomputed} transitions"
+        )
+    return "permissiveness by explicit recomputation"

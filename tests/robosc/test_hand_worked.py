@@ -14,7 +14,7 @@ from robosc.exploration import explore
 from robosc.model.structure import Deployment, Model
 from robosc.supervisor.conditions import state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
-from robosc.verification import ExplicitSupervisor, Outcome, synthesize_explicit, verify
+from robosc.verification import ExplicitSupervisor, Outcome, synthesize_explicit, verify_explicitly
 from support.models import model_of
 
 type Graph = dict[str, dict[str, str]]
@@ -55,7 +55,7 @@ def _graph(text: str, deployment: Deployment = CONTROLLER) -> Graph:
         return lambda at: supervisor.allows(at, event)
 
     added = {event.name: condition(event.name) for event in system.events if event.is_controllable}
-    found = verify(system, added)
+    found = verify_explicitly(system, added)
     assert {found.safe, found.controllable, found.nonblocking, found.maximally_permissive} == {Outcome.PASSED}
     graph = explore(system, added, model)
     for engine in ENGINES:

@@ -29,7 +29,7 @@ from robosc.signatures import (
 from robosc.source import Bundle
 from robosc.supervisor import Supervisor, decode, make_supervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES
-from robosc.supervisor.recheck import recheck
+from robosc.supervisor.recheck import verify_supervisor_file
 from robosc.supervisor.structure import PropertyResult
 from robosc.verification import DEFAULT_STATES, Limits
 from robosc_api.security import Credentials
@@ -285,7 +285,7 @@ def _checked(data: bytes, place: str, bundle: Bundle, source: Source, tell: Call
     try:
         supervisor = decode(data)
         _require_deployment(supervisor, source.deployment, place)
-        found = recheck(supervisor, bundle, Limits.of(DEFAULT_STATES), deployment=source.deployment)
+        found = verify_supervisor_file(supervisor, bundle, Limits.of(DEFAULT_STATES), deployment=source.deployment)
     except RoboscError as error:
         raise NoSupervisorError(f"{place}: {error}") from error
     if found.diagnostics:

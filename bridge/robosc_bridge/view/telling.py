@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from robosc.execution.event_log import Entry, plain
-from robosc.explanation.blocked import Judged, Requests, StateError
+from robosc.explanation.blocked import RequestAvailability, Requests, StateError
 from robosc_bridge.view.definition import Robot, definition_text
 from robosc_bridge.view.facts import Happenings, LaserScan, Notice, Status
 
@@ -54,7 +54,7 @@ class Teller:
     def __init__(self, portrait: Portrait) -> None:
         self._robot = portrait.robot
         self._requests = portrait.requests
-        self._judged: tuple[Any, Any, Judged | str] | None = None
+        self._available: tuple[Any, Any, RequestAvailability | str] | None = None
         self._lights = Lights(portrait.robot)
         self._number = 0
 
@@ -136,35 +136,35 @@ class Teller:
             has_behaviour = any(item.behaviour for item in self._robot.shape.components)
             if has_behaviour:
                 return [], [{"event": event, "why": [NOT_EXECUTED]} for event in events], []
-        judged = self._judgement(status)
-        if isinstance(judged, str):
-            warnings = [Notice("STATE_UNKNOWN", judged)] if judged else []
+        available = self._availability(status)
+        if isinstance(available, str):
+            warnings = [Notice("STATE_UNKNOWN", available)] if available else []
             known = None if status.enabled is None else {f"{name}.request" for name in status.enabled}
             if known is None:
                 return [], [], warnings
             why = {event: [NOT_KNOWN] for event in events}
         else:
-            told = judged.enabled if status.enabled is None else [f"{name}.request" for name in status.enabled]
+            told = available.enabled if status.enabled is None else [f"{name}.request" for name in status.enabled]
             known = set(told)
-            why = {item.event: list(item.why) for item in judged.blocked}
+            why = {item.event: list(item.why) for item in available.blocked}
             if status.enabled is not None:
                 why = {event: why.get(event) or [NOT_KNOWN] for event in events}
             warnings = []
         disabled = [{"event": event, "why": why[event]} for event in events if event not in known and event in why]
         return [event for event in events if event in known], disabled, warnings
 
-    def _judgement(self, status: Status) -> Judged | str:
+    def _availability(self, status: Status) -> RequestAvailability | str:
         """The requests judged; or why they cannot be, which is empty where nobody knows the supervisor."""
         if self._requests is None:
             return ""
         state = status.components, status.communications
-        if self._judged is None or (self._judged[0], self._judged[1]) != state:
+        if self._available is None or (self._available[0], self._available[1]) != state:
             try:
-                found: Judged | str = self._requests.judge(*state)
+                found: RequestAvailability | str = self._requests.availability(*state)
             except StateError as error:
                 found = f"The model is not that of this robot: {error}."
-            self._judged = (*state, found)
-        return self._judged[2]
+            self._available = (*state, found)
+        return self._available[2]
 
 
 class Lights:

@@ -6,11 +6,11 @@ from typing import Any
 
 from robosc.automata.decision import Decision
 from robosc.automata.structure import System
+from robosc.verification.explicit_check import Failure, Outcome, Verification, failure, require_known, verification
 from robosc.verification.symbolic.reach import Reachability
 from robosc.verification.symbolic.relations import Relations
 from robosc.verification.symbolic.variables import Variables
 from robosc.verification.symbolic.work import TooMuchWorkError, Work
-from robosc.verification.verify import Failure, Outcome, Verification, failure, require_known, verification
 
 DEFAULT_WORK = 10_000_000
 """Work after which a check is given up: some seconds with the engine in C."""
@@ -69,7 +69,7 @@ class _Check:
         self._reachable = self._reachability.reachable(self._initial)
 
     def verification(self) -> Verification:
-        """The judgement; where the work for one property is too much, that property counts as not checked."""
+        """The outcome; where the work for one property is too much, that property counts as not checked."""
         found = {"safe": self._unsafe(), "controllable": self._uncontrollable()}
         with suppress(TooMuchWorkError):
             found["nonblocking"] = self._blocking()

@@ -11,8 +11,8 @@ from robosc.model.structure import Model
 from robosc.model_checking import Property, properties_of, property_errors_json, verdicts_json, verify_properties
 from robosc.source import SourceFile
 from robosc.supervisor import Supervisor, decode
-from robosc.supervisor.recheck import Recheck, recheck
-from robosc.supervisor.recheck_report import has_passed, malformed_json, recheck_json
+from robosc.supervisor.recheck import FileVerification, verify_supervisor_file
+from robosc.supervisor.recheck_report import file_verification_json, has_passed, malformed_json
 from robosc.synthesis.engines import resolve_engine
 from robosc.verification import Limits
 from robosc_api.v1 import synthesis_pb2 as pb
@@ -62,7 +62,7 @@ def _given(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) -
         supervisor = decode(request.supervisor)
     except InvalidSupervisorError as error:
         return _result(pb.VERIFICATION_STATUS_FAILED, malformed_json(error), reason=str(error))
-    found = recheck(
+    found = verify_supervisor_file(
         supervisor,
         given.bundle(request.bundle),
         Limits.of(request.maximum_states or DEFAULT_STATES),
@@ -72,14 +72,14 @@ def _given(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) -
     )
     if has_passed(found, is_strict=request.strict) and (request.properties or request.property_files):
         return _verdicts(request, supervisor, maximum_nodes, on_report)
-    document = recheck_json(found, supervisor, is_strict=request.strict)
+    document = file_verification_json(found, supervisor, is_strict=request.strict)
     status = _OUTCOMES[str(document["status"])]
     return _result(status, document, reason=_no_robot(found), diagnostics=found.diagnostics)
 
 
-def _no_robot(found: Recheck) -> str:
+def _no_robot(found: FileVerification) -> str:
     """Return the reason why nothing was looked at where nothing is wrong either."""
-    if found.diagnostics or found.judgement or found.faults:
+    if found.diagnostics or found.report or found.faults:
         return ""
     return "a library has no robot that a supervisor could be for"
 

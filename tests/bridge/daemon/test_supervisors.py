@@ -275,7 +275,7 @@ def signed(tmp_path: Path) -> Signed:
 def test_a_signed_file_is_taken_without_its_model_and_without_verification(
     signed: Signed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delattr("robosc_bridge.daemon.supervisors.recheck")
+    monkeypatch.delattr("robosc_bridge.daemon.supervisors.verify_supervisor_file")
     told: list[str] = []
     found = obtain(signed.source(signed.others, signed.ours), told.append)
     assert encode(found) == signed.file.read_bytes()

@@ -63,16 +63,16 @@ def test_a_request_has_a_reason_if_and_only_if_it_is_not_enabled(seed: int) -> N
     requests = Requests(supervisor.model, supervisor.added)
     for system in wander(supervisor, dice, 12):
         known, components = locations(supervisor, system), system.state()
-        judged = requests.judge(components, known)
-        assert judged.enabled == enabled(system, requests)
-        assert judged.unknown == ()
-        assert {item.event for item in judged.blocked} == set(requests.events) - set(judged.enabled)
-        for item in judged.blocked:
+        available = requests.availability(components, known)
+        assert available.enabled == enabled(system, requests)
+        assert available.unknown == ()
+        assert {item.event for item in available.blocked} == set(requests.events) - set(available.enabled)
+        for item in available.blocked:
             assert 0 < len(item.why) <= MAXIMUM_REASONS
             assert all(why and "\n" not in why for why in item.why)
         # The same out of a log file, and out of the topic.
-        assert requests.judge(plain(components), known) == judged
-        assert requests.judge(as_texts(components), known) == judged
+        assert requests.availability(plain(components), known) == available
+        assert requests.availability(as_texts(components), known) == available
 
 
 @given(st.integers(0, 10**6))
@@ -83,7 +83,7 @@ def test_what_is_told_without_locations_holds_with_them(seed: int) -> None:
     for system in wander(supervisor, dice, 6):
         known = locations(supervisor, system)
         some = {name: place for name, place in known.items() if dice.random() < 0.5}
-        whole, part = requests.judge(system.state(), known), requests.judge(system.state(), some)
+        whole, part = requests.availability(system.state(), known), requests.availability(system.state(), some)
         assert set(part.enabled) <= set(whole.enabled)
         assert {item.event for item in part.blocked} <= {item.event for item in whole.blocked}
         told = {*part.enabled, *part.unknown, *(item.event for item in part.blocked)}
@@ -96,7 +96,7 @@ def test_the_sentences_are_in_the_words_of_the_model() -> None:
     turning: dict[str, Any] = {**system.state(), "Rotator": {"state": "idle", "variables": {}}}
     states = [item.name for item in supervisor.model.component("Rotator").behaviour.states]  # type: ignore[union-attr]
     turning["Rotator"]["state"] = next(name for name in states if name != "idle")
-    found = {item.event: item.why for item in requests.judge(turning, {}).blocked}
+    found = {item.event: item.why for item in requests.availability(turning, {}).blocked}
     (first, second) = found["rotate_left.request"]
     assert first == f"Rotator is in {turning['Rotator']['state']}, not in idle"
     assert second.startswith("requirement rotate_left needs Rotator.idle and LidarSensor.front = front_wall: ")
@@ -133,7 +133,7 @@ def test_a_state_of_another_model_is_refused() -> None:
     requests, state = Requests(supervisor.model, supervisor.added), InterpretedSystem(supervisor).state()
     for wrong in ({}, {**state, "Rotator": 3}, {**state, "Rotator": {"state": "flying"}}, {**state, "LidarSensor": {}}):
         with pytest.raises(StateError):
-            requests.judge(wrong, {})
+            requests.availability(wrong, {})
 
 
 def test_what_a_requirement_reads_is_listed_up_to_a_limit() -> None:
@@ -145,7 +145,7 @@ def test_what_a_requirement_reads_is_listed_up_to_a_limit() -> None:
         f"requirement few needs C.v0 > C.v1 requirement many needs {' + '.join(f'C.{name}' for name in names)} > 9 }}"
     )
     supervisor = Supervisor(model, Deployment.CONTROLLER, (), CERTIFICATE)
-    judged = Requests(model, ()).judge(InterpretedSystem(supervisor).state(), {})
-    few, many = (item.why[0] for item in judged.blocked)
+    available = Requests(model, ()).availability(InterpretedSystem(supervisor).state(), {})
+    few, many = (item.why[0] for item in available.blocked)
     assert few.endswith("C.v0 > C.v1, which does not hold (C.v0 is 1, C.v1 is 1)")
     assert many.endswith(f"({', '.join(f'C.{name} is 1' for name in names[:MAXIMUM_NAMES])}, ...)")

@@ -15,7 +15,7 @@ from robosc.properties.orders import Orders
 from robosc.properties.search import search
 from robosc.properties.structure import always_end, never_conflict, stays_nonblocking
 from robosc.supervisor.structure import Supervisor
-from robosc.verification import verify
+from robosc.verification import verify_explicitly
 from support.controller_twin import twin_of
 from support.random_controllers import ONE_FIELD, random_controller, random_robot
 from support.random_supervisors import random_supervisor
@@ -237,8 +237,8 @@ def test_any_supervisor_is_judged(seed: int) -> None:
     """Supervisors that nobody synthesized, with everything that the language has; the same whatever came before."""
     supervisor = random_supervisor(seed)
     used = Semantics(supervisor.executable.automata)
-    before = verify(used.system, {}, limit=150, semantics=used)
-    assert before == verify(used.system, {}, limit=150)
+    before = verify_explicitly(used.system, {}, limit=150, semantics=used)
+    assert before == verify_explicitly(used.system, {}, limit=150)
     first, second, third = (
         check_controller(
             supervisor.executable,

@@ -11,7 +11,7 @@ from robosc.supervisor import OutcomeStatus, Progress, encode, make_supervisor, 
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import AddedCondition, Certificate, DecisionDiagram
 from robosc.synthesis import SynthesisResult, synthesize
-from robosc.verification import Limits, verify
+from robosc.verification import Limits, verify_explicitly
 from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle
 
 COUNTER = """robot Counter {
@@ -39,7 +39,7 @@ def test_the_examples_get_a_certified_supervisor(name: str, deployment: Deployme
     checks = (certificate.safe, certificate.controllable, certificate.nonblocking, certificate.maximally_permissive)
     assert set(checks) == {"passed"}
     system = to_automata(outcome.supervisor.model, deployment)
-    found = verify(system, state_predicates(system, outcome.supervisor.added))
+    found = verify_explicitly(system, state_predicates(system, outcome.supervisor.added))
     assert (str(found.states), str(found.transitions)) == (certificate.states, certificate.transitions)
     assert summary_json(outcome.supervisor)["states"] == found.states
     assert f"{found.states} states, {found.transitions} transitions" in summary_text(outcome.supervisor)

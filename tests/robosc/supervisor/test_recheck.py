@@ -17,9 +17,9 @@ from robosc.source import Bundle
 from robosc.supervisor import Supervisor, decode, encode, make_supervisor
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.differences import MAXIMUM_DIFFERENCES, model_differences
-from robosc.supervisor.recheck import PROPERTIES, Recheck, recheck
+from robosc.supervisor.recheck import PROPERTIES, FileVerification, verify_supervisor_file
 from robosc.synthesis import SynthesisStatus, synthesize
-from robosc.verification import Limits, Outcome, judge, synthesize_explicit
+from robosc.verification import Limits, Outcome, synthesize_explicit, verify
 from support.effort import examples
 from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle
 from support.mutants import (
@@ -84,11 +84,11 @@ def _supervisor(bundle: Bundle, deployment: Deployment = Deployment.CONTROLLER) 
     return found
 
 
-def _passed(found: Recheck) -> bool:
-    return found.judgement is not None and not found.faults
+def _passed(found: FileVerification) -> bool:
+    return found.report is not None and not found.faults
 
 
-def _failed_checks(found: Recheck) -> set[str]:
+def _failed_checks(found: FileVerification) -> set[str]:
     return {name for name, outcome in found.outcomes().items() if outcome is Outcome.FAILED}
 
 
@@ -104,14 +104,14 @@ def _read_back(mutant: Mutant[Supervisor]) -> Supervisor | None:
 def test_the_examples_pass(name: str, deployment: Deployment) -> None:
     bundle = example_bundle(name)
     for limits in (LIMITS, SYMBOLIC):
-        found = recheck(_supervisor(bundle, deployment), bundle, limits)
+        found = verify_supervisor_file(_supervisor(bundle, deployment), bundle, limits)
         assert _passed(found)
         assert found.notes == () if limits is LIMITS else "was not checked here" in found.notes[0]
         assert found.unchecked() == (() if limits is LIMITS else ("maximally_permissive",))
 
 
 def _right_or_caught(bundle: Bundle, supervisor: Supervisor, most: int, seed: int) -> tuple[int, int]:
-    """Check mutants of what is added against the slow judge; returns how many are right and how many are not."""
+    """Check mutants of what is added against the slow verifier; returns how many are right and how many are not."""
     system = to_automata(supervisor.model, supervisor.deployment)
     right = explicit_supervisor(system)
     assert right is not None
@@ -123,7 +123,7 @@ def _right_or_caught(bundle: Bundle, supervisor: Supervisor, most: int, seed: in
         handed = _read_back(Mutant(mutant.name, with_added(supervisor, mutant.value)))
         assert handed is not None, mutant.name
         expected = is_right(system, state_predicates(system, mutant.value), right)
-        found = recheck(handed, bundle, LIMITS)
+        found = verify_supervisor_file(handed, bundle, LIMITS)
         assert _passed(found) == expected, (mutant.name, found.faults)
         assert expected or _failed_checks(found) & {*PROPERTIES}, mutant.name
         for fault in found.faults:
@@ -133,13 +133,13 @@ def _right_or_caught(bundle: Bundle, supervisor: Supervisor, most: int, seed: in
 
 
 @pytest.mark.parametrize(("name", "deployment"), EXAMPLE_DEPLOYMENTS)
-def test_every_mutant_of_what_the_examples_add_is_judged_rightly(name: str, deployment: Deployment) -> None:
+def test_every_mutant_of_what_the_examples_add_is_verified_rightly(name: str, deployment: Deployment) -> None:
     bundle = example_bundle(name)
     _, wrong = _right_or_caught(bundle, _supervisor(bundle, deployment), 15, 1)
     assert wrong >= 2
 
 
-def test_every_mutant_of_a_counter_is_judged_rightly() -> None:
+def test_every_mutant_of_a_counter_is_verified_rightly() -> None:
     bundle = bundle_of(COUNTER)
     right, wrong = _right_or_caught(bundle, _supervisor(bundle), 1000, 1)
     assert right >= 2
@@ -148,7 +148,7 @@ def test_every_mutant_of_a_counter_is_judged_rightly() -> None:
 
 @settings(max_examples=examples(10))
 @given(st.integers(0, 10**6))
-def test_mutants_of_random_models_are_judged_rightly(seed: int) -> None:
+def test_mutants_of_random_models_are_verified_rightly(seed: int) -> None:
     bundle = random_bundle(seed)
     checked = check(bundle)
     assume(checked.model is not None)
@@ -161,7 +161,7 @@ def test_mutants_of_random_models_are_judged_rightly(seed: int) -> None:
     _right_or_caught(bundle, supervisor, 6, seed)
 
 
-def _judged_rightly(system: System, seed: int, most: int) -> None:
+def _verified_rightly(system: System, seed: int, most: int) -> None:
     result, right = synthesize(system), explicit_supervisor(system)
     assert right is not None
     assume(result.status is SynthesisStatus.SUPERVISOR and disables_something(system, right))
@@ -169,9 +169,9 @@ def _judged_rightly(system: System, seed: int, most: int) -> None:
     for mutant in Random(seed).sample(mutants, min(most, len(mutants))):
         added = state_predicates(system, mutant.value)
         expected = is_right(system, added, right)
-        found = judge(system, added, LIMITS)
+        found = verify(system, added, LIMITS)
         assert (not found.verification.failures) == expected, mutant.name
-        symbolic = judge(system, added, SYMBOLIC).verification
+        symbolic = verify(system, added, SYMBOLIC).verification
         serious = [item.property for item in found.verification.failures if item.property != "maximally permissive"]
         assert [item.property for item in symbolic.failures] == serious
         assert symbolic.states == found.verification.states
@@ -179,8 +179,8 @@ def _judged_rightly(system: System, seed: int, most: int) -> None:
 
 @settings(max_examples=examples(10))
 @given(systems(), st.integers(0, 10**6))
-def test_mutants_of_random_supervisors_are_judged_rightly(system: System, seed: int) -> None:
-    _judged_rightly(system, seed, 4)
+def test_mutants_of_random_supervisors_are_verified_rightly(system: System, seed: int) -> None:
+    _verified_rightly(system, seed, 4)
 
 
 @pytest.mark.parametrize("name", ["navigation/navigation", "maze_solver/maze_solver"])
@@ -194,9 +194,9 @@ def test_every_mutant_of_the_model_inside_is_caught(name: str) -> None:
         if handed is None:
             refused += 1
             continue
-        found = recheck(handed, bundle, Limits.of(0))
+        found = verify_supervisor_file(handed, bundle, Limits.of(0))
         assert _failed_checks(found) == {"model"}, mutant.name
-        assert found.judgement is None
+        assert found.report is None
         assert all(outcome is Outcome.NOT_CHECKED for outcome in list(found.outcomes().values())[2:])
     assert count - refused >= 20
 
@@ -220,18 +220,18 @@ def test_false_certificates_are_caught() -> None:
     bundle = bundle_of(COUNTER)
     supervisor = _supervisor(bundle)
     for mutant in false_certificates(supervisor.certificate):
-        found = recheck(change(supervisor, certificate=mutant.value), bundle, LIMITS)
+        found = verify_supervisor_file(change(supervisor, certificate=mutant.value), bundle, LIMITS)
         if int(mutant.value.states) > LIMITS.states:
-            assert found.judgement is not None
-            assert found.judgement.method.startswith("symbolic search")
+            assert found.report is not None
+            assert found.report.method.startswith("symbolic search")
         assert _failed_checks(found) == {"certificate"}, mutant.name
     modest = change(supervisor.certificate, safe="not checked", transitions=None)
-    assert _passed(recheck(change(supervisor, certificate=modest), bundle, LIMITS))
+    assert _passed(verify_supervisor_file(change(supervisor, certificate=modest), bundle, LIMITS))
 
 
 def test_a_false_claim_is_told_as_one() -> None:
     bundle = bundle_of(COUNTER)
-    found = recheck(change(_supervisor(bundle), added=()), bundle, LIMITS)
+    found = verify_supervisor_file(change(_supervisor(bundle), added=()), bundle, LIMITS)
     assert _failed_checks(found) >= {"certificate", "safe"}
     texts = [fault.message for fault in found.faults if fault.check == "certificate"]
     assert "it says 'safe: passed', which is false" in texts
@@ -248,40 +248,44 @@ def test_another_digest_is_told_and_decides_nothing() -> None:
     bundle = bundle_of(COUNTER)
     supervisor = _supervisor(bundle)
     other = bundle_of(COUNTER + "// the same")
-    found = recheck(supervisor, other, LIMITS)
+    found = verify_supervisor_file(supervisor, other, LIMITS)
     assert _passed(found)
     assert "digest is of other texts" in found.notes[0]
     forged = change(supervisor, certificate=change(supervisor.certificate, bundle_sha256="0" * 64, engine_version="9"))
-    notes = recheck(forged, bundle, LIMITS).notes
+    notes = verify_supervisor_file(forged, bundle, LIMITS).notes
     assert len(notes) == 2
     assert "made by RoboSC 9" in notes[1]
 
 
-def test_a_supervisor_of_another_deployment_is_judged_as_what_it_says() -> None:
+def test_a_supervisor_of_another_deployment_is_verified_as_what_it_says() -> None:
     bundle = bundle_of(ACTION)
     supervisor = _supervisor(bundle)
-    assert _passed(recheck(supervisor, bundle, LIMITS, deployment=Deployment.CONTROLLER))
-    wanted = recheck(supervisor, bundle, LIMITS, deployment=Deployment.LAYER)
+    assert _passed(verify_supervisor_file(supervisor, bundle, LIMITS, deployment=Deployment.CONTROLLER))
+    wanted = verify_supervisor_file(supervisor, bundle, LIMITS, deployment=Deployment.LAYER)
     assert _failed_checks(wanted) == {"deployment"}
     certificate = change(supervisor.certificate, deployment=Deployment.LAYER)
     forged = change(supervisor, deployment=Deployment.LAYER, certificate=certificate)
     with pytest.raises(InvalidSupervisorError):
         decode(encode(change(supervisor, deployment=Deployment.LAYER)))
     expected = _supervisor(bundle, Deployment.LAYER)
-    found = recheck(forged, bundle, LIMITS)
-    assert found.judgement is not None
-    assert _passed(found) == (found.judgement.verification.states == int(expected.certificate.states))
+    found = verify_supervisor_file(forged, bundle, LIMITS)
+    assert found.report is not None
+    assert _passed(found) == (found.report.verification.states == int(expected.certificate.states))
     without_actions = bundle_of(COUNTER)
-    assert _passed(recheck(_supervisor(without_actions), without_actions, LIMITS, deployment=Deployment.LAYER))
+    assert _passed(
+        verify_supervisor_file(_supervisor(without_actions), without_actions, LIMITS, deployment=Deployment.LAYER)
+    )
 
 
 def test_texts_without_a_model_and_without_a_robot() -> None:
     supervisor = _supervisor(bundle_of(COUNTER))
-    broken = recheck(supervisor, bundle_of("robot R { requirement x needs true }"), LIMITS)
+    broken = verify_supervisor_file(supervisor, bundle_of("robot R { requirement x needs true }"), LIMITS)
     assert [item.code for item in broken.diagnostics] == ["unknown-name"]
-    assert broken.judgement is None
-    library = recheck(supervisor, bundle_of("library L { component C { incoming message m with type: none } }"), LIMITS)
-    assert (library.judgement, library.faults) == (None, ())
+    assert broken.report is None
+    library = verify_supervisor_file(
+        supervisor, bundle_of("library L { component C { incoming message m with type: none } }"), LIMITS
+    )
+    assert (library.report, library.faults) == (None, ())
 
 
 def test_differences_end() -> None:
@@ -302,7 +306,7 @@ def test_one_that_is_to_be_a_layer_must_tell_messages_apart() -> None:
     } provide slow with 1 provide fast with 2 }"""
     bundle = bundle_of(text)
     supervisor = _supervisor(bundle)
-    assert _passed(recheck(supervisor, bundle, LIMITS, deployment=Deployment.CONTROLLER))
-    refused = recheck(supervisor, bundle, LIMITS, deployment=Deployment.LAYER)
+    assert _passed(verify_supervisor_file(supervisor, bundle, LIMITS, deployment=Deployment.CONTROLLER))
+    refused = verify_supervisor_file(supervisor, bundle, LIMITS, deployment=Deployment.LAYER)
     assert [item.code for item in refused.diagnostics] == ["ambiguous-layer-topic"]
     assert not refused.has_passed

@@ -6,7 +6,7 @@ from robosc.automata import Semantics
 from robosc.automata.controlled import controlled_graph
 from robosc.supervisor.conditions import state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
-from robosc.verification import Outcome, synthesize_explicit, verify
+from robosc.verification import Outcome, synthesize_explicit, verify_explicitly
 from support.families import FAMILIES
 
 SMALL = [
@@ -33,9 +33,9 @@ def test_symbolic_is_explicit(family: str, size: int, engine: str) -> None:
     assert not explicit.is_empty
     assert found.statistics.states == len(explicit.reachable)
     added = state_predicates(system, found.added)
-    judged = verify(system, added)
-    outcomes = (judged.safe, judged.controllable, judged.nonblocking, judged.maximally_permissive)
-    assert outcomes == (Outcome.PASSED,) * 4, judged.message
+    verified = verify_explicitly(system, added)
+    outcomes = (verified.safe, verified.controllable, verified.nonblocking, verified.maximally_permissive)
+    assert outcomes == (Outcome.PASSED,) * 4, verified.message
     graph = controlled_graph(Semantics(system), added, limit=100_000)
     assert graph is not None
     assert frozenset(graph.states) == explicit.reachable

@@ -15,7 +15,7 @@ from robosc.expressions.tree import Binary, Constant, VariableRead
 from robosc.model.structure import Deployment
 from robosc.supervisor.conditions import state_predicate, state_predicates
 from robosc.synthesis import Progress, SynthesisResult, SynthesisStatus, UnknownEngineError, synthesize
-from robosc.verification import Outcome, verify
+from robosc.verification import Outcome, verify_explicitly
 from robosc.verification.symbolic import verify_symbolically
 from support.effort import seeds
 from support.models import EXAMPLE_NAMES, example_model
@@ -72,7 +72,7 @@ def assert_verified(system: System, result: SynthesisResult) -> None:
     """All four properties hold for the independent verifiers, state by state and on sets of states."""
     added = state_predicates(system, result.added)
     initial = None if result.initial is None else state_predicate(system, result.initial)
-    one_by_one = verify(system, added, initial=initial, limit=LIMIT, permissive_limit=LIMIT)
+    one_by_one = verify_explicitly(system, added, initial=initial, limit=LIMIT, permissive_limit=LIMIT)
     checked = (one_by_one.safe, one_by_one.controllable, one_by_one.nonblocking, one_by_one.maximally_permissive)
     assert set(checked) == {Outcome.PASSED}, one_by_one.message
     on_sets = verify_symbolically(system, added, initial=initial, limit=10**9)

@@ -15,7 +15,7 @@ from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import AddedCondition
 from robosc.verification import packing as packing_module
 from robosc.verification import search as search_module
-from robosc.verification import synthesize_explicit, verify
+from robosc.verification import synthesize_explicit, verify_explicitly
 from robosc.verification.packing import Packing
 from robosc.verification.permissive import Allowed, allowed
 from robosc.verification.search import Effort, Reached, blocking_state, search
@@ -129,10 +129,10 @@ def test_an_event_that_may_end_badly_is_no_way_out() -> None:
 def test_what_is_forgotten_is_worked_out_again(monkeypatch: pytest.MonkeyPatch) -> None:
     made = FAMILIES["random robot"](3)
     before = searched(made, {})
-    whole = verify(made, {})
+    whole = verify_explicitly(made, {})
     monkeypatch.setattr(packing_module, "REMEMBERED", 2)
     assert searched(made, {}).codes == before.codes
-    assert verify(made, {}) == whole
+    assert verify_explicitly(made, {}) == whole
 
 
 @settings(max_examples=examples(10))

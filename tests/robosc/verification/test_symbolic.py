@@ -27,7 +27,7 @@ from robosc.expressions import (
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import AddedCondition, DecisionDiagram
 from robosc.synthesis import SynthesisStatus, synthesize
-from robosc.verification import Outcome, Verification, verify
+from robosc.verification import Outcome, Verification, verify_explicitly
 from robosc.verification.symbolic import expressions, order, verify_symbolically
 from robosc.verification.symbolic.order import cuthill_mckee, place_order
 from robosc.verification.symbolic.reach import Reachability
@@ -61,7 +61,7 @@ def replay(made: System, added: Mapping[str, Decision], trace: Sequence[str]) ->
 
 
 def _agrees(made: System, added: Mapping[str, Decision], engine: str = "cudd") -> Verification:
-    explicit = verify(made, added, permissive_limit=0)
+    explicit = verify_explicitly(made, added, permissive_limit=0)
     symbolic = verify_symbolically(made, added, engine=engine)
     assert (symbolic.states, _three(symbolic)) == (explicit.states, _three(explicit))
     assert symbolic.maximally_permissive is NOT_CHECKED
@@ -235,7 +235,7 @@ def test_relations_of_wider_integers_agree_with_the_explicit_search(high: int) -
         patch.setattr(expressions, "FEW_VALUATIONS", 0)
         for relation in relations:
             made = _measured(relation, Call("min", (operation(received(), "-", 0), Constant(high))), high)
-            explicit, symbolic = verify(made, {}, permissive_limit=0), verify_symbolically(made, {})
+            explicit, symbolic = verify_explicitly(made, {}, permissive_limit=0), verify_symbolically(made, {})
             assert (symbolic.states, _three(symbolic)) == (explicit.states, _three(explicit))
             assert explicit.states is not None and explicit.states > (high + 1) ** 2
 

@@ -9,7 +9,7 @@ from robosc.automata import System
 from robosc.automata.decision import Decision
 from robosc.supervisor.conditions import state_predicate, state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
-from robosc.verification import Outcome, Verification, synthesize_explicit, verify
+from robosc.verification import Outcome, Verification, synthesize_explicit, verify_explicitly
 from robosc.verification.symbolic import verify_symbolically
 from support.effort import seeds
 from support.random_systems import wide_system
@@ -19,7 +19,7 @@ LIMIT = 20_000
 
 
 def verdicts(made: System, added: dict[str, Decision], initial: Decision | None) -> tuple[Verification, Verification]:
-    one_by_one = verify(made, added, initial=initial, limit=LIMIT, permissive_limit=LIMIT)
+    one_by_one = verify_explicitly(made, added, initial=initial, limit=LIMIT, permissive_limit=LIMIT)
     on_sets = verify_symbolically(made, added, initial=initial, limit=10**9)
     for name in ("safe", "controllable", "nonblocking"):
         assert getattr(one_by_one, name) == getattr(on_sets, name), name

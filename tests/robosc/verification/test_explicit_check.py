@@ -13,7 +13,7 @@ from robosc.automata.controlled import Added
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import IntegerType, StateTest
 from robosc.model.structure import Deployment
-from robosc.verification import ExplicitSupervisor, Failure, Outcome, Verification, verify
+from robosc.verification import ExplicitSupervisor, Failure, Outcome, Verification, verify_explicitly
 from support.effort import examples
 from support.models import EXAMPLE_NAMES, example_model
 from support.random_systems import disables_something, explicit_supervisor, systems
@@ -62,7 +62,7 @@ def _replay(made: System, added: Added, trace: Sequence[str]) -> set[State]:
 
 
 def test_a_right_supervisor_passes() -> None:
-    found = verify(WALK, RIGHT)
+    found = verify_explicitly(WALK, RIGHT)
     assert _outcomes(found) == (PASSED, PASSED, PASSED, PASSED)
     assert (found.states, found.transitions) == (2, 2)
     assert (found.failures, found.trace, found.message) == ((), (), "")
@@ -71,7 +71,7 @@ def test_a_right_supervisor_passes() -> None:
 @pytest.mark.parametrize(("event", "trace"), [("jump", ("walk", "jump")), ("skate", ("skate", "u_slip"))])
 def test_a_forbidden_request_that_is_allowed_blocks(event: str, trace: tuple[str, ...]) -> None:
     added = {name: condition for name, condition in RIGHT.items() if name != event}
-    found = verify(WALK, added)
+    found = verify_explicitly(WALK, added)
     assert found.nonblocking is FAILED
     assert found.safe is PASSED
     failure = _failure(found, "nonblocking")
@@ -81,7 +81,7 @@ def test_a_forbidden_request_that_is_allowed_blocks(event: str, trace: tuple[str
 
 def test_an_allowed_request_that_is_forbidden_is_found() -> None:
     added = {**RIGHT, "walk": lambda at: False}
-    found = verify(WALK, added)
+    found = verify_explicitly(WALK, added)
     assert _outcomes(found) == (PASSED, PASSED, PASSED, FAILED)
     assert found.message == "not maximally permissive: walk is disabled although it could be allowed in A = home"
     assert found.trace == ()
@@ -89,7 +89,7 @@ def test_an_allowed_request_that_is_forbidden_is_found() -> None:
 
 def test_a_request_forbidden_deep_inside_is_found_there() -> None:
     added = {**RIGHT, "back": lambda at: False}
-    found = verify(WALK, added)
+    found = verify_explicitly(WALK, added)
     failure = _failure(found, "maximally permissive")
     assert failure.trace == ("walk",)
     assert failure.state == ("street",)
@@ -100,16 +100,16 @@ def test_a_bad_state_that_can_be_reached_is_unsafe() -> None:
     made = system(
         automaton("A", ["l -go-> m", "m -u_x-> l", "l -on-> n", "n -off-> l"]), conditions={"u_x": StateTest("A", "l")}
     )
-    found = verify(made, {})
+    found = verify_explicitly(made, {})
     assert found.safe is FAILED
     assert found.message == "not safe: u_x can happen against its requirement in A = m"
     assert found.trace == ("go",)
-    assert _outcomes(verify(made, {"go": lambda at: False})) == (PASSED, PASSED, PASSED, PASSED)
+    assert _outcomes(verify_explicitly(made, {"go": lambda at: False})) == (PASSED, PASSED, PASSED, PASSED)
 
 
 def test_the_environment_does_not_care_about_requirements() -> None:
     made = system(automaton("A", ["l -u_x-> pit"], marked=["l"]), conditions={"u_x": StateTest("A", "pit")})
-    found = verify(made, {})
+    found = verify_explicitly(made, {})
     assert found.states == 2
     assert found.safe is FAILED
     assert _failure(found, "nonblocking").trace == ("u_x",)
@@ -123,16 +123,16 @@ def test_a_range_that_the_environment_can_leave_is_unsafe() -> None:
             variables=[DiscreteVariable("n", IntegerType(0, 2), (0,))],
         )
     )
-    found = verify(made, {})
+    found = verify_explicitly(made, {})
     assert found.safe is FAILED
     assert found.trace == ("ask", "u_got", "ask", "u_got", "ask")
-    assert _outcomes(verify(made, {"ask": lambda at: at[1] != 2})) == (PASSED, PASSED, PASSED, PASSED)
-    assert verify(made, {"ask": lambda at: at[1] == 0}).maximally_permissive is FAILED
+    assert _outcomes(verify_explicitly(made, {"ask": lambda at: at[1] != 2})) == (PASSED, PASSED, PASSED, PASSED)
+    assert verify_explicitly(made, {"ask": lambda at: at[1] == 0}).maximally_permissive is FAILED
 
 
 def test_disabling_an_uncontrollable_event_is_found() -> None:
     made = system(automaton("A", ["home -skate-> ice", "ice -u_slip-> pit", "ice -back-> home"], marked=["home"]))
-    found = verify(made, {"u_slip": lambda at: False})
+    found = verify_explicitly(made, {"u_slip": lambda at: False})
     assert _outcomes(found) == (PASSED, FAILED, PASSED, PASSED)
     assert found.trace == ("skate",)
     assert found.message == "not controllable: the uncontrollable u_slip is disabled in A = ice"
@@ -140,29 +140,29 @@ def test_disabling_an_uncontrollable_event_is_found() -> None:
 
 def test_a_condition_on_an_uncontrollable_event_that_disables_nothing_is_allowed() -> None:
     made = system(automaton("A", ["l -go-> m", "m -u_x-> l"]))
-    assert _outcomes(verify(made, {"u_x": lambda at: at == ("m",)})) == (PASSED, PASSED, PASSED, PASSED)
+    assert _outcomes(verify_explicitly(made, {"u_x": lambda at: at == ("m",)})) == (PASSED, PASSED, PASSED, PASSED)
 
 
 def test_every_requirement_counts_even_if_the_supervisor_adds_nothing() -> None:
     made = system(automaton("A", ["l -go-> m", "m -back-> l"]), conditions={"go": StateTest("A", "m")})
-    found = verify(made, {})
+    found = verify_explicitly(made, {})
     assert found.states == 1
     assert found.safe is PASSED
 
 
 def test_beyond_the_limits_nothing_is_claimed() -> None:
-    assert verify(WALK, RIGHT, limit=1) == Verification(None, None, *[NOT_CHECKED] * 4)  # type: ignore[arg-type]
-    assert _outcomes(verify(WALK, RIGHT, permissive_limit=3)) == (PASSED, PASSED, PASSED, NOT_CHECKED)
+    assert verify_explicitly(WALK, RIGHT, limit=1) == Verification(None, None, *[NOT_CHECKED] * 4)  # type: ignore[arg-type]
+    assert _outcomes(verify_explicitly(WALK, RIGHT, permissive_limit=3)) == (PASSED, PASSED, PASSED, NOT_CHECKED)
 
 
 def test_an_unknown_event_is_refused() -> None:
     with pytest.raises(ValueError, match="does not have: fly"):
-        verify(WALK, {"fly": lambda at: True})
+        verify_explicitly(WALK, {"fly": lambda at: True})
 
 
 def test_it_stops_when_told() -> None:
     with pytest.raises(SynthesisCancelled):
-        verify(WALK, RIGHT, should_stop=lambda: True)
+        verify_explicitly(WALK, RIGHT, should_stop=lambda: True)
 
 
 def _added(made: System, supervisor: ExplicitSupervisor) -> dict[str, Callable[[State], bool]]:
@@ -177,7 +177,7 @@ def _added(made: System, supervisor: ExplicitSupervisor) -> dict[str, Callable[[
 def test_what_is_synthesized_passes(drawn: System) -> None:
     supervisor = explicit_supervisor(drawn)
     assert supervisor is not None
-    found = verify(drawn, _added(drawn, supervisor))
+    found = verify_explicitly(drawn, _added(drawn, supervisor))
     if supervisor.is_empty:
         assert FAILED in (found.safe, found.nonblocking)
     else:
@@ -211,7 +211,7 @@ def test_every_mutant_is_caught_with_a_trace_that_replays(drawn: System, data: s
     ]
     where, event = data.draw(st.sampled_from(places))
     added = _mutant(drawn, supervisor, (where, event))
-    found = verify(drawn, added)
+    found = verify_explicitly(drawn, added)
     if supervisor.allows(where, event):
         assert found.maximally_permissive is FAILED
         assert found.safe is PASSED
@@ -229,6 +229,6 @@ def test_the_examples_have_supervisors_that_pass(name: str, deployment: Deployme
     supervisor = explicit_supervisor(drawn)
     assert supervisor is not None
     assert not supervisor.is_empty
-    found = verify(drawn, _added(drawn, supervisor))
+    found = verify_explicitly(drawn, _added(drawn, supervisor))
     assert _outcomes(found) == (PASSED, PASSED, PASSED, PASSED)
     assert found.states == len(supervisor.reachable)

@@ -19,11 +19,11 @@ from robosc.explanation.obstacles import Obstacle, ObstacleKind, without_marks
 from robosc.explanation.problems import Problems
 from robosc.model.structure import is_tau
 from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import allowed
+from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.runs import Run, ShortestRuns
-from robosc.synthesis.symbolic import Symbols
 from robosc.synthesis.transitions import Steps
-from robosc.synthesis.watch import Watch
 
 
 class HindranceKind(StrEnum):
@@ -112,7 +112,7 @@ class Analysis:
 
     Args:
         encoding: The variables.
-        watch: Watch of the waiting caller.
+        monitor: Monitor of the waiting caller.
         problems: The problem and what is left of it without obstacles.
         obstacles: All of them.
         good: The states that a supervisor may be in.
@@ -123,7 +123,7 @@ class Analysis:
     def __init__(
         self,
         encoding: Encoding,
-        watch: Watch,
+        monitor: ProgressMonitor,
         problems: Problems,
         obstacles: Sequence[Obstacle],
         good: Any,
@@ -132,14 +132,14 @@ class Analysis:
         dropped = tuple(dropped)
         self._encoding = encoding
         self._manager = encoding.manager
-        self._watch = watch
+        self._monitor = monitor
         self._problems = problems
         self._dropped_conditions = {place for item in dropped for place in item.conditions}
         self._dropped_invariants = {place for item in dropped for place in item.invariants}
         self._dropped_ranges = tuple(item for item in dropped if item.range is not None)
         self._automata = without_marks(encoding.system, dropped).automata
         self._ranges = tuple(item for item in obstacles if item.kind is ObstacleKind.RANGE)
-        self._symbols = Symbols(encoding)
+        self._encoder = ExpressionEncoder(encoding)
         self._fixed_point, self._problem = problems.without(dropped)
         self._steps = {steps.event.name: steps for steps in self._problem.steps}
         safe = self._problem.safe
@@ -163,7 +163,7 @@ class Analysis:
                 (
                     automaton.name,
                     self._encoding.any_of(
-                        self._encoding.in_location(automaton.name, edge.source) & self._symbols.holds(edge.guard)
+                        self._encoding.in_location(automaton.name, edge.source) & self._encoder.holds(edge.guard)
                         for edge in automaton.edges
                         if edge.event == event
                     ),
@@ -244,7 +244,7 @@ class Analysis:
 
     def _runs(self, steps: Mapping[str, Steps], start: Any, possible: Mapping[str, Any]) -> ShortestRuns:
         chosen = [item for name, item in steps.items() if name in possible]
-        return ShortestRuns(self._encoding, self._watch, chosen, possible, start)
+        return ShortestRuns(self._encoding, self._monitor, chosen, possible, start)
 
     def trouble_after(self, start: Any) -> Trouble:
         """Return a run into trouble from one of some states that must be avoided."""
@@ -354,7 +354,7 @@ class Analysis:
         )
 
     def _way(self, steps: Mapping[str, Steps], possible: Mapping[str, Any], start: Any, goal: Any) -> Run | None:
-        return ShortestRuns(self._encoding, self._watch, tuple(steps.values()), possible, start).run_to(goal)
+        return ShortestRuns(self._encoding, self._monitor, tuple(steps.values()), possible, start).run_to(goal)
 
     def predicate(self, state: State) -> Any:
         """Return the predicate that is true where the state is this one."""

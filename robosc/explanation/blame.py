@@ -8,7 +8,7 @@ from robosc.automata.structure import System
 from robosc.explanation.analysis import Analysis
 from robosc.explanation.conflict import minimal_conflict, minimal_removal
 from robosc.explanation.obstacles import Obstacle, ObstacleKind, obstacles_of
-from robosc.explanation.problems import BoundedWatch, EffortSpentError, Problems
+from robosc.explanation.problems import BoundedMonitor, EffortSpentError, Problems
 from robosc.explanation.reports import Reporter
 from robosc.explanation.structure import Blamed, EmptyExplanation
 from robosc.explanation.terms import Terms
@@ -16,7 +16,7 @@ from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.findings import questions_about
-from robosc.synthesis.result import Progress
+from robosc.synthesis.result import SynthesisProgress
 from robosc.synthesis.workspace import Workspace, workspace
 
 EFFORT = 100
@@ -50,19 +50,19 @@ class Blame:
     removal: tuple[int, ...] | None
 
 
-def find_blame(problems: Problems, obstacles: Sequence[Obstacle], false: Any, watch: BoundedWatch) -> Blame:
+def find_blame(problems: Problems, obstacles: Sequence[Obstacle], false: Any, monitor: BoundedMonitor) -> Blame:
     """Find what is to blame for a problem without a supervisor.
 
     Args:
         problems: The problem.
         obstacles: Obstacles that it could be without; those to be blamed rather than others first.
         false: The predicate that is true nowhere.
-        watch: Watch that bounds the work; beyond its limit what has been found so far is reported.
+        monitor: Monitor that bounds the work; beyond its limit what has been found so far is reported.
 
     Raises:
         SynthesisCancelled: The work is to end.
     """
-    search = _Search(problems, obstacles, false, watch)
+    search = _Search(problems, obstacles, false, monitor)
     conflict, sufficing, removal = None, None, None
     try:
         conflict = minimal_conflict(range(len(obstacles)), search.is_empty)
@@ -90,11 +90,11 @@ def _to_keep(obstacles: Sequence[Obstacle], conflict: Sequence[int]) -> tuple[in
 class _Search:
     """Remembers what was asked, and the smallest set that was found to leave no supervisor."""
 
-    def __init__(self, problems: Problems, obstacles: Sequence[Obstacle], false: Any, watch: BoundedWatch) -> None:
+    def __init__(self, problems: Problems, obstacles: Sequence[Obstacle], false: Any, monitor: BoundedMonitor) -> None:
         self._problems = problems
         self._obstacles = obstacles
         self._false = false
-        self._watch = watch
+        self._monitor = monitor
         self.everything = range(len(obstacles))
         self.smallest = frozenset(self.everything)
         self._known: dict[frozenset[int], bool] = {}
@@ -122,7 +122,7 @@ def explain_empty(
     deployment: Deployment,
     engine: str | EngineOptions = "auto",
     should_stop: Callable[[], bool] = lambda: False,
-    on_progress: Callable[[Progress], None] = lambda progress: None,
+    on_progress: Callable[[SynthesisProgress], None] = lambda progress: None,
 ) -> EmptyExplanation:
     """Explain why a model has no supervisor.
 
@@ -139,15 +139,15 @@ def explain_empty(
         SynthesisCancelled: `should_stop` became true.
     """
     with workspace(system, engine, should_stop, on_progress) as place:
-        watch = BoundedWatch(place.watch)
+        monitor = BoundedMonitor(place.monitor)
         obstacles = obstacles_of(system, questions_about(model, system, deployment).restrictions)
-        problems = Problems(place.encoding, watch)
-        return explain_lost(place, watch, problems, obstacles, Terms(model, places, system, obstacles))
+        problems = Problems(place.encoding, monitor)
+        return explain_lost(place, monitor, problems, obstacles, Terms(model, places, system, obstacles))
 
 
 def explain_lost(
     place: Workspace,
-    watch: BoundedWatch,
+    monitor: BoundedMonitor,
     problems: Problems,
     obstacles: Sequence[Obstacle],
     terms: Terms,
@@ -157,14 +157,14 @@ def explain_lost(
     fixed_point, problem = problems.without(())
     fixed_point.good_states(problem, false)
     # What one synthesis takes, encoding and all, tells how large the problem is.
-    watch.limit = max(LEAST_EFFORT, EFFORT * watch.steps)
+    monitor.limit = max(LEAST_EFFORT, EFFORT * monitor.steps)
     with place.reordering():
-        blame = find_blame(problems, obstacles, false, watch)
-    watch.limit = None
+        blame = find_blame(problems, obstacles, false, monitor)
+    monitor.limit = None
     # The trouble is that of what is blamed alone: so both tell one story.
     blamed = set(blame.conflict)
     dropped = (item for place, item in enumerate(obstacles) if place not in blamed)
-    analysis = Analysis(encoding, watch, problems, obstacles, false, dropped)
+    analysis = Analysis(encoding, monitor, problems, obstacles, false, dropped)
     trouble = Reporter(analysis, terms).trouble(analysis.trouble_after(fixed_point.initial))
     sufficing, removal = blame.sufficing, blame.removal or ()
     return EmptyExplanation(

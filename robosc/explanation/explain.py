@@ -13,7 +13,7 @@ from robosc.explanation.analysis import Analysis, Detour, Hindrance, HindranceKi
 from robosc.explanation.blame import explain_lost
 from robosc.explanation.conflict import minimal_conflict
 from robosc.explanation.obstacles import obstacles_of
-from robosc.explanation.problems import BoundedWatch, Problems
+from robosc.explanation.problems import BoundedMonitor, Problems
 from robosc.explanation.reports import Reporter
 from robosc.explanation.requests import MAXIMUM_SHOWN, RequestError, asked_event, asked_run, asked_state
 from robosc.explanation.structure import EventHere, EventReport, Explanation, Reason, Remark, StateReport
@@ -25,12 +25,12 @@ from robosc.source import visible
 from robosc.synthesis.controlled import ControlledSystem
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import EngineOptions
+from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.findings import findings, questions_about
+from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.nodes import count_models
-from robosc.synthesis.result import Progress
+from robosc.synthesis.result import SynthesisProgress
 from robosc.synthesis.runs import Run, decoded
-from robosc.synthesis.symbolic import Symbols
-from robosc.synthesis.watch import Watch
 from robosc.synthesis.workspace import workspace
 
 MAXIMUM_STATES = 5
@@ -51,7 +51,7 @@ def explain_synthesis(
     state: str | None = None,
     after: str | None = None,
     should_stop: Callable[[], bool] = lambda: False,
-    on_progress: Callable[[Progress], None] = lambda progress: None,
+    on_progress: Callable[[SynthesisProgress], None] = lambda progress: None,
 ) -> Explanation:
     """Explain what synthesis did to a model.
 
@@ -78,30 +78,30 @@ def explain_synthesis(
     condition = None if state is None else asked_state(system, model, state)
     run = None if after is None else asked_run(system, model, after)
     with workspace(system, engine, should_stop, on_progress) as place:
-        encoding, watch = place.encoding, BoundedWatch(place.watch)
+        encoding, monitor = place.encoding, BoundedMonitor(place.monitor)
         obstacles = obstacles_of(system, questions_about(model, system, deployment).restrictions)
-        problems = Problems(encoding, watch)
+        problems = Problems(encoding, monitor)
         terms = Terms(model, places, system, obstacles)
         fixed_point, problem = problems.without(())
         with place.reordering():
             good = fixed_point.good_states(problem, encoding.manager.false)
             reachable = None if good.reason else fixed_point.reachable_states(problem, good.states)
         if good.reason:
-            return Explanation(empty=explain_lost(place, watch, problems, obstacles, terms))
-        analysis = Analysis(encoding, watch, problems, obstacles, good.states)
+            return Explanation(empty=explain_lost(place, monitor, problems, obstacles, terms))
+        analysis = Analysis(encoding, monitor, problems, obstacles, good.states)
         explainer = _Explainer(
-            encoding, watch, system, analysis, Reporter(analysis, terms), reachable, fixed_point.initial
+            encoding, monitor, system, analysis, Reporter(analysis, terms), reachable, fixed_point.initial
         )
         if condition is not None or run is not None:
             fitting = reachable
             if run is not None:
                 fitting = explainer.after(run)
             if condition is not None:
-                fitting = explainer.fitting(fitting, Symbols(encoding).holds(condition), str(state))
+                fitting = explainer.fitting(fitting, ExpressionEncoder(encoding).holds(condition), str(state))
             return Explanation(state=explainer.state(fitting, name, run))
         if name is not None:
             return Explanation(events=(explainer.event(name, has_behaviours=True),))
-        controlled = ControlledSystem(encoding, watch, problem, good.states, reachable)
+        controlled = ControlledSystem(encoding, monitor, problem, good.states, reachable)
         diagnostics = findings(model, places, controlled.answers(questions_about(model, system, deployment)))
         return Explanation(
             events=tuple(explainer.event(item.name) for item in system.events if item.is_controllable),
@@ -125,7 +125,7 @@ class _Explainer:
     def __init__(
         self,
         encoding: Encoding,
-        watch: Watch,
+        monitor: ProgressMonitor,
         system: System,
         analysis: Analysis,
         reporter: Reporter,
@@ -133,7 +133,7 @@ class _Explainer:
         initial: Any,
     ) -> None:
         self._encoding = encoding
-        self._watch = watch
+        self._monitor = monitor
         self._false = encoding.manager.false
         self._system = system
         self._analysis = analysis
@@ -278,7 +278,7 @@ class _Explainer:
         """States of components that the controlled system never gets to."""
         for component in model.components:
             for location in component.behaviour.states if component.behaviour else ():
-                self._watch.check_stop()
+                self._monitor.check_stop()
                 goal = self._encoding.in_location(component.name, location.name)
                 if goal & self._reachable != self._false:
                     continue
@@ -312,7 +312,7 @@ class _Explainer:
         count = count_models(self._encoding.manager, states, self._encoding.state_names)
         left, shown = states, 0
         while left != self._false and shown < MAXIMUM_STATES:
-            self._watch.check_stop()
+            self._monitor.check_stop()
             run = self._run_to(left)
             shown += 1
             where = f"after {events_text(run.events)}" if run.events else "in the initial state"

@@ -12,26 +12,26 @@ from robosc.automata.state import Subject
 from robosc.automata.structure import System
 from robosc.explanation.obstacles import Obstacle, without_marks, without_ranges
 from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import FixedPoint, Problem
-from robosc.synthesis.symbolic import Symbols
+from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.transitions import Steps, transition_of
-from robosc.synthesis.watch import Watch
 
 
 class EffortSpentError(Exception):
     """The work has taken more steps than it may."""
 
 
-class BoundedWatch(Watch):
-    """A watch that counts steps, and ends the work at a limit once one is set.
+class BoundedMonitor(ProgressMonitor):
+    """A monitor that counts steps, and ends the work at a limit once one is set.
 
     Args:
-        watch: Watch of the waiting caller.
+        monitor: Monitor of the waiting caller.
     """
 
-    def __init__(self, watch: Watch) -> None:
+    def __init__(self, monitor: ProgressMonitor) -> None:
         super().__init__(lambda: False, lambda progress: None)
-        self._watch = watch
+        self._monitor = monitor
         self.steps = 0
         """Steps so far; the same for every engine."""
         self.limit: int | None = None
@@ -44,14 +44,14 @@ class BoundedWatch(Watch):
             SynthesisCancelled: The work is to end.
             EffortSpentError: It has taken more steps than it may.
         """
-        self._watch.check_stop()
+        self._monitor.check_stop()
         self.steps += 1
         if self.limit is not None and self.steps > self.limit:
             raise EffortSpentError
 
     def tell(self, phase: str, rounds: int, states: Any) -> None:
         """Pass on progress."""
-        self._watch.tell(phase, rounds, states)
+        self._monitor.tell(phase, rounds, states)
 
 
 class Problems:
@@ -59,15 +59,15 @@ class Problems:
 
     Args:
         encoding: The variables.
-        watch: Watch of the waiting caller.
+        monitor: Monitor of the waiting caller.
     """
 
-    def __init__(self, encoding: Encoding, watch: Watch) -> None:
+    def __init__(self, encoding: Encoding, monitor: ProgressMonitor) -> None:
         self._encoding = encoding
-        self._watch = watch
+        self._monitor = monitor
         # Copies share the manager and its variables; only what their automata may do and have marked differs.
         self._variant = copy(encoding)
-        self._symbols = Symbols(encoding)
+        self._encoder = ExpressionEncoder(encoding)
         self._events = {event.name: event for event in encoding.system.events}
         self._written = _written(encoding.system)
         self._base: dict[tuple[str, frozenset[Obstacle]], Steps] = {}
@@ -99,14 +99,14 @@ class Problems:
         safe = self._encoding.all_of([self._encoding.valid_states(), *(self.invariant(place) for place in kept)])
         marked = copy(self._encoding)
         marked.system = without_marks(self._encoding.system, obstacles)
-        return FixedPoint(marked, self._watch), Problem(steps, safe)
+        return FixedPoint(marked, self._monitor), Problem(steps, safe)
 
     def steps(self, event: str, ranges: Iterable[Obstacle] = ()) -> Steps:
         """Return the steps of an event without some ranges, under its event conditions."""
         mine = frozenset(item for item in ranges if item.range in self._written.get(event, ()))
         found = self._base.get((event, mine))
         if found is None:
-            self._watch.check_stop()
+            self._monitor.check_stop()
             self._variant.system = without_ranges(self._encoding.system, mine)
             transition = transition_of(self._variant, self._events[event])
             found = self._base[event, mine] = Steps(self._encoding, transition)
@@ -119,15 +119,15 @@ class Problems:
     def condition(self, place: int) -> Any:
         """Return the states where an event condition is true."""
         if place not in self._conditions:
-            self._watch.check_stop()
-            self._conditions[place] = self._symbols.holds(self._encoding.system.conditions[place].condition)
+            self._monitor.check_stop()
+            self._conditions[place] = self._encoder.holds(self._encoding.system.conditions[place].condition)
         return self._conditions[place]
 
     def invariant(self, place: int) -> Any:
         """Return the states where an invariant is true."""
         if place not in self._invariants:
-            self._watch.check_stop()
-            self._invariants[place] = self._symbols.holds(self._encoding.system.invariants[place])
+            self._monitor.check_stop()
+            self._invariants[place] = self._encoder.holds(self._encoding.system.invariants[place])
         return self._invariants[place]
 
     def written_by(self, event: str, ranges: Iterable[Obstacle]) -> tuple[Obstacle, ...]:

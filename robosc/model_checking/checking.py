@@ -27,9 +27,9 @@ from robosc.model_checking.formulas import (
 from robosc.model_checking.outcome import Verdict
 from robosc.model_checking.structure import KripkeStructure
 from robosc.supervisor.structure import AddedCondition
-from robosc.synthesis import EngineOptions, Progress
-from robosc.synthesis.step import never_enough
-from robosc.synthesis.symbolic import Symbols
+from robosc.synthesis import EngineOptions, SynthesisProgress
+from robosc.synthesis.expression_encoder import ExpressionEncoder
+from robosc.synthesis.step import never_done
 from robosc.synthesis.workspace import workspace
 
 
@@ -40,7 +40,7 @@ def verify_properties(
     *,
     engine: str | EngineOptions = "auto",
     should_stop: Callable[[], bool] = lambda: False,
-    on_progress: Callable[[Progress], None] = lambda progress: None,
+    on_progress: Callable[[SynthesisProgress], None] = lambda progress: None,
 ) -> tuple[Verdict, ...]:
     """Verify whether properties hold in the controlled system, in their order; the same for every engine.
 
@@ -70,8 +70,8 @@ class _Checker:
     def __init__(self, structure: KripkeStructure) -> None:
         self._structure = structure
         self._manager = structure.manager
-        self._watch = structure.watch
-        self._symbols = Symbols(structure.encoding)
+        self._monitor = structure.monitor
+        self._encoder = ExpressionEncoder(structure.encoding)
         # By identity: to compare formulas would take longer than to work them out. The formula lives in the property.
         self._known: dict[int, tuple[Formula, Any]] = {}
 
@@ -87,7 +87,7 @@ class _Checker:
         """The states in which a formula holds."""
         found = self._known.get(id(formula))
         if found is None:
-            self._watch.check_stop()
+            self._monitor.check_stop()
             found = self._known[id(formula)] = (formula, self._structure.states & self._work_out(formula))
         return found[1]
 
@@ -108,7 +108,7 @@ class _Checker:
     def _work_out(self, formula: Formula) -> Any:
         match formula:
             case Condition(expression=expression):
-                return self._symbols.holds(expression)
+                return self._encoder.holds(expression)
             case Enabled(event=event):
                 return self._structure.enabled(event)
             case Not(operand=operand):
@@ -134,14 +134,14 @@ class _Checker:
                 late, never = self._not(second), self._not(first | second)
                 return self._not(self._until(late, never) | self._forever(late))
 
-    def _leading_to(self, states: Any, is_enough: Callable[[Any], bool] = never_enough) -> Any:
-        return self._until(self._structure.states, states, is_enough)
+    def _leading_to(self, states: Any, is_done: Callable[[Any], bool] = never_done) -> Any:
+        return self._until(self._structure.states, states, is_done)
 
-    def _until(self, through: Any, goal: Any, is_enough: Callable[[Any], bool] = never_enough) -> Any:
+    def _until(self, through: Any, goal: Any, is_done: Callable[[Any], bool] = never_done) -> Any:
         """The least fixed point of `goal or (through and EX ...)`."""
         if goal == self._manager.false:
             return goal
-        return self._structure.leading_to(goal, through, is_enough)
+        return self._structure.leading_to(goal, through, is_done)
 
     def _forever(self, states: Any) -> Any:
         """The greatest fixed point of `states and EX ...`."""
@@ -149,7 +149,7 @@ class _Checker:
         while True:
             kept = states & self._structure.before(states)
             rounds += 1
-            self._watch.tell("states that can stay", rounds, kept)
+            self._monitor.tell("states that can stay", rounds, kept)
             if kept == states:
                 return kept
             states = kept

@@ -60,7 +60,7 @@ class Runs:
     def __init__(self, structure: KripkeStructure) -> None:
         self._structure = structure
         self._manager = structure.manager
-        self._watch = structure.watch
+        self._monitor = structure.monitor
 
     def path(self, start: Any, within: Any, goal: Any) -> Path:
         """A path from a single state to one of `goal`; every state before its last is one of `within`.
@@ -112,7 +112,7 @@ class Runs:
         while True:
             kept = ahead & self._structure.after(ahead)
             rounds += 1
-            self._watch.tell("cycles", rounds, kept)
+            self._monitor.tell("cycles", rounds, kept)
             if kept == ahead:
                 return kept
             ahead = kept
@@ -130,13 +130,13 @@ class Runs:
                 layers.append(_Layer(found, self._structure.moves))
             else:
                 for move in self._structure.moves:
-                    self._watch.check_stop()
+                    self._monitor.check_stop()
                     found = layers[-1].reached | move.image(layers[-1].reached & within)
                     if found != layers[-1].reached:
                         layers.append(_Layer(found, (move,)))
             if layers[-1].reached == before:
                 return None
-            self._watch.tell("runs", len(layers) - 1, layers[-1].reached)
+            self._monitor.tell("runs", len(layers) - 1, layers[-1].reached)
         return self._back(layers, within, goal)
 
     def _back(self, layers: Sequence[_Layer], within: Any, goal: Any) -> Path:
@@ -159,7 +159,7 @@ class Runs:
     def _before(self, layers: Sequence[_Layer], number: int, state: Any, within: Any) -> tuple[Move, Any]:
         """A move that leads to a state which a layer is the first to have, and the states that it leads there from."""
         for move in layers[number].moves:
-            self._watch.check_stop()
+            self._monitor.check_stop()
             sources = layers[number - 1].reached & within & move.sources(state)
             if sources != self._manager.false:
                 return move, sources

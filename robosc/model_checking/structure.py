@@ -17,7 +17,7 @@ from robosc.synthesis.closure import closure_under
 from robosc.synthesis.encoding import Bits, Encoding
 from robosc.synthesis.fixed_point import initial_states
 from robosc.synthesis.nodes import cofactors, is_constant, support
-from robosc.synthesis.step import Step, never_enough
+from robosc.synthesis.step import Step, never_done
 from robosc.synthesis.transitions import Steps, transition_of
 from robosc.synthesis.workspace import Workspace
 
@@ -53,23 +53,23 @@ class KripkeStructure:
     """
 
     def __init__(self, system: System, place: Workspace, added: Sequence[AddedCondition]) -> None:
-        encoding, watch = place.encoding, place.watch
+        encoding, monitor = place.encoding, place.monitor
         self.encoding = encoding
         self.manager = encoding.manager
-        self.watch = watch
+        self.monitor = monitor
         self.initial = initial_states(encoding)
         conditions = {item.event: item.condition for item in added}
         steps: list[tuple[Steps, Any]] = []
         for event in system.events:
-            watch.check_stop()
+            monitor.check_stop()
             found = Steps(encoding, transition_of(encoding, event))
             allowed = found.plant & found.condition if event.is_controllable else self.manager.true
             if event.name in conditions:
                 allowed = allowed & diagram_predicate(encoding, conditions[event.name])
             steps.append((found, allowed))
-            watch.tell("encoding", len(steps), found.plant)
+            monitor.tell("encoding", len(steps), found.plant)
         with place.reordering():
-            closure = closure_under(encoding, starmap(self._onwards, steps), self.manager.true, watch)
+            closure = closure_under(encoding, starmap(self._onwards, steps), self.manager.true, monitor)
             self.states = closure.of(self.initial, "reachability")
         self._backwards = tuple(starmap(self._towards, steps))
         moves = [self._move(found, self.states & allowed) for found, allowed in steps]
@@ -88,17 +88,17 @@ class KripkeStructure:
     def _names(self, steps: Steps, allowed: Any) -> frozenset[str]:
         return steps.names | support(self.manager, allowed)
 
-    def leading_to(self, goal: Any, through: Any, is_enough: Callable[[Any], bool] = never_enough) -> Any:
+    def leading_to(self, goal: Any, through: Any, is_done: Callable[[Any], bool] = never_done) -> Any:
         """Return a goal, and the states from which runs through some states lead to it.
 
         Args:
             goal: States in which the runs end.
             through: States in which they may be before.
-            is_enough: Function called again and again with what has been found; once it returns true, the rest is not
+            is_done: Function called again and again with what has been found; once it returns true, the rest is not
                 found.
         """
-        closure = closure_under(self.encoding, self._backwards, goal | (through & self.states), self.watch)
-        return closure.of(goal, "states that lead there", is_enough)
+        closure = closure_under(self.encoding, self._backwards, goal | (through & self.states), self.monitor)
+        return closure.of(goal, "states that lead there", is_done)
 
     def _move(self, steps: Steps, allowed: Any) -> Move:
         return Move(
@@ -115,7 +115,7 @@ class KripkeStructure:
         """The states that some move leads into `states` from."""
         found = self.manager.false
         for move in self.moves:
-            self.watch.check_stop()
+            self.monitor.check_stop()
             found = found | move.sources(states)
         return found
 
@@ -123,7 +123,7 @@ class KripkeStructure:
         """The states that some move leads to from `states`."""
         found = self.manager.false
         for move in self.moves:
-            self.watch.check_stop()
+            self.monitor.check_stop()
             found = found | move.image(states)
         return found
 

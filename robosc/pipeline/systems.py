@@ -16,8 +16,7 @@ from robosc.supervisor.conditions import state_predicate, state_predicates
 from robosc.supervisor.diagram import diagram_domains
 from robosc.supervisor.structure import AddedCondition, DecisionDiagram
 from robosc.supervisor.words import Formulas
-from robosc.synthesis import Progress as SynthesisProgress
-from robosc.synthesis import Statistics, synthesize
+from robosc.synthesis import Statistics, SynthesisProgress, synthesize
 from robosc.synthesis import SynthesisStatus as CoreStatus
 from robosc.tables import html_table
 from robosc.verification import Limits, VerificationReport, verify, verify_explicitly

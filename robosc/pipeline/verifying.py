@@ -29,8 +29,7 @@ from robosc.supervisor import Progress, SynthesisOutcome
 from robosc.supervisor.recheck import verify_supervisor_file
 from robosc.supervisor.recheck_report import file_verification_json, file_verification_text, has_passed, malformed_json
 from robosc.supervisor.structure import Supervisor as CoreSupervisor
-from robosc.synthesis import EngineOptions
-from robosc.synthesis import Progress as SynthesisProgress
+from robosc.synthesis import EngineOptions, SynthesisProgress
 from robosc.synthesis.engines import resolve_engine
 from robosc.verification import Limits
 

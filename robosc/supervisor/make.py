@@ -26,12 +26,12 @@ from robosc.supervisor.structure import Supervisor
 from robosc.synthesis import (
     EngineOptions,
     Statistics,
+    SynthesisProgress,
     SynthesisStatus,
     findings,
     questions_about,
     synthesize,
 )
-from robosc.synthesis import Progress as SynthesisProgress
 from robosc.verification import DEFAULT_STATES, Limits
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from robosc.synthesis.engines import EngineOptions, UnknownEngineError, engine_names, register, resolve_engine
 from robosc.synthesis.findings import findings, questions_about
 from robosc.synthesis.questions import Answers, Cause, Never, Questions, Restriction, Together
-from robosc.synthesis.result import Progress, Statistics, SynthesisResult, SynthesisStatus
+from robosc.synthesis.result import Statistics, SynthesisProgress, SynthesisResult, SynthesisStatus
 from robosc.synthesis.synthesize import synthesize
 
 __all__ = [
@@ -11,10 +11,10 @@ __all__ = [
     "Cause",
     "EngineOptions",
     "Never",
-    "Progress",
     "Questions",
     "Restriction",
     "Statistics",
+    "SynthesisProgress",
     "SynthesisResult",
     "SynthesisStatus",
     "Together",

@@ -6,12 +6,12 @@ from typing import Any
 
 from robosc.synthesis.closure import closure_under
 from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import FixedPoint, Problem, allowed, initial_states, safe_states
+from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.questions import Cause, Never
 from robosc.synthesis.step import Step
-from robosc.synthesis.symbolic import Symbols
 from robosc.synthesis.transitions import Steps
-from robosc.synthesis.watch import Watch
 
 
 class Causes:
@@ -19,16 +19,18 @@ class Causes:
 
     Args:
         encoding: The variables.
-        watch: Watch for the waiting caller.
+        monitor: Monitor of the waiting caller.
         problem: Problem that was solved.
         good: Its good states.
         reachable: States of the controlled system.
     """
 
-    def __init__(self, encoding: Encoding, watch: Watch, problem: Problem, good: Any, reachable: Any) -> None:
+    def __init__(
+        self, encoding: Encoding, monitor: ProgressMonitor, problem: Problem, good: Any, reachable: Any
+    ) -> None:
         self._encoding = encoding
         self._false = encoding.manager.false
-        self._watch = watch
+        self._monitor = monitor
         self._problem = problem
         self._good = good
         self._reachable = reachable
@@ -66,7 +68,7 @@ class Causes:
             return Step(lambda states: steps.image(states & source), steps.names)
 
         steps = map(onwards, self._problem.steps)
-        closure = closure_under(self._encoding, steps, self._encoding.manager.true, self._watch)
+        closure = closure_under(self._encoding, steps, self._encoding.manager.true, self._monitor)
         return closure.of(initial_states(self._encoding), "reachability")
 
     def _is_possible_without_invariants(self, steps: Steps) -> bool:
@@ -78,13 +80,13 @@ class Causes:
     @cached_property
     def _without_invariants(self) -> tuple[Any, Any]:
         """Good states, and states of the controlled system, if nothing had to hold always."""
-        fixed_point = FixedPoint(self._encoding, self._watch)
+        fixed_point = FixedPoint(self._encoding, self._monitor)
         problem = Problem(self._problem.steps, safe_states(self._encoding, ()))
         good = fixed_point.good_states(problem, known=self._good).states
         return good, fixed_point.reachable_states(problem, good)
 
     def _broken(self, states: Any) -> tuple[int, ...]:
         """The invariants that some of the states break."""
-        holds = Symbols(self._encoding).holds
+        holds = ExpressionEncoder(self._encoding).holds
         invariants = enumerate(self._encoding.system.invariants)
         return tuple(place for place, item in invariants if not self._is_nowhere(states & ~holds(item)))

@@ -13,8 +13,8 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from robosc.synthesis.step import Step, never_enough
-from robosc.synthesis.watch import Watch
+from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.step import Step, never_done
 
 
 class Chaining:
@@ -24,30 +24,30 @@ class Chaining:
         levels: The level of each current-state variable at the beginning.
         steps: The steps; of equally close and low ones the first is taken first.
         within: Predicate that added states have to satisfy.
-        watch: Watch for the waiting caller.
+        monitor: Monitor of the waiting caller.
     """
 
-    def __init__(self, levels: Mapping[str, int], steps: Sequence[Step], within: Any, watch: Watch) -> None:
+    def __init__(self, levels: Mapping[str, int], steps: Sequence[Step], within: Any, monitor: ProgressMonitor) -> None:
         def distance_and_height(step: Step) -> tuple[int, int]:
             touched = [levels[name] for name in step.names]
             return (max(touched) - min(touched), -min(touched)) if touched else (0, 0)
 
         self._steps = sorted(steps, key=distance_and_height)
         self._within = within
-        self._watch = watch
+        self._monitor = monitor
         users: defaultdict[str, set[int]] = defaultdict(set)
         for number, step in enumerate(self._steps):
             for name in step.names:
                 users[name].add(number)
         self._after = [sorted(set().union(*(users[name] for name in step.names))) for step in self._steps]
 
-    def of(self, states: Any, phase: str, is_enough: Callable[[Any], bool] = never_enough) -> Any:
+    def of(self, states: Any, phase: str, is_done: Callable[[Any], bool] = never_done) -> Any:
         """Return `states` and all that steps from them add.
 
         Args:
             states: States to begin with; they satisfy the predicate for added states.
             phase: Phase for which progress is reported.
-            is_enough: Function called with what has been found whenever that has grown; once it returns true, the
+            is_done: Function called with what has been found whenever that has grown; once it returns true, the
                 rest is not found.
         """
         if not self._steps:
@@ -60,24 +60,24 @@ class Chaining:
                 # What states have to keep to may read more than a step does, so each has the last word.
                 number = next((n for n, step in enumerate(self._steps) if self._grown(step, states) != states), None)
                 if number is None:
-                    self._watch.tell(phase, told + 1, states)
+                    self._monitor.tell(phase, told + 1, states)
                     return states
             grown = self._grown(self._steps[number], states)
             taken += 1
             while grown != states:
                 states = grown
                 work.add(self._after[number])
-                if is_enough(states):
-                    self._watch.tell(phase, told + 1, states)
+                if is_done(states):
+                    self._monitor.tell(phase, told + 1, states)
                     return states
                 grown = self._grown(self._steps[number], states)
                 taken += 1
             if taken >= (told + 1) * len(self._steps):
                 told += 1
-                self._watch.tell(phase, told, states)
+                self._monitor.tell(phase, told, states)
 
     def _grown(self, step: Step, states: Any) -> Any:
-        self._watch.check_stop()
+        self._monitor.check_stop()
         return states | (self._within & step.add(states))
 
 

@@ -11,21 +11,23 @@ from typing import Any
 from robosc.synthesis.chaining import Chaining
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import is_reordering
+from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.saturation import Saturation
 from robosc.synthesis.step import Step
-from robosc.synthesis.watch import Watch
 
 
-def closure_under(encoding: Encoding, steps: Iterable[Step], within: Any, watch: Watch) -> Chaining | Saturation:
+def closure_under(
+    encoding: Encoding, steps: Iterable[Step], within: Any, monitor: ProgressMonitor
+) -> Chaining | Saturation:
     """Return the closure of sets of states under some steps that suits its manager best.
 
     Args:
         encoding: The variables.
         steps: The steps.
         within: Predicate that added states have to satisfy.
-        watch: Watch for the waiting caller.
+        monitor: Monitor of the waiting caller.
     """
     levels = {name: level for level, name in enumerate(encoding.order)}
     if is_reordering(encoding.manager):
-        return Chaining(levels, tuple(steps), within, watch)
-    return Saturation(encoding.manager, levels, tuple(steps), within, watch)
+        return Chaining(levels, tuple(steps), within, monitor)
+    return Saturation(encoding.manager, levels, tuple(steps), within, monitor)

@@ -6,12 +6,12 @@ from typing import Any
 from robosc.expressions import Expression
 from robosc.synthesis.causes import Causes
 from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import FixedPoint, Problem, allowed, initial_states, safe_states
+from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.questions import Answers, Never, Questions, Restriction, Together
 from robosc.synthesis.runs import ShortestRuns
-from robosc.synthesis.symbolic import Symbols
 from robosc.synthesis.transitions import Steps
-from robosc.synthesis.watch import Watch
 
 MAXIMUM_TOGETHER = 100
 """Pairs of rivals that are told: a hundred requests on one identifier make thousands, which would tell nothing new."""
@@ -22,22 +22,24 @@ class ControlledSystem:
 
     Args:
         encoding: The variables.
-        watch: Watch for the waiting caller.
+        monitor: Monitor of the waiting caller.
         problem: Problem that was solved.
         good: Its good states.
         reachable: States of the controlled system.
     """
 
-    def __init__(self, encoding: Encoding, watch: Watch, problem: Problem, good: Any, reachable: Any) -> None:
+    def __init__(
+        self, encoding: Encoding, monitor: ProgressMonitor, problem: Problem, good: Any, reachable: Any
+    ) -> None:
         self._encoding = encoding
         self._manager = encoding.manager
-        self._watch = watch
+        self._monitor = monitor
         self._problem = problem
         self._good = good
         self._reachable = reachable
-        self._symbols = Symbols(encoding)
+        self._encoder = ExpressionEncoder(encoding)
         self._steps = {steps.event.name: steps for steps in problem.steps}
-        self._causes = Causes(encoding, watch, problem, good, reachable)
+        self._causes = Causes(encoding, monitor, problem, good, reachable)
         self._known: dict[str, Any] = {}
 
     def answers(self, questions: Questions) -> Answers:
@@ -57,7 +59,7 @@ class ControlledSystem:
         """The states of the controlled system in which an event can happen."""
         found = self._known.get(event)
         if found is None:
-            self._watch.check_stop()
+            self._monitor.check_stop()
             steps = self._steps[event]
             found = self._known[event] = self._reachable & steps.plant & allowed(steps, self._good)
         return found
@@ -100,8 +102,8 @@ class ControlledSystem:
         return False
 
     def _holds(self, condition: Expression) -> Any:
-        self._watch.check_stop()
-        return self._symbols.holds(condition)
+        self._monitor.check_stop()
+        return self._encoder.holds(condition)
 
     def _supervisor_disables(self) -> bool:
         return any(
@@ -127,7 +129,7 @@ class ControlledSystem:
     def _is_the_same_without(self, restrictions: Sequence[Restriction]) -> bool:
         """Return True if the controlled system of the problem without some restrictions allows nothing more."""
         problem = self._without(restrictions)
-        good = FixedPoint(self._encoding, self._watch).good_states(problem, known=self._good)
+        good = FixedPoint(self._encoding, self._monitor).good_states(problem, known=self._good)
         return all(
             self._reachable & steps.plant & allowed(steps, good.states) == self._possible(steps.event.name)
             for steps in problem.steps
@@ -159,7 +161,7 @@ class ControlledSystem:
             return ()
         possible = {name: self._reachable & allowed(steps, self._good) for name, steps in self._steps.items()}
         start = initial_states(self._encoding) & self._good
-        runs = ShortestRuns(self._encoding, self._watch, self._problem.steps, possible, start)
+        runs = ShortestRuns(self._encoding, self._monitor, self._problem.steps, possible, start)
         return tuple(Together(first, second, runs.trace_to(states)) for first, second, states in pairs)
 
     def _pairs(self, groups: Iterable[Sequence[str]]) -> Iterator[tuple[str, str, Any]]:

@@ -14,12 +14,12 @@ from robosc.expressions import Expression
 from robosc.synthesis.chaining import Chaining
 from robosc.synthesis.closure import closure_under
 from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.expression_encoder import ExpressionEncoder
+from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.nodes import support
 from robosc.synthesis.saturation import Saturation
 from robosc.synthesis.step import Step
-from robosc.synthesis.symbolic import Symbols
 from robosc.synthesis.transitions import Steps
-from robosc.synthesis.watch import Watch
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,18 +52,18 @@ class GoodStates:
 
 def safe_states(encoding: Encoding, invariants: Iterable[Expression]) -> Any:
     """Return the predicate that is true where every place of the state encodes a value and every invariant holds."""
-    symbols = Symbols(encoding)
-    return encoding.all_of([encoding.valid_states(), *(symbols.holds(item) for item in invariants)])
+    encoder = ExpressionEncoder(encoding)
+    return encoding.all_of([encoding.valid_states(), *(encoder.holds(item) for item in invariants)])
 
 
 def initial_states(encoding: Encoding) -> Any:
     """Return the states in which the uncontrolled system may begin."""
-    return encoding.initial_places() & Symbols(encoding).holds(encoding.system.initial)
+    return encoding.initial_places() & ExpressionEncoder(encoding).holds(encoding.system.initial)
 
 
 def marked_states(encoding: Encoding) -> Any:
     """The marked states."""
-    return encoding.marked_locations() & Symbols(encoding).holds(encoding.system.marker)
+    return encoding.marked_locations() & ExpressionEncoder(encoding).holds(encoding.system.marker)
 
 
 class FixedPoint:
@@ -71,12 +71,12 @@ class FixedPoint:
 
     Args:
         encoding: The variables.
-        watch: Watch for the waiting caller.
+        monitor: Monitor of the waiting caller.
     """
 
-    def __init__(self, encoding: Encoding, watch: Watch) -> None:
+    def __init__(self, encoding: Encoding, monitor: ProgressMonitor) -> None:
         self._encoding = encoding
-        self._watch = watch
+        self._monitor = monitor
         self.initial = initial_states(encoding)
         """The initial states."""
         self.marked = marked_states(encoding)
@@ -105,7 +105,7 @@ class FixedPoint:
                 reason = "uncontrollable events can lead from the initial state into states to be avoided"
                 return GoodStates(good, rounds, reason)
             rounds += 1
-            self._watch.tell("fixed point", rounds, good)
+            self._monitor.tell("fixed point", rounds, good)
             if good == before or (is_closed and good == nonblocking):
                 return GoodStates(good, rounds)
 
@@ -162,11 +162,11 @@ class FixedPoint:
         return source, steps.names | support(self._encoding.manager, source)
 
     def _closure(self, steps: Iterable[Step], within: Any) -> Chaining | Saturation:
-        return closure_under(self._encoding, steps, within, self._watch)
+        return closure_under(self._encoding, steps, within, self._monitor)
 
     def _each(self, problem: Problem) -> Iterator[Steps]:
         for steps in problem.steps:
-            self._watch.check_stop()
+            self._monitor.check_stop()
             yield steps
 
 

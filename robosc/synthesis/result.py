@@ -16,7 +16,7 @@ class SynthesisStatus(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class SynthesisProgress:
     """Progress of a synthesis.
 
     Attributes:

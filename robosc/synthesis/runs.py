@@ -16,9 +16,9 @@ from robosc.automata.compile import State
 from robosc.automata.state import subjects
 from robosc.errors import InternalError
 from robosc.synthesis.encoding import Bits, Encoding
+from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.nodes import cofactors, is_constant
 from robosc.synthesis.transitions import Steps
-from robosc.synthesis.watch import Watch
 
 MAXIMUM_EFFORT = 1_000_000
 """Nodes of all rings together, counted once for each event: up to about a second with the faster engine."""
@@ -57,7 +57,7 @@ class ShortestRuns:
 
     Args:
         encoding: The variables.
-        watch: Watch for the waiting caller.
+        monitor: Monitor of the waiting caller.
         steps: The events, in the order in which equally short runs are preferred.
         possible: For each event the states in which it may happen, such as those of the controlled system.
         start: States in which runs begin.
@@ -66,14 +66,14 @@ class ShortestRuns:
     def __init__(
         self,
         encoding: Encoding,
-        watch: Watch,
+        monitor: ProgressMonitor,
         steps: Sequence[Steps],
         possible: Mapping[str, Any],
         start: Any,
     ) -> None:
         self._encoding = encoding
         self._manager = encoding.manager
-        self._watch = watch
+        self._monitor = monitor
         self._steps = steps
         self._possible = possible
         self._layers = [_Layer(start, ())]
@@ -138,7 +138,7 @@ class ShortestRuns:
         if self._layers[-1].reached == before:
             return False
         self._rounds += 1
-        self._watch.tell("shortest runs", self._rounds, self._layers[-1].reached)
+        self._monitor.tell("shortest runs", self._rounds, self._layers[-1].reached)
         return True
 
     def _add_ring(self) -> None:
@@ -159,14 +159,14 @@ class ShortestRuns:
                 self._layers.append(_Layer(found, (steps,)))
 
     def _image(self, steps: Steps, states: Any) -> Any:
-        self._watch.check_stop()
+        self._monitor.check_stop()
         return steps.image(states & self._possible[steps.event.name])
 
     def _before(self, number: int, state: Any) -> tuple[str, Any]:
         """An event that leads to a state which a layer is the first to have, and states before that it leads from."""
         before = self._layers[number - 1].reached
         for steps in self._layers[number].events:
-            self._watch.check_stop()
+            self._monitor.check_stop()
             sources = before & self._possible[steps.event.name] & steps.some(state)
             if sources != self._manager.false:
                 return steps.event.name, sources

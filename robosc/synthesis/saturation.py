@@ -17,9 +17,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from robosc.synthesis.engines import Manager
+from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.nodes import cofactors, is_constant
-from robosc.synthesis.step import Step, never_enough
-from robosc.synthesis.watch import Watch
+from robosc.synthesis.step import Step, never_done
 
 
 class Saturation:
@@ -30,15 +30,15 @@ class Saturation:
         levels: The level of each current-state variable.
         steps: The steps; of those that begin at one level the first is taken first.
         within: Predicate that added states have to satisfy.
-        watch: Watch for the waiting caller.
+        monitor: Monitor of the waiting caller.
     """
 
     def __init__(
-        self, manager: Manager, levels: Mapping[str, int], steps: Sequence[Step], within: Any, watch: Watch
+        self, manager: Manager, levels: Mapping[str, int], steps: Sequence[Step], within: Any, monitor: ProgressMonitor
     ) -> None:
         self._manager = manager
         self._within = within
-        self._watch = watch
+        self._monitor = monitor
         groups: defaultdict[int, list[Step]] = defaultdict(list)
         for step in steps:
             # One that neither reads nor changes anything leads nowhere.
@@ -50,30 +50,30 @@ class Saturation:
         self._phase = ""
         self._taken = self._told = 0
 
-    def of(self, states: Any, phase: str, is_enough: Callable[[Any], bool] = never_enough) -> Any:
+    def of(self, states: Any, phase: str, is_done: Callable[[Any], bool] = never_done) -> Any:
         """Return `states` and all that steps from them add.
 
         Args:
             states: States to begin with; they satisfy the predicate for added states.
             phase: Phase for which progress is reported.
-            is_enough: Function called with what has been found whenever the topmost steps have added to it; once it
+            is_done: Function called with what has been found whenever the topmost steps have added to it; once it
                 returns true, the rest is not found.
         """
         if not self._groups:
             return states
         self._taken = self._told = 0
         self._phase = phase
-        states = self._of_whole(states, is_enough)
+        states = self._of_whole(states, is_done)
         self._tell(states)
         self._known.clear()
         return states
 
-    def _of_whole(self, states: Any, is_enough: Callable[[Any], bool]) -> Any:
+    def _of_whole(self, states: Any, is_done: Callable[[Any], bool]) -> Any:
         _, topmost = self._groups[0]
-        while not is_enough(states):
+        while not is_done(states):
             before = states = self._saturated(states, self._within, 1)
             for step in topmost:
-                if is_enough(states):
+                if is_done(states):
                     return states
                 states = self._grown(states, self._within, step)
             if states == before:
@@ -123,7 +123,7 @@ class Saturation:
         return cofactors(predicate)
 
     def _grown(self, states: Any, within: Any, step: Step) -> Any:
-        self._watch.check_stop()
+        self._monitor.check_stop()
         self._taken += 1
         if self._taken >= (self._told + 1) * self._count:
             self._tell(states)
@@ -131,4 +131,4 @@ class Saturation:
 
     def _tell(self, states: Any) -> None:
         self._told += 1
-        self._watch.tell(self._phase, self._told, states)
+        self._monitor.tell(self._phase, self._told, states)

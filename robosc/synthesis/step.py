@@ -18,6 +18,6 @@ class Step:
     names: frozenset[str]
 
 
-def never_enough(states: Any) -> bool:
-    """Nothing is enough before all is found."""
+def never_done(states: Any) -> bool:
+    """Return False: the work is done only once all is found."""
     return False

@@ -10,7 +10,7 @@ from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.fixed_point import FixedPoint, Problem, safe_states
 from robosc.synthesis.nodes import count_models
 from robosc.synthesis.questions import Questions
-from robosc.synthesis.result import Progress, Statistics, SynthesisResult, SynthesisStatus
+from robosc.synthesis.result import Statistics, SynthesisProgress, SynthesisResult, SynthesisStatus
 from robosc.synthesis.simplify import Simplifier
 from robosc.synthesis.transitions import Steps, transition_of
 from robosc.synthesis.workspace import Workspace, workspace
@@ -22,7 +22,7 @@ def _never() -> bool:
     return False
 
 
-def _silent(progress: Progress) -> None:
+def _silent(progress: SynthesisProgress) -> None:
     """Tell nobody."""
 
 
@@ -32,7 +32,7 @@ def synthesize(
     engine: str | EngineOptions = "auto",
     questions: Questions = _NOTHING,
     should_stop: Callable[[], bool] = _never,
-    on_progress: Callable[[Progress], None] = _silent,
+    on_progress: Callable[[SynthesisProgress], None] = _silent,
 ) -> SynthesisResult:
     """Synthesize the safe, controllable, nonblocking and maximally permissive supervisor of a system.
 
@@ -58,7 +58,7 @@ class _Synthesis:
 
     def __init__(self, system: System, place: Workspace) -> None:
         self._place = place
-        self._watch = place.watch
+        self._monitor = place.monitor
         self._encoding = place.encoding
         self._manager = place.encoding.manager
         self._problem = Problem(self._steps(), safe_states(self._encoding, system.invariants))
@@ -66,14 +66,14 @@ class _Synthesis:
     def _steps(self) -> tuple[Steps, ...]:
         found: list[Steps] = []
         for event in self._encoding.system.events:
-            self._watch.check_stop()
+            self._monitor.check_stop()
             found.append(Steps(self._encoding, transition_of(self._encoding, event)))
-            self._watch.tell("encoding", len(found), found[-1].plant)
+            self._monitor.tell("encoding", len(found), found[-1].plant)
         return tuple(found)
 
     def result(self, questions: Questions) -> SynthesisResult:
         """The supervisor, or why there is none."""
-        fixed_point = FixedPoint(self._encoding, self._watch)
+        fixed_point = FixedPoint(self._encoding, self._monitor)
         with self._place.reordering():
             good = fixed_point.good_states(self._problem, self._manager.false)
             reachable = None if good.reason else fixed_point.reachable_states(self._problem, good.states)
@@ -84,13 +84,13 @@ class _Synthesis:
         added: list[AddedCondition] = []
         simplifier = Simplifier(self._encoding)
         for steps in self._problem.steps:
-            self._watch.check_stop()
+            self._monitor.check_stop()
             condition = self._added(simplifier, steps, good.states, reachable)
             if condition is not None:
                 added.append(AddedCondition(steps.event.name, condition))
         # The figures are those of the synthesis: what the questions take on top is not in them.
         statistics = self._statistics(good.rounds, states)
-        controlled = ControlledSystem(self._encoding, self._watch, self._problem, good.states, reachable)
+        controlled = ControlledSystem(self._encoding, self._monitor, self._problem, good.states, reachable)
         return SynthesisResult(
             SynthesisStatus.SUPERVISOR,
             tuple(added),
@@ -100,7 +100,7 @@ class _Synthesis:
         )
 
     def _statistics(self, rounds: int, states: int) -> Statistics:
-        return Statistics(self._place.engine, len(self._encoding.state_names), rounds, self._watch.peak_nodes, states)
+        return Statistics(self._place.engine, len(self._encoding.state_names), rounds, self._monitor.peak_nodes, states)
 
     def _added(self, simplifier: Simplifier, steps: Steps, good: Any, reachable: Any) -> DecisionDiagram | None:
         """The condition to add to an event, simplified where it does not matter; None if there is nothing to add."""

@@ -16,8 +16,8 @@ from robosc.automata.structure import Automaton, Edge, Event, Role, System
 from robosc.errors import NondeterministicEventError
 from robosc.synthesis.changes import Leads, leads_of
 from robosc.synthesis.encoding import Bits, Encoding, next_name
+from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.nodes import renamed, support
-from robosc.synthesis.symbolic import Symbols
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class _Arc:
 def transition_of(encoding: Encoding, event: Event) -> Transition:
     """Return the effect of an event of the encoded system."""
     manager, system = encoding.manager, encoding.system
-    symbols = Symbols(encoding, encoding.inputs_of(event.name))
+    encoder = ExpressionEncoder(encoding, encoding.inputs_of(event.name))
     participants = [automaton for automaton in system.automata if event.name in automaton.alphabet]
     # An event in no alphabet belongs to no plant, so it cannot happen.
     plants = [automaton for automaton in participants if automaton.role is Role.PLANT]
@@ -65,7 +65,7 @@ def transition_of(encoding: Encoding, event: Event) -> Transition:
     functions: dict[str, Any] = {}
     out_of_range = manager.false
     for automaton in participants:
-        arcs, choice, is_taken = _arcs(encoding, symbols, automaton, event)
+        arcs, choice, is_taken = _arcs(encoding, encoder, automaton, event)
         if choice is not None:
             hidden += choice.names
             possible = possible & encoding.valid(choice)
@@ -82,19 +82,19 @@ def transition_of(encoding: Encoding, event: Event) -> Transition:
         event=event,
         possible=possible,
         out_of_range=out_of_range,
-        condition=_condition(encoding, symbols, system, event.name),
+        condition=_condition(encoding, encoder, system, event.name),
         watched=watched,
         functions=functions,
         hidden=tuple(hidden),
     )
 
 
-def _condition(encoding: Encoding, symbols: Symbols, system: System, event: str) -> Any:
-    return encoding.all_of(symbols.holds(item.condition) for item in system.conditions if item.event == event)
+def _condition(encoding: Encoding, encoder: ExpressionEncoder, system: System, event: str) -> Any:
+    return encoding.all_of(encoder.holds(item.condition) for item in system.conditions if item.event == event)
 
 
 def _arcs(
-    encoding: Encoding, symbols: Symbols, automaton: Automaton, event: Event
+    encoding: Encoding, encoder: ExpressionEncoder, automaton: Automaton, event: Event
 ) -> tuple[list[_Arc], Bits | None, Any]:
     """The edges of an automaton for an event; where several may be taken, a choice decides; and where one may be.
 
@@ -102,7 +102,7 @@ def _arcs(
         NondeterministicEventError: The event is controllable, and in some state several may be taken.
     """
     guards = [
-        (edge, encoding.in_location(automaton.name, edge.source) & symbols.holds(edge.guard))
+        (edge, encoding.in_location(automaton.name, edge.source) & encoder.holds(edge.guard))
         for edge in automaton.edges
         if edge.event == event.name
     ]
@@ -110,7 +110,7 @@ def _arcs(
     leads = leads_of([edge for edge, _ in guards])
     rivals = _rivals(encoding, guards)
     if not rivals:
-        return [_arc(encoding, symbols, automaton, edge, guard, leads) for edge, guard in guards], None, is_taken
+        return [_arc(encoding, encoder, automaton, edge, guard, leads) for edge, guard in guards], None, is_taken
     if event.is_controllable:
         location = guards[min(rivals)][0].source
         raise NondeterministicEventError(
@@ -121,7 +121,7 @@ def _arcs(
     arcs = []
     for number, (edge, guard) in enumerate(guards):
         taken = guard & encoding.code(choice, rivals[number]) if number in rivals else guard
-        arcs.append(_arc(encoding, symbols, automaton, edge, taken, leads))
+        arcs.append(_arc(encoding, encoder, automaton, edge, taken, leads))
     return arcs, choice, is_taken
 
 
@@ -142,7 +142,9 @@ def _rivals(encoding: Encoding, guards: Sequence[tuple[Edge, Any]]) -> dict[int,
     return found
 
 
-def _arc(encoding: Encoding, symbols: Symbols, automaton: Automaton, edge: Edge, taken: Any, leads: Leads) -> _Arc:
+def _arc(
+    encoding: Encoding, encoder: ExpressionEncoder, automaton: Automaton, edge: Edge, taken: Any, leads: Leads
+) -> _Arc:
     manager = encoding.manager
     written: dict[str, Any] = {}
     out_of_range = manager.false
@@ -154,7 +156,7 @@ def _arc(encoding: Encoding, symbols: Symbols, automaton: Automaton, edge: Edge,
             written[name] = manager.true if (index >> place) & 1 else manager.false
     for update in edge.updates:
         bits = encoding.subjects[Subject(automaton.name, update.variable)]
-        new, leaves = symbols.written(bits, update.expression)
+        new, leaves = encoder.written(bits, update.expression)
         written |= new
         out_of_range = out_of_range | leaves
     return _Arc(taken, written, out_of_range)

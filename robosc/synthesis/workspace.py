@@ -15,8 +15,8 @@ from robosc.synthesis.engines import (
     reordering,
     resolve_engine,
 )
-from robosc.synthesis.result import Progress
-from robosc.synthesis.watch import Watch
+from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.result import SynthesisProgress
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,13 +26,13 @@ class Workspace:
     Attributes:
         engine: Name of the engine that was resolved.
         encoding: The variables.
-        watch: Watch for the waiting caller; it also counts nodes where they are limited.
+        monitor: Monitor of the waiting caller; it also counts nodes where they are limited.
         is_reordering: True if the engine may change its order.
     """
 
     engine: str
     encoding: Encoding
-    watch: Watch
+    monitor: ProgressMonitor
     is_reordering: bool
 
     def reordering(self) -> AbstractContextManager[None]:
@@ -45,7 +45,7 @@ def workspace(
     system: System,
     engine: str | EngineOptions,
     should_stop: Callable[[], bool],
-    on_progress: Callable[[Progress], None],
+    on_progress: Callable[[SynthesisProgress], None],
 ) -> Iterator[Workspace]:
     """A workspace of its own for a system.
 
@@ -63,6 +63,6 @@ def workspace(
     options = engine_options(engine)
     name = resolve_engine(options.name)
     manager = make_manager(name)
-    watch = Watch(should_stop, on_progress, node_check(manager, options.maximum_nodes))
+    monitor = ProgressMonitor(should_stop, on_progress, node_check(manager, options.maximum_nodes))
     with limited(manager, options.maximum_nodes):
-        yield Workspace(name, Encoding(system, manager, watch.check_stop), watch, options.is_reordering)
+        yield Workspace(name, Encoding(system, manager, monitor.check_stop), monitor, options.is_reordering)

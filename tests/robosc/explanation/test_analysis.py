@@ -9,10 +9,10 @@ from robosc.automata.compile import NO_DATA, State, compile_expression
 from robosc.automata.state import Subject, subjects
 from robosc.explanation.analysis import Analysis, Hindrance, HindranceKind
 from robosc.explanation.obstacles import Obstacle, ObstacleKind, obstacles_of, without_ranges
-from robosc.explanation.problems import BoundedWatch, Problems
+from robosc.explanation.problems import BoundedMonitor, Problems
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
-from robosc.synthesis.watch import Watch
+from robosc.synthesis.monitor import ProgressMonitor
 from support.effort import seeds
 from support.random_systems import explicit_supervisor, random_system
 
@@ -40,14 +40,14 @@ class Twin:
         self.unbounded = Semantics(without_ranges(self.system, self.ranges))
         self.places = {subject: place for place, subject in enumerate(subjects(self.system))}
         manager = make_manager("cudd")
-        watch = BoundedWatch(Watch(lambda: False, lambda progress: None))
+        monitor = BoundedMonitor(ProgressMonitor(lambda: False, lambda progress: None))
         encoding = Encoding(self.system, manager)
-        problems = Problems(encoding, watch)
+        problems = Problems(encoding, monitor)
         fixed_point, problem = problems.without(())
         good = fixed_point.good_states(problem, manager.false)
         assert bool(good.reason) == supervisor.is_empty
         self.false = manager.false
-        self.analysis = Analysis(encoding, watch, problems, self.obstacles, good.states)
+        self.analysis = Analysis(encoding, monitor, problems, self.obstacles, good.states)
 
     def check(self, state: State, event: str, met: Counter[str]) -> None:
         here = self.analysis.predicate(state)

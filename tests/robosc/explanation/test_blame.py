@@ -14,11 +14,11 @@ from robosc.errors import SynthesisCancelled
 from robosc.explanation.analysis import Analysis, HindranceKind, Trouble
 from robosc.explanation.blame import find_blame
 from robosc.explanation.obstacles import Obstacle, ObstacleKind, obstacles_of, without
-from robosc.explanation.problems import BoundedWatch, Problems
+from robosc.explanation.problems import BoundedMonitor, Problems
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.fixed_point import initial_states
-from robosc.synthesis.watch import Watch
+from robosc.synthesis.monitor import ProgressMonitor
 from robosc.verification import synthesize_explicit
 from support.effort import seeds
 from support.empty_systems import empty_system
@@ -38,13 +38,13 @@ class Symbolic:
 
     def __init__(self, system: System, engine: str) -> None:
         self.manager = make_manager(engine)
-        self.watch = BoundedWatch(Watch(lambda: False, lambda progress: None))
+        self.monitor = BoundedMonitor(ProgressMonitor(lambda: False, lambda progress: None))
         self.encoding = Encoding(system, self.manager)
         self.obstacles = obstacles_of(system)
-        self.problems = Problems(self.encoding, self.watch)
+        self.problems = Problems(self.encoding, self.monitor)
 
     def trouble(self, dropped: Iterable[Obstacle] = ()) -> Trouble:
-        analysis = Analysis(self.encoding, self.watch, self.problems, self.obstacles, self.manager.false, dropped)
+        analysis = Analysis(self.encoding, self.monitor, self.problems, self.obstacles, self.manager.false, dropped)
         return analysis.trouble_after(initial_states(self.encoding))
 
 
@@ -61,7 +61,7 @@ def test_the_blamed_set_is_minimal_and_the_removal_too() -> None:
     for seed in seeds(EXAMPLES):
         system = empty_system(seed)
         symbolic = [Symbolic(system, engine) for engine in ENGINES]
-        blames = [find_blame(item.problems, item.obstacles, item.manager.false, item.watch) for item in symbolic]
+        blames = [find_blame(item.problems, item.obstacles, item.manager.false, item.monitor) for item in symbolic]
         assert blames[0] == blames[1]
         blame, obstacles = blames[0], symbolic[0].obstacles
         everything = frozenset(range(len(obstacles)))
@@ -211,7 +211,7 @@ def test_trouble_without_some_obstacles_speaks_of_the_others_alone() -> None:
     for seed in seeds(3 * EXAMPLES):
         system = empty_system(seed)
         symbolic = [Symbolic(system, engine) for engine in ENGINES]
-        blame = find_blame(symbolic[0].problems, symbolic[0].obstacles, symbolic[0].manager.false, symbolic[0].watch)
+        blame = find_blame(symbolic[0].problems, symbolic[0].obstacles, symbolic[0].manager.false, symbolic[0].monitor)
         obstacles = symbolic[0].obstacles
         kept = [obstacles[place] for place in blame.conflict]
         dropped = [item for item in obstacles if item not in kept]
@@ -335,13 +335,13 @@ def _check_detour(system: System, search: Search, trouble: Trouble, last: State,
 def test_a_search_that_takes_too_long_tells_what_it_has() -> None:
     """Check for any limit: blamed obstacles are to blame, and only a search to its end calls the blame minimal."""
     symbolic = Symbolic(empty_system(3), "cudd")
-    full = find_blame(symbolic.problems, symbolic.obstacles, symbolic.manager.false, symbolic.watch)
-    needed = symbolic.watch.steps
+    full = find_blame(symbolic.problems, symbolic.obstacles, symbolic.manager.false, symbolic.monitor)
+    needed = symbolic.monitor.steps
     seen = set()
     for limit in range(0, needed + 20, max(1, needed // 40)):
         item = Symbolic(empty_system(3), "cudd")
-        item.watch.limit = limit
-        blame = find_blame(item.problems, item.obstacles, item.manager.false, item.watch)
+        item.monitor.limit = limit
+        blame = find_blame(item.problems, item.obstacles, item.manager.false, item.monitor)
         kept = {item.obstacles[place] for place in blame.conflict}
         assert is_empty(without(empty_system(3), [each for each in item.obstacles if each not in kept]))
         assert not blame.is_minimal or blame.conflict == full.conflict
@@ -352,7 +352,7 @@ def test_a_search_that_takes_too_long_tells_what_it_has() -> None:
 
 def test_the_search_can_be_stopped() -> None:
     symbolic = Symbolic(empty_system(3), "cudd")
-    stopped = BoundedWatch(Watch(lambda: True, lambda progress: None))
+    stopped = BoundedMonitor(ProgressMonitor(lambda: True, lambda progress: None))
     problems = Problems(symbolic.encoding, stopped)
     with pytest.raises(SynthesisCancelled):
         find_blame(problems, symbolic.obstacles, symbolic.manager.false, stopped)

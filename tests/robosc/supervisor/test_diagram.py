@@ -14,7 +14,7 @@ from robosc.supervisor.structure import DecisionDiagram, DecisionNode
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
-from robosc.synthesis.symbolic import Symbols
+from robosc.synthesis.expression_encoder import ExpressionEncoder
 from support.effort import examples
 from support.random_expressions import SYSTEM, conditions
 
@@ -41,7 +41,7 @@ def plain(expression: Expression, state: tuple[Any, ...]) -> Any:
 @given(conditions.filter(lambda condition: not any(isinstance(leaf, Received) for leaf in leaves(condition))))
 def test_a_diagram_means_the_predicate(condition: Expression) -> None:
     encoding = Encoding(SYSTEM, make_manager("autoref"))
-    predicate = Symbols(encoding).holds(condition) & encoding.valid_states()
+    predicate = ExpressionEncoder(encoding).holds(condition) & encoding.valid_states()
     diagram = extract(encoding, predicate)
     del predicate
     validate(diagram, DOMAINS)

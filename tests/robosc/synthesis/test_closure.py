@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.errors import SynthesisCancelled
-from robosc.synthesis import Progress
+from robosc.synthesis import SynthesisProgress
 from robosc.synthesis.chaining import Chaining
 from robosc.synthesis.engines import Manager, make_manager
+from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.saturation import Saturation
 from robosc.synthesis.step import Step
-from robosc.synthesis.watch import Watch
 from support.effort import examples
 
 ORDER = ("a", "b", "c", "d", "e")
@@ -24,8 +24,8 @@ State = tuple[bool, ...]
 Move = Callable[[State], set[State]]
 
 
-def silent() -> Watch:
-    return Watch(lambda: False, lambda progress: None)
+def silent() -> ProgressMonitor:
+    return ProgressMonitor(lambda: False, lambda progress: None)
 
 
 def random_moves(dice: Random) -> tuple[frozenset[str], Move]:
@@ -146,8 +146,8 @@ class Everything:
         return other
 
 
-def chaining(step: Step, watch: Watch) -> Chaining:
-    return Chaining(LEVELS, [step], Everything(), watch)
+def chaining(step: Step, monitor: ProgressMonitor) -> Chaining:
+    return Chaining(LEVELS, [step], Everything(), monitor)
 
 
 def counting(limit: int) -> tuple[Step, list[int]]:
@@ -191,7 +191,7 @@ def test_enough_is_enough_for_saturation(wanted: int) -> None:
 def test_chaining_stops_when_told() -> None:
     step, asked = counting(1000)
     with pytest.raises(SynthesisCancelled):
-        chaining(step, Watch(lambda: len(asked) >= 20, lambda progress: None)).of(States({(True,)}), "test")
+        chaining(step, ProgressMonitor(lambda: len(asked) >= 20, lambda progress: None)).of(States({(True,)}), "test")
     assert len(asked) == 20
 
 
@@ -203,9 +203,9 @@ def test_saturation_stops_when_told() -> None:
         asked.append(None)
         return len(asked) == 7
 
-    watch = Watch(should_stop, lambda progress: None)
+    monitor = ProgressMonitor(should_stop, lambda progress: None)
     with pytest.raises(SynthesisCancelled):
-        Saturation(sets.manager, LEVELS, [counter(sets)], sets.manager.true, watch).of(
+        Saturation(sets.manager, LEVELS, [counter(sets)], sets.manager.true, monitor).of(
             sets.predicate({(False,) * 5}), "test"
         )
     assert len(asked) == 7
@@ -213,11 +213,11 @@ def test_saturation_stops_when_told() -> None:
 
 def test_progress_is_told_at_the_end_at_least() -> None:
     step, _ = counting(3)
-    told: list[Progress] = []
-    chaining(step, Watch(lambda: False, told.append)).of(States({(True,)}), "test")
+    told: list[SynthesisProgress] = []
+    chaining(step, ProgressMonitor(lambda: False, told.append)).of(States({(True,)}), "test")
     sets = Sets(make_manager("autoref"))
-    watch = Watch(lambda: False, told.append)
-    found = Saturation(sets.manager, LEVELS, [counter(sets)], sets.manager.true, watch).of(
+    monitor = ProgressMonitor(lambda: False, told.append)
+    found = Saturation(sets.manager, LEVELS, [counter(sets)], sets.manager.true, monitor).of(
         sets.predicate({(True, True, True, True, False)}), "test"
     )
     assert {progress.phase for progress in told} == {"test"}

@@ -22,9 +22,9 @@ from robosc.synthesis import (
     Answers,
     Cause,
     Never,
-    Progress,
     Questions,
     Restriction,
+    SynthesisProgress,
     Together,
     synthesize,
 )
@@ -416,7 +416,7 @@ def test_cancelling_while_runs_are_searched(engine: str) -> None:
     """The search for runs asks too: it can be the longest part."""
     phases: list[str] = []
 
-    def watch(progress: Progress) -> None:
+    def hear(progress: SynthesisProgress) -> None:
         phases.append(progress.phase)
 
     questions = Questions(rivals=(("first", "second"),))
@@ -425,7 +425,7 @@ def test_cancelling_while_runs_are_searched(engine: str) -> None:
             chain(50),
             engine=engine,
             questions=questions,
-            on_progress=watch,
+            on_progress=hear,
             should_stop=lambda: phases.count("shortest runs") == 10,
         )
     assert phases.count("shortest runs") == 10

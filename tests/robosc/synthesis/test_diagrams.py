@@ -16,7 +16,7 @@ from robosc.synthesis.blocks import Blocks
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
-from robosc.synthesis.symbolic import Symbols
+from robosc.synthesis.expression_encoder import ExpressionEncoder
 from support.effort import examples
 from support.random_expressions import SYSTEM, conditions
 from support.systems import automaton, operation, read, system
@@ -33,7 +33,7 @@ def engine(request: pytest.FixtureRequest) -> str:
 
 def diagram_of(condition: Expression, engine: str) -> DecisionDiagram:
     encoding = Encoding(SYSTEM, make_manager(engine))
-    return extract(encoding, Symbols(encoding).holds(condition))
+    return extract(encoding, ExpressionEncoder(encoding).holds(condition))
 
 
 @settings(max_examples=examples(60))
@@ -75,7 +75,7 @@ def test_a_diagram_has_a_limit_in_all() -> None:
     encoding = Encoding(
         system(*made, conditions={"e": operation(read("A.x"), "<", read("B.x"))}), make_manager("autoref")
     )
-    less = Symbols(encoding).holds(operation(read("A.x"), "<", read("B.x")))
+    less = ExpressionEncoder(encoding).holds(operation(read("A.x"), "<", read("B.x")))
     # One hundred ranges of the one, and for all but its last value two of the other.
     assert len(extract(encoding, less, 400).nodes) == 100
     with pytest.raises(UnsupportedModelError, match=r"relates the values of '[AB]\.x' to those of other variables"):

@@ -14,7 +14,7 @@ from robosc.expressions import BooleanType, IntegerType, Received
 from robosc.expressions.tree import Binary, Constant, VariableRead
 from robosc.model.structure import Deployment
 from robosc.supervisor.conditions import state_predicate, state_predicates
-from robosc.synthesis import Progress, SynthesisResult, SynthesisStatus, UnknownEngineError, synthesize
+from robosc.synthesis import SynthesisProgress, SynthesisResult, SynthesisStatus, UnknownEngineError, synthesize
 from robosc.verification import Outcome, verify_explicitly
 from robosc.verification.symbolic import verify_symbolically
 from support.effort import seeds
@@ -201,7 +201,7 @@ def test_cancelling(engine: str) -> None:
 
 
 def test_progress_is_told(engine: str) -> None:
-    told: list[Progress] = []
+    told: list[SynthesisProgress] = []
     synthesize(counter(3), engine=engine, on_progress=told.append)
     assert list(dict.fromkeys(progress.phase for progress in told)) == [
         "encoding",

@@ -69,7 +69,7 @@ class Partition:
 Symbolic = Truth | Number | Partition
 
 
-class Symbols:
+class ExpressionEncoder:
     """Translates the expressions of one encoding.
 
     Args:

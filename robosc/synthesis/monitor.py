@@ -1,14 +1,14 @@
-"""The one who waits for a synthesis: asked whether to stop, told where it is."""
+"""Cancellation and progress of a synthesis."""
 
 from collections.abc import Callable
 from typing import Any
 
 from robosc.errors import SynthesisCancelled
-from robosc.synthesis.result import Progress
+from robosc.synthesis.result import SynthesisProgress
 
 
-class Watch:
-    """Passes on questions and progress, and counts nodes.
+class ProgressMonitor:
+    """Monitor of a synthesis: it asks the waiting caller whether to stop, reports progress, and counts nodes.
 
     Args:
         should_stop: Asked before each step of the work with one event; once true, the work ends.
@@ -22,7 +22,7 @@ class Watch:
     def __init__(
         self,
         should_stop: Callable[[], bool],
-        on_progress: Callable[[Progress], None],
+        on_progress: Callable[[SynthesisProgress], None],
         check_nodes: Callable[[], None] = lambda: None,
     ) -> None:
         self._should_stop = should_stop
@@ -45,4 +45,4 @@ class Watch:
         """After each round: its phase and number, and the predicate that was found."""
         nodes = states.dag_size
         self.peak_nodes = max(self.peak_nodes, nodes)
-        self._on_progress(Progress(phase, rounds, nodes))
+        self._on_progress(SynthesisProgress(phase, rounds, nodes))

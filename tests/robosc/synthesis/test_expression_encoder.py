@@ -12,7 +12,7 @@ from robosc.expressions import Binary, Constant, Expression, VariableRead
 from robosc.expressions.evaluate import evaluate
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
-from robosc.synthesis.symbolic import Number, Partition, Symbols, Truth
+from robosc.synthesis.expression_encoder import ExpressionEncoder, Number, Partition, Truth
 from support.effort import examples
 from support.random_expressions import SYSTEM, conditions, numbers
 
@@ -26,7 +26,7 @@ class Valuations:
     def __init__(self, engine: str) -> None:
         self.encoding = Encoding(SYSTEM, make_manager(engine))
         self.inputs = self.encoding.inputs_of("e")
-        self.symbols = Symbols(self.encoding, self.inputs)
+        self.encoder = ExpressionEncoder(self.encoding, self.inputs)
         domains = [subject_domain(SYSTEM, subject) for subject in PLACES]
         self.all = [
             (state, element, seen)
@@ -76,7 +76,7 @@ def valuations(request: pytest.FixtureRequest) -> Valuations:
 @settings(max_examples=examples(100))
 @given(condition=conditions)
 def test_conditions(valuations: Valuations, condition: Expression) -> None:
-    translated = valuations.symbols.translate(condition)
+    translated = valuations.encoder.translate(condition)
     assert isinstance(translated, Truth)
     for valuation in valuations.all[:: 1 + len(valuations.all) // 150]:
         assignment = valuations.assignment(*valuation)
@@ -88,7 +88,7 @@ def test_conditions(valuations: Valuations, condition: Expression) -> None:
 @settings(max_examples=examples(100))
 @given(number=numbers)
 def test_numbers(valuations: Valuations, number: Expression) -> None:
-    translated = valuations.symbols.translate(number)
+    translated = valuations.encoder.translate(number)
     for valuation in valuations.all[:: 1 + len(valuations.all) // 100]:
         assignment = valuations.assignment(*valuation)
         value = plain(number, *valuation)
@@ -108,7 +108,7 @@ def test_numbers(valuations: Valuations, number: Expression) -> None:
 def test_too_many_doubles_are_refused(valuations: Valuations, monkeypatch: pytest.MonkeyPatch) -> None:
     half, third = (Binary("/", VariableRead("A", name), Constant(n)) for name, n in (("wide", 2), ("small", 3)))
     condition = Binary("<", Binary("+", half, third), Constant(1.5))
-    valuations.symbols.holds(condition)
-    monkeypatch.setattr("robosc.synthesis.symbolic.MAXIMUM_PARTITION", 10)
+    valuations.encoder.holds(condition)
+    monkeypatch.setattr("robosc.synthesis.expression_encoder.MAXIMUM_PARTITION", 10)
     with pytest.raises(UnsupportedModelError, match="more than 10 combinations"):
-        valuations.symbols.holds(condition)
+        valuations.encoder.holds(condition)

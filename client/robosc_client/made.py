@@ -15,7 +15,7 @@ from robosc.expressions import Value
 from robosc.model import check
 from robosc.model.structure import Deployment, Model
 from robosc.model_checking import Property, Verdict, properties_of
-from robosc.model_checking.outcome import Remainder, Run, RunKind
+from robosc.model_checking.outcome import EvidenceRun, Remainder, RunKind
 from robosc.source import Bundle, SourceFile, visible
 from robosc.supervisor import OutcomeStatus, Supervisor, SynthesisOutcome, decode
 from robosc_client.errors import ServiceError, malformed
@@ -200,8 +200,8 @@ def _verdict(entry: Any, claim: Property, system: System, model: Model) -> Verdi
     return Verdict(claim, entry["holds"], None if run is None else _run(run, system, model))
 
 
-def _run(entry: Any, system: System, model: Model) -> Run:
-    found = Run(
+def _run(entry: Any, system: System, model: Model) -> EvidenceRun:
+    found = EvidenceRun(
         kind=RunKind(entry["kind"]),
         states=tuple(_state(state, system, model) for state in entry["states"]),
         events=tuple(event if event is None else visible(event) for event in entry["events"]),

@@ -15,14 +15,14 @@ from typing import Any
 from robosc.automata.compile import State
 from robosc.automata.state import subjects
 from robosc.errors import InternalError
-from robosc.explanation.obstacles import Obstacle, ObstacleKind, without_marks
+from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, without_marks
 from robosc.explanation.problems import Problems
 from robosc.model.structure import is_tau
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import allowed
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.runs import Run, ShortestRuns
+from robosc.synthesis.runs import ShortestRuns, SystemRun
 from robosc.synthesis.transitions import Steps
 
 
@@ -56,12 +56,12 @@ class Hindrance:
     event: str
     where: Any
     automaton: str | None = None
-    range: Obstacle | None = None
+    range: RelaxableConstraint | None = None
     condition: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Trouble:
+class Counterexample:
     """A run into trouble, and what the trouble is.
 
     Attributes:
@@ -75,10 +75,10 @@ class Trouble:
         unmarked: Automata that are in no marked location, where the state blocks.
     """
 
-    run: Run
+    run: SystemRun
     is_forced: bool
     invariants: tuple[int, ...]
-    leaving: tuple[tuple[str, Obstacle], ...]
+    leaving: tuple[tuple[str, RelaxableConstraint], ...]
     forbidden: tuple[tuple[str, int], ...]
     detour: "Detour | None"
     unmarked: tuple[str, ...]
@@ -113,10 +113,10 @@ class Analysis:
     Args:
         encoding: The variables.
         monitor: Monitor of the waiting caller.
-        problems: The problem and what is left of it without obstacles.
-        obstacles: All of them.
+        problems: The problem and what is left of it without constraints.
+        constraints: All of them.
         good: The states that a supervisor may be in.
-        dropped: Obstacles that the problem is thought to be without. Runs leave no range nevertheless, unless there
+        dropped: Constraints that the problem is thought to be without. Runs leave no range nevertheless, unless there
             is no other way.
     """
 
@@ -125,9 +125,9 @@ class Analysis:
         encoding: Encoding,
         monitor: ProgressMonitor,
         problems: Problems,
-        obstacles: Sequence[Obstacle],
+        constraints: Sequence[RelaxableConstraint],
         good: Any,
-        dropped: Iterable[Obstacle] = (),
+        dropped: Iterable[RelaxableConstraint] = (),
     ) -> None:
         dropped = tuple(dropped)
         self._encoding = encoding
@@ -138,7 +138,7 @@ class Analysis:
         self._dropped_invariants = {place for item in dropped for place in item.invariants}
         self._dropped_ranges = tuple(item for item in dropped if item.range is not None)
         self._automata = without_marks(encoding.system, dropped).automata
-        self._ranges = tuple(item for item in obstacles if item.kind is ObstacleKind.RANGE)
+        self._ranges = tuple(item for item in constraints if item.kind is ConstraintKind.RANGE)
         self._encoder = ExpressionEncoder(encoding)
         self._fixed_point, self._problem = problems.without(dropped)
         self._steps = {steps.event.name: steps for steps in self._problem.steps}
@@ -150,7 +150,7 @@ class Analysis:
         self._troubled = ~self._fixed_point.nonblocking_states(self._problem, safe)
         self.good = good
         """The states that a supervisor may be in."""
-        free = (*dropped, *(item for item in obstacles if item.kind is not ObstacleKind.MARKING))
+        free = (*dropped, *(item for item in constraints if item.kind is not ConstraintKind.MARKING))
         _, self._free = problems.without(free)
         self._participants: dict[str, tuple[tuple[str, Any], ...]] = {}
 
@@ -221,7 +221,7 @@ class Analysis:
             found.append(Hindrance(HindranceKind.SUPERVISOR, event, lost))
         return tuple(item for item in found if item.where != self._manager.false)
 
-    def _leaving(self, event: str) -> Iterable[tuple[Obstacle, Any]]:
+    def _leaving(self, event: str) -> Iterable[tuple[RelaxableConstraint, Any]]:
         """Yield each of the ranges that an event can leave, with the states where it leaves it."""
         mine = self._problems.written_by(event, self._ranges)
         for item in mine:
@@ -246,7 +246,7 @@ class Analysis:
         chosen = [item for name, item in steps.items() if name in possible]
         return ShortestRuns(self._encoding, self._monitor, chosen, possible, start)
 
-    def trouble_after(self, start: Any) -> Trouble:
+    def counterexample_after(self, start: Any) -> Counterexample:
         """Return a run into trouble from one of some states that must be avoided."""
         for steps, is_forced in self._ways_on():
             possible = {
@@ -272,7 +272,7 @@ class Analysis:
     def _restricted(self, steps: Steps) -> Any:
         return steps.condition if steps.event.is_controllable else self._manager.true
 
-    def _named(self, run: Run, is_forced: bool) -> Trouble:
+    def _named(self, run: SystemRun, is_forced: bool) -> Counterexample:
         state = self.predicate(run.states[-1])
         false = self._manager.false
         invariants = tuple(
@@ -295,7 +295,7 @@ class Analysis:
             if self._problems.condition(place) & state == false
         )
         is_blocking = self.safe & state != false
-        return Trouble(
+        return Counterexample(
             run,
             is_forced,
             invariants,
@@ -332,11 +332,11 @@ class Analysis:
         # Under the requirements first: what synthesis keeps from happening is told before what is forbidden anyhow.
         steps = self._steps
         possible = {name: item.plant & self._restricted(item) for name, item in steps.items()}
-        beyond = self._way(steps, possible, inside, goal)
+        beyond = self._path(steps, possible, inside, goal)
         if beyond is None:
             steps = {item.event.name: item for item in self._free.steps}
             possible = {name: item.plant for name, item in steps.items()}
-            beyond = self._way(steps, possible, inside, goal)
+            beyond = self._path(steps, possible, inside, goal)
         if beyond is None:
             return None
         event, there = beyond.events[0], self.predicate(beyond.states[1])
@@ -353,7 +353,7 @@ class Analysis:
             self.hindrances(event, here, good),
         )
 
-    def _way(self, steps: Mapping[str, Steps], possible: Mapping[str, Any], start: Any, goal: Any) -> Run | None:
+    def _path(self, steps: Mapping[str, Steps], possible: Mapping[str, Any], start: Any, goal: Any) -> SystemRun | None:
         return ShortestRuns(self._encoding, self._monitor, tuple(steps.values()), possible, start).run_to(goal)
 
     def predicate(self, state: State) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 from robosc.automata.structure import System
 from robosc.explanation.analysis import Analysis
 from robosc.explanation.conflict import minimal_conflict, minimal_removal
-from robosc.explanation.obstacles import Obstacle, ObstacleKind, obstacles_of
+from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, relaxable_constraints
 from robosc.explanation.problems import BoundedMonitor, EffortSpentError, Problems
 from robosc.explanation.reports import Reporter
 from robosc.explanation.structure import Blamed, EmptyExplanation
@@ -28,16 +28,16 @@ LEAST_EFFORT = 20_000
 MAXIMUM_PARTS = 200
 """Parts of the model that an explanation lists: a search that was given up early may leave thousands."""
 
-_ASKED = (ObstacleKind.REQUIREMENT, ObstacleKind.INVARIANT)
-"""Kinds of obstacles that are asked of the robot; the others are what it is."""
+_ASKED = (ConstraintKind.REQUIREMENT, ConstraintKind.INVARIANT)
+"""Kinds of constraints that are asked of the robot; the others are what it is."""
 
 
 @dataclass(frozen=True, slots=True)
 class Blame:
-    """Obstacles to blame for the lack of a supervisor: places in a list of obstacles, in its order.
+    """Constraints to blame for the lack of a supervisor: places in a list of constraints, in its order.
 
     Attributes:
-        conflict: Obstacles that, without any other, leave no supervisor.
+        conflict: Constraints that, without any other, leave no supervisor.
         is_minimal: True if it is known that none of them can be missing.
         sufficing: Those of the conflict without which alone there is a supervisor, beside all others; None where
             that was not found out.
@@ -50,26 +50,28 @@ class Blame:
     removal: tuple[int, ...] | None
 
 
-def find_blame(problems: Problems, obstacles: Sequence[Obstacle], false: Any, monitor: BoundedMonitor) -> Blame:
+def find_blame(
+    problems: Problems, constraints: Sequence[RelaxableConstraint], false: Any, monitor: BoundedMonitor
+) -> Blame:
     """Find what is to blame for a problem without a supervisor.
 
     Args:
         problems: The problem.
-        obstacles: Obstacles that it could be without; those to be blamed rather than others first.
+        constraints: Constraints that it could be without; those to be blamed rather than others first.
         false: The predicate that is true nowhere.
         monitor: Monitor that bounds the work; beyond its limit what has been found so far is reported.
 
     Raises:
         SynthesisCancelled: The work is to end.
     """
-    search = _Search(problems, obstacles, false, monitor)
+    search = _Search(problems, constraints, false, monitor)
     conflict, sufficing, removal = None, None, None
     try:
-        conflict = minimal_conflict(range(len(obstacles)), search.is_empty)
+        conflict = minimal_conflict(range(len(constraints)), search.is_empty)
         everything = frozenset(search.everything)
         sufficing = tuple(item for item in conflict if not search.is_empty(everything - {item}))
-        asked = tuple(item for item in sufficing if obstacles[item].kind in _ASKED)
-        removal = asked[:1] or minimal_removal(_to_keep(obstacles, conflict), search.is_empty)
+        asked = tuple(item for item in sufficing if constraints[item].kind in _ASKED)
+        removal = asked[:1] or minimal_removal(_to_keep(constraints, conflict), search.is_empty)
     except EffortSpentError:
         pass
     found = search.smallest if conflict is None else conflict
@@ -78,29 +80,31 @@ def find_blame(problems: Problems, obstacles: Sequence[Obstacle], false: Any, mo
     )
 
 
-def _to_keep(obstacles: Sequence[Obstacle], conflict: Sequence[int]) -> tuple[int, ...]:
-    """Return the order in which obstacles stay.
+def _to_keep(constraints: Sequence[RelaxableConstraint], conflict: Sequence[int]) -> tuple[int, ...]:
+    """Return the order in which constraints stay.
 
     What the robot is comes before what is asked of it; of this, what is not blamed comes first.
     """
     blamed = set(conflict)
-    return tuple(sorted(range(len(obstacles)), key=lambda item: (obstacles[item].kind in _ASKED, item in blamed)))
+    return tuple(sorted(range(len(constraints)), key=lambda item: (constraints[item].kind in _ASKED, item in blamed)))
 
 
 class _Search:
     """Remembers what was asked, and the smallest set that was found to leave no supervisor."""
 
-    def __init__(self, problems: Problems, obstacles: Sequence[Obstacle], false: Any, monitor: BoundedMonitor) -> None:
+    def __init__(
+        self, problems: Problems, constraints: Sequence[RelaxableConstraint], false: Any, monitor: BoundedMonitor
+    ) -> None:
         self._problems = problems
-        self._obstacles = obstacles
+        self._constraints = constraints
         self._false = false
         self._monitor = monitor
-        self.everything = range(len(obstacles))
+        self.everything = range(len(constraints))
         self.smallest = frozenset(self.everything)
         self._known: dict[frozenset[int], bool] = {}
 
     def is_empty(self, kept: frozenset[int]) -> bool:
-        """Return True if there is no supervisor with these obstacles alone."""
+        """Return True if there is no supervisor with these constraints alone."""
         found = self._known.get(kept)
         if found is None:
             found = self._known[kept] = self._solve(kept)
@@ -109,7 +113,7 @@ class _Search:
         return found
 
     def _solve(self, kept: frozenset[int]) -> bool:
-        dropped = (item for place, item in enumerate(self._obstacles) if place not in kept)
+        dropped = (item for place, item in enumerate(self._constraints) if place not in kept)
         fixed_point, problem = self._problems.without(dropped)
         return bool(fixed_point.good_states(problem, self._false).reason)
 
@@ -140,16 +144,16 @@ def explain_empty(
     """
     with workspace(system, engine, should_stop, on_progress) as place:
         monitor = BoundedMonitor(place.monitor)
-        obstacles = obstacles_of(system, questions_about(model, system, deployment).restrictions)
+        constraints = relaxable_constraints(system, questions_about(model, system, deployment).restrictions)
         problems = Problems(place.encoding, monitor)
-        return explain_lost(place, monitor, problems, obstacles, Terms(model, places, system, obstacles))
+        return explain_lost(place, monitor, problems, constraints, Terms(model, places, system, constraints))
 
 
 def explain_lost(
     place: Workspace,
     monitor: BoundedMonitor,
     problems: Problems,
-    obstacles: Sequence[Obstacle],
+    constraints: Sequence[RelaxableConstraint],
     terms: Terms,
 ) -> EmptyExplanation:
     """Explain why a problem has no supervisor, in the words of its model."""
@@ -159,21 +163,21 @@ def explain_lost(
     # What one synthesis takes, encoding and all, tells how large the problem is.
     monitor.limit = max(LEAST_EFFORT, EFFORT * monitor.steps)
     with place.reordering():
-        blame = find_blame(problems, obstacles, false, monitor)
+        blame = find_blame(problems, constraints, false, monitor)
     monitor.limit = None
     # The trouble is that of what is blamed alone: so both tell one story.
     blamed = set(blame.conflict)
-    dropped = (item for place, item in enumerate(obstacles) if place not in blamed)
-    analysis = Analysis(encoding, monitor, problems, obstacles, false, dropped)
-    trouble = Reporter(analysis, terms).trouble(analysis.trouble_after(fixed_point.initial))
+    dropped = (item for place, item in enumerate(constraints) if place not in blamed)
+    analysis = Analysis(encoding, monitor, problems, constraints, false, dropped)
+    trouble = Reporter(analysis, terms).counterexample(analysis.counterexample_after(fixed_point.initial))
     sufficing, removal = blame.sufficing, blame.removal or ()
     return EmptyExplanation(
         trouble=trouble,
         blamed=tuple(
-            Blamed(terms.part(obstacles[item]), None if sufficing is None else item in sufficing)
+            Blamed(terms.part(constraints[item]), None if sufficing is None else item in sufficing)
             for item in blame.conflict[:MAXIMUM_PARTS]
         ),
         is_minimal=blame.is_minimal,
-        removal=tuple(terms.part(obstacles[item]) for item in removal) if len(removal) <= MAXIMUM_PARTS else (),
+        removal=tuple(terms.part(constraints[item]) for item in removal) if len(removal) <= MAXIMUM_PARTS else (),
         left_out=max(0, len(blame.conflict) - MAXIMUM_PARTS),
     )

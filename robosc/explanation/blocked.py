@@ -131,7 +131,7 @@ class _Kept:
 
 
 @dataclass(frozen=True, slots=True)
-class _Way:
+class _GuardedTransition:
     """A transition on a request."""
 
     guard: _Condition | None
@@ -143,7 +143,7 @@ class _Part:
     """A component whose behaviour mentions a request, with its transitions on it by state."""
 
     name: str
-    ways: Mapping[str, tuple[_Way, ...]]
+    transitions: Mapping[str, tuple[_GuardedTransition, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,13 +250,15 @@ class Requests:
             component.name,
             {
                 state.name: tuple(
-                    self._way(component.name, behaviour, item) for item in ordered if item.source in (state.name, None)
+                    self._transition(component.name, behaviour, item)
+                    for item in ordered
+                    if item.source in (state.name, None)
                 )
                 for state in behaviour.states
             },
         )
 
-    def _way(self, component: str, behaviour: Behaviour, transition: Transition) -> _Way:
+    def _transition(self, component: str, behaviour: Behaviour, transition: Transition) -> _GuardedTransition:
         kept = []
         for update in transition.updates:
             variable = next(item for item in behaviour.variables if item.name == update.variable)
@@ -264,7 +266,7 @@ class Requests:
                 case IntegerType(low=int(low), high=int(high)) if variable.is_synthesis:
                     function = compile_expression(update.expression, self._places)
                     kept.append(_Kept(Subject(component, variable.name), function, low, high))
-        return _Way(None if transition.guard is None else self._condition(transition.guard), tuple(kept))
+        return _GuardedTransition(None if transition.guard is None else self._condition(transition.guard), tuple(kept))
 
     def _need(self, item: Requirement) -> _Need:
         is_needs = item.form is RequirementForm.NEEDS
@@ -349,13 +351,13 @@ class Requests:
 
     def _hindered(self, part: _Part, state: State) -> Iterator[str]:
         location = str(state[self._places[Subject(part.name)]])
-        ways = part.ways[location]
-        taken = next((way for way in ways if way.guard is None or way.guard.holds(state)), None)
-        if taken is None and not ways:
-            there = [name for name, found in part.ways.items() if found]
+        transitions = part.transitions[location]
+        taken = next((way for way in transitions if way.guard is None or way.guard.holds(state)), None)
+        if taken is None and not transitions:
+            there = [name for name, found in part.transitions.items() if found]
             yield f"{part.name} is in {location}, not in {_listed(there)}" if there else f"{part.name} never allows it"
         elif taken is None:
-            guards = [way.guard for way in ways if way.guard is not None]
+            guards = [way.guard for way in transitions if way.guard is not None]
             told = " nor ".join(guard.text for guard in guards[:MAXIMUM_NAMES])
             read = tuple(dict.fromkeys(subject for guard in guards for subject in guard.reads))
             yield f"{part.name} is in {location}, where {told} does not hold{self._values(read, state)}"

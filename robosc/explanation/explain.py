@@ -12,7 +12,7 @@ from robosc.errors import Diagnostic, InternalError
 from robosc.explanation.analysis import Analysis, Detour, Hindrance, HindranceKind
 from robosc.explanation.blame import explain_lost
 from robosc.explanation.conflict import minimal_conflict
-from robosc.explanation.obstacles import obstacles_of
+from robosc.explanation.constraints import relaxable_constraints
 from robosc.explanation.problems import BoundedMonitor, Problems
 from robosc.explanation.reports import Reporter
 from robosc.explanation.requests import MAXIMUM_SHOWN, RequestError, asked_event, asked_run, asked_state
@@ -30,7 +30,7 @@ from robosc.synthesis.findings import findings, questions_about
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.nodes import count_models
 from robosc.synthesis.result import SynthesisProgress
-from robosc.synthesis.runs import Run, decoded
+from robosc.synthesis.runs import SystemRun, decoded
 from robosc.synthesis.workspace import workspace
 
 MAXIMUM_STATES = 5
@@ -79,16 +79,16 @@ def explain_synthesis(
     run = None if after is None else asked_run(system, model, after)
     with workspace(system, engine, should_stop, on_progress) as place:
         encoding, monitor = place.encoding, BoundedMonitor(place.monitor)
-        obstacles = obstacles_of(system, questions_about(model, system, deployment).restrictions)
+        constraints = relaxable_constraints(system, questions_about(model, system, deployment).restrictions)
         problems = Problems(encoding, monitor)
-        terms = Terms(model, places, system, obstacles)
+        terms = Terms(model, places, system, constraints)
         fixed_point, problem = problems.without(())
         with place.reordering():
             good = fixed_point.good_states(problem, encoding.manager.false)
             reachable = None if good.reason else fixed_point.reachable_states(problem, good.states)
         if good.reason:
-            return Explanation(empty=explain_lost(place, monitor, problems, obstacles, terms))
-        analysis = Analysis(encoding, monitor, problems, obstacles, good.states)
+            return Explanation(empty=explain_lost(place, monitor, problems, constraints, terms))
+        analysis = Analysis(encoding, monitor, problems, constraints, good.states)
         explainer = _Explainer(
             encoding, monitor, system, analysis, Reporter(analysis, terms), reachable, fixed_point.initial
         )
@@ -143,7 +143,7 @@ class _Explainer:
         self._possible = {event.name: reachable & analysis.possible(event.name) for event in system.events}
         self._runs = analysis.runs(initial, self._possible)
 
-    def _run_to(self, states: Any) -> Run:
+    def _run_to(self, states: Any) -> SystemRun:
         run = self._runs.run_to(states)
         if run is None:
             raise InternalError("a state of the controlled system is not reachable")
@@ -253,11 +253,11 @@ class _Explainer:
         run = self._run_to(chosen)
         if after is not None:
             # Only the state after it is told, so the states on its way need not be found.
-            run = Run(after, (run.states[-1],), is_shortest=len(after) == len(run.events) and run.is_shortest)
+            run = SystemRun(after, (run.states[-1],), is_shortest=len(after) == len(run.events) and run.is_shortest)
         here = self._analysis.predicate(run.states[-1])
         names = [item.name for item in self._system.events] if event is None else [event]
         return StateReport(
-            way=self._reporter.way(run),
+            way=self._reporter.path(run),
             fitting=str(count_models(self._encoding.manager, states, self._encoding.state_names)),
             events=tuple(self._here(name, here, run.states[-1]) for name in names),
         )
@@ -317,7 +317,7 @@ class _Explainer:
             shown += 1
             where = f"after {events_text(run.events)}" if run.events else "in the initial state"
             of_all = f" (one of {count} such states)" if count > 1 else ""
-            yield Remark(kind, f"{where} {what}{of_all}", None, self._reporter.way(run))
+            yield Remark(kind, f"{where} {what}{of_all}", None, self._reporter.path(run))
             left = left & ~self._locations(run.states[-1])
 
     def _locations(self, state: Any) -> Any:

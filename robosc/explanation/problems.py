@@ -1,6 +1,6 @@
-"""The problems that are left of one problem without some of its obstacles, over one set of Boolean variables.
+"""The problems that are left of one problem without some of its constraints, over one set of Boolean variables.
 
-What an event does depends on few obstacles, so it is encoded once for each choice of the ranges that it could leave,
+What an event does depends on few constraints, so it is encoded once for each choice of the ranges that it could leave,
 and a condition once for all events and problems.
 """
 
@@ -10,7 +10,7 @@ from typing import Any
 
 from robosc.automata.state import Subject
 from robosc.automata.structure import System
-from robosc.explanation.obstacles import Obstacle, without_marks, without_ranges
+from robosc.explanation.constraints import RelaxableConstraint, without_marks, without_ranges
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import FixedPoint, Problem
@@ -55,7 +55,7 @@ class BoundedMonitor(ProgressMonitor):
 
 
 class Problems:
-    """Variants of a problem without some of its obstacles.
+    """Variants of a problem without some of its constraints.
 
     Args:
         encoding: The variables.
@@ -70,23 +70,23 @@ class Problems:
         self._encoder = ExpressionEncoder(encoding)
         self._events = {event.name: event for event in encoding.system.events}
         self._written = _written(encoding.system)
-        self._base: dict[tuple[str, frozenset[Obstacle]], Steps] = {}
+        self._base: dict[tuple[str, frozenset[RelaxableConstraint]], Steps] = {}
         self._conditions: dict[int, Any] = {}
         self._invariants: dict[int, Any] = {}
         self._on_event: dict[str, list[int]] = {}
         for place, item in enumerate(encoding.system.conditions):
             self._on_event.setdefault(item.event, []).append(place)
 
-    def without(self, dropped: Iterable[Obstacle]) -> tuple[FixedPoint, Problem]:
-        """The problem without some obstacles, and what solves it.
+    def without(self, dropped: Iterable[RelaxableConstraint]) -> tuple[FixedPoint, Problem]:
+        """The problem without some constraints, and what solves it.
 
         Raises:
             SynthesisCancelled: The work is to end.
         """
-        obstacles = tuple(dropped)
-        conditions = {place for item in obstacles for place in item.conditions}
-        invariants = {place for item in obstacles for place in item.invariants}
-        ranges = frozenset(item for item in obstacles if item.range is not None)
+        constraints = tuple(dropped)
+        conditions = {place for item in constraints for place in item.conditions}
+        invariants = {place for item in constraints for place in item.invariants}
+        ranges = frozenset(item for item in constraints if item.range is not None)
         steps = tuple(
             self.steps(event, ranges).under(
                 self._encoding.all_of(
@@ -98,10 +98,10 @@ class Problems:
         kept = (place for place in range(len(self._encoding.system.invariants)) if place not in invariants)
         safe = self._encoding.all_of([self._encoding.valid_states(), *(self.invariant(place) for place in kept)])
         marked = copy(self._encoding)
-        marked.system = without_marks(self._encoding.system, obstacles)
+        marked.system = without_marks(self._encoding.system, constraints)
         return FixedPoint(marked, self._monitor), Problem(steps, safe)
 
-    def steps(self, event: str, ranges: Iterable[Obstacle] = ()) -> Steps:
+    def steps(self, event: str, ranges: Iterable[RelaxableConstraint] = ()) -> Steps:
         """Return the steps of an event without some ranges, under its event conditions."""
         mine = frozenset(item for item in ranges if item.range in self._written.get(event, ()))
         found = self._base.get((event, mine))
@@ -130,7 +130,7 @@ class Problems:
             self._invariants[place] = self._encoder.holds(self._encoding.system.invariants[place])
         return self._invariants[place]
 
-    def written_by(self, event: str, ranges: Iterable[Obstacle]) -> tuple[Obstacle, ...]:
+    def written_by(self, event: str, ranges: Iterable[RelaxableConstraint]) -> tuple[RelaxableConstraint, ...]:
         """The ranges that an event could leave."""
         return tuple(item for item in ranges if item.range in self._written.get(event, ()))
 

@@ -3,11 +3,11 @@
 from typing import Any
 
 from robosc.automata.compile import State
-from robosc.explanation.analysis import Analysis, Detour, Hindrance, HindranceKind, Trouble
-from robosc.explanation.structure import Reason, Stopped, TroubleReport, Way
+from robosc.explanation.analysis import Analysis, Counterexample, Detour, Hindrance, HindranceKind
+from robosc.explanation.structure import CounterexampleReport, Path, Reason, Stopped
 from robosc.explanation.terms import Terms
 from robosc.explanation.words import value_text
-from robosc.synthesis.runs import Run
+from robosc.synthesis.runs import SystemRun
 
 MAXIMUM_REASONS = 20
 """Reasons, and parts that are broken, that are told of one state: thousands would tell nothing more."""
@@ -25,32 +25,32 @@ class Reporter:
         self._analysis = analysis
         self._terms = terms
 
-    def way(self, run: Run) -> Way:
+    def path(self, run: SystemRun) -> Path:
         """A run."""
-        return Way(run.events, run.is_shortest, self._terms.state(run.states[-1]))
+        return Path(run.events, run.is_shortest, self._terms.state(run.states[-1]))
 
-    def reason(self, item: Hindrance, state: State, good: Any, run: Run | None = None) -> Reason:
+    def reason(self, item: Hindrance, state: State, good: Any, run: SystemRun | None = None) -> Reason:
         """Return the reason why an event cannot happen in a state, to which a run leads."""
         message, part = self._terms.hindered(item, state)
         trouble = None
         if item.kind is HindranceKind.SUPERVISOR:
             lost = self._analysis.lost_after(item.event, self._analysis.predicate(state), good)
-            trouble = self.trouble(self._analysis.trouble_after(lost))
-        return Reason(str(item.kind), message, part, self.way(run) if run else None, trouble)
+            trouble = self.counterexample(self._analysis.counterexample_after(lost))
+        return Reason(str(item.kind), message, part, self.path(run) if run else None, trouble)
 
     def stopped(self, item: Detour, good: Any) -> Stopped:
         """A way of the behaviours, and where it is stopped."""
         reasons = tuple(self.reason(hindrance, item.state, good) for hindrance in item.hindrances[:MAXIMUM_REASONS])
         return Stopped(item.events, item.stopped_at, self._terms.state(item.state), reasons)
 
-    def trouble(self, item: Trouble) -> TroubleReport:
+    def counterexample(self, item: Counterexample) -> CounterexampleReport:
         """A run into trouble."""
         state = item.run.states[-1]
         parts = [self._terms.invariant_part(place) for place in item.invariants[:MAXIMUM_REASONS]]
         messages = [f"'{part.text}' is broken" for part in parts]
-        for event, obstacle in item.leaving[:MAXIMUM_REASONS]:
-            part = self._terms.part(obstacle)
-            subject = str(obstacle.range)
+        for event, constraint in item.leaving[:MAXIMUM_REASONS]:
+            part = self._terms.part(constraint)
+            subject = str(constraint.range)
             value = self._terms.state(state).variables[subject]
             messages.append(f"{event} can take {subject}, which is {value_text(value)}, out of its range")
             parts.append(part)
@@ -70,9 +70,9 @@ class Reporter:
                 messages.append("the behaviours by themselves have no way to one")
             else:
                 stopped = self.stopped(item.detour, self._analysis.safe)
-        return TroubleReport(
+        return CounterexampleReport(
             kind="blocking" if item.is_blocking else "bad",
-            way=self.way(item.run),
+            way=self.path(item.run),
             is_forced=item.is_forced,
             messages=tuple(messages),
             parts=tuple(dict.fromkeys(parts)),

@@ -45,7 +45,7 @@ class StateValues:
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class Path:
     """A run, and where it ends.
 
     Attributes:
@@ -68,14 +68,14 @@ class Reason:
         message: Reason in one sentence.
         part: The part of the model, or None where it is the supervisor.
         way: A shortest run to a state where it is so, or None where the state is given.
-        trouble: Trouble that would follow, where the supervisor forbids it.
+        trouble: Counterexample that would follow, where the supervisor forbids it.
     """
 
     kind: str
     message: str
     part: Part | None
-    way: Way | None = None
-    trouble: "TroubleReport | None" = None
+    way: Path | None = None
+    trouble: "CounterexampleReport | None" = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +96,7 @@ class Stopped:
 
 
 @dataclass(frozen=True, slots=True)
-class TroubleReport:
+class CounterexampleReport:
     """A run into trouble.
 
     Attributes:
@@ -111,7 +111,7 @@ class TroubleReport:
     """
 
     kind: str
-    way: Way
+    way: Path
     is_forced: bool
     messages: tuple[str, ...]
     parts: tuple[Part, ...]
@@ -144,7 +144,7 @@ class EmptyExplanation:
         left_out: Number of blamed parts that are not listed.
     """
 
-    trouble: TroubleReport
+    trouble: CounterexampleReport
     blamed: tuple[Blamed, ...]
     is_minimal: bool
     removal: tuple[Part, ...]
@@ -203,7 +203,7 @@ class StateReport:
         events: The events asked for.
     """
 
-    way: Way
+    way: Path
     fitting: str
     events: tuple[EventHere, ...]
 
@@ -223,7 +223,7 @@ class Remark:
     kind: str
     message: str
     location: Location | None
-    way: Way | None = None
+    way: Path | None = None
     stopped: Stopped | None = None
 
 

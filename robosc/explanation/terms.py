@@ -7,7 +7,7 @@ from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import Subject, subject_type, subjects
 from robosc.automata.structure import System
 from robosc.explanation.analysis import Hindrance, HindranceKind
-from robosc.explanation.obstacles import Obstacle, ObstacleKind
+from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
 from robosc.explanation.structure import Part, StateValues
 from robosc.explanation.words import requirement_text, value_text
 from robosc.expressions import TRUE, Expression, Value, type_text
@@ -30,21 +30,23 @@ class Terms:
         model: The model.
         places: Places of its parts.
         system: Its automata.
-        obstacles: Obstacles that its problem could be without; requirements and invariants in the model's order.
+        constraints: Constraints that its problem could be without; requirements and invariants in the model's order.
     """
 
-    def __init__(self, model: Model, places: Places, system: System, obstacles: Sequence[Obstacle]) -> None:
+    def __init__(
+        self, model: Model, places: Places, system: System, constraints: Sequence[RelaxableConstraint]
+    ) -> None:
         self._model = model
         self._components = frozenset(item.name for item in model.components)
         self._places = places
         self._system = system
-        self._obstacles = tuple(obstacles)
+        self._constraints = tuple(constraints)
         self._subjects = {subject: place for place, subject in enumerate(subjects(system))}
         self._plants = {communication_plant_name(item): item for item in model.communications}
-        requirements = [item for item in obstacles if item.kind is ObstacleKind.REQUIREMENT]
+        requirements = [item for item in constraints if item.kind is ConstraintKind.REQUIREMENT]
         self._requirements = {item: number for number, item in enumerate(requirements)}
-        self._by_condition = {place: item for item in obstacles for place in item.conditions}
-        self._by_invariant = {place: item for item in obstacles for place in item.invariants}
+        self._by_condition = {place: item for item in constraints for place in item.conditions}
+        self._by_invariant = {place: item for item in constraints for place in item.invariants}
 
     # States
 
@@ -83,13 +85,13 @@ class Terms:
 
     # Parts
 
-    def part(self, obstacle: Obstacle) -> Part:
-        """Return the part of the model that an obstacle is."""
-        text, location = self._described(obstacle)
-        return Part(str(obstacle.kind), _cut(text), location)
+    def part(self, constraint: RelaxableConstraint) -> Part:
+        """Return the part of the model that a constraint is."""
+        text, location = self._described(constraint)
+        return Part(str(constraint.kind), _cut(text), location)
 
-    def _described(self, item: Obstacle) -> tuple[str, Location]:
-        if item.kind is ObstacleKind.REQUIREMENT:
+    def _described(self, item: RelaxableConstraint) -> tuple[str, Location]:
+        if item.kind is ConstraintKind.REQUIREMENT:
             number = self._requirements[item]
             return requirement_text(self._model.requirements[number], self._components), self._places.requirements[
                 number

@@ -3,18 +3,18 @@
 from collections.abc import Iterator
 
 from robosc.explanation.structure import (
+    CounterexampleReport,
     EmptyExplanation,
     EventHere,
     EventReport,
     Explanation,
     Part,
+    Path,
     Reason,
     Remark,
     StateReport,
     StateValues,
     Stopped,
-    TroubleReport,
-    Way,
 )
 from robosc.explanation.words import events_text, value_text
 from robosc.source import visible
@@ -78,7 +78,7 @@ def _part(part: Part) -> str:
     return part.text if part.location is None else f"{part.location}: {part.text}"
 
 
-def _trouble(item: TroubleReport, start: str, here: str) -> Iterator[str]:
+def _trouble(item: CounterexampleReport, start: str, here: str) -> Iterator[str]:
     """Yield the lines about a run into trouble.
 
     Args:
@@ -99,7 +99,7 @@ def _trouble(item: TroubleReport, start: str, here: str) -> Iterator[str]:
         yield from _indented(_stopped(item.stopped, "the behaviours would have the way"))
 
 
-def _run(way: Way) -> str:
+def _run(way: Path) -> str:
     return events_text(way.events) + ("" if way.is_shortest else " (perhaps not the shortest way)")
 
 

@@ -2,14 +2,14 @@
 
 from robosc.model_checking.checking import verify_properties
 from robosc.model_checking.formulas import Property, formula_text
-from robosc.model_checking.outcome import Remainder, Run, RunKind, Verdict
+from robosc.model_checking.outcome import EvidenceRun, Remainder, RunKind, Verdict
 from robosc.model_checking.report import property_errors_json, verdict_text, verdicts_json
 from robosc.model_checking.resolution import properties_of
 
 __all__ = [
+    "EvidenceRun",
     "Property",
     "Remainder",
-    "Run",
     "RunKind",
     "Verdict",
     "formula_text",

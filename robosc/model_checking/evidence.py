@@ -21,7 +21,7 @@ from robosc.model_checking.formulas import (
     Not,
     Until,
 )
-from robosc.model_checking.outcome import Remainder, Run, RunKind
+from robosc.model_checking.outcome import EvidenceRun, Remainder, RunKind
 from robosc.model_checking.runs import Path, Runs
 from robosc.model_checking.structure import KripkeStructure
 
@@ -52,12 +52,12 @@ class Evidence:
         self._forever = forever
         self._runs = Runs(structure)
 
-    def run(self, formula: Formula, start: Any, *, holds: bool) -> Run | None:
+    def run(self, formula: Formula, start: Any, *, holds: bool) -> EvidenceRun | None:
         """A run from a single state that shows that a formula holds there, or does not; None if none shows anything."""
         shown = self._show(formula, holds, Path((start,)))
         if shown.left and not shown.path.events:
             return None
-        return Run(
+        return EvidenceRun(
             RunKind.WITNESS if holds else RunKind.COUNTEREXAMPLE,
             tuple(self._structure.values(state) for state in shown.path.states),
             shown.path.events,

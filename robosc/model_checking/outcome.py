@@ -35,7 +35,7 @@ class Remainder:
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class EvidenceRun:
     """A run of the controlled system from an initial state.
 
     Attributes:
@@ -66,4 +66,4 @@ class Verdict:
 
     property: Property
     holds: bool
-    run: Run | None
+    run: EvidenceRun | None

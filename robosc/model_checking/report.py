@@ -11,7 +11,7 @@ from robosc.expressions.text import automaton_text
 from robosc.json_documents import diagnostics_json
 from robosc.model.structure import Model
 from robosc.model_checking.formulas import formula_text
-from robosc.model_checking.outcome import Run, State, Verdict
+from robosc.model_checking.outcome import EvidenceRun, State, Verdict
 
 _NOTHING = "(nothing can happen any more)"
 _WIDTH, _NARROWEST = 110, 40
@@ -32,7 +32,7 @@ def _components(model: Model) -> frozenset[str]:
     return frozenset(component.name for component in model.components)
 
 
-def _run_lines(run: Run, system: System, components: frozenset[str]) -> Iterator[str]:
+def _run_lines(run: EvidenceRun, system: System, components: frozenset[str]) -> Iterator[str]:
     yield f"{run.kind}:"
     width = max(len(event or _NOTHING) for event in ("initially", *run.events))
     before: dict[str, str] = {}
@@ -90,7 +90,7 @@ def _verdict_json(verdict: Verdict, system: System, model: Model) -> dict[str, o
     }
 
 
-def _run_json(run: Run, system: System, model: Model) -> dict[str, object]:
+def _run_json(run: EvidenceRun, system: System, model: Model) -> dict[str, object]:
     return {
         "kind": str(run.kind),
         "states": [_state_json(system, model, state) for state in run.states],

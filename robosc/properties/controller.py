@@ -66,7 +66,7 @@ class Goal:
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class SilentRun:
     """Silent steps in the executor's order, to the end.
 
     Attributes:
@@ -134,7 +134,7 @@ class Controller:
             for item in model.communications
             if item.kind is not CommunicationKind.OUTGOING_MESSAGE
         )
-        self._runs: dict[Node, Run] = {}
+        self._runs: dict[Node, SilentRun] = {}
         # Only where it is not marked everywhere, as a message's plant is.
         self._marked = tuple(
             (places[Subject(item.name)], item.marked)
@@ -187,14 +187,14 @@ class Controller:
             if target is not None and target != state:
                 yield event, (target, held)
 
-    def run(self, node: Node) -> Run:
+    def run(self, node: Node) -> SilentRun:
         """The silent steps that the executor takes from a state."""
         found = self._runs.get(node)
         if found is None:
             found = self._runs[node] = self._work_out(node)
         return found
 
-    def _work_out(self, node: Node) -> Run:
+    def _work_out(self, node: Node) -> SilentRun:
         places = {node: 0}
         visited = [node]
         events: list[str] = []
@@ -202,7 +202,7 @@ class Controller:
             step = next(self.silent_steps(visited[-1]), None)
             if step is None:
                 end = self.observed(visited[-1])
-                return Run(tuple(events), (), end, any(map(self.is_marked, visited)))
+                return SilentRun(tuple(events), (), end, any(map(self.is_marked, visited)))
             event, target = step
             events.append(event)
             if target in places:
@@ -210,7 +210,7 @@ class Controller:
                 again = visited[first:]
                 is_marked = any(map(self.is_marked, again))
                 states = tuple(state for state, _ in again)
-                return Run(tuple(events[:first]), tuple(events[first:]), None, is_marked, states)
+                return SilentRun(tuple(events[:first]), tuple(events[first:]), None, is_marked, states)
             places[target] = len(visited)
             visited.append(target)
 

@@ -38,7 +38,7 @@ class _Layer:
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class SystemRun:
     """A run of a system.
 
     Attributes:
@@ -95,7 +95,7 @@ class ShortestRuns:
             raise InternalError("a run is looked for to states that are not reachable")
         return run.events
 
-    def run_to(self, states: Any) -> Run | None:
+    def run_to(self, states: Any) -> SystemRun | None:
         """A run to one of some states, with the states on it, or None where none leads there.
 
         It is the same for every engine, and as short as `trace_to` says.
@@ -117,7 +117,7 @@ class ShortestRuns:
             number = self._first_layer(sources)
             state = self._one(self._layers[number].reached & sources)
             visited.append(decoded(self._encoding, state))
-        return Run(tuple(reversed(events)), tuple(reversed(visited)), is_shortest)
+        return SystemRun(tuple(reversed(events)), tuple(reversed(visited)), is_shortest)
 
     def _first_layer(self, states: Any) -> int:
         """Number of the first layer that has one of some states, which the last one has."""

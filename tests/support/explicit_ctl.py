@@ -21,7 +21,7 @@ from robosc.model_checking.formulas import (
     Not,
     Until,
 )
-from robosc.model_checking.outcome import Run
+from robosc.model_checking.outcome import EvidenceRun
 
 States = frozenset[int]
 
@@ -92,7 +92,7 @@ class ExplicitChecker:
 
     # Runs
 
-    def replay(self, run: Run) -> "Replayed":
+    def replay(self, run: EvidenceRun) -> "Replayed":
         """A run on the graph; an assertion fails where it is none."""
         assert self.graph is not None
         numbers = {state: number for number, state in enumerate(self.graph.states)}
@@ -112,7 +112,7 @@ class ExplicitChecker:
 class Replayed:
     """A run of the graph, asked what it shows."""
 
-    def __init__(self, checker: ExplicitChecker, run: Run, path: Sequence[int]) -> None:
+    def __init__(self, checker: ExplicitChecker, run: EvidenceRun, path: Sequence[int]) -> None:
         self._checker = checker
         self._run = run
         self._path = path

@@ -11,7 +11,7 @@ from robosc.verification.symbolic.work import TooMuchWorkError
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class Trace:
     """A run into some states.
 
     Attributes:
@@ -78,7 +78,7 @@ class Reachability:
                 for other in self._related[number]:
                     waiting[other] = True
 
-    def run(self, initial: Any, wanted: Any) -> Run:
+    def run(self, initial: Any, wanted: Any) -> Trace:
         """A run into one of some states that are reachable from the initial ones: a shortest one if that can be found.
 
         Only after `reachable` has been asked for with these initial states.
@@ -93,7 +93,7 @@ class Reachability:
         finally:
             self._variables.work = ordinary
 
-    def _shortest_run(self, initial: Any, wanted: Any) -> Run:
+    def _shortest_run(self, initial: Any, wanted: Any) -> Trace:
         false = self._variables.manager.false
         layers, seen = [initial], initial
         while layers[-1] & wanted == false:
@@ -109,9 +109,9 @@ class Reachability:
                     trace.append(relation.event.name)
                     state = self._variables.a_state(before)
                     break
-        return Run(tuple(reversed(trace)), end, True)
+        return Trace(tuple(reversed(trace)), end, True)
 
-    def _any_run(self, wanted: Any) -> Run:
+    def _any_run(self, wanted: Any) -> Trace:
         """A run along what the search has found, step by step."""
         variables, false = self._variables, self._variables.manager.false
         # The sets grow, so the first that the wanted states meet is found by halves.
@@ -125,7 +125,7 @@ class Reachability:
         trace: list[str] = []
         if low == 0:
             state = end = variables.a_state(self._history[0][0] & wanted if self._history else wanted)
-            return Run((), end, False)
+            return Trace((), end, False)
         before, relation = self._history[low - 1]
         state = end = variables.a_state(relation.image(variables, before) & wanted)
         while True:
@@ -138,7 +138,7 @@ class Reachability:
             while low > 0 and self._history[low - 1][0] & here != false:
                 low -= 1
             if low == 0:
-                return Run(tuple(reversed(trace)), end, False)
+                return Trace(tuple(reversed(trace)), end, False)
 
     def _by_name(self) -> list[Relation]:
         return sorted(self._relations, key=lambda item: item.event.name)

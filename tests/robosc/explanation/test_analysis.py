@@ -8,7 +8,7 @@ from robosc.automata import Semantics
 from robosc.automata.compile import NO_DATA, State, compile_expression
 from robosc.automata.state import Subject, subjects
 from robosc.explanation.analysis import Analysis, Hindrance, HindranceKind
-from robosc.explanation.obstacles import Obstacle, ObstacleKind, obstacles_of, without_ranges
+from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, relaxable_constraints, without_ranges
 from robosc.explanation.problems import BoundedMonitor, Problems
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
@@ -35,8 +35,8 @@ class Twin:
         assert supervisor is not None
         self.supervisor = supervisor
         self.semantics = Semantics(self.system)
-        self.obstacles = obstacles_of(self.system)
-        self.ranges = [item for item in self.obstacles if item.kind is ObstacleKind.RANGE]
+        self.constraints = relaxable_constraints(self.system)
+        self.ranges = [item for item in self.constraints if item.kind is ConstraintKind.RANGE]
         self.unbounded = Semantics(without_ranges(self.system, self.ranges))
         self.places = {subject: place for place, subject in enumerate(subjects(self.system))}
         manager = make_manager("cudd")
@@ -47,7 +47,7 @@ class Twin:
         good = fixed_point.good_states(problem, manager.false)
         assert bool(good.reason) == supervisor.is_empty
         self.false = manager.false
-        self.analysis = Analysis(encoding, monitor, problems, self.obstacles, good.states)
+        self.analysis = Analysis(encoding, monitor, problems, self.constraints, good.states)
 
     def check(self, state: State, event: str, met: Counter[str]) -> None:
         here = self.analysis.predicate(state)
@@ -103,7 +103,7 @@ class Twin:
         ]
 
 
-def _cause(item: Hindrance) -> str | Obstacle | int | None:
+def _cause(item: Hindrance) -> str | RelaxableConstraint | int | None:
     return {
         HindranceKind.BEHAVIOUR: item.automaton,
         HindranceKind.RANGE: item.range,
@@ -134,7 +134,7 @@ def test_what_would_follow_runs_into_trouble() -> None:
             for event in twin.system.events:
                 kinds = {item.kind for item in twin.analysis.hindrances(event.name, here)}
                 if HindranceKind.SUPERVISOR in kinds:
-                    trouble = twin.analysis.trouble_after(
+                    trouble = twin.analysis.counterexample_after(
                         twin.analysis.lost_after(event.name, here, twin.analysis.good)
                     )
                     start = trouble.run.states[0]

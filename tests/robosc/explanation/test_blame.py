@@ -11,9 +11,9 @@ from robosc.automata import Semantics, System
 from robosc.automata.compile import NO_DATA, State, compile_expression
 from robosc.automata.state import subjects
 from robosc.errors import SynthesisCancelled
-from robosc.explanation.analysis import Analysis, HindranceKind, Trouble
+from robosc.explanation.analysis import Analysis, Counterexample, HindranceKind
 from robosc.explanation.blame import find_blame
-from robosc.explanation.obstacles import Obstacle, ObstacleKind, obstacles_of, without
+from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, relaxable_constraints, without
 from robosc.explanation.problems import BoundedMonitor, Problems
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
@@ -40,12 +40,12 @@ class Symbolic:
         self.manager = make_manager(engine)
         self.monitor = BoundedMonitor(ProgressMonitor(lambda: False, lambda progress: None))
         self.encoding = Encoding(system, self.manager)
-        self.obstacles = obstacles_of(system)
+        self.constraints = relaxable_constraints(system)
         self.problems = Problems(self.encoding, self.monitor)
 
-    def trouble(self, dropped: Iterable[Obstacle] = ()) -> Trouble:
-        analysis = Analysis(self.encoding, self.monitor, self.problems, self.obstacles, self.manager.false, dropped)
-        return analysis.trouble_after(initial_states(self.encoding))
+    def trouble(self, dropped: Iterable[RelaxableConstraint] = ()) -> Counterexample:
+        analysis = Analysis(self.encoding, self.monitor, self.problems, self.constraints, self.manager.false, dropped)
+        return analysis.counterexample_after(initial_states(self.encoding))
 
 
 def is_empty(system: System) -> bool:
@@ -61,16 +61,16 @@ def test_the_blamed_set_is_minimal_and_the_removal_too() -> None:
     for seed in seeds(EXAMPLES):
         system = empty_system(seed)
         symbolic = [Symbolic(system, engine) for engine in ENGINES]
-        blames = [find_blame(item.problems, item.obstacles, item.manager.false, item.monitor) for item in symbolic]
+        blames = [find_blame(item.problems, item.constraints, item.manager.false, item.monitor) for item in symbolic]
         assert blames[0] == blames[1]
-        blame, obstacles = blames[0], symbolic[0].obstacles
-        everything = frozenset(range(len(obstacles)))
+        blame, constraints = blames[0], symbolic[0].constraints
+        everything = frozenset(range(len(constraints)))
 
         @cache
         def empty_with(
-            kept: frozenset[int], system: System = system, obstacles: tuple[Obstacle, ...] = obstacles
+            kept: frozenset[int], system: System = system, constraints: tuple[RelaxableConstraint, ...] = constraints
         ) -> bool:
-            return is_empty(without(system, [item for place, item in enumerate(obstacles) if place not in kept]))
+            return is_empty(without(system, [item for place, item in enumerate(constraints) if place not in kept]))
 
         assert blame.is_minimal
         conflict = frozenset(blame.conflict)
@@ -81,7 +81,7 @@ def test_the_blamed_set_is_minimal_and_the_removal_too() -> None:
         left = everything - set(blame.removal)
         assert not empty_with(left)
         assert all(empty_with(left | {item}) for item in blame.removal)
-        if len(obstacles) <= 5:
+        if len(constraints) <= 5:
             # The whole lattice: less never empties, nothing at all is solvable.
             subsets = chain.from_iterable(combinations(sorted(everything), n) for n in range(len(everything) + 1))
             for kept in map(frozenset, subsets):
@@ -89,11 +89,11 @@ def test_the_blamed_set_is_minimal_and_the_removal_too() -> None:
             met["lattice"] += 1
         met[len(conflict)] += 1
         met[f"removal of {len(blame.removal)}"] += 1
-        met.update(obstacles[item].kind for item in conflict)
+        met.update(constraints[item].kind for item in conflict)
     assert met[1] and met[2] + met[3] >= EXAMPLES // 20, met
     assert met["removal of 2"], met
     assert met["lattice"] >= EXAMPLES // 10
-    assert all(met[kind] for kind in ObstacleKind if kind is not ObstacleKind.REQUIREMENT), met
+    assert all(met[kind] for kind in ConstraintKind if kind is not ConstraintKind.REQUIREMENT), met
 
 
 class Search:
@@ -206,15 +206,17 @@ def test_trouble_is_real_and_the_run_is_shortest() -> None:
 
 @pytest.mark.random
 def test_trouble_without_some_obstacles_speaks_of_the_others_alone() -> None:
-    """Check the blamed obstacles alone: the run is one of the system that is left, and complete in what it names."""
+    """Check the blamed constraints alone: the run is one of the system that is left, and complete in what it names."""
     met: Counter[str] = Counter()
     for seed in seeds(3 * EXAMPLES):
         system = empty_system(seed)
         symbolic = [Symbolic(system, engine) for engine in ENGINES]
-        blame = find_blame(symbolic[0].problems, symbolic[0].obstacles, symbolic[0].manager.false, symbolic[0].monitor)
-        obstacles = symbolic[0].obstacles
-        kept = [obstacles[place] for place in blame.conflict]
-        dropped = [item for item in obstacles if item not in kept]
+        blame = find_blame(
+            symbolic[0].problems, symbolic[0].constraints, symbolic[0].manager.false, symbolic[0].monitor
+        )
+        constraints = symbolic[0].constraints
+        kept = [constraints[place] for place in blame.conflict]
+        dropped = [item for item in constraints if item not in kept]
         trouble, other = (item.trouble(dropped) for item in symbolic)
         assert (trouble.run, trouble.is_forced, trouble.unmarked) == (other.run, other.is_forced, other.unmarked)
         search = Search(without(system, dropped))
@@ -234,9 +236,11 @@ def test_trouble_without_some_obstacles_speaks_of_the_others_alone() -> None:
     assert all(met[name] for name in ("another story", "real", "range dropped", "shortest")), met
 
 
-def _check_run_of_the_robot(system: System, search: Search, trouble: Trouble, met: Counter[str]) -> None:
+def _check_run_of_the_robot(system: System, search: Search, trouble: Counterexample, met: Counter[str]) -> None:
     """No update of the run stops at the end of a range, if there is such a run; and no shorter run is there."""
-    free = Semantics(without(system, [item for item in obstacles_of(system) if item.kind is not ObstacleKind.RANGE]))
+    free = Semantics(
+        without(system, [item for item in relaxable_constraints(system) if item.kind is not ConstraintKind.RANGE])
+    )
 
     def really(state: State, *, is_forced: bool) -> Iterator[tuple[str, State]]:
         for name, target in search.steps(state):
@@ -261,7 +265,9 @@ def _check_run_of_the_robot(system: System, search: Search, trouble: Trouble, me
     met["range dropped"] += search.system.automata != system.automata
 
 
-def _check_what_is_broken(system: System, search: Search, trouble: Trouble, last: State, met: Counter[str]) -> None:
+def _check_what_is_broken(
+    system: System, search: Search, trouble: Counterexample, last: State, met: Counter[str]
+) -> None:
     places = {subject: place for place, subject in enumerate(subjects(system))}
     broken = [compile_expression(item, places)(last, NO_DATA) is not True for item in system.invariants]
     assert trouble.invariants == tuple(place for place, is_broken in enumerate(broken) if is_broken)
@@ -272,13 +278,13 @@ def _check_what_is_broken(system: System, search: Search, trouble: Trouble, last
             expected = is_broken and search.semantics.enabled(last, condition.event)
             assert ((condition.event, place) in trouble.forbidden) == expected
             met["condition"] += expected
-    for event, obstacle in trouble.leaving:
+    for event, constraint in trouble.leaving:
         # With all other ranges left out and no condition or invariant, the state is still bad because of this one.
-        others = [item for item in obstacles_of(system) if item != obstacle]
+        others = [item for item in relaxable_constraints(system) if item != constraint]
         assert Semantics(without(system, others)).trouble(last) is not None
         assert not system.event(event).is_controllable
         met["range"] += 1
-    free = [item for item in obstacles_of(system) if item.kind is not ObstacleKind.RANGE]
+    free = [item for item in relaxable_constraints(system) if item.kind is not ConstraintKind.RANGE]
     assert Semantics(without(system, free)).bad(last) == bool(trouble.leaving)
 
 
@@ -297,9 +303,11 @@ def _distance(
     return None
 
 
-def _check_detour(system: System, search: Search, trouble: Trouble, last: State, met: Counter[str]) -> None:
+def _check_detour(system: System, search: Search, trouble: Counterexample, last: State, met: Counter[str]) -> None:
     """The plants alone would have this way, and up to the event named all of it is allowed."""
-    free = Semantics(without(system, [item for item in obstacles_of(system) if item.kind is not ObstacleKind.MARKING]))
+    free = Semantics(
+        without(system, [item for item in relaxable_constraints(system) if item.kind is not ConstraintKind.MARKING])
+    )
     inside = search.inside(last)
 
     def freely(state: State) -> Iterator[State]:
@@ -333,17 +341,17 @@ def _check_detour(system: System, search: Search, trouble: Trouble, last: State,
 
 
 def test_a_search_that_takes_too_long_tells_what_it_has() -> None:
-    """Check for any limit: blamed obstacles are to blame, and only a search to its end calls the blame minimal."""
+    """Check for any limit: blamed constraints are to blame, and only a search to its end calls the blame minimal."""
     symbolic = Symbolic(empty_system(3), "cudd")
-    full = find_blame(symbolic.problems, symbolic.obstacles, symbolic.manager.false, symbolic.monitor)
+    full = find_blame(symbolic.problems, symbolic.constraints, symbolic.manager.false, symbolic.monitor)
     needed = symbolic.monitor.steps
     seen = set()
     for limit in range(0, needed + 20, max(1, needed // 40)):
         item = Symbolic(empty_system(3), "cudd")
         item.monitor.limit = limit
-        blame = find_blame(item.problems, item.obstacles, item.manager.false, item.monitor)
-        kept = {item.obstacles[place] for place in blame.conflict}
-        assert is_empty(without(empty_system(3), [each for each in item.obstacles if each not in kept]))
+        blame = find_blame(item.problems, item.constraints, item.manager.false, item.monitor)
+        kept = {item.constraints[place] for place in blame.conflict}
+        assert is_empty(without(empty_system(3), [each for each in item.constraints if each not in kept]))
         assert not blame.is_minimal or blame.conflict == full.conflict
         assert blame.sufficing is None or blame.sufficing == full.sufficing
         seen.add((blame.is_minimal, blame.removal is None))
@@ -355,4 +363,4 @@ def test_the_search_can_be_stopped() -> None:
     stopped = BoundedMonitor(ProgressMonitor(lambda: True, lambda progress: None))
     problems = Problems(symbolic.encoding, stopped)
     with pytest.raises(SynthesisCancelled):
-        find_blame(problems, symbolic.obstacles, symbolic.manager.false, stopped)
+        find_blame(problems, symbolic.constraints, symbolic.manager.false, stopped)

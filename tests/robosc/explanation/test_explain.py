@@ -12,7 +12,7 @@ from robosc.automata.compile import NO_DATA, State, compile_expression
 from robosc.automata.state import Subject, subjects
 from robosc.errors import UnsupportedModelError
 from robosc.explanation import Explanation, RequestError, explain_synthesis, explanation_text
-from robosc.explanation.obstacles import ObstacleKind, obstacles_of, without_ranges
+from robosc.explanation.constraints import ConstraintKind, relaxable_constraints, without_ranges
 from robosc.explanation.structure import EventReport, document
 from robosc.model import Places
 from robosc.model.structure import Deployment, Model, is_tau
@@ -475,7 +475,7 @@ class Enumerated:
     def __init__(self, system: System, supervisor: ExplicitSupervisor) -> None:
         self.system = system
         self.semantics = Semantics(system)
-        ranges = [item for item in obstacles_of(system) if item.kind is ObstacleKind.RANGE]
+        ranges = [item for item in relaxable_constraints(system) if item.kind is ConstraintKind.RANGE]
         self.unbounded = Semantics(without_ranges(system, ranges))
         self.supervisor = supervisor
         self.places = {subject: place for place, subject in enumerate(subjects(system))}

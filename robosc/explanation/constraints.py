@@ -1,10 +1,10 @@
-"""Obstacles that a synthesis problem could be without (requirements, ranges, markings), and the problem left.
+"""Constraints that a synthesis problem could be without (requirements, ranges, markings), and the problem left.
 
-Leaving an obstacle out never takes anything from a supervisor: where one keeps the system safe and nonblocking, it
+Leaving a constraint out never takes anything from a supervisor: where one keeps the system safe and nonblocking, it
 still does. A condition or an invariant less forbids less, and a location more that is marked is one more to get to.
 A range counts as left out when an update beyond it stops at its end, as `clamp` does: in a state from which the
 variable is not led out of its range nothing changes, and the others become safe. So emptiness is monotone, which is
-all that finding a minimal set needs (see `conflict`), and without any obstacle every system has a supervisor.
+all that finding a minimal set needs (see `conflict`), and without any constraint every system has a supervisor.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -17,8 +17,8 @@ from robosc.expressions import Call, Constant, Expression, IntegerType
 from robosc.synthesis.questions import Restriction
 
 
-class ObstacleKind(StrEnum):
-    """Kind of obstacle; in this order the earlier are blamed rather than the later."""
+class ConstraintKind(StrEnum):
+    """Kind of constraint; in this order the earlier are blamed rather than the later."""
 
     REQUIREMENT = "requirement"
     """On events."""
@@ -33,56 +33,58 @@ class ObstacleKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Obstacle:
+class RelaxableConstraint:
     """Something that a problem could be without.
 
     Attributes:
-        kind: Kind of obstacle.
+        kind: Kind of constraint.
         conditions: Places in `System.conditions`.
         invariants: Places in `System.invariants`.
         range: The variable whose range it is.
         marking: The automaton whose marking it is.
     """
 
-    kind: ObstacleKind
+    kind: ConstraintKind
     conditions: tuple[int, ...] = ()
     invariants: tuple[int, ...] = ()
     range: Subject | None = None
     marking: str | None = None
 
 
-def obstacles_of(system: System, restrictions: Sequence[Restriction] = ()) -> tuple[Obstacle, ...]:
-    """Every obstacle of a system, the earlier ones to be blamed rather than the later ones.
+def relaxable_constraints(system: System, restrictions: Sequence[Restriction] = ()) -> tuple[RelaxableConstraint, ...]:
+    """Every constraint of a system, the earlier ones to be blamed rather than the later ones.
 
     Args:
         system: The system.
         restrictions: Conditions and invariants that stand or fall together; the others stand alone.
     """
     found = [
-        Obstacle(
-            ObstacleKind.INVARIANT if item.invariants else ObstacleKind.REQUIREMENT, item.conditions, item.invariants
+        RelaxableConstraint(
+            ConstraintKind.INVARIANT if item.invariants else ConstraintKind.REQUIREMENT,
+            item.conditions,
+            item.invariants,
         )
         for item in restrictions
     ]
     conditions = {place for item in found for place in item.conditions}
     invariants = {place for item in found for place in item.invariants}
     found += [
-        Obstacle(ObstacleKind.CONDITION, conditions=(place,))
+        RelaxableConstraint(ConstraintKind.CONDITION, conditions=(place,))
         for place in range(len(system.conditions))
         if place not in conditions
     ]
     found += [
-        Obstacle(ObstacleKind.INVARIANT, invariants=(place,))
+        RelaxableConstraint(ConstraintKind.INVARIANT, invariants=(place,))
         for place in range(len(system.invariants))
         if place not in invariants
     ]
-    found += [Obstacle(ObstacleKind.RANGE, range=subject) for subject in _ranged(system)]
+    found += [RelaxableConstraint(ConstraintKind.RANGE, range=subject) for subject in _ranged(system)]
     found += [
-        Obstacle(ObstacleKind.MARKING, marking=item.name)
+        RelaxableConstraint(ConstraintKind.MARKING, marking=item.name)
         for item in system.automata
         if not item.marked.issuperset(item.locations)
     ]
-    ranks = list(ObstacleKind)
+    ranks = list(ConstraintKind)
     return tuple(sorted(found, key=lambda item: ranks.index(item.kind)))
 
 
@@ -100,9 +102,9 @@ def _ranged(system: System) -> Iterator[Subject]:
                 yield Subject(automaton.name, variable.name)
 
 
-def without(system: System, obstacles: Iterable[Obstacle]) -> System:
-    """The system that is left without some obstacles."""
-    dropped = tuple(obstacles)
+def without(system: System, constraints: Iterable[RelaxableConstraint]) -> System:
+    """The system that is left without some constraints."""
+    dropped = tuple(constraints)
     conditions = {place for item in dropped for place in item.conditions}
     invariants = {place for item in dropped for place in item.invariants}
     return replace(
@@ -112,18 +114,18 @@ def without(system: System, obstacles: Iterable[Obstacle]) -> System:
     )
 
 
-def without_marks(system: System, obstacles: Iterable[Obstacle]) -> System:
+def without_marks(system: System, constraints: Iterable[RelaxableConstraint]) -> System:
     """The system in which every location of some automata is marked."""
-    dropped = {item.marking for item in obstacles}
+    dropped = {item.marking for item in constraints}
     automata = (
         replace(item, marked=frozenset(item.locations)) if item.name in dropped else item for item in system.automata
     )
     return replace(system, automata=tuple(automata))
 
 
-def without_ranges(system: System, obstacles: Iterable[Obstacle]) -> System:
+def without_ranges(system: System, constraints: Iterable[RelaxableConstraint]) -> System:
     """The system in which updates of some variables stop at the ends of their ranges."""
-    dropped = {item.range for item in obstacles if item.range is not None}
+    dropped = {item.range for item in constraints if item.range is not None}
     touched = {subject.automaton for subject in dropped}
     automata = (_clamped(item, dropped) if item.name in touched else item for item in system.automata)
     return replace(system, automata=tuple(automata))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from robosc.explanation import structure
+from robosc.explanation import explanations
 from support.tutorial import Shell, play, read_chapters
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -28,7 +28,9 @@ def test_the_page_is_true(tmp_path: Path) -> None:
 
 
 def test_every_key_is_explained() -> None:
-    kinds = [item for item in vars(structure).values() if is_dataclass(item) and item.__module__ == structure.__name__]
+    kinds = [
+        item for item in vars(explanations).values() if is_dataclass(item) and item.__module__ == explanations.__name__
+    ]
     names = {field.name for kind in kinds for field in fields(kind)}
     assert len(names) > 25
     assert [name for name in sorted(names) if f"`{name}`" not in PAGE] == []

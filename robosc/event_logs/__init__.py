@@ -6,9 +6,9 @@ the bridge and the simulations. Drawing needs the extra `robosc[plot]`; reading 
 
 from robosc.event_logs.checking import LogCheck, Violation, WrongDeploymentError, check_log
 from robosc.event_logs.drawing import Drawn, PlottingUnavailableError, draw_sequence
+from robosc.event_logs.entries import LogEntry, LoggedRun
 from robosc.event_logs.reading import LogError, read_log
 from robosc.event_logs.sequence import PlotError
-from robosc.event_logs.structure import LogEntry, LoggedRun
 
 __all__ = [
     "Drawn",

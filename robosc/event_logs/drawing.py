@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from robosc.errors import RoboscError
+from robosc.event_logs.entries import LoggedRun
 from robosc.event_logs.sequence import PlotError, sequence_of
-from robosc.event_logs.structure import LoggedRun
 
 CONTROLLABLE = "#D55E00"
 UNCONTROLLABLE = "#0072B2"

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from robosc.errors import RoboscError
-from robosc.event_logs.structure import LogEntry, LoggedRun
+from robosc.event_logs.entries import LogEntry, LoggedRun
 
 if TYPE_CHECKING:
     from typing_extensions import TypeIs

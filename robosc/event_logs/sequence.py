@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from robosc.errors import RoboscError
-from robosc.event_logs.structure import LogEntry, LoggedRun
+from robosc.event_logs.entries import LogEntry, LoggedRun
 
 MAXIMUM_ROWS = 80
 """Rows that a page can hold: of more, the most frequent are shown."""

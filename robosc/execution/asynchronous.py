@@ -14,8 +14,8 @@ from robosc.execution.clock import Clock, SystemClock
 from robosc.execution.event_log import EventLog
 from robosc.execution.executor import Executor
 from robosc.execution.protocol import ControlledSystem
-from robosc.execution.rest import CANCEL_WAIT_S, describe_error
 from robosc.execution.runner import Status
+from robosc.execution.safe_stop import CANCEL_WAIT_S, describe_error
 from robosc.execution.settings import Settings
 
 WATCH_S = 0.05

@@ -9,8 +9,8 @@ from robosc.execution.decision import Policy, make_policy
 from robosc.execution.event_log import EventLog
 from robosc.execution.protocol import ControlledSystem, Middleware
 from robosc.execution.requests import Decisions
-from robosc.execution.rest import describe_error
 from robosc.execution.runner import Runner
+from robosc.execution.safe_stop import describe_error
 from robosc.execution.settings import Settings
 
 
@@ -64,8 +64,8 @@ class Executor(Runner):
             if self._may_request:
                 if self._decisions.decide(now):
                     self._deadline_s = self._next_deadline(now)
-            elif self._rest.reasons:
-                self._rest.retry()
+            elif self._safe_stop.reasons:
+                self._safe_stop.retry()
         except Exception as error:
             self._fail(describe_error(error))
 

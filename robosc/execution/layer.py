@@ -13,11 +13,11 @@ from robosc.execution.callers import Callers
 from robosc.execution.clock import Clock
 from robosc.execution.commands import Commands
 from robosc.execution.event_log import EventLog
-from robosc.execution.foreign import is_finite
+from robosc.execution.middleware_messages import is_finite
 from robosc.execution.protocol import CommunicationInfo, ControlledSystem, LayerMiddleware, RobotSide
 from robosc.execution.requests import Request
-from robosc.execution.rest import describe_error, request_cancel
 from robosc.execution.runner import DeploymentError, Runner, Status, guarded
+from robosc.execution.safe_stop import describe_error, request_cancel
 from robosc.execution.settings import Settings
 from robosc.execution.steps import ExecutionError
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Dict, List, Optional, Sequence, Tuple
 
-from robosc.execution.edges import have_fallen
+from robosc.execution.falling_conditions import have_fallen
 from robosc.execution.protocol import ControlledSystem
 
 

@@ -7,7 +7,7 @@ from typing import Any, Optional
 from robosc.execution.calls import OUTCOMES, Calls, Goal, Goals
 from robosc.execution.protocol import RobotSide
 from robosc.execution.recorder import Recorder
-from robosc.execution.rest import request_cancel
+from robosc.execution.safe_stop import request_cancel
 from robosc.execution.steps import ExecutionError, Steps
 
 

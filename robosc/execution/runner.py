@@ -24,7 +24,7 @@ from robosc.execution.recorder import Counters, Recorder
 from robosc.execution.release import Releases
 from robosc.execution.replies import Replies
 from robosc.execution.requests import by_identifier, requests_of
-from robosc.execution.rest import Rest, describe_error
+from robosc.execution.safe_stop import SafeStop, describe_error
 from robosc.execution.sensors import Sensors
 from robosc.execution.settings import Settings, require_settings_of, settings_for
 from robosc.execution.steps import ExecutionError, Steps
@@ -114,7 +114,7 @@ class Runner:
             self.settings.max_age_s,
         )
         self._has_watched_sensors = bool(self._sensors)
-        self._rest = Rest(robot, self._releases, self._goals)
+        self._safe_stop = SafeStop(robot, self._releases, self._goals)
         self._steps = Steps(system, robot, self._recorder, self._releases, self._goals, self.settings.on_unknown)
         self._replies = Replies(self._steps, robot, self._recorder, self._calls, self._goals)
         self._batches = batches(infos)
@@ -129,8 +129,8 @@ class Runner:
     @property
     def status(self) -> Status:
         """Current status of the executor."""
-        if self._rest.reasons:
-            return Status.STOPPING if self._rest.is_awaiting(self._clock.monotonic()) else Status.STOPPED
+        if self._safe_stop.reasons:
+            return Status.STOPPING if self._safe_stop.is_awaiting(self._clock.monotonic()) else Status.STOPPED
         if not self._is_started:
             return Status.NEW
         return Status.RUNNING if self._may_request else Status.WAITING
@@ -138,12 +138,12 @@ class Runner:
     @property
     def reasons(self) -> Tuple[str, ...]:
         """Reasons why it is stopped, in words; empty if it is not."""
-        return tuple(self._rest.reasons.values())
+        return tuple(self._safe_stop.reasons.values())
 
     @property
     def is_faulty(self) -> bool:
         """True if a fault stopped it; only `restart` ends that."""
-        return _FAULT in self._rest.reasons
+        return _FAULT in self._safe_stop.reasons
 
     @property
     def counters(self) -> Counters:
@@ -167,8 +167,8 @@ class Runner:
             return
         try:
             self._look_at_clock()
-            if self._rest.reasons:
-                self._rest.retry()
+            if self._safe_stop.reasons:
+                self._safe_stop.retry()
         except Exception as error:
             self._fail(describe_error(error))
 
@@ -265,11 +265,11 @@ class Runner:
     def restart(self) -> None:
         """Begin again in the initial state, whatever happened; goals and calls under way are the old run's."""
         self._now_s = self._clock.monotonic()
-        if not self._rest.reasons or self._rest.restless:
+        if not self._safe_stop.reasons or self._safe_stop.unsent:
             self._come_to_rest()
-        if self._rest.restless:
+        if self._safe_stop.unsent:
             raise ExecutionError("no restart: the robot could not be brought to rest")
-        self._rest.reasons.clear()
+        self._safe_stop.reasons.clear()
         self._recorder.note("restart", "")
         self._begin()
 
@@ -309,14 +309,14 @@ class Runner:
         """Replies that did not come in time, and stale sensors."""
         self._replies.expire(now)
         for name, identifier in self._sensors.stale(now):
-            if _stale_key(name) not in self._rest.reasons:
+            if _stale_key(name) not in self._safe_stop.reasons:
                 self._stop(_stale_key(name), "{} on {} is stale".format(name, identifier))
         self._deadline_s = self._next_deadline(now)
 
     def _see(self, name: str) -> None:
         """A message came: its sensor is fresh, and a stop because it was not is over."""
         if self._sensors.see(name, self._now_s):
-            if self._rest.reasons.pop(_stale_key(name), None) is not None:
+            if self._safe_stop.reasons.pop(_stale_key(name), None) is not None:
                 self._recorder.note("resume", "{} is back".format(name))
                 self._deadline_s = self._next_deadline(self._now_s)
             self._update_may_request()
@@ -343,28 +343,28 @@ class Runner:
         """Something was handled, whether it went well or not. Never raises."""
 
     def _update_may_request(self) -> None:
-        self._may_request = self._is_started and not self._rest.reasons and self._sensors.are_all_seen()
+        self._may_request = self._is_started and not self._safe_stop.reasons and self._sensors.are_all_seen()
 
-    # Rest.
+    # Safe stop.
 
     def _fail(self, reason: str) -> None:
         """A fault. Never raises."""
         self._recorder.fault(reason)
-        self._rest.reasons.setdefault(_FAULT, reason)
+        self._safe_stop.reasons.setdefault(_FAULT, reason)
         self._come_to_rest()
 
     def _stop(self, key: str, reason: str) -> None:
         """A safe stop that is no fault. Never raises."""
         self._recorder.note("stop", reason)
-        self._rest.reasons.setdefault(key, reason)
+        self._safe_stop.reasons.setdefault(key, reason)
         self._come_to_rest()
 
     def _come_to_rest(self) -> None:
         """Nothing is requested any more, wheels stop, goals are cancelled; what fails is a fault. Never raises."""
         self._may_request = False
-        for failure in self._rest.come_to_rest(self._now_s):
+        for failure in self._safe_stop.stop(self._now_s):
             self._recorder.fault(failure)
-            self._rest.reasons.setdefault(_FAULT, failure)
+            self._safe_stop.reasons.setdefault(_FAULT, failure)
 
 
 def _require_deployment(description: Description, deployment: str) -> None:

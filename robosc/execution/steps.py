@@ -10,11 +10,11 @@ from __future__ import annotations
 from typing import Any, Dict, Optional, Tuple
 
 from robosc.execution.calls import Goals
+from robosc.execution.livelock import LivelockDetector
 from robosc.execution.protocol import ControlledSystem, Reading, RobotSide
 from robosc.execution.recorder import Recorder
 from robosc.execution.release import Releases
-from robosc.execution.rest import request_cancel
-from robosc.execution.silent import RunWatch
+from robosc.execution.safe_stop import request_cancel
 
 
 class ExecutionError(Exception):
@@ -158,7 +158,7 @@ class Steps:
             Whether the stable state may be another one.
 
         Raises:
-            EndlessRun: They do not end.
+            LivelockError: They do not end.
             ExecutionError: Something was unknown, and that is a fault.
         """
         has_changed = self._system.changes != self._stable
@@ -188,9 +188,9 @@ class Steps:
 
     def _run_on(self, event: Optional[str]) -> None:
         """Silent steps after the first one, `event`, until none is enabled."""
-        watch = RunWatch(self._system.description.silent_bound)
+        detector = LivelockDetector(self._system.description.silent_bound)
         while event is not None:
-            watch.check(self._system.signature, event)
+            detector.check(self._system.signature, event)
             event = self._silent_step()
 
     def _silent_step(self) -> Optional[str]:

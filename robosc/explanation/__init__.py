@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from robosc.explanation.blame import explain_empty
     from robosc.explanation.explain import explain_synthesis
+    from robosc.explanation.explanations import EmptyExplanation, Explanation, document, from_text, to_text
     from robosc.explanation.requests import RequestError
-    from robosc.explanation.structure import EmptyExplanation, Explanation, document, from_text, to_text
     from robosc.explanation.text import empty_text, explanation_text
 
 _HOMES = {
-    "EmptyExplanation": "structure",
-    "Explanation": "structure",
+    "EmptyExplanation": "explanations",
+    "Explanation": "explanations",
     "RequestError": "requests",
-    "document": "structure",
+    "document": "explanations",
     "empty_text": "text",
     "explain_empty": "blame",
     "explain_synthesis": "explain",
     "explanation_text": "text",
-    "from_text": "structure",
-    "to_text": "structure",
+    "from_text": "explanations",
+    "to_text": "explanations",
 }
 
 __all__ = [

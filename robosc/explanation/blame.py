@@ -8,9 +8,9 @@ from robosc.automata.structure import System
 from robosc.explanation.analysis import Analysis
 from robosc.explanation.conflict import minimal_conflict, minimal_removal
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, relaxable_constraints
+from robosc.explanation.explanations import Blamed, EmptyExplanation
 from robosc.explanation.problems import BoundedMonitor, EffortSpentError, Problems
 from robosc.explanation.reports import Reporter
-from robosc.explanation.structure import Blamed, EmptyExplanation
 from robosc.explanation.terms import Terms
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model

@@ -20,7 +20,7 @@ from robosc.automata.decision import Decision, Test, index_in
 from robosc.automata.plants import communication_plant, communication_plant_name
 from robosc.automata.state import Subject
 from robosc.errors import RoboscError
-from robosc.explanation.words import requirement_text, value_text
+from robosc.explanation.notation import requirement_text, value_text
 from robosc.expressions import (
     BooleanType,
     DoubleType,

@@ -13,12 +13,12 @@ from robosc.explanation.analysis import Analysis, Detour, Hindrance, HindranceKi
 from robosc.explanation.blame import explain_lost
 from robosc.explanation.conflict import minimal_conflict
 from robosc.explanation.constraints import relaxable_constraints
+from robosc.explanation.explanations import EventHere, EventReport, Explanation, Reason, Remark, StateReport
+from robosc.explanation.notation import events_text
 from robosc.explanation.problems import BoundedMonitor, Problems
 from robosc.explanation.reports import Reporter
 from robosc.explanation.requests import MAXIMUM_SHOWN, RequestError, asked_event, asked_run, asked_state
-from robosc.explanation.structure import EventHere, EventReport, Explanation, Reason, Remark, StateReport
 from robosc.explanation.terms import Terms
-from robosc.explanation.words import events_text
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, EventKind, Model
 from robosc.source import visible

@@ -4,9 +4,9 @@ from typing import Any
 
 from robosc.automata.compile import State
 from robosc.explanation.analysis import Analysis, Counterexample, Detour, Hindrance, HindranceKind
-from robosc.explanation.structure import CounterexampleReport, Path, Reason, Stopped
+from robosc.explanation.explanations import CounterexampleReport, Path, Reason, Stopped
+from robosc.explanation.notation import value_text
 from robosc.explanation.terms import Terms
-from robosc.explanation.words import value_text
 from robosc.synthesis.runs import SystemRun
 
 MAXIMUM_REASONS = 20

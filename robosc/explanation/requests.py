@@ -6,7 +6,7 @@ from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import Subject, subject_domain, subject_type, subjects
 from robosc.automata.structure import System
 from robosc.errors import RoboscError
-from robosc.explanation.words import value_text
+from robosc.explanation.notation import value_text
 from robosc.expressions import (
     Binary,
     BinaryOperator,

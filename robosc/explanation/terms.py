@@ -8,8 +8,8 @@ from robosc.automata.state import Subject, subject_type, subjects
 from robosc.automata.structure import System
 from robosc.explanation.analysis import Hindrance, HindranceKind
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
-from robosc.explanation.structure import Part, StateValues
-from robosc.explanation.words import requirement_text, value_text
+from robosc.explanation.explanations import Part, StateValues
+from robosc.explanation.notation import requirement_text, value_text
 from robosc.expressions import TRUE, Expression, Value, type_text
 from robosc.expressions.text import automaton_text, expression_text
 from robosc.model.places import Places

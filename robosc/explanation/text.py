@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from robosc.explanation.structure import (
+from robosc.explanation.explanations import (
     CounterexampleReport,
     EmptyExplanation,
     EventHere,
@@ -16,7 +16,7 @@ from robosc.explanation.structure import (
     StateValues,
     Stopped,
 )
-from robosc.explanation.words import events_text, value_text
+from robosc.explanation.notation import events_text, value_text
 from robosc.source import visible
 
 MAXIMUM_VALUES = 30

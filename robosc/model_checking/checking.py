@@ -24,8 +24,8 @@ from robosc.model_checking.formulas import (
     Property,
     Until,
 )
+from robosc.model_checking.kripke import KripkeStructure
 from robosc.model_checking.outcome import Verdict
-from robosc.model_checking.structure import KripkeStructure
 from robosc.supervisor.structure import AddedCondition
 from robosc.synthesis import EngineOptions, SynthesisProgress
 from robosc.synthesis.expression_encoder import ExpressionEncoder

@@ -21,9 +21,9 @@ from robosc.model_checking.formulas import (
     Not,
     Until,
 )
+from robosc.model_checking.kripke import KripkeStructure
 from robosc.model_checking.outcome import EvidenceRun, Remainder, RunKind
 from robosc.model_checking.runs import Path, Runs
-from robosc.model_checking.structure import KripkeStructure
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from robosc.errors import InternalError
-from robosc.model_checking.structure import KripkeStructure, Move
+from robosc.model_checking.kripke import KripkeStructure, Move
 
 MAXIMUM_EFFORT = 1_000_000
 """Nodes of all rings of a path together, counted once for each move; beyond it moves are chained, and the path may be

@@ -13,13 +13,13 @@ from robosc.automata import ExecutableSystem, Semantics, System
 from robosc.automata.compile import State
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import subjects
+from robosc.controller_properties import check_controller
 from robosc.errors import Diagnostic, sorted_diagnostics
 from robosc.expressions import Value
 from robosc.expressions.text import automaton_text
 from robosc.model import check
 from robosc.model.layers import layer_findings
 from robosc.model.structure import CommunicationKind, Deployment, Model
-from robosc.properties import check_controller
 from robosc.source import Bundle
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.differences import model_differences

@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from robosc.controller_properties import check_controller
 from robosc.errors import LanguageError, RoboscError
 from robosc.language import load_bundle
 from robosc.model.layers import confusable
 from robosc.model.structure import CommunicationKind, Deployment
-from robosc.properties import check_controller
 from robosc.signatures import (
     MAXIMUM_KEY_BYTES,
     MAXIMUM_SIGNATURE_BYTES,

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
+from robosc.execution.livelock import LivelockDetector, LivelockError
 from robosc.execution.protocol import Reading
 from robosc.execution.runner import Status
-from robosc.execution.silent import EndlessRun, RunWatch
 from support.execution import Bench, bench, system_of
 
 SCANNER = """
@@ -184,19 +184,19 @@ def test_a_restart_ends_a_livelock_for_now() -> None:
 @pytest.mark.parametrize("length", [1, 2, 7, 8, 9, 100])
 @pytest.mark.parametrize("lead", [0, 1, 30])
 def test_a_repeated_state_is_found_soon(length: int, lead: int) -> None:
-    watch = RunWatch(10**9)
-    with pytest.raises(EndlessRun):
+    detector = LivelockDetector(10**9)
+    with pytest.raises(LivelockError):
         for step in range(8 + 4 * (lead + length) + 8):
             state = step if step < lead else lead + (step - lead) % length
-            watch.check(partial(int, state), "A.tau_1")
+            detector.check(partial(int, state), "A.tau_1")
 
 
 def test_a_long_run_without_repetition_goes_on_up_to_the_bound() -> None:
-    watch = RunWatch(500)
+    detector = LivelockDetector(500)
     for step in range(500):
-        watch.check(partial(int, step), "A.tau_1")
-    with pytest.raises(EndlessRun):
-        watch.check(partial(int, 500), "A.tau_1")
+        detector.check(partial(int, step), "A.tau_1")
+    with pytest.raises(LivelockError):
+        detector.check(partial(int, 500), "A.tau_1")
 
 
 def test_a_long_run_that_ends_is_no_fault() -> None:

@@ -13,7 +13,7 @@ from robosc.automata.state import Subject, subjects
 from robosc.errors import UnsupportedModelError
 from robosc.explanation import Explanation, RequestError, explain_synthesis, explanation_text
 from robosc.explanation.constraints import ConstraintKind, relaxable_constraints, without_ranges
-from robosc.explanation.structure import EventReport, document
+from robosc.explanation.explanations import EventReport, document
 from robosc.model import Places
 from robosc.model.structure import Deployment, Model, is_tau
 from robosc.source import Location

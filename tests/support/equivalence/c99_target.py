@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import IO, Any
 
 from robosc.automata.plants import communication_plant_name
-from robosc.execution.foreign import is_finite
 from robosc.execution.interpreter import describe
+from robosc.execution.middleware_messages import is_finite
 from robosc.execution.runner import Status
 from robosc.execution.settings import Settings, settings_for
 from robosc.expressions import BooleanType, DoubleType, EnumType, StringType, Type

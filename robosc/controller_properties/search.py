@@ -9,10 +9,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 
+from robosc.controller_properties.confluence import ConfluenceSearch
+from robosc.controller_properties.controller import Controller, Node
+from robosc.controller_properties.outcome import Blocking, Conflict, Livelock
 from robosc.errors import SynthesisCancelled
-from robosc.properties.controller import Controller, Node
-from robosc.properties.orders import Orders
-from robosc.properties.outcome import Blocking, Conflict, Livelock
 
 STOP_INTERVAL = 64
 """States handled between two questions whether to stop."""
@@ -89,7 +89,7 @@ def search(
     controller: Controller,
     *,
     limit: int,
-    orders: Orders | None,
+    confluence: ConfluenceSearch | None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Searched:
     """Visit every stable state of a controller, the same for the same input.
@@ -97,7 +97,7 @@ def search(
     Args:
         controller: The automaton.
         limit: Stable states beyond which to give up; also beyond `MAXIMUM_EFFORT`.
-        orders: Compares the orders of the silent steps of every state that is met, or None if nobody asks.
+        confluence: Compares the orders of the silent steps of every state that is met, or None if nobody asks.
         should_stop: Asked now and then; once true, the work ends.
 
     Raises:
@@ -120,8 +120,8 @@ def search(
                     found.blocking = _shorter(found.blocking, Blocking(livelock.trace, run.cycle_states))
                 if run.is_marked and is_sure and parent is not None:
                     graph.good.add(parent)
-            if orders is not None and found.conflict is None:
-                found.conflict = orders.conflict(node, lambda: (*graph.trace(parent), *events))
+            if confluence is not None and found.conflict is None:
+                found.conflict = confluence.conflict(node, lambda: (*graph.trace(parent), *events))
         if run.end is None:
             return
         number, is_nearer = graph.meet(run.end, parent, (*events, *run.events))

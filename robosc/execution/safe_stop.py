@@ -1,4 +1,4 @@
-"""Coming to rest, whatever happens: default messages on release identifiers, goals cancelled (semantics 3.8)."""
+"""Safe stop, whatever happens: default messages on release identifiers, goals cancelled (semantics 3.8)."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def request_cancel(middleware: RobotSide, goal: Goal) -> None:
         goal.is_cancel_sent = True
 
 
-class Rest:
-    """The reasons why an executor rests, and what it does to come to rest.
+class SafeStop:
+    """The reasons why an executor has stopped, and what it does to stop safely.
 
     Args:
         middleware: Middleware that sends default messages and cancels.
@@ -39,10 +39,10 @@ class Rest:
     Attributes:
         reasons: Reasons in words, by a key; nothing may be requested while there is one.
         awaited_until_s: Time until which the goals' ends are awaited, in seconds.
-        restless: Release identifiers whose default message could not be sent so far.
+        unsent: Release identifiers whose default message could not be sent so far.
     """
 
-    __slots__ = ("_goals", "_middleware", "_releases", "awaited_until_s", "reasons", "restless")
+    __slots__ = ("_goals", "_middleware", "_releases", "awaited_until_s", "reasons", "unsent")
 
     def __init__(self, middleware: RobotSide, releases: Releases, goals: Goals) -> None:
         self._middleware = middleware
@@ -50,11 +50,11 @@ class Rest:
         self._goals = goals
         self.reasons: Dict[str, str] = {}
         self.awaited_until_s = 0.0
-        self.restless: Tuple[str, ...] = ()
+        self.unsent: Tuple[str, ...] = ()
 
-    def come_to_rest(self, now_s: float) -> List[str]:
+    def stop(self, now_s: float) -> List[str]:
         """Send every default message and cancel every goal; what failed, in words. Never raises."""
-        self.restless = self._releases.identifiers
+        self.unsent = self._releases.identifiers
         for goal in self._goals.all():
             goal.is_cancel_wanted = True
         self.awaited_until_s = now_s + CANCEL_WAIT_S
@@ -66,13 +66,13 @@ class Rest:
         """Send the default messages and cancels that are still owed; what failed, in words. Never raises."""
         failures: List[str] = []
         owed: List[str] = []
-        for identifier in self.restless:
+        for identifier in self.unsent:
             try:
                 self._middleware.publish_default(identifier)
             except Exception as error:
                 owed.append(identifier)
                 failures.append("the default message on {} failed: {}".format(identifier, describe_error(error)))
-        self.restless = tuple(owed)
+        self.unsent = tuple(owed)
         for goal in self._goals.all():
             if goal.is_cancel_wanted:
                 try:

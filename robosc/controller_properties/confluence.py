@@ -3,14 +3,15 @@
 All orders are followed, not only the executor's. They agree where they have one outcome: the same stable state, or no
 end at all. (Newman's lemma, that it is enough to compare single steps, needs that every order ends: M. H. A. Newman,
 "On theories with a combinatorial definition of 'equivalence'", Annals of Mathematics 43(2), 1942, pp. 223-243. So
-outcomes are compared here, and the lemma serves only where `robosc.properties.structure` has proved that they end.)
+outcomes are compared here, and the lemma serves only where `robosc.controller_properties.silent_steps` has proved that
+they end.)
 """
 
 from collections.abc import Callable
 
 from robosc.automata.compile import State
-from robosc.properties.controller import Controller, Node
-from robosc.properties.outcome import Conflict, Order
+from robosc.controller_properties.controller import Controller, Node
+from robosc.controller_properties.outcome import Conflict, Order
 
 _Outcome = State | None
 """The stable state in which steps end, or None: they do not end."""
@@ -18,7 +19,7 @@ _Outcome = State | None
 _Step = tuple[str, Node]
 
 
-class Orders:
+class ConfluenceSearch:
     """Comparison of the orders of silent steps, each state once.
 
     Args:

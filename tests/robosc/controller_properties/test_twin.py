@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 
 from robosc.automata import ExecutableSystem, Semantics
+from robosc.controller_properties import Properties, check_controller
+from robosc.controller_properties.confluence import ConfluenceSearch
+from robosc.controller_properties.controller import Controller, Node
+from robosc.controller_properties.search import search
+from robosc.controller_properties.silent_steps import always_end, never_conflict, stays_nonblocking
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.structure import Deployment
-from robosc.properties import Properties, check_controller
-from robosc.properties.controller import Controller, Node
-from robosc.properties.orders import Orders
-from robosc.properties.search import search
-from robosc.properties.structure import always_end, never_conflict, stays_nonblocking
 from robosc.supervisor.structure import Supervisor
 from robosc.verification import verify_explicitly
 from support.controller_twin import twin_of
@@ -49,7 +49,7 @@ def test_the_executor_shows_what_the_automaton_has(record_property: Callable[[st
             shares["no supervisor" if supervisor is None else "too large"] += 1
             continue
         controller = Controller(ExecutableSystem(supervisor.model, Deployment.CONTROLLER), supervisor.added)
-        found = search(controller, limit=LIMIT, orders=Orders(controller, LIMIT))
+        found = search(controller, limit=LIMIT, confluence=ConfluenceSearch(controller, LIMIT))
         assert found.is_complete
         assert found.states == len(twin.states), seed
         shown = (twin.has_livelock, twin.has_conflict, twin.is_blocking)
@@ -78,12 +78,12 @@ def test_enums_of_one_field_agree(record_property: Callable[[str, object], None]
         if twin is None:
             continue
         controller = Controller(ExecutableSystem(supervisor.model, Deployment.CONTROLLER), supervisor.added)
-        found = search(controller, limit=LIMIT, orders=Orders(controller, LIMIT))
+        found = search(controller, limit=LIMIT, confluence=ConfluenceSearch(controller, LIMIT))
         assert found.states == len(twin.states), seed
         shown = (twin.has_livelock, twin.has_conflict, twin.is_blocking)
         assert (found.livelock is not None, found.conflict is not None, found.blocking is not None) == shown, seed
         controller._choices.clear()
-        apart = search(controller, limit=LIMIT, orders=Orders(controller, LIMIT))
+        apart = search(controller, limit=LIMIT, confluence=ConfluenceSearch(controller, LIMIT))
         met["compared"] += 1
         met["fewer states"] += found.states < apart.states
     for name, count in sorted(met.items()):
@@ -198,7 +198,7 @@ def test_the_way_to_where_no_task_is_completed_is_a_shortest_one() -> None:
     for seed in range(150):
         supervisor = random_robot(seed)
         controller = Controller(ExecutableSystem(supervisor.model, Deployment.CONTROLLER), ())
-        found = search(controller, limit=LIMIT, orders=None)
+        found = search(controller, limit=LIMIT, confluence=None)
         length = _shortest_blocking(controller)
         assert (None if found.blocking is None else len(found.blocking.trace)) == length, seed
         lengths[length] += 1
@@ -210,7 +210,7 @@ def test_what_is_proved_by_structure_is_true(record_property: Callable[[str, obj
     for seed in range(250):
         supervisor = random_robot(seed)
         controller = Controller(ExecutableSystem(supervisor.model, Deployment.CONTROLLER), ())
-        found = search(controller, limit=LIMIT, orders=Orders(controller, LIMIT))
+        found = search(controller, limit=LIMIT, confluence=ConfluenceSearch(controller, LIMIT))
         if always_end(controller.system):
             proved["ends"] += 1
             assert found.livelock is None, seed
@@ -225,7 +225,7 @@ def test_what_is_proved_by_structure_is_true(record_property: Callable[[str, obj
             controller = Controller(ExecutableSystem(made.model, Deployment.CONTROLLER), made.added)
             if stays_nonblocking(made.model, controller, made.added):
                 proved["nonblocking"] += 1
-                assert search(controller, limit=LIMIT, orders=None).blocking is None, seed
+                assert search(controller, limit=LIMIT, confluence=None).blocking is None, seed
     for name, count in sorted(proved.items()):
         record_property(name, count)
     assert min(proved["ends"], proved["confluent"]) > 50

@@ -10,15 +10,15 @@ from __future__ import annotations
 from typing import Any, Callable
 
 PATIENCE = 8
-"""Steps that are not watched: almost every run is shorter."""
+"""Steps that are not checked: almost every run is shorter."""
 
 
-class EndlessRun(Exception):
+class LivelockError(Exception):
     """A run of silent steps does not end."""
 
 
-class RunWatch:
-    """Watches one run.
+class LivelockDetector:
+    """Detector of a livelock in one run.
 
     Args:
         bound: More steps than this can only be a run that does not end.
@@ -41,16 +41,18 @@ class RunWatch:
             event: The step's event.
 
         Raises:
-            EndlessRun: The state is one that the run was in before, or the bound is passed.
+            LivelockError: The state is one that the run was in before, or the bound is passed.
         """
         self._steps += 1
         if self._steps > self._bound:
-            raise EndlessRun("silent steps do not end: more than {} in a row, the last {}".format(self._bound, event))
+            raise LivelockError(
+                "silent steps do not end: more than {} in a row, the last {}".format(self._bound, event)
+            )
         if self._steps <= PATIENCE:
             return
         now = signature()
         if now == self._remembered:
-            raise EndlessRun("silent steps do not end: a state came twice, the last step was {}".format(event))
+            raise LivelockError("silent steps do not end: a state came twice, the last step was {}".format(event))
         self._distance += 1
         if self._distance == self._power:
             self._remembered = now

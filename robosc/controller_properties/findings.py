@@ -6,11 +6,11 @@ from robosc.automata.compile import State
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import Subject, subjects
 from robosc.automata.structure import System
+from robosc.controller_properties.outcome import Blocking, Conflict, Livelock, Order, Properties
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.expressions.text import automaton_text
 from robosc.model.places import Places
 from robosc.model.structure import Model, is_tau
-from robosc.properties.outcome import Blocking, Conflict, Livelock, Order, Properties
 from robosc.source import Location
 
 MAXIMUM_EVENTS = 12

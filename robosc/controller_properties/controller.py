@@ -9,7 +9,7 @@ may send a message or answer, and any enabled request may be issued.
   order, with no silent step between them. Under the setting `on_unknown: keep` an event whose enum is unknown does
   not happen, so any part of a batch may happen as well; a *whole* batch can happen under every setting.
 - Received data takes every value that matters; events of one message carry what the same fields can bring
-  (`robosc.properties.messages`). Code-only variables do not matter: nothing that decides about events
+  (`robosc.controller_properties.messages`). Code-only variables do not matter: nothing that decides about events
   reads one (language A.6). They only decide what is sent; a request whose data is unknown counts as possible.
 - That an action cannot be requested again until its cancelled goal is known to have ended (3.2) is left out: the end
   can become known in any state and changes nothing else, so every state is reached, and left, as if it were known.
@@ -25,11 +25,11 @@ from robosc.automata import ExecutableSystem, System
 from robosc.automata.compile import NO_DATA, Function, State, compile_expression, subjects_read
 from robosc.automata.semantics import Semantics
 from robosc.automata.state import Subject, subjects
+from robosc.controller_properties.messages import Choice, choices_together
 from robosc.model.structure import (
     CommunicationKind,
     EventKind,
 )
-from robosc.properties.messages import Choice, choices_together
 from robosc.supervisor.conditions import state_predicates
 from robosc.supervisor.structure import AddedCondition
 

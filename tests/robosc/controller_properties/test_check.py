@@ -3,12 +3,12 @@
 import pytest
 
 from robosc.automata import ExecutableSystem, to_automata
+from robosc.controller_properties import Properties, check_controller
+from robosc.controller_properties.confluence import ConfluenceSearch
+from robosc.controller_properties.controller import Controller
+from robosc.controller_properties.search import search
 from robosc.errors import Severity, SynthesisCancelled
 from robosc.model.structure import Deployment
-from robosc.properties import Properties, check_controller
-from robosc.properties.controller import Controller
-from robosc.properties.orders import Orders
-from robosc.properties.search import search
 from robosc.supervisor import OutcomeStatus, decode, encode, make_supervisor, summary_json, summary_text
 from robosc.supervisor.structure import AddedCondition, DecisionDiagram, DecisionNode
 from robosc.synthesis import synthesize
@@ -441,7 +441,7 @@ def test_it_can_be_stopped() -> None:
         )
     controller = Controller(ExecutableSystem(model, Deployment.CONTROLLER), ())
     with pytest.raises(SynthesisCancelled):
-        search(controller, limit=9, orders=None, should_stop=lambda: True)
+        search(controller, limit=9, confluence=None, should_stop=lambda: True)
 
 
 def test_too_many_orders_are_not_called_confluent() -> None:
@@ -450,10 +450,10 @@ def test_too_many_orders_are_not_called_confluent() -> None:
         for n in range(12)
     ]
     controller = Controller(ExecutableSystem(model_of(robot(EYE, *parts)), Deployment.CONTROLLER), ())
-    few, all_ = Orders(controller, 100), Orders(controller, 10_000)
-    assert search(controller, limit=100, orders=few).conflict is None
+    few, all_ = ConfluenceSearch(controller, 100), ConfluenceSearch(controller, 10_000)
+    assert search(controller, limit=100, confluence=few).conflict is None
     assert few.is_exhausted
-    assert search(controller, limit=100, orders=all_).conflict is None
+    assert search(controller, limit=100, confluence=all_).conflict is None
     assert not all_.is_exhausted
 
 

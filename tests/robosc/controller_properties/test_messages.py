@@ -5,8 +5,8 @@ import re
 import pytest
 
 from robosc.automata import ExecutableSystem, to_automata
+from robosc.controller_properties import check_controller
 from robosc.model.structure import Deployment
-from robosc.properties import check_controller
 from robosc.synthesis import synthesize
 from support.models import model_of
 

@@ -15,10 +15,10 @@ from math import prod
 from robosc.automata.compile import NO_DATA, Function, State, compile_expression, subjects_read
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.automata.structure import Automaton, Edge, System
+from robosc.controller_properties.controller import Controller
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import Value
 from robosc.model.structure import CommunicationKind, EventKind, Model, is_tau
-from robosc.properties.controller import Controller
 from robosc.supervisor.structure import AddedCondition
 
 MAXIMUM_VALUATIONS = 20_000
@@ -197,7 +197,7 @@ def never_conflict(
 ) -> bool:
     """Return True if any two silent steps that are enabled together lead to one state in either order.
 
-    Where silent steps always end, that is confluence, by Newman's lemma (see `robosc.properties.orders`).
+    Where silent steps always end, that is confluence, by Newman's lemma (see `confluence`).
 
     Args:
         controller: The automaton.

@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterable
 
 from robosc.automata.executable import ExecutableSystem
 from robosc.automata.semantics import Semantics, TooManyChoicesError
-from robosc.properties.controller import Controller
-from robosc.properties.orders import Orders
-from robosc.properties.outcome import Properties
-from robosc.properties.search import search
-from robosc.properties.structure import always_end, never_conflict, stays_nonblocking
+from robosc.controller_properties.confluence import ConfluenceSearch
+from robosc.controller_properties.controller import Controller
+from robosc.controller_properties.outcome import Properties
+from robosc.controller_properties.search import search
+from robosc.controller_properties.silent_steps import always_end, never_conflict, stays_nonblocking
 from robosc.supervisor.structure import AddedCondition, PropertyResult
 
 DEFAULT_LIMIT = 10_000
@@ -58,8 +58,8 @@ def check_controller(
         how = f"not searched: more than {HOPELESS * limit} states in the controlled system"
         return Properties("passed", "passed", "not checked", _method(proved, how))
     try:
-        orders = None if is_confluent else Orders(controller, limit)
-        found = search(controller, limit=limit, orders=orders, should_stop=should_stop)
+        orders = None if is_confluent else ConfluenceSearch(controller, limit)
+        found = search(controller, limit=limit, confluence=orders, should_stop=should_stop)
     except TooManyChoicesError as error:
         outcomes = (_outcome(item, False, False) for item in proved)
         finite_response, confluence, nonblocking = outcomes

@@ -2,13 +2,13 @@
 
 After Reijnen, Erens, van de Mortel-Fronczak and Rooda, "Supervisory controller synthesis and implementation for
 safety PLCs", Discrete Event Dynamic Systems 32, 2022, pp. 115-141, with the automaton of our executor
-(`robosc.properties.controller`), and one difference: a marked state counts as reached also where silent steps only
-pass through it, since the robot has then completed its task, if only for a moment.
+(`robosc.controller_properties.controller`), and one difference: a marked state counts as reached also where silent
+steps only pass through it, since the robot has then completed its task, if only for a moment.
 """
 
-from robosc.properties.check import DEFAULT_LIMIT, check_controller
-from robosc.properties.findings import controller_findings
-from robosc.properties.outcome import Blocking, Conflict, Livelock, Order, Properties
+from robosc.controller_properties.check import DEFAULT_LIMIT, check_controller
+from robosc.controller_properties.findings import controller_findings
+from robosc.controller_properties.outcome import Blocking, Conflict, Livelock, Order, Properties
 
 __all__ = [
     "DEFAULT_LIMIT",

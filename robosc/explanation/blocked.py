@@ -17,6 +17,7 @@ from typing import Any
 
 from robosc.automata.compile import Function, State, compile_expression, subjects_read
 from robosc.automata.decision import Decision, Test, index_in
+from robosc.automata.executable import CALLED_KINDS, ExecutableEvent, ExecutableSystem, Moves, Participant
 from robosc.automata.plants import communication_plant, communication_plant_name
 from robosc.automata.state import Subject
 from robosc.errors import RoboscError
@@ -36,15 +37,10 @@ from robosc.expressions import (
 )
 from robosc.expressions.text import automaton_text, expression_text
 from robosc.model.structure import (
-    Behaviour,
     Communication,
-    CommunicationKind,
-    Component,
     EventKind,
-    Model,
     Requirement,
     RequirementForm,
-    Transition,
 )
 from robosc.supervisor.structure import AddedCondition, DecisionDiagram
 
@@ -62,8 +58,6 @@ MAXIMUM_DIGITS = 400
 
 _INTEGER = re.compile(r"-?[0-9]{1,18}", re.ASCII)
 _TRUTHS = {"true": True, "false": False}
-_CALLED = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
-_IDLE = "idle"
 
 
 class StateError(RoboscError, ValueError):
@@ -131,19 +125,11 @@ class _Kept:
 
 
 @dataclass(frozen=True, slots=True)
-class _GuardedTransition:
-    """A transition on a request."""
-
-    guard: _Condition | None
-    kept: tuple[_Kept, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class _Part:
-    """A component whose behaviour mentions a request, with its transitions on it by state."""
+    """A component whose behaviour mentions a request: in each state that allows it, the updates that have a range."""
 
     name: str
-    transitions: Mapping[str, tuple[_GuardedTransition, ...]]
+    kept: Mapping[str, tuple[_Kept, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +147,7 @@ class _Rule:
     """All that may block a request."""
 
     event: str
-    plant: str | None
+    moves: Moves | None
     parts: tuple[_Part, ...]
     needs: tuple[_Need, ...]
     added: Decision | None
@@ -171,14 +157,17 @@ class Requests:
     """Requests of one supervisor: those that may be made in a state, and why others may not.
 
     Args:
-        model: The checked model.
+        system: Executable system that it supervises.
         added: Conditions that synthesis adds to it.
     """
 
-    def __init__(self, model: Model, added: Iterable[AddedCondition]) -> None:
+    def __init__(self, system: ExecutableSystem, added: Iterable[AddedCondition]) -> None:
+        model = system.model
         self._components = frozenset(item.name for item in model.components)
         self._behaviours = {item.name: item.behaviour for item in model.components if item.behaviour is not None}
-        self._plants = {communication_plant_name(item): item for item in model.communications if item.kind in _CALLED}
+        self._plants = {
+            communication_plant_name(item): item for item in model.communications if item.kind in CALLED_KINDS
+        }
         self._types: dict[Subject, Type] = {
             Subject(name, variable.name): variable.type
             for name, behaviour in self._behaviours.items()
@@ -188,9 +177,9 @@ class Requests:
         self._places = {subject: place for place, subject in enumerate([*locations, *self._types])}
         diagrams = {item.event: item.condition for item in added}
         self._rules = tuple(
-            self._rule(model, item, diagrams.get(item.event(EventKind.REQUEST)))
-            for item in model.communications
-            if item.kind is not CommunicationKind.OUTGOING_MESSAGE
+            self._rule(event, diagrams.get(event.name))
+            for event in system.events.values()
+            if event.kind is EventKind.REQUEST
         )
 
     @property
@@ -213,7 +202,7 @@ class Requests:
         enabled, blocked, unknown = list[str](), list[Blocked](), list[str]()
         for rule in self._rules:
             why = tuple(self._why(rule, state))[:MAXIMUM_REASONS]
-            is_unknown = rule.plant is not None and state[self._places[Subject(rule.plant)]] is None
+            is_unknown = rule.moves is not None and state[self._places[Subject(rule.moves.plant)]] is None
             if not why and rule.added is not None:
                 allowed, tested = self._decided(rule.added, state)
                 is_unknown = is_unknown or allowed is None
@@ -229,44 +218,28 @@ class Requests:
 
     # Taking the model apart
 
-    def _rule(self, model: Model, communication: Communication, added: DecisionDiagram | None) -> _Rule:
-        event = communication.event(EventKind.REQUEST)
+    def _rule(self, event: ExecutableEvent, added: DecisionDiagram | None) -> _Rule:
         return _Rule(
-            event,
-            communication_plant_name(communication) if communication.kind in _CALLED else None,
-            tuple(
-                self._part(component, behaviour, event)
-                for component in model.components
-                if (behaviour := component.behaviour) and any(item.event == event for item in behaviour.transitions)
-            ),
-            tuple(self._need(item) for item in model.requirements_on(communication.name)),
+            event.name,
+            event.moves,
+            tuple(_Part(item.component, self._kept(item)) for item in event.participants),
+            tuple(map(self._need, event.requirements)),
             None if added is None else self._decision(added),
         )
 
-    def _part(self, component: Component, behaviour: Behaviour, event: str) -> _Part:
-        on_event = [item for item in behaviour.transitions if item.event == event]
-        ordered = [*(item for item in on_event if item.source is not None), *(i for i in on_event if i.source is None)]
-        return _Part(
-            component.name,
-            {
-                state.name: tuple(
-                    self._transition(component.name, behaviour, item)
-                    for item in ordered
-                    if item.source in (state.name, None)
-                )
-                for state in behaviour.states
-            },
-        )
-
-    def _transition(self, component: str, behaviour: Behaviour, transition: Transition) -> _GuardedTransition:
-        kept = []
-        for update in transition.updates:
-            variable = next(item for item in behaviour.variables if item.name == update.variable)
-            match variable.type:
-                case IntegerType(low=int(low), high=int(high)) if variable.is_synthesis:
-                    function = compile_expression(update.expression, self._places)
-                    kept.append(_Kept(Subject(component, variable.name), function, low, high))
-        return _GuardedTransition(None if transition.guard is None else self._condition(transition.guard), tuple(kept))
+    def _kept(self, participant: Participant) -> dict[str, tuple[_Kept, ...]]:
+        """The updates that must stay in a range, by the state in which they are made."""
+        types = {item.name: item.type for item in participant.behaviour.variables if item.is_synthesis}
+        found: dict[str, tuple[_Kept, ...]] = {}
+        for states, transition in participant.branches:
+            kept = []
+            for update in transition.updates:
+                match types.get(update.variable):
+                    case IntegerType(low=int(low), high=int(high)):
+                        function = compile_expression(update.expression, self._places)
+                        kept.append(_Kept(Subject(participant.component, update.variable), function, low, high))
+            found.update(dict.fromkeys(states, tuple(kept)))
+        return {state: found[state] for state in participant.taken}
 
     def _need(self, item: Requirement) -> _Need:
         is_needs = item.form is RequirementForm.NEEDS
@@ -339,10 +312,11 @@ class Requests:
     # Why
 
     def _why(self, rule: _Rule, state: State) -> Iterator[str]:
-        if rule.plant is not None:
-            location = state[self._places[Subject(rule.plant)]]
-            if location not in (None, _IDLE):
-                yield f"{automaton_text(rule.plant, self._components)} is in {location}, not in {_IDLE}"
+        if rule.moves is not None:
+            location = state[self._places[Subject(rule.moves.plant)]]
+            if location is not None and location not in rule.moves.targets:
+                needed = _listed(list(rule.moves.targets))
+                yield f"{automaton_text(rule.moves.plant, self._components)} is in {location}, not in {needed}"
         for part in rule.parts:
             yield from self._hindered(part, state)
         for need in rule.needs:
@@ -351,22 +325,14 @@ class Requests:
 
     def _hindered(self, part: _Part, state: State) -> Iterator[str]:
         location = str(state[self._places[Subject(part.name)]])
-        transitions = part.transitions[location]
-        taken = next((way for way in transitions if way.guard is None or way.guard.holds(state)), None)
-        if taken is None and not transitions:
-            there = [name for name, found in part.transitions.items() if found]
-            yield f"{part.name} is in {location}, not in {_listed(there)}" if there else f"{part.name} never allows it"
-        elif taken is None:
-            guards = [way.guard for way in transitions if way.guard is not None]
-            told = " nor ".join(guard.text for guard in guards[:MAXIMUM_NAMES])
-            read = tuple(dict.fromkeys(subject for guard in guards for subject in guard.reads))
-            yield f"{part.name} is in {location}, where {told} does not hold{self._values(read, state)}"
-        else:
-            for item in taken.kept:
-                value = item.function(state, _NO_DATA)
-                if value is not None and values.assignable_integer(value, item.low, item.high) is None:
-                    now = value_text(state[self._places[item.subject]])
-                    yield f"it would take {item.subject}, which is {now}, out of its range {item.low}..{item.high}"
+        if location not in part.kept:
+            yield f"{part.name} is in {location}, not in {_listed(list(part.kept))}"
+            return
+        for item in part.kept[location]:
+            value = item.function(state, _NO_DATA)
+            if value is not None and values.assignable_integer(value, item.low, item.high) is None:
+                now = value_text(state[self._places[item.subject]])
+                yield f"it would take {item.subject}, which is {now}, out of its range {item.low}..{item.high}"
 
     def _violated(self, need: _Need, state: State) -> str:
         if need.condition.function(state, _NO_DATA) is None:

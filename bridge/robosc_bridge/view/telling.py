@@ -41,7 +41,7 @@ class Portrait:
         self.robot = robot
         self.text = definition_text(robot)
         made = robot.supervisor
-        self.requests = None if made is None else Requests(made.model, made.added)
+        self.requests = None if made is None else Requests(made.executable, made.added)
 
 
 class Teller:

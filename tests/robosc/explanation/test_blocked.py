@@ -60,7 +60,7 @@ def as_texts(components: Any) -> Any:
 @settings(max_examples=examples(100))
 def test_a_request_has_a_reason_if_and_only_if_it_is_not_enabled(seed: int) -> None:
     supervisor, dice = random_supervisor(seed), Random(seed)
-    requests = Requests(supervisor.model, supervisor.added)
+    requests = Requests(supervisor.executable, supervisor.added)
     for system in wander(supervisor, dice, 12):
         known, components = locations(supervisor, system), system.state()
         available = requests.availability(components, known)
@@ -79,7 +79,7 @@ def test_a_request_has_a_reason_if_and_only_if_it_is_not_enabled(seed: int) -> N
 @settings(max_examples=examples(60))
 def test_what_is_told_without_locations_holds_with_them(seed: int) -> None:
     supervisor, dice = random_supervisor(seed), Random(seed)
-    requests = Requests(supervisor.model, supervisor.added)
+    requests = Requests(supervisor.executable, supervisor.added)
     for system in wander(supervisor, dice, 6):
         known = locations(supervisor, system)
         some = {name: place for name, place in known.items() if dice.random() < 0.5}
@@ -92,7 +92,7 @@ def test_what_is_told_without_locations_holds_with_them(seed: int) -> None:
 
 def test_the_sentences_are_in_the_words_of_the_model() -> None:
     supervisor = example_supervisor("maze_solver/maze_solver")
-    system, requests = InterpretedSystem(supervisor), Requests(supervisor.model, supervisor.added)
+    system, requests = InterpretedSystem(supervisor), Requests(supervisor.executable, supervisor.added)
     turning: dict[str, Any] = {**system.state(), "Rotator": {"state": "idle", "variables": {}}}
     states = [item.name for item in supervisor.model.component("Rotator").behaviour.states]  # type: ignore[union-attr]
     turning["Rotator"]["state"] = next(name for name in states if name != "idle")
@@ -130,7 +130,7 @@ def test_what_comes_from_elsewhere_is_read_by_its_type(type_: Any, raw: Any, val
 
 def test_a_state_of_another_model_is_refused() -> None:
     supervisor = example_supervisor("maze_solver/maze_solver")
-    requests, state = Requests(supervisor.model, supervisor.added), InterpretedSystem(supervisor).state()
+    requests, state = Requests(supervisor.executable, supervisor.added), InterpretedSystem(supervisor).state()
     for wrong in ({}, {**state, "Rotator": 3}, {**state, "Rotator": {"state": "flying"}}, {**state, "LidarSensor": {}}):
         with pytest.raises(StateError):
             requests.availability(wrong, {})
@@ -145,7 +145,7 @@ def test_what_a_requirement_reads_is_listed_up_to_a_limit() -> None:
         f"requirement few needs C.v0 > C.v1 requirement many needs {' + '.join(f'C.{name}' for name in names)} > 9 }}"
     )
     supervisor = Supervisor(model, Deployment.CONTROLLER, (), CERTIFICATE)
-    available = Requests(model, ()).availability(InterpretedSystem(supervisor).state(), {})
+    available = Requests(supervisor.executable, ()).availability(InterpretedSystem(supervisor).state(), {})
     few, many = (item.why[0] for item in available.blocked)
     assert few.endswith("C.v0 > C.v1, which does not hold (C.v0 is 1, C.v1 is 1)")
     assert many.endswith(f"({', '.join(f'C.{name} is 1' for name in names[:MAXIMUM_NAMES])}, ...)")

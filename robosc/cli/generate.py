@@ -19,7 +19,6 @@ from robosc.json_documents import diagnostics_json
 from robosc.source import Bundle
 
 if TYPE_CHECKING:
-    from robosc.supervisor import SynthesisOutcome
     from robosc.targets import GeneratedFiles, GenerateOptions
 
 WRITTEN = "the files are written"
@@ -109,14 +108,15 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize, generate and write; 0 if files were written."""
-    from robosc.targets import generated, require_generatable
+    from robosc.pipeline.generating import generation_of
+    from robosc.targets import require_generatable
 
     require_generatable(arguments.target)
     options = generate_options(arguments)
     bundle = read_bundle(arguments)
-    made = synth.make(arguments, bundle, allow_livelock=arguments.allow_livelock)
-    made, files = generated(made, arguments.target, options)
-    return report_generated(arguments, made, files, bundle)
+    outcome = synth.make(arguments, bundle, allow_livelock=arguments.allow_livelock)
+    generation = generation_of(outcome, arguments.target, options)
+    return report_generated(arguments, generation, generation.files, bundle)
 
 
 def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
@@ -148,31 +148,31 @@ def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
 
 
 def report_generated(
-    arguments: argparse.Namespace, made: "SynthesisOutcome", files: "GeneratedFiles | None", bundle: Bundle
+    arguments: argparse.Namespace, outcome: synth.Outcome, files: "GeneratedFiles | None", bundle: Bundle
 ) -> ExitCode:
     """Write the files, print the outcome as asked and return the exit status."""
     from robosc.targets import Written, write_generated
 
-    outcome = Written(())
+    done = Written(())
     if files is not None:
-        outcome = write_generated(files, arguments.target, arguments.output, force=arguments.force)
-    written, left_out, removal = [str(path) for path in outcome.files], outcome.left_out, outcome.removal
+        done = write_generated(files, arguments.target, arguments.output, force=arguments.force)
+    written, left_out, removal = [str(path) for path in done.files], done.left_out, done.removal
     if arguments.json:
         print_json(
             {
-                "status": str(made.status),
-                **synth.reasons_json(made),
+                "status": str(outcome.status),
+                **synth.reasons_json(outcome),
                 "target": arguments.target,
                 "folder": str(arguments.output),
                 "files": written,
                 "left_out": list(left_out),
                 "removed": [str(path) for path in removal.removed],
                 "kept": [str(path) for path in removal.kept],
-                **diagnostics_json(made.diagnostics),
+                **diagnostics_json(outcome.diagnostics),
             }
         )
     else:
-        synth.report_problems(made, bundle)
+        synth.report_problems(outcome, bundle)
         for path in written:
             sys.stdout.write(f"{path}\n")
         if left_out:

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from enum import StrEnum
 from typing import TYPE_CHECKING, Protocol
 
 from robosc.cli.arguments import (
@@ -16,6 +17,7 @@ from robosc.cli.arguments import (
     read_bundle,
 )
 from robosc.cli.output import ExitCode, ProgressLine, print_diagnostics, print_json, require_other_file, write_bytes
+from robosc.errors import Diagnostic
 from robosc.json_documents import diagnostics_json
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
@@ -35,6 +37,18 @@ class Reasons(Protocol):
     @property
     def explanation(self) -> "EmptyExplanation | None":
         """Explanation of what is to blame if no supervisor exists."""
+
+
+class Outcome(Reasons, Protocol):
+    """Outcome of a synthesis, or of what needs one."""
+
+    @property
+    def status(self) -> StrEnum:
+        """Status at the end."""
+
+    @property
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
+        """Every finding about the model, sorted by place."""
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -121,7 +135,7 @@ def report_written(arguments: argparse.Namespace, outcome: "SynthesisOutcome", b
     return ExitCode.OK if outcome.supervisor is not None else ExitCode.FAILED
 
 
-def report_problems(outcome: "SynthesisOutcome", bundle: Bundle) -> None:
+def report_problems(outcome: Outcome, bundle: Bundle) -> None:
     """Findings and, where there is no supervisor, why, on standard error."""
     print_diagnostics(outcome.diagnostics, bundle)
     report_reasons(outcome, bundle)

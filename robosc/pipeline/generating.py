@@ -11,7 +11,7 @@ from robosc.pipeline.supervisors import Supervisor
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, make, never, status_of
 from robosc.supervisor import OutcomeStatus, Progress, SynthesisOutcome
 from robosc.supervisor.structure import Supervisor as CoreSupervisor
-from robosc.targets import GenerateOptions, generated, require_generatable
+from robosc.targets import GenerateOptions, TargetRefusal, generate_or_refuse, require_generatable
 
 DEFAULT_GENERATION = GenerateOptions()
 UNKNOWN_FINDINGS = (
@@ -67,13 +67,25 @@ def generate(
     return replace(found, diagnostics=Findings(found.diagnostics, bundle))
 
 
+def generation_of(outcome: SynthesisOutcome, target: str, options: GenerateOptions) -> Generation:
+    """Return the files of a target, or of all of them, for the outcome of a synthesis.
+
+    Raises:
+        UnknownTargetError: There is no such target.
+        UnsupportedModelError: The model is outside what the target handles.
+    """
+    status, diagnostics = SynthesisStatus(str(outcome.status)), outcome.diagnostics
+    files = generate_or_refuse(outcome.supervisor, diagnostics, target, options)
+    if isinstance(files, TargetRefusal):
+        status, diagnostics, files = SynthesisStatus.MODEL_ERRORS, files.diagnostics, None
+    return Generation(status, diagnostics, outcome.reason, files, outcome.explanation, target)
+
+
 def _generation(
-    made: SynthesisOutcome, target: str, generation: GenerateOptions, on_progress: OnProgress
+    outcome: SynthesisOutcome, target: str, options: GenerateOptions, on_progress: OnProgress
 ) -> Generation:
     on_progress(Progress("generation", target))
     try:
-        judged, files = generated(made, target, generation)
+        return generation_of(outcome, target, options)
     except UnsupportedModelError as error:
-        return Generation(SynthesisStatus.UNSUPPORTED_MODEL, made.diagnostics, str(error), None, target=target)
-    status = SynthesisStatus(str(judged.status))
-    return Generation(status, judged.diagnostics, judged.reason, files, judged.explanation, target)
+        return Generation(SynthesisStatus.UNSUPPORTED_MODEL, outcome.diagnostics, str(error), None, target=target)

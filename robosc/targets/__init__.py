@@ -4,15 +4,22 @@ A target reads a supervisor and returns files as text (`GeneratedFiles`); `write
 that writes them. Same supervisor, same bytes: no time, no machine path, everything sorted.
 """
 
+from robosc.targets.all_targets import (
+    ALL,
+    Written,
+    generate_or_refuse,
+    require_generatable,
+    targets_left_out,
+    write_generated,
+)
 from robosc.targets.controller_config import (
     CONFIG_FILE,
     ControllerConfig,
     ControllerConfigError,
     read_controller_config,
 )
-from robosc.targets.everything import ALL, Written, generated, refusals, require_generatable, write_generated
 from robosc.targets.files import GeneratedFiles, OverwriteError, Removal, remove_earlier, write_files
-from robosc.targets.judgement import judged_for
+from robosc.targets.refusal import TargetRefusal, apply_target_errors
 from robosc.targets.registry import (
     GenerateOptions,
     SupervisedController,
@@ -35,18 +42,19 @@ __all__ = [
     "Removal",
     "SupervisedController",
     "TargetInfo",
+    "TargetRefusal",
     "UnknownTargetError",
     "Written",
+    "apply_target_errors",
     "available_targets",
     "generate",
-    "generated",
-    "judged_for",
+    "generate_or_refuse",
     "read_controller_config",
-    "refusals",
     "register",
     "remove_earlier",
     "require_generatable",
     "require_target",
+    "targets_left_out",
     "write_files",
     "write_generated",
 ]

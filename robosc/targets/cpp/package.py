@@ -22,7 +22,7 @@ from robosc.targets.files import GeneratedFiles
 from robosc.targets.python.package import package_name
 from robosc.targets.python.text import printable
 from robosc.targets.registry import GenerateOptions
-from robosc.targets.ros.package import chosen, packages, release_identifiers, require_own_names, told_by
+from robosc.targets.ros.package import chosen, error_context, packages, release_identifiers, require_own_names
 from robosc.targets.ros.runtime.parameters import Parameter, declarations
 from robosc.targets.ros.topics import Topic, servers, shapes_of, topics
 from robosc.targets.words import requirement_text
@@ -73,7 +73,7 @@ def generate_package(supervisor: Supervisor, options: GenerateOptions, middlewar
         UnsupportedModelError: The model is outside what the target handles.
     """
     name = package_name(supervisor, options, "controller")
-    with told_by(middleware.target):
+    with error_context(middleware.target):
         return _generate(supervisor, name, options, middleware)
 
 

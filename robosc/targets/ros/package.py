@@ -36,7 +36,7 @@ _TITLES = {Deployment.CONTROLLER: "Supervisory controller", Deployment.LAYER: "S
 
 
 @contextmanager
-def told_by(target: str) -> Iterator[None]:
+def error_context(target: str) -> Iterator[None]:
     """Errors about the model name the target.
 
     Raises:

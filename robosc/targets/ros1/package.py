@@ -13,11 +13,11 @@ from robosc.targets.ros.package import (
     chosen,
     context,
     environment,
+    error_context,
     packages,
     python_files,
     release_identifiers,
     require_own_names,
-    told_by,
 )
 from robosc.targets.ros.runtime.parameters import USE_SIM_TIME, declarations
 from robosc.targets.ros.runtime.supervised import callers_name, robots_name
@@ -28,7 +28,6 @@ _OWN_DEPENDENCIES = ("actionlib", "diagnostic_msgs", "rosgraph", "rospy", "std_m
 
 # Where each module of a package's runtime comes from.
 _RUNTIME_MODULES = {
-    "early": "robosc.targets.ros.runtime",
     "goals": "robosc.targets.ros1.runtime",
     "health": "robosc.targets.ros.runtime",
     "inbox": "robosc.targets.ros1.runtime",
@@ -38,18 +37,19 @@ _RUNTIME_MODULES = {
     "reports": "robosc.targets.ros.runtime",
     "scans": "robosc.targets.ros.runtime",
     "services": "robosc.targets.ros1.runtime",
+    "startup": "robosc.targets.ros.runtime",
     "timers": "robosc.targets.ros1.runtime",
     "types": "robosc.targets.ros1.runtime",
 }
 
 _RUNTIME_MODULES_OF = {
-    Deployment.CONTROLLER: {"late_controller": "robosc.targets.ros.runtime"},
+    Deployment.CONTROLLER: {"startup_controller": "robosc.targets.ros.runtime"},
     Deployment.LAYER: {
         "children": "robosc.targets.ros.runtime",
         "defaults": "robosc.targets.ros1.runtime",
-        "late_layer": "robosc.targets.ros.runtime",
         "remapping": "robosc.targets.ros1.runtime",
         "servers": "robosc.targets.ros1.runtime",
+        "startup_layer": "robosc.targets.ros.runtime",
         "supervised": "robosc.targets.ros.runtime",
     },
 }
@@ -99,7 +99,7 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
     """
     deployment = supervisor.deployment
     name = package_name(supervisor, options, str(deployment))
-    with told_by("ros1"):
+    with error_context("ros1"):
         found, asked = topics(supervisor.model), servers(supervisor.model)
         require_own_names(name, found, asked)
         _require_names(found, asked)

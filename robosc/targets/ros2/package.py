@@ -12,11 +12,11 @@ from robosc.targets.ros.package import (
     chosen,
     context,
     environment,
+    error_context,
     packages,
     python_files,
     release_identifiers,
     require_own_names,
-    told_by,
 )
 from robosc.targets.ros.runtime.parameters import declarations
 from robosc.targets.ros.runtime.supervised import callers_name, robots_name
@@ -37,7 +37,6 @@ _OWN_DEPENDENCIES = (
 # Where each module of a package's runtime comes from.
 _RUNTIME_MODULES = {
     "clients": "robosc.targets.ros2.runtime",
-    "early": "robosc.targets.ros.runtime",
     "health": "robosc.targets.ros.runtime",
     "lifecycle": "robosc.targets.ros2.runtime",
     "messages": "robosc.targets.ros.runtime",
@@ -45,16 +44,17 @@ _RUNTIME_MODULES = {
     "presence": "robosc.targets.ros.runtime",
     "reports": "robosc.targets.ros.runtime",
     "scans": "robosc.targets.ros.runtime",
+    "startup": "robosc.targets.ros.runtime",
 }
 
 _RUNTIME_MODULES_OF = {
-    Deployment.CONTROLLER: {"late_controller": "robosc.targets.ros.runtime"},
+    Deployment.CONTROLLER: {"startup_controller": "robosc.targets.ros.runtime"},
     Deployment.LAYER: {
         "children": "robosc.targets.ros.runtime",
         "defaults": "robosc.targets.ros2.runtime",
-        "late_layer": "robosc.targets.ros.runtime",
         "remapping": "robosc.targets.ros2.runtime",
         "servers": "robosc.targets.ros2.runtime",
+        "startup_layer": "robosc.targets.ros.runtime",
         "supervised": "robosc.targets.ros.runtime",
     },
 }
@@ -104,7 +104,7 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
     """
     deployment = supervisor.deployment
     name = package_name(supervisor, options, str(deployment))
-    with told_by("ros2"):
+    with error_context("ros2"):
         found, asked = topics(supervisor.model), servers(supervisor.model)
         require_own_names(name, found, asked)
         if deployment is Deployment.LAYER:

@@ -7,7 +7,8 @@ from typing import Any, Protocol, Self
 from robosc.errors import UnsupportedModelError
 from robosc.explanation import to_text
 from robosc.model.structure import Deployment
-from robosc.supervisor import SynthesisOutcome, make_supervisor
+from robosc.supervisor import OutcomeStatus, SynthesisOutcome, make_supervisor
+from robosc.targets import TargetRefusal
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.convert import given, told
 from robosc_server.tasks.task import Report
@@ -32,11 +33,13 @@ class Attempt:
 
     Attributes:
         made: Result of making the supervisor; None where the attempt did not come so far.
+        refusal: Refusal of the target that was asked for, or None.
         error: Error that says why the model cannot be handled, or None.
     """
 
     def __init__(self) -> None:
         self.made: SynthesisOutcome | None = None
+        self.refusal: TargetRefusal | None = None
         self.error: UnsupportedModelError | None = None
 
     def __enter__(self) -> Self:
@@ -68,12 +71,12 @@ class Attempt:
     def ending(self) -> dict[str, Any]:
         """The fields that every result has: `status`, `diagnostics`, `reason` and `explanation`."""
         made, error = self.made, self.error
-        diagnostics = made.diagnostics if made else ()
+        diagnostics = self.refusal.diagnostics if self.refusal else made.diagnostics if made else ()
         if error is not None or made is None:
             status, reason = pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL, str(error)
             return {"status": status, "diagnostics": told.findings(diagnostics), "reason": reason}
         return {
-            "status": told.STATUSES[made.status],
+            "status": told.STATUSES[OutcomeStatus.MODEL_ERRORS if self.refusal else made.status],
             "diagnostics": told.findings(diagnostics),
             "reason": made.reason,
             "explanation": to_text(made.explanation) if made.explanation else "",

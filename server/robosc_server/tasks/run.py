@@ -20,7 +20,7 @@ from robosc.supervisor import Supervisor, encode
 from robosc.supervisor.conditions import state_predicates
 from robosc.synthesis import UnknownEngineError
 from robosc.synthesis.engines import keep_ready, resolve_engine
-from robosc.targets import GeneratedFiles, UnknownTargetError, generated, require_generatable
+from robosc.targets import GeneratedFiles, TargetRefusal, UnknownTargetError, generate_or_refuse, require_generatable
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.attempt import Attempt, OnReport
 from robosc_server.tasks.convert import given, pieces, told
@@ -144,7 +144,11 @@ def _generate(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterat
     with attempt:
         made = attempt.make(request, limits.nodes, on_report, allow_livelock=request.options.allow_livelock)
         on_report(Report("generation", request.target))
-        attempt.made, files = generated(made, request.target, choices)
+        found = generate_or_refuse(made.supervisor, made.diagnostics, request.target, choices)
+        if isinstance(found, TargetRefusal):
+            attempt.refusal = found
+        else:
+            files = found
     listing = [] if files is None else pieces.listing(files)
     digest = pieces.digest_of(listing) if listing else b""
     yield pb.GenerateResponse(result=pb.GenerationResult(files=listing, digest=digest, **attempt.ending()))

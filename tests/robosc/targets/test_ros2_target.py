@@ -69,7 +69,7 @@ def test_everything_that_a_package_needs_is_there(files: GeneratedFiles) -> None
         f"{PACKAGE}/node.py",
         f"{PACKAGE}/start.py",
         f"{PACKAGE}/supervisor.py",
-        f"{PACKAGE}/runtime/early.py",
+        f"{PACKAGE}/runtime/startup.py",
     } <= set(files)
 
 

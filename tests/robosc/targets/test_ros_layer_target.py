@@ -80,7 +80,7 @@ def test_it_has_what_a_layer_needs_and_nothing_of_a_controller(ros: Ros, files: 
         f"{PACKAGE}/caller.py",
         f"{PACKAGE}/node.py",
         f"{PACKAGE}/robot.py",
-        f"{PACKAGE}/runtime/late_layer.py",
+        f"{PACKAGE}/runtime/startup_layer.py",
         f"{PACKAGE}/runtime/servers.py",
         f"{PACKAGE}/start.py",
     } <= set(files)

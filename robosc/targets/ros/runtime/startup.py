@@ -41,7 +41,7 @@ class HeldMessages:
         return [entry[1:] for entry in held]
 
 
-class LateRunner(Runner):
+class StartupBufferingRunner(Runner):
     """An executor of either deployment that starts with what came before."""
 
     _came_s: float | None = None

@@ -8,10 +8,10 @@ from __future__ import annotations
 from typing import Any
 
 from robosc.execution.executor import Executor
-from robosc.targets.ros.runtime.early import LateRunner
+from robosc.targets.ros.runtime.startup import StartupBufferingRunner
 
 
-class LateExecutor(LateRunner, Executor):
+class StartupBufferingExecutor(StartupBufferingRunner, Executor):
     """The executor of a controller that starts with what came before: nothing is decided before the last of it."""
 
     def _take_in(self, messages: list[tuple[str, Any, float]]) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from robosc.cli.main import main
-from robosc.errors import UnsupportedModelError
+from robosc.errors import Severity, UnsupportedModelError
 from robosc.model.structure import Deployment
 from robosc.supervisor import SynthesisOutcome, make_supervisor
 from robosc.targets import (
@@ -14,14 +14,15 @@ from robosc.targets import (
     GeneratedFiles,
     GenerateOptions,
     TargetInfo,
+    TargetRefusal,
     UnknownTargetError,
     available_targets,
     generate,
-    generated,
-    refusals,
+    generate_or_refuse,
     register,
     registry,
     require_generatable,
+    targets_left_out,
 )
 from robosc.targets.registry import Target
 from support.models import bundle_of
@@ -42,8 +43,14 @@ def own_registry(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "_registered", {})
 
 
-def made_of(text: str) -> SynthesisOutcome:
+def outcome_of(text: str) -> SynthesisOutcome:
     return make_supervisor(bundle_of(text), deployment=Deployment.CONTROLLER)
+
+
+def files_of(outcome: SynthesisOutcome, target: str) -> GeneratedFiles:
+    found = generate_or_refuse(outcome.supervisor, outcome.diagnostics, target)
+    assert isinstance(found, GeneratedFiles)
+    return found
 
 
 def refusing(name: str) -> None:
@@ -56,38 +63,38 @@ def refusing(name: str) -> None:
 
 
 def test_each_target_gives_what_it_gives_alone() -> None:
-    made = made_of(MAZE.read_text(encoding="utf-8"))
-    judged, files = generated(made, ALL)
-    assert judged == made
-    assert files is not None
-    assert made.supervisor is not None
+    outcome = outcome_of(MAZE.read_text(encoding="utf-8"))
+    files = files_of(outcome, ALL)
+    assert outcome.supervisor is not None
     expected = {"README.md"}
     for info in available_targets():
-        alone = generate(made.supervisor, info.name)
+        alone = generate(outcome.supervisor, info.name)
         expected |= {f"{info.name}/{path}" for path in alone}
         assert {path: files[f"{info.name}/{path}"] for path in alone} == dict(alone)
         assert {f"{info.name}/{path}" for path in alone.executables} <= files.executables
     assert set(files) == expected
-    assert refusals(files, ALL) == ()
-    assert generated(made, ALL)[1] == files
+    assert targets_left_out(files, ALL) == ()
+    assert files_of(outcome, ALL) == files
 
 
 def test_what_refuses_is_left_out_and_told() -> None:
     refusing("cobol")
-    _, files = generated(made_of(MAZE.read_text(encoding="utf-8")), ALL)
-    assert files is not None
-    assert refusals(files, ALL) == ("cobol",)
+    files = files_of(outcome_of(MAZE.read_text(encoding="utf-8")), ALL)
+    assert targets_left_out(files, ALL) == ("cobol",)
     assert "| cobol | picky | not generated: no \\| model will do |" in files["README.md"].splitlines()
-    assert refusals(files, "cif") == ()
+    assert targets_left_out(files, "cif") == ()
 
 
 def test_an_error_of_one_target_leaves_out_that_one() -> None:
-    made = made_of(SPACES)
-    assert generated(made, "ros2")[1] is None
-    _, files = generated(made, ALL)
-    assert files is not None
-    assert "ros2" in refusals(files, ALL)
-    assert "python" not in refusals(files, ALL)
+    outcome = outcome_of(SPACES)
+    refusal = generate_or_refuse(outcome.supervisor, outcome.diagnostics, "ros2")
+    assert isinstance(refusal, TargetRefusal)
+    assert refusal.target == "ros2"
+    assert [item.code for item in refusal.diagnostics if item.severity is Severity.ERROR] == ["invalid-identifier"]
+    assert all(item.severity is not Severity.ERROR for item in outcome.diagnostics)
+    files = files_of(outcome, ALL)
+    assert "ros2" in targets_left_out(files, ALL)
+    assert "python" not in targets_left_out(files, ALL)
     assert "[invalid-identifier]" in files["README.md"]
 
 
@@ -95,7 +102,7 @@ def test_where_every_target_refuses_there_is_nothing(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(registry, "_BUILT_IN", {})
     refusing("cobol")
     with pytest.raises(UnsupportedModelError, match="no target can do this model"):
-        generated(made_of(MAZE.read_text(encoding="utf-8")), ALL)
+        files_of(outcome_of(MAZE.read_text(encoding="utf-8")), ALL)
 
 
 def test_names() -> None:
@@ -105,8 +112,9 @@ def test_names() -> None:
 
 
 def test_without_a_supervisor_there_are_no_files() -> None:
-    made, files = generated(made_of("robot R { nonsense }"), ALL)
-    assert (made.supervisor, files) == (None, None)
+    outcome = outcome_of("robot R { nonsense }")
+    assert outcome.supervisor is None
+    assert generate_or_refuse(outcome.supervisor, outcome.diagnostics, ALL) is None
 
 
 def test_the_command_tells_what_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,8 +6,8 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 from __future__ import annotations
 
 from robosc.execution.layer import Layer
-from robosc.targets.ros.runtime.early import LateRunner
+from robosc.targets.ros.runtime.startup import StartupBufferingRunner
 
 
-class LateLayer(LateRunner, Layer):
+class StartupBufferingLayer(StartupBufferingRunner, Layer):
     """A supervision layer that starts with what came before, and passes it on then."""

@@ -1,14 +1,14 @@
 """One target's files, or those of all targets that can do a model, each in a folder of its own."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from robosc._version import __version__
-from robosc.errors import UnsupportedModelError
-from robosc.supervisor.make import SynthesisOutcome
+from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.supervisor.structure import Supervisor
 from robosc.targets.files import GeneratedFiles, Removal, remove_earlier, write_files
-from robosc.targets.judgement import judged_for
+from robosc.targets.refusal import TargetRefusal, apply_target_errors
 from robosc.targets.registry import (
     GENERAL_ERRORS,
     GenerateOptions,
@@ -47,43 +47,45 @@ def require_generatable(name: str) -> None:
         require_target(name)
 
 
-def generated(
-    made: SynthesisOutcome, target: str, options: GenerateOptions | None = None
-) -> tuple[SynthesisOutcome, GeneratedFiles | None]:
-    """Return the files of a target, or of all of them; and the outcome as the target sees it.
+def generate_or_refuse(
+    supervisor: Supervisor | None,
+    diagnostics: Sequence[Diagnostic],
+    target: str,
+    options: GenerateOptions | None = None,
+) -> GeneratedFiles | TargetRefusal | None:
+    """Return the files of a target, or of all of them; or the target's refusal of the model.
 
     Where all are asked for, one that refuses the model is left out, and the bundle's `README.md` says why.
 
     Args:
-        made: The outcome of `make_supervisor`.
+        supervisor: The supervisor, or None if there is none: then there are no files.
+        diagnostics: Every finding about its model.
         target: Name of a target, or `ALL`.
         options: Choices of the user; the defaults if None.
-
-    Returns:
-        The outcome with the target's own errors, and the files: none where the outcome has no supervisor.
 
     Raises:
         UnknownTargetError: There is no such target.
         UnsupportedModelError: The model is outside what the target handles; of all targets, outside what any does.
     """
     if target != ALL:
-        judged = judged_for(made, target)
-        return judged, None if judged.supervisor is None else generate(judged.supervisor, target, options)
-    names = [info.name for info in available_targets()]
-    outcomes = [judged_for(made, name) for name in names]
-    if made.supervisor is None or all(outcome.supervisor is None for outcome in outcomes):
-        return outcomes[0], None
-    return made, _of_all(made, made.supervisor, options)
+        refusal = apply_target_errors(diagnostics, target)
+        return refusal or (None if supervisor is None else generate(supervisor, target, options))
+    refusals = [apply_target_errors(diagnostics, info.name) for info in available_targets()]
+    if supervisor is None or all(refusals):
+        return refusals[0]
+    return _of_all(supervisor, diagnostics, options)
 
 
-def _of_all(made: SynthesisOutcome, supervisor: Supervisor, options: GenerateOptions | None) -> GeneratedFiles:
+def _of_all(
+    supervisor: Supervisor, diagnostics: Sequence[Diagnostic], options: GenerateOptions | None
+) -> GeneratedFiles:
     texts: dict[str, str] = {}
     executables: set[str] = set()
     rows: list[str] = []
     is_incomplete = False
     for info in available_targets():
         try:
-            files = _of_one(made, supervisor, info.name, options)
+            files = _of_one(supervisor, diagnostics, info.name, options)
         except UnsupportedModelError as error:
             rows.append(f"| {info.name} | {info.description} | not generated: {_cell(str(error))} |")
             is_incomplete = True
@@ -104,10 +106,10 @@ def _of_all(made: SynthesisOutcome, supervisor: Supervisor, options: GenerateOpt
 
 
 def _of_one(
-    made: SynthesisOutcome, supervisor: Supervisor, name: str, options: GenerateOptions | None
+    supervisor: Supervisor, diagnostics: Sequence[Diagnostic], name: str, options: GenerateOptions | None
 ) -> GeneratedFiles:
     codes = errors_for(name) - GENERAL_ERRORS
-    against = [item for item in made.diagnostics if item.code in codes]
+    against = [item for item in diagnostics if item.code in codes]
     if against:
         raise UnsupportedModelError("; ".join(f"{item.message} [{item.code}]" for item in against))
     return generate(supervisor, name, options)
@@ -118,7 +120,7 @@ def _cell(text: str) -> str:
     return " ".join(text.split()).replace("|", "\\|")
 
 
-def refusals(files: GeneratedFiles, target: str) -> tuple[str, ...]:
+def targets_left_out(files: GeneratedFiles, target: str) -> tuple[str, ...]:
     """The targets that are not among the files of all of them."""
     if target != ALL:
         return ()
@@ -160,6 +162,6 @@ def write_generated(files: GeneratedFiles, target: str, folder: Path, *, force: 
         OverwriteError: A file was changed by somebody; nothing was written.
         UnwritableError: The place cannot be written.
     """
-    left_out = refusals(files, target)
+    left_out = targets_left_out(files, target)
     written = write_files(files, folder, force)
     return Written(written, left_out, remove_earlier(folder, left_out) if left_out else Removal())

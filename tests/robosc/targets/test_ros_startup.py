@@ -14,9 +14,9 @@ from robosc.execution.settings import Settings
 from robosc.model.structure import Deployment
 from robosc.supervisor.structure import Supervisor
 from robosc.targets import generate
-from robosc.targets.ros.runtime.early import HeldMessages
-from robosc.targets.ros.runtime.late_controller import LateExecutor
-from robosc.targets.ros.runtime.late_layer import LateLayer
+from robosc.targets.ros.runtime.startup import HeldMessages
+from robosc.targets.ros.runtime.startup_controller import StartupBufferingExecutor
+from robosc.targets.ros.runtime.startup_layer import StartupBufferingLayer
 from support.execution import RecordingMiddleware, system_of
 from support.generated import imported
 from support.layers import BothSides
@@ -41,9 +41,9 @@ robot Guarded {
 """
 
 
-def executor_of(clock: ManualClock, **settings: Any) -> tuple[LateExecutor, RecordingMiddleware]:
+def executor_of(clock: ManualClock, **settings: Any) -> tuple[StartupBufferingExecutor, RecordingMiddleware]:
     middleware = RecordingMiddleware()
-    return LateExecutor(system_of(MODEL), middleware, Settings(**settings), clock), middleware
+    return StartupBufferingExecutor(system_of(MODEL), middleware, Settings(**settings), clock), middleware
 
 
 def test_of_each_topic_the_last_messages_are_held_in_order() -> None:
@@ -107,7 +107,9 @@ def test_a_layer_holds_everything_back_before_it_begins_and_then_passes_on_what_
             initial marked state shut { on response from open goto wide }
             marked state wide { on request to go }
         } } }"""
-    layer = LateLayer(system_of(text, Deployment.LAYER), sides, sides, Settings(max_age_s={"/open": 1.0}), clock)
+    layer = StartupBufferingLayer(
+        system_of(text, Deployment.LAYER), sides, sides, Settings(max_age_s={"/open": 1.0}), clock
+    )
     layer.on_request("/go", None)
     assert sides.sent == [("blocked", "/go")]
     came_s = clock.monotonic()

@@ -1,7 +1,7 @@
 """RoboSC: supervisory controllers for robots, correct by construction.
 
 Pipeline, one way: text -> syntax tree (`robosc.language`) -> checked model (`robosc.model`) ->
-automata (`robosc.automata`) -> symbolic supervisor (`robosc.synthesis`, `robosc.supervisor`) ->
+automata (`robosc.automata`) -> certified supervisor (`robosc.synthesis`, `robosc.certification`) ->
 execution and targets (`robosc.execution`, `robosc.targets`).
 
 As a Python API, it is these functions, one for each command (`robosc.pipeline`, docs/python-api.md):
@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from robosc._version import __version__
 
 if TYPE_CHECKING:
+    from robosc.certification import Progress
     from robosc.diagnostics import UnknownCodeError
     from robosc.errors import (
         Diagnostic,
@@ -59,7 +60,6 @@ if TYPE_CHECKING:
     from robosc.pipeline.synthesis import Synthesis, synthesize
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
     from robosc.pipeline.verifying import verify
-    from robosc.supervisor import Progress
     from robosc.synthesis import UnknownEngineError
     from robosc.targets import GenerateOptions, OverwriteError, UnknownTargetError
 
@@ -85,7 +85,7 @@ _HOMES = {
     "NodeLimitError": "errors",
     "NothingGeneratedError": "pipeline.results",
     "OverwriteError": "targets",
-    "Progress": "supervisor",
+    "Progress": "certification",
     "RequestError": "explanation",
     "RoboscError": "errors",
     "Run": "pipeline.simulation",

@@ -165,8 +165,8 @@ def serve(pipe: Connection) -> None:
     """Take inputs until the other side is gone."""
     import traceback
 
+    from robosc.certification import make_supervisor  # noqa: F401
     from robosc.formatting import format_text  # noqa: F401  # so that only inputs are timed
-    from robosc.supervisor import make_supervisor  # noqa: F401
 
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     pipe.send("ready")
@@ -190,13 +190,13 @@ def try_one(text: str) -> str:
     Raises:
         AssertionError: Something is wrong with them.
     """
+    from robosc.certification import make_supervisor
     from robosc.errors import Severity, UnsupportedModelError
     from robosc.formatting import format_text
     from robosc.language import parse
     from robosc.language.tokens import tokenize
     from robosc.model import check
     from robosc.source import Bundle, SourceFile
-    from robosc.supervisor import make_supervisor
 
     bundle = Bundle(SourceFile("model.rscd", text))
     parsed = parse(bundle.main)

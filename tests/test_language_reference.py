@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from robosc.certification import make_supervisor
 from robosc.expressions import ARGUMENTS
 from robosc.language.words import RESERVED_WORDS
-from robosc.supervisor import make_supervisor
 from support.models import bundle_of, checked
 
 PAGE = (Path(__file__).parents[1] / "docs" / "language.md").read_text(encoding="utf-8")

@@ -3,10 +3,10 @@
 import re
 from pathlib import Path
 
+from robosc.certification import make_supervisor
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.settings import OTHER_DEPLOYMENT, Settings
 from robosc.model.structure import Deployment
-from robosc.supervisor import make_supervisor
 from support.layers import LayerBench
 from support.models import bundle_of, checked
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from robosc.certification import OutcomeStatus, make_supervisor
 from robosc.cli.main import make_parser
-from robosc.supervisor import OutcomeStatus, make_supervisor
 from robosc_bridge import main as bridge
 from robosc_bridge.simulated import __main__ as simulated
 from robosc_client.main import make_parser as client_parser

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from support.node_logs import Entry, entries_of
 from support.process import Process
 from support.ros1_cpp import Master, Peer, built_once, missing, node_command, supervisor_of

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from robosc.certification import make_supervisor
 from robosc.language import load_bundle
-from robosc.supervisor import make_supervisor
 from robosc.targets import generate, write_files
 from support.process import Process
 from support.ros1 import Master, Peer, missing, start_node, until

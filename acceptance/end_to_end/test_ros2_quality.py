@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate, write_files
 from support.models import model_of
 from support.random_supervisors import CERTIFICATE

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from robosc.certification import make_supervisor
 from robosc.language import load_bundle
-from robosc.supervisor import make_supervisor
 from robosc.targets import generate, write_files
 from support.ros2 import Peer, RosProcess, environment, own_domain
 from support.ros2_servers import End, HeldAction, HeldService, ServerHost, cancel_all

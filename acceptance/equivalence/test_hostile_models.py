@@ -11,7 +11,7 @@ import pytest
 
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import GeneratedFiles, available_targets, generate, write_files
 from support.c99 import GCC
 from support.cif_system import CifSystem

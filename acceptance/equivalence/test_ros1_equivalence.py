@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from robosc.certification import make_supervisor
 from robosc.language import load_bundle
 from robosc.model.structure import Deployment
-from robosc.supervisor import make_supervisor
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from support.equivalence.python_targets import observe
 from support.equivalence.random_scenarios import ODD_MESSAGES, for_node, node_scenario
 from support.equivalence.recorded import read_recorded

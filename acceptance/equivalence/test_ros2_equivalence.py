@@ -5,11 +5,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from robosc.certification import make_supervisor
 from robosc.expressions import Binary, DoubleType, EnumType, Expression, Received
 from robosc.language import load_bundle
 from robosc.model.structure import CommunicationKind, Deployment, Interface, Property
-from robosc.supervisor import make_supervisor
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from support.equivalence.node_target import timed_log
 from support.equivalence.python_targets import observe, reference
 from support.equivalence.random_scenarios import for_node, node_scenario, node_settings

@@ -9,6 +9,7 @@ from msgspec import UNSET, UnsetType
 from robosc.automata import to_automata
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.automata.structure import System
+from robosc.certification import OutcomeStatus, SynthesisOutcome
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.exploration import Graph, GraphState, graph_columns
 from robosc.expressions import Value
@@ -17,7 +18,7 @@ from robosc.model.structure import Deployment, Model
 from robosc.model_checking import Property, Verdict, properties_of
 from robosc.model_checking.outcome import EvidenceRun, Remainder, RunKind
 from robosc.source import Bundle, SourceFile, visible
-from robosc.supervisor import OutcomeStatus, Supervisor, SynthesisOutcome, decode
+from robosc.supervisor import Supervisor, decode
 from robosc_client.errors import ServiceError, malformed
 from robosc_client.results import Exploration, Generation, StateGraph, Synthesis, SynthesisStatus
 

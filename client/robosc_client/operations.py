@@ -13,8 +13,8 @@ from robosc.pipeline.files import given_path, read_bounded
 from robosc.pipeline.findings import Findings
 from robosc.pipeline.loading import FileName, ModelLike, loaded, property_file
 from robosc.source import SourceFile
+from robosc.supervisor import Supervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES, encode
-from robosc.supervisor.structure import Supervisor
 from robosc.targets import GenerateOptions, TargetInfo
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb

@@ -12,11 +12,11 @@ from typing import IO, NoReturn
 import msgspec
 
 from robosc.automata import to_automata
+from robosc.certification import make_supervisor
+from robosc.conditions.summary import added_texts
 from robosc.errors import NodeLimitError, RoboscError
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, SourceFile
-from robosc.supervisor import make_supervisor
-from robosc.supervisor.summary import added_texts
 from robosc.synthesis.engines import EngineOptions
 from robosc_lsp.outcome import Asked, Finding, Outcome
 

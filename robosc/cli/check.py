@@ -16,8 +16,8 @@ from robosc.model.structure import Deployment
 from robosc.source import Bundle
 
 if TYPE_CHECKING:
+    from robosc.certification import SynthesisOutcome
     from robosc.explanation import EmptyExplanation
-    from robosc.supervisor import SynthesisOutcome
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -106,7 +106,7 @@ class _Synthesized:
 
 
 def _synthesized(outcome: "SynthesisOutcome") -> _Synthesized:
-    from robosc.supervisor import OutcomeStatus
+    from robosc.certification import OutcomeStatus
 
     has_failed = outcome.status is OutcomeStatus.EMPTY
     return _Synthesized(outcome.diagnostics, str(outcome.status), outcome.reason, has_failed, outcome.explanation)

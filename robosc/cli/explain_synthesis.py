@@ -58,9 +58,9 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize and explain; 0 with a supervisor, 1 without."""
+    from robosc.certification import SynthesisOutcome
     from robosc.explanation import document, explanation_text
     from robosc.pipeline.explaining import explained
-    from robosc.supervisor import SynthesisOutcome
 
     bundle = read_bundle(arguments)
     progress = ProgressLine()

@@ -23,8 +23,8 @@ from robosc.model.structure import Deployment
 from robosc.source import Bundle
 
 if TYPE_CHECKING:
+    from robosc.certification import SynthesisOutcome
     from robosc.explanation import EmptyExplanation
-    from robosc.supervisor import SynthesisOutcome
 
 
 class Reasons(Protocol):
@@ -87,7 +87,7 @@ def make(
     arguments: argparse.Namespace, bundle: Bundle, *, allow_livelock: bool, verify_limit: int = SYNTHESIS_STATES
 ) -> "SynthesisOutcome":
     """Synthesize as the arguments say, with a progress line on a terminal."""
-    from robosc.supervisor import make_supervisor
+    from robosc.certification import make_supervisor
 
     progress = ProgressLine()
     try:
@@ -114,7 +114,7 @@ def report_synthesis(arguments: argparse.Namespace, outcome: "SynthesisOutcome",
 
 def report_written(arguments: argparse.Namespace, outcome: "SynthesisOutcome", bundle: Bundle) -> ExitCode:
     """Print the outcome as asked and return the exit status: of a supervisor whose file is there, if it has one."""
-    from robosc.supervisor import summary_json, summary_text
+    from robosc.conditions.summary import summary_json, summary_text
 
     if arguments.json:
         print_json(

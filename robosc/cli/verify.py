@@ -118,9 +118,9 @@ def run_with(
 
 
 def _verify_supervisor(arguments: argparse.Namespace) -> int:
+    from robosc.certification.file_report import file_verification_json, has_passed
+    from robosc.certification.supervisor_file import verify_supervisor_file
     from robosc.supervisor.codec import decode
-    from robosc.supervisor.recheck import verify_supervisor_file
-    from robosc.supervisor.recheck_report import file_verification_json, has_passed
     from robosc.synthesis.engines import resolve_engine
     from robosc.verification import Limits
 
@@ -168,7 +168,7 @@ def report_recheck(
         diagnostics: Reasons why the texts hold no model that the supervisor could be for.
         bundle: The texts.
     """
-    from robosc.supervisor.recheck_report import file_verification_text
+    from robosc.certification.file_report import file_verification_text
 
     if arguments.json:
         print_json(document)
@@ -213,7 +213,7 @@ def tell_signer(arguments: argparse.Namespace, key: "PublicKey") -> None:
 
 def report_malformed(arguments: argparse.Namespace, error: InvalidSupervisorError | SignatureError) -> ExitCode:
     """Print that a file is no supervisor, or not signed as it must be, and return the exit status."""
-    from robosc.supervisor.recheck_report import malformed_json
+    from robosc.certification.file_report import malformed_json
 
     if arguments.json:
         print_json(malformed_json(error))

@@ -9,7 +9,7 @@ from robosc.controller_properties.controller import Controller
 from robosc.controller_properties.outcome import Properties
 from robosc.controller_properties.search import search
 from robosc.controller_properties.silent_steps import always_end, never_conflict, stays_nonblocking
-from robosc.supervisor.structure import AddedCondition, PropertyResult
+from robosc.supervisor import AddedCondition, PropertyResult
 
 DEFAULT_LIMIT = 10_000
 """Stable states beyond which a search is given up."""

@@ -30,8 +30,8 @@ from robosc.model.structure import (
     CommunicationKind,
     EventKind,
 )
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.structure import AddedCondition
+from robosc.supervisor import AddedCondition
+from robosc.supervisor.predicates import state_predicates
 
 Held = tuple[int, ...]
 """For each action with requirements: a bit for each of them that held in a stable state since its request."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from robosc.automata.compile import State
-from robosc.supervisor.structure import ControllerProperties, PropertyResult
+from robosc.supervisor import ControllerProperties, PropertyResult
 
 
 @dataclass(frozen=True, slots=True)

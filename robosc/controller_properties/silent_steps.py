@@ -19,7 +19,7 @@ from robosc.controller_properties.controller import Controller
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import Value
 from robosc.model.structure import CommunicationKind, EventKind, Model, is_tau
-from robosc.supervisor.structure import AddedCondition
+from robosc.supervisor import AddedCondition
 
 MAXIMUM_VALUATIONS = 20_000
 """Values, of all that some silent steps read, beyond which they are not gone through."""

@@ -17,7 +17,7 @@ from robosc.event_logs.entries import LogEntry, LoggedRun
 from robosc.event_logs.replay import Replay
 from robosc.event_logs.stops import is_ended
 from robosc.model.structure import CommunicationKind, Deployment, EventKind
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 
 MAXIMUM_VIOLATIONS = 1000
 """Violations that are told one by one: more are only counted."""

@@ -25,8 +25,8 @@ from robosc.model.structure import (
     ProvidedValue,
     Variable,
 )
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
+from robosc.supervisor.predicates import state_predicates
 
 _WITH_RESET = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 _NAMES_SHOWN = 3

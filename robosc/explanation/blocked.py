@@ -42,7 +42,7 @@ from robosc.model.structure import (
     Requirement,
     RequirementForm,
 )
-from robosc.supervisor.structure import AddedCondition, DecisionDiagram
+from robosc.supervisor import AddedCondition, DecisionDiagram
 
 MAXIMUM_REASONS = 8
 """Sentences for one request."""

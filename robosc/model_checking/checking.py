@@ -26,7 +26,7 @@ from robosc.model_checking.formulas import (
 )
 from robosc.model_checking.kripke import KripkeStructure
 from robosc.model_checking.outcome import Verdict
-from robosc.supervisor.structure import AddedCondition
+from robosc.supervisor import AddedCondition
 from robosc.synthesis import EngineOptions, SynthesisProgress
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.step import never_done

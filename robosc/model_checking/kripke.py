@@ -12,7 +12,7 @@ from typing import Any
 from robosc.automata.state import subjects
 from robosc.automata.structure import System
 from robosc.expressions import Value
-from robosc.supervisor.structure import AddedCondition, DecisionDiagram
+from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.synthesis.closure import closure_under
 from robosc.synthesis.encoding import Bits, Encoding
 from robosc.synthesis.fixed_point import initial_states

@@ -4,13 +4,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from robosc.automata import System
+from robosc.conditions.rendering import Line, diagram_lines
+from robosc.conditions.summary import added_formulas, told
 from robosc.errors import UnknownNameError
 from robosc.expressions import TRUE, Expression
 from robosc.model.findings import did_you_mean
+from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.supervisor.diagram import diagram_domains
-from robosc.supervisor.structure import AddedCondition, DecisionDiagram
-from robosc.supervisor.summary import added_formulas, told
-from robosc.supervisor.words import Line, diagram_lines
 from robosc.tables import html_table, html_text
 
 

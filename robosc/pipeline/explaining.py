@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import overload
 
+from robosc.certification import Progress, SynthesisOutcome, SynthesisProblem, prepare
 from robosc.diagnostics import Page, page
 from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.explanation import Explanation, explain_synthesis
@@ -13,7 +14,6 @@ from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, Outcome, SynthesisStatus
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, never
 from robosc.source import Bundle
-from robosc.supervisor import Progress, SynthesisOutcome, SynthesisProblem, prepare
 from robosc.synthesis import EngineOptions
 
 

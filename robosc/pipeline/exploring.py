@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from robosc.certification import Progress, SynthesisOutcome
 from robosc.errors import UnsupportedModelError
 from robosc.explanation import EmptyExplanation
 from robosc.exploration import DEFAULT_LIMIT, Graph
@@ -12,9 +13,8 @@ from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, Outcome, SynthesisStatus
 from robosc.pipeline.supervisors import Supervisor
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, findings_of, ignored, make, never, status_of, why_not
-from robosc.supervisor import Progress, SynthesisOutcome
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.structure import Supervisor as CoreSupervisor
+from robosc.supervisor import Supervisor as CoreSupervisor
+from robosc.supervisor.predicates import state_predicates
 
 
 @dataclass(frozen=True, slots=True, repr=False)

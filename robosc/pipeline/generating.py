@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from robosc.certification import OutcomeStatus, Progress, SynthesisOutcome
 from robosc.errors import UnsupportedModelError
 from robosc.pipeline.findings import Findings
 from robosc.pipeline.loading import ModelLike, loaded
@@ -9,8 +10,7 @@ from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import Generation, SynthesisStatus
 from robosc.pipeline.supervisors import Supervisor
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, make, never, status_of
-from robosc.supervisor import OutcomeStatus, Progress, SynthesisOutcome
-from robosc.supervisor.structure import Supervisor as CoreSupervisor
+from robosc.supervisor import Supervisor as CoreSupervisor
 from robosc.targets import GenerateOptions, TargetRefusal, generate_or_refuse, require_generatable
 
 DEFAULT_GENERATION = GenerateOptions()

@@ -221,7 +221,7 @@ class Verification(Outcome):
             )
         if "checks" not in self.report:
             return None
-        from robosc.supervisor.recheck_report import file_verification_text
+        from robosc.certification.file_report import file_verification_text
 
         return file_verification_text(self.report)
 

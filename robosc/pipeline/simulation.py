@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from robosc.automata.plants import communication_plant_name
+from robosc.certification.supervisor_file import StateInWords
 from robosc.errors import RoboscError, UnknownNameError
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.interpreter.received import EnumChoice
@@ -31,7 +32,6 @@ from robosc.model.findings import did_you_mean
 from robosc.model.structure import CommunicationKind, EventKind, Model, is_tau
 from robosc.pipeline.conditions import unknown_event
 from robosc.pipeline.supervisors import SupervisorLike, supervisor_of
-from robosc.supervisor.recheck import StateInWords
 from robosc.tables import html_table
 
 

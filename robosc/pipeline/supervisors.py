@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from robosc.automata import System
+from robosc.conditions.summary import summary_json, summary_text
 from robosc.errors import Diagnostic
 from robosc.model.structure import Deployment, Model
 from robosc.pipeline.conditions import Conditions, conditions_of
@@ -13,10 +14,9 @@ from robosc.pipeline.files import given_path, read_bounded, write_whole
 from robosc.pipeline.findings import Findings
 from robosc.pipeline.loading import FileName
 from robosc.pipeline.results import Summary
+from robosc.supervisor import AddedCondition, Certificate
+from robosc.supervisor import Supervisor as CoreSupervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES, decode, encode
-from robosc.supervisor.structure import AddedCondition, Certificate
-from robosc.supervisor.structure import Supervisor as CoreSupervisor
-from robosc.supervisor.summary import summary_json, summary_text
 from robosc.tables import html_table
 
 

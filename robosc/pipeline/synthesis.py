@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import overload
 
 from robosc.automata import System
+from robosc.certification import Progress, SynthesisOutcome, make_supervisor
 from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.explanation import EmptyExplanation
 from robosc.model import check
@@ -14,7 +15,6 @@ from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, Outcome, Summary, SynthesisStatus
 from robosc.pipeline.supervisors import Supervisor
 from robosc.pipeline.systems import SystemSynthesis, synthesize_system
-from robosc.supervisor import Progress, SynthesisOutcome, make_supervisor
 from robosc.synthesis import Statistics
 from robosc.verification import DEFAULT_STATES
 

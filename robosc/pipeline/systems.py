@@ -7,15 +7,15 @@ from typing import Any
 
 from robosc.automata import System, check_system
 from robosc.automata.state import subjects
+from robosc.certification import Progress
+from robosc.conditions.rendering import Formulas
 from robosc.errors import UnsupportedModelError
 from robosc.pipeline.conditions import Condition, Conditions, condition_of, conditions_of
 from robosc.pipeline.options import SynthesisOptions
 from robosc.pipeline.results import Outcome, SynthesisStatus, Verification, VerificationStatus
-from robosc.supervisor import Progress
-from robosc.supervisor.conditions import state_predicate, state_predicates
+from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.supervisor.diagram import diagram_domains
-from robosc.supervisor.structure import AddedCondition, DecisionDiagram
-from robosc.supervisor.words import Formulas
+from robosc.supervisor.predicates import state_predicate, state_predicates
 from robosc.synthesis import Statistics, SynthesisProgress, synthesize
 from robosc.synthesis import SynthesisStatus as CoreStatus
 from robosc.tables import html_table

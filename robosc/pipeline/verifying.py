@@ -4,6 +4,9 @@ from collections.abc import Callable, Sequence
 from typing import overload
 
 from robosc.automata import System
+from robosc.certification import Progress, SynthesisOutcome
+from robosc.certification.file_report import file_verification_json, file_verification_text, has_passed, malformed_json
+from robosc.certification.supervisor_file import verify_supervisor_file
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.json_documents import diagnostics_json
 from robosc.model import check
@@ -25,10 +28,7 @@ from robosc.pipeline.supervisors import SupervisorLike, supervisor_of
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, make, never, status_of
 from robosc.pipeline.systems import SystemSupervisor, verify_system
 from robosc.source import Bundle, SourceFile
-from robosc.supervisor import Progress, SynthesisOutcome
-from robosc.supervisor.recheck import verify_supervisor_file
-from robosc.supervisor.recheck_report import file_verification_json, file_verification_text, has_passed, malformed_json
-from robosc.supervisor.structure import Supervisor as CoreSupervisor
+from robosc.supervisor import Supervisor as CoreSupervisor
 from robosc.synthesis import EngineOptions, SynthesisProgress
 from robosc.synthesis.engines import resolve_engine
 from robosc.verification import Limits

@@ -4,7 +4,7 @@ from typing import Any
 
 from robosc.automata.state import Subject
 from robosc.errors import InternalError, UnsupportedModelError
-from robosc.supervisor.structure import DecisionDiagram, DecisionNode
+from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.synthesis.encoding import Bits, Encoding
 from robosc.synthesis.nodes import cofactors, is_constant
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from robosc.supervisor.structure import AddedCondition, DecisionDiagram
+from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.synthesis.questions import Answers
 
 

@@ -14,17 +14,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from robosc.automata.state import Subject
+from robosc.conditions.cover import Words, cover
+from robosc.conditions.formula import OPERANDS, STEPS, length
+from robosc.conditions.literals import operands
+from robosc.conditions.multivalued import GaveUp, Space
+from robosc.conditions.relations import MAXIMUM_PLACES, Relations
+from robosc.conditions.rendering import Formulas
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import TRUE, IntegerType
-from robosc.supervisor.cover import Words, cover
+from robosc.supervisor import DecisionDiagram
 from robosc.supervisor.diagram import Subject as Place
 from robosc.supervisor.diagram import diagram_domains
-from robosc.supervisor.formula import OPERANDS, STEPS, length
-from robosc.supervisor.literals import operands
-from robosc.supervisor.multivalued import GaveUp, Space
-from robosc.supervisor.relations import MAXIMUM_PLACES, Relations
-from robosc.supervisor.structure import DecisionDiagram
-from robosc.supervisor.words import Formulas
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.nodes import restrict, support

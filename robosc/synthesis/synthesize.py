@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from robosc.automata.structure import System
-from robosc.supervisor.structure import AddedCondition, DecisionDiagram
+from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.synthesis.controlled import ControlledSystem
 from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.fixed_point import FixedPoint, Problem, safe_states

@@ -9,7 +9,7 @@ from robosc.automata.plants import communication_plant_name
 from robosc.expressions import FALSE, TRUE, Expression, IntegerType, StateTest, Unary, conjunction
 from robosc.expressions.text import expression_text
 from robosc.model.structure import Behaviour, Deployment, EventKind, Model, Transition, is_tau
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.events import has_plant_location, plant_step, split, taken_transition
 from robosc.targets.words import requirement_text
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from robosc._version import __version__
 from robosc.errors import Diagnostic, UnsupportedModelError
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.files import GeneratedFiles, Removal, remove_earlier, write_files
 from robosc.targets.refusal import TargetRefusal, apply_target_errors
 from robosc.targets.registry import (

@@ -12,7 +12,7 @@ from difflib import get_close_matches
 from importlib.metadata import entry_points
 
 from robosc.errors import RoboscError
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.files import GeneratedFiles
 
 ENTRY_POINT_GROUP = "robosc.targets"

@@ -29,9 +29,9 @@ HEADER = (
 
 
 def _row(family: str, size: int) -> list[str]:
+    from robosc.conditions.literals import operands
+    from robosc.conditions.rendering import Formulas, diagram_lines, in_words
     from robosc.supervisor.diagram import diagram_domains
-    from robosc.supervisor.literals import operands
-    from robosc.supervisor.words import Formulas, diagram_lines, in_words
     from robosc.synthesis import synthesize
     from robosc.synthesis.simplify import Simplifier
     from support.families import FAMILIES

@@ -19,7 +19,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from robosc.supervisor import make_supervisor
+from robosc.certification import make_supervisor
 from robosc.targets import generate, write_files
 from support.models import EXAMPLES, bundle_of
 from support.ros2 import Peer, RosProcess, environment, own_domain

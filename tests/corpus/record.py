@@ -16,6 +16,7 @@ from zlib import crc32
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import robosc
+from robosc.certification import make_supervisor
 from robosc.errors import LanguageError
 from robosc.expressions import (
     ArrayType,
@@ -31,7 +32,6 @@ from robosc.expressions import (
 )
 from robosc.model import check
 from robosc.model.structure import CommunicationKind, EnumDefinition, Model
-from robosc.supervisor.make import make_supervisor
 from support.corpus import Run, Stimulus, bundle_of_case, cases, differences, outcome, recorded, recording_path, written
 
 STEPS = 40

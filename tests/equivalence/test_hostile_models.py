@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate
 from support.c99 import GCC
 from support.equivalence.c99_target import C99Target

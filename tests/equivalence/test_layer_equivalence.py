@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import CommunicationKind, Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate
 from support.c99 import GCC
 from support.effort import examples

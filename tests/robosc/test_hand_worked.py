@@ -12,7 +12,7 @@ from robosc.automata import System, to_automata
 from robosc.automata.compile import State
 from robosc.exploration import explore
 from robosc.model.structure import Deployment, Model
-from robosc.supervisor.conditions import state_predicates
+from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
 from robosc.verification import ExplicitSupervisor, Outcome, synthesize_explicit, verify_explicitly
 from support.models import model_of

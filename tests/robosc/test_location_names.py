@@ -7,6 +7,7 @@ import pytest
 
 from robosc.automata import to_automata
 from robosc.cli.main import main
+from robosc.conditions.rendering import diagram_lines
 from robosc.explanation import RequestError
 from robosc.explanation.requests import asked_state
 from robosc.expressions import StateTest, Unary
@@ -15,9 +16,8 @@ from robosc.model.structure import Deployment
 from robosc.model_checking import properties_of
 from robosc.model_checking.formulas import Condition
 from robosc.source import SourceFile
+from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import SubjectDomain
-from robosc.supervisor.structure import DecisionDiagram, DecisionNode
-from robosc.supervisor.words import diagram_lines
 from support.models import model_of
 
 ROBOT = """robot R {

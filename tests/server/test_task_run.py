@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 import robosc_server.tasks.run as run_module
+from robosc.certification import make_supervisor
 from robosc.cli.main import main as robosc
 from robosc.json_documents import json_text
 from robosc.language import load_bundle
 from robosc.model.structure import Deployment
-from robosc.supervisor import make_supervisor
 from robosc.targets import available_targets
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.convert.pieces import CHUNK_BYTES

@@ -27,7 +27,7 @@ from robosc.expressions import (
     Type,
 )
 from robosc.model.structure import CommunicationKind, ObjectValue
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate
 from robosc.targets.c99.layout import PLANT_LOCATIONS, Layout, event_data, make_layout
 from robosc.targets.events import has_plant_location

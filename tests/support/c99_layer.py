@@ -12,7 +12,7 @@ from robosc.execution.runner import Status
 from robosc.execution.settings import Settings
 from robosc.expressions import DoubleType, Type
 from robosc.model.structure import CommunicationKind
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.c99.layer import request_parameters
 from robosc.targets.c99.layout import Layout, event_data
 from support.c99 import Reference, _hex, built, data_words, microseconds, replay

@@ -4,7 +4,7 @@ import re
 
 from robosc.expressions import Type
 from robosc.model.structure import CommunicationKind
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.c99.header import receive_head, reply_head
 from robosc.targets.c99.layer import call_head, cancel_head, goal_head, request_head, request_parameters
 from robosc.targets.c99.layout import Layout, event_data

@@ -15,7 +15,7 @@ from robosc.expressions import (
     Type,
 )
 from robosc.model.structure import CommunicationKind
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.c99.header import batch, batch_parameters, receive_head, reply_head
 from robosc.targets.c99.layout import Layout, event_data
 from robosc.targets.c99.provide import Field, request_field

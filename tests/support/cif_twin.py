@@ -9,8 +9,8 @@ from robosc.automata import Semantics, System, to_automata
 from robosc.automata.semantics import TooManyChoicesError
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.expressions.evaluate import evaluate
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
+from robosc.supervisor.predicates import state_predicates
 from robosc.targets import generate
 from support.cif_parser import Type
 from support.cif_system import CifSystem, Table, TooManyValuationsError

@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from robosc.supervisor import encode, make_supervisor
+from robosc.certification import make_supervisor
+from robosc.supervisor import encode
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.main import main

@@ -13,7 +13,7 @@ from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.protocol import Reading
 from robosc.expressions.evaluate import evaluate
 from robosc.model.structure import CommunicationKind
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from support.execution import Bench
 
 StateKey = tuple[Any, ...]

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from robosc.automata import Semantics, System, to_automata
+from robosc.certification import make_supervisor
 from robosc.errors import Diagnostic, LanguageError
 from robosc.execution.clock import ManualClock
 from robosc.execution.event_log import Entry, MemoryLog, plain
@@ -25,9 +26,8 @@ from robosc.language import load_bundle
 from robosc.model import check
 from robosc.model.structure import CommunicationKind, Deployment, Model
 from robosc.source import Bundle
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.make import make_supervisor
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
+from robosc.supervisor.predicates import state_predicates
 from support.execution import RecordingMiddleware
 
 CORPUS = Path(__file__).parents[1] / "corpus"

@@ -5,10 +5,11 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from robosc.certification import make_supervisor
 from robosc.execution.clock import ManualClock
 from robosc.execution.event_log import MemoryLog
 from robosc.model.structure import Deployment
-from robosc.supervisor import Supervisor, make_supervisor
+from robosc.supervisor import Supervisor
 from robosc_bridge.configuration import parse, tie
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.jobs import Job

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from robosc.certification import make_supervisor
 from robosc.language import load_bundle
 from robosc.model.structure import Deployment
-from robosc.supervisor import make_supervisor
 from robosc.targets import generate, write_files
 from support.kinematic_robot import KinematicRobot
 from support.models import EXAMPLES

@@ -11,7 +11,7 @@ from robosc.execution.protocol import ControlledSystem, DataDoesNotFit
 from robosc.execution.runner import Runner, Status
 from robosc.execution.settings import Settings
 from robosc.model.structure import Deployment, Model
-from robosc.supervisor.structure import AddedCondition, Certificate, Supervisor
+from robosc.supervisor import AddedCondition, Certificate, Supervisor
 from support.models import example_model, model_of
 
 Sent = tuple[Any, ...]

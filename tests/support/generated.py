@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import GeneratedFiles, generate, write_files
 from robosc.targets.python.bundle import bundle
 from robosc.targets.python.generate import RUNTIME, model_part
@@ -23,7 +23,7 @@ _numbers = itertools.count()
 @cache
 def example_supervisor(name: str, deployment: Deployment = Deployment.CONTROLLER) -> Supervisor:
     """The supervisor of an example robot, such as `maze_solver/maze_solver`, through the whole pipeline."""
-    from robosc.supervisor import make_supervisor  # Only this needs the synthesizer.
+    from robosc.certification import make_supervisor  # Only this needs the synthesizer.
     from support.models import example_bundle
 
     made = make_supervisor(example_bundle(name), deployment=deployment)

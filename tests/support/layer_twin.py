@@ -13,7 +13,7 @@ from robosc.execution.interpreter import InterpretedSystem
 from robosc.expressions import Expression
 from robosc.expressions.evaluate import evaluate
 from robosc.model.structure import CommunicationKind
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 
 Told = tuple[Any, ...]
 Holds = tuple[bool, ...]

@@ -2,8 +2,9 @@
 
 import sys
 
+from robosc.certification import make_supervisor
 from robosc.execution.event_log import NullLog
-from robosc.supervisor import Supervisor, make_supervisor
+from robosc.supervisor import Supervisor
 from robosc_bridge.configuration import parse, tie
 from robosc_bridge.daemon.assembly import Machine, assemble
 from robosc_bridge.daemon.states import Command

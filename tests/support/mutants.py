@@ -11,7 +11,7 @@ from robosc.automata.controlled import Added, controlled_graph
 from robosc.automata.state import subject_domain, subjects
 from robosc.expressions import TRUE, Binary, BooleanType, Constant, Expression, IntegerType, Unary
 from robosc.model.structure import Behaviour, Component, Model, RequirementForm
-from robosc.supervisor.structure import AddedCondition, Certificate, DecisionDiagram, DecisionNode, Supervisor
+from robosc.supervisor import AddedCondition, Certificate, DecisionDiagram, DecisionNode, Supervisor
 from robosc.verification import ExplicitSupervisor
 from support.random_supervisors import random_diagram
 

@@ -16,7 +16,7 @@ from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.settings import Settings
 from robosc.model.structure import Communication, CommunicationKind, EventKind, Model
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 
 Entry = dict[str, Any]
 

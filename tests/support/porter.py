@@ -8,9 +8,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from robosc.certification import make_supervisor
 from robosc.model.structure import Deployment
-from robosc.supervisor import make_supervisor
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from support.models import bundle_of
 from support.ros2 import Peer, RosProcess, environment, own_domain
 from support.ros2_servers import ServerHost

@@ -45,7 +45,7 @@ from robosc.model.structure import (
     Update,
     Variable,
 )
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.synthesis import SynthesisStatus, synthesize
 from support.execution import supervisor_of
 from support.failing import made, model_files

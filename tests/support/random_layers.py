@@ -6,7 +6,7 @@ import msgspec
 
 from robosc.expressions import Binary, Constant, Expression, Received
 from robosc.model.structure import Communication, CommunicationKind, Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from support.execution import supervisor_of
 from support.failing import made, model_files
 from support.random_controllers import SAMPLE, random_robot

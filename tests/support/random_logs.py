@@ -19,7 +19,7 @@ from robosc.execution.protocol import Reading
 from robosc.expressions import BooleanType, EnumType
 from robosc.model.received import converted_paths
 from robosc.model.structure import Communication, CommunicationKind
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from support.execution import Bench
 from support.layers import LayerBench
 

@@ -65,7 +65,7 @@ from robosc.model.structure import (
     Update,
     Variable,
 )
-from robosc.supervisor.structure import AddedCondition, Certificate, DecisionDiagram, DecisionNode, Supervisor
+from robosc.supervisor import AddedCondition, Certificate, DecisionDiagram, DecisionNode, Supervisor
 from support.failing import made, model_files
 
 CERTIFICATE = Certificate(

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from robosc.supervisor import make_supervisor
-from robosc.supervisor.structure import Supervisor
+from robosc.certification import make_supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate, write_files
 from support.models import bundle_of
 from support.shared import shared

@@ -12,9 +12,9 @@ from typing import Any, Self
 
 import pytest
 
+from robosc.certification import make_supervisor
 from robosc.language import load_bundle
-from robosc.supervisor import make_supervisor
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate, write_files
 from support.process import Process
 from support.shared import shared

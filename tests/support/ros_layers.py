@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate, write_files
 from support.models import model_of
 from support.own_tests import own_tests

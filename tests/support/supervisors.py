@@ -39,7 +39,7 @@ from robosc.model.structure import (
     Update,
     Variable,
 )
-from robosc.supervisor.structure import AddedCondition, Certificate, DecisionDiagram, DecisionNode, Supervisor
+from robosc.supervisor import AddedCondition, Certificate, DecisionDiagram, DecisionNode, Supervisor
 
 CLEARANCE = EnumType("Clearance", ("clear", "obstructed"))
 READ_FRONT = VariableRead("Sensor", "front")

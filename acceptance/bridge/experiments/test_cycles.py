@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc_bridge.experiments.cycles.driving import measured_driving
 from robosc_bridge.experiments.cycles.measure import measure
 from robosc_bridge.experiments.cycles.times import PAPER

@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from robosc.certification import make_supervisor
+from robosc.certification.supervisor_file import verify_supervisor_file
 from robosc.controller_properties import check_controller
 from robosc.errors import LanguageError, RoboscError
 from robosc.language import load_bundle
@@ -27,10 +29,8 @@ from robosc.signatures import (
     signer,
 )
 from robosc.source import Bundle
-from robosc.supervisor import Supervisor, decode, make_supervisor
+from robosc.supervisor import PropertyResult, Supervisor, decode
 from robosc.supervisor.codec import MAXIMUM_BYTES
-from robosc.supervisor.recheck import verify_supervisor_file
-from robosc.supervisor.structure import PropertyResult
 from robosc.verification import DEFAULT_STATES, Limits
 from robosc_api.security import Credentials
 from robosc_bridge.configuration.structure import SupervisorSource

@@ -18,7 +18,7 @@ from robosc.model.structure import Deployment
 from robosc.source import visible
 
 if TYPE_CHECKING:
-    from robosc.supervisor.structure import Supervisor
+    from robosc.supervisor import Supervisor
     from robosc_bridge.experiments.cycles.times import CycleTimes
     from robosc_bridge.experiments.lines_of_code import CodeSize
     from robosc_bridge.experiments.report import FailedRun, Report, ReportedRun
@@ -346,9 +346,9 @@ def _supervisor(experiment: Experiment, deployment: Deployment) -> "tuple[Superv
     Raises:
         UsageError: There is none.
     """
+    from robosc.certification import make_supervisor
     from robosc.language import load_bundle
     from robosc.language.interfaces import interface_folders
-    from robosc.supervisor import make_supervisor
     from robosc_bridge.experiments.lines_of_code import model_size
 
     model: Path = importlib.import_module(f"{_MODULES}.{experiment.serial_module}").MODEL

@@ -15,7 +15,7 @@ from pathlib import PurePosixPath
 
 from robosc.errors import RoboscError
 from robosc.source import Bundle
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import available_targets, generate
 
 COUNTER = "RoboSC's own counter (lines that are neither blank nor comment)"

@@ -14,10 +14,11 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from robosc.certification import make_supervisor
 from robosc.errors import RoboscError
 from robosc.language import load_bundle
 from robosc.model.structure import Deployment
-from robosc.supervisor import Supervisor, encode, make_supervisor
+from robosc.supervisor import Supervisor, encode
 from robosc.targets import generate, write_files
 from robosc_bridge.experiments.line import BOX, FREE_M, HELD_S, line_figures
 from robosc_bridge.experiments.line import MODEL as LINE_MODEL

@@ -52,8 +52,8 @@ from robosc_client.commands.supervisor_file import write_supervisor
 from robosc_client.errors import malformed
 
 if TYPE_CHECKING:
+    from robosc.certification import SynthesisOutcome
     from robosc.signatures import PublicKey
-    from robosc.supervisor import SynthesisOutcome
 
 _MAXIMUM_SENDABLE = 2**64 - 1
 

@@ -5,7 +5,7 @@ from math import prod
 from robosc.execution.protocol import CommunicationInfo, Description
 from robosc.expressions import conjuncts
 from robosc.model.structure import Communication, CommunicationKind, EventKind, Model, Transition, is_tau
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 
 _MAXIMUM_BOUND = 2**63 - 1
 """No run of this length ends in anybody's lifetime; a longer number is of no use."""

@@ -24,7 +24,7 @@ from robosc.expressions import (
 )
 from robosc.expressions.evaluate import BINARY, CALL, QUANTIFIER, REDUCTION, UNARY
 from robosc.expressions.values import array_part, conditional, part_at
-from robosc.supervisor.structure import DecisionDiagram, DecisionNode
+from robosc.supervisor import DecisionDiagram, DecisionNode
 
 Place = tuple[str, str | None]
 """An automaton's location (None), or one of its variables."""

@@ -30,7 +30,7 @@ from robosc.model.structure import (
     Transition,
     Variable,
 )
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 
 
 @dataclass(frozen=True, slots=True)

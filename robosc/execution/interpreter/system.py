@@ -19,7 +19,7 @@ from robosc.execution.interpreter.rules import (
 from robosc.execution.protocol import MATCHES, Match, Reading, batches, requesting
 from robosc.expressions import Value, conjuncts
 from robosc.model.structure import is_tau
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """Generated functions that tell whether a controllable event is allowed now, and which requirements hold."""
 
+from robosc.conditions.rendering import Formulas, in_words, size_in_words
 from robosc.expressions import (
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
@@ -8,9 +9,8 @@ from robosc.expressions import (
     conjuncts,
 )
 from robosc.model.structure import Model
+from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import diagram_domains
-from robosc.supervisor.structure import DecisionDiagram, DecisionNode
-from robosc.supervisor.words import Formulas, in_words, size_in_words
 from robosc.targets import acceptance
 from robosc.targets.acceptance import InOneOf, StaysInRange, accepting_conditions, enabling_conditions
 from robosc.targets.c99.expressions import (

@@ -19,7 +19,7 @@ from robosc.expressions import (
     type_text,
 )
 from robosc.model.structure import Communication, CommunicationKind, EventKind
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.c99.layer import request_declarations
 from robosc.targets.c99.layout import PLANT_LOCATIONS, Layout, data_that_comes, event_data, width
 from robosc.targets.c99.provide import request_field, request_struct

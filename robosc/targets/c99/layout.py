@@ -19,7 +19,7 @@ from robosc.expressions import (
     Type,
 )
 from robosc.model.structure import Behaviour, Communication, CommunicationKind, Deployment, EventKind, Model
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.c99.naming import Namer, prefix_for
 from robosc.targets.events import events, has_plant_location, is_controllable
 

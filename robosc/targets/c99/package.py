@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import Constant, Expression, Received, StringType, leaves
 from robosc.model.structure import Model, ObjectValue
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.c99.example import example_file
 from robosc.targets.c99.header import head, header_file
 from robosc.targets.c99.layer_example import layer_example_file

@@ -24,7 +24,7 @@ from robosc.expressions import (
     leaves,
 )
 from robosc.model.received import Path
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.c99.expressions import TRUE_CODE, Code, Scope, Sort, code_for, equality, sort_of, value
 from robosc.targets.c99.layout import Layout, make_layout
 from robosc.targets.paths import path_type

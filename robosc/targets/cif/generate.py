@@ -7,7 +7,7 @@ from robosc.automata import System
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import Expression, Unary
 from robosc.model.structure import CommunicationKind, Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.cif.expressions import Translator
 from robosc.targets.cif.logic import Predicate
 from robosc.targets.cif.names import Names

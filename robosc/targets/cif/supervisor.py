@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 from robosc.automata import System
 from robosc.automata.state import Subject
+from robosc.conditions.formula import to_expression
+from robosc.supervisor import DecisionDiagram, DecisionNode, Supervisor
 from robosc.supervisor.diagram import diagram_domains
-from robosc.supervisor.formula import to_expression
-from robosc.supervisor.structure import DecisionDiagram, DecisionNode, Supervisor
 from robosc.targets.cif.expressions import Translator
 from robosc.targets.cif.names import SUPERVISOR, data_plant
 from robosc.targets.cif.plants import Plants

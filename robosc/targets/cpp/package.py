@@ -11,7 +11,7 @@ import jinja2
 from robosc._version import __version__
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind, Deployment, EventKind, Interface
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.c99.header import head, with_prefix
 from robosc.targets.c99.package import generate as generate_c
 from robosc.targets.c99.text import safe, string_literal

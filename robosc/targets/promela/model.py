@@ -15,8 +15,8 @@ from robosc.automata.state import Subject, initial_values, subject_domain, subje
 from robosc.automata.structure import Automaton, Edge, Event, EventCondition, InputVariable, System
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import BooleanType, IntegerType, Type, Value, domain
+from robosc.supervisor import AddedCondition, DecisionNode
 from robosc.supervisor.diagram import evaluate
-from robosc.supervisor.structure import AddedCondition, DecisionNode
 from robosc.targets.promela.expressions import Datum, Translator, all_of, any_of, index_of, integer_text, negated
 from robosc.targets.promela.names import Names
 

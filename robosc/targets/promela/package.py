@@ -1,6 +1,6 @@
 """The files of the target `promela`: the model, and how to check it."""
 
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.promela.model import promela_model
 from robosc.targets.python.package import package_name

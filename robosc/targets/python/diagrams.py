@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from robosc.automata import System
+from robosc.conditions.rendering import Formulas, in_words, size_in_words
 from robosc.expressions import Value
+from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import diagram_domains
-from robosc.supervisor.structure import DecisionDiagram, DecisionNode
-from robosc.supervisor.words import Formulas, in_words, size_in_words
 from robosc.targets.python.expressions import FALSE_CODE, TRUE_CODE, Code, Scope, truth
 from robosc.targets.python.text import docstring, indent
 

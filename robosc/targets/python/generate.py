@@ -7,7 +7,7 @@ from robosc.execution.interpreter import describe
 from robosc.execution.protocol import Description, batches, requesting
 from robosc.expressions import DoubleType
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.events import has_plant_location
 from robosc.targets.python.allow import allow_method, conjuncts_method, requirements_method
 from robosc.targets.python.bundle import bundle, section_title

@@ -11,7 +11,7 @@ from robosc.model.structure import (
     EventKind,
     Model,
 )
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.events import events, has_plant_location, is_controllable
 from robosc.targets.python.naming import Namer
 

@@ -5,7 +5,7 @@ import re
 
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.python.generate import supervisor_module
 from robosc.targets.python.naming import snake_case

@@ -7,7 +7,7 @@ from robosc.automata import System
 from robosc.errors import InternalError
 from robosc.expressions import PathStep, Type
 from robosc.model.structure import Model
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.python.diagrams import Diagrams
 from robosc.targets.python.expressions import Code, Scope
 from robosc.targets.python.layout import Layout, make_layout

@@ -12,7 +12,7 @@ import jinja2
 from robosc._version import __version__
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind, Deployment, Interface, Model
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.events import has_plant_location
 from robosc.targets.python.generate import header
 from robosc.targets.python.layout import make_layout

@@ -4,7 +4,7 @@ from functools import partial
 
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind, Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.python.package import package_name
 from robosc.targets.registry import GenerateOptions

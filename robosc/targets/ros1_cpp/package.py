@@ -1,7 +1,7 @@
 """The target `ros1-cpp`: a catkin package with a roscpp node around the generated supervisor in C99."""
 
 from robosc.model.structure import Interface
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.cpp.package import Middleware, generate_package
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.registry import GenerateOptions

@@ -3,7 +3,7 @@
 from functools import partial
 
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.python.package import package_name
 from robosc.targets.registry import GenerateOptions

@@ -1,7 +1,7 @@
 """The target `ros2-cpp`: an ament_cmake package with an rclcpp node around the generated supervisor in C99."""
 
 from robosc.model.structure import Interface
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.cpp.naming import file_name
 from robosc.targets.cpp.package import Middleware, generate_package
 from robosc.targets.files import GeneratedFiles

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Protocol, Self
 
+from robosc.certification import OutcomeStatus, SynthesisOutcome, make_supervisor
 from robosc.errors import UnsupportedModelError
 from robosc.explanation import to_text
 from robosc.model.structure import Deployment
-from robosc.supervisor import OutcomeStatus, SynthesisOutcome, make_supervisor
 from robosc.targets import TargetRefusal
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.convert import given, told

@@ -17,7 +17,7 @@ from robosc.formatting import format_text
 from robosc.json_documents import json_pieces
 from robosc.model import check
 from robosc.supervisor import Supervisor, encode
-from robosc.supervisor.conditions import state_predicates
+from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import UnknownEngineError
 from robosc.synthesis.engines import keep_ready, resolve_engine
 from robosc.targets import GeneratedFiles, TargetRefusal, UnknownTargetError, generate_or_refuse, require_generatable

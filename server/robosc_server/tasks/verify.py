@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from robosc.automata import to_automata
+from robosc.certification.file_report import file_verification_json, has_passed, malformed_json
+from robosc.certification.supervisor_file import FileVerification, verify_supervisor_file
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.json_documents import diagnostics_json, json_text
 from robosc.model import check
@@ -11,8 +13,6 @@ from robosc.model.structure import Model
 from robosc.model_checking import Property, properties_of, property_errors_json, verdicts_json, verify_properties
 from robosc.source import SourceFile
 from robosc.supervisor import Supervisor, decode
-from robosc.supervisor.recheck import FileVerification, verify_supervisor_file
-from robosc.supervisor.recheck_report import file_verification_json, has_passed, malformed_json
 from robosc.synthesis.engines import resolve_engine
 from robosc.verification import Limits
 from robosc_api.v1 import synthesis_pb2 as pb

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc_bridge.experiments.cycles.times import PAPER
 from robosc_bridge.experiments.cycles.times import feed as comes
 from support.execution import supervisor_of

@@ -4,10 +4,10 @@ import logging
 
 import pytest
 
+from robosc.certification import make_supervisor
 from robosc.execution.clock import ManualClock
 from robosc.execution.event_log import MemoryLog
 from robosc.model.structure import Deployment
-from robosc.supervisor import make_supervisor
 from robosc_bridge.configuration import parse, tie
 from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.configuration.ties import Ties

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from robosc.certification import make_supervisor
 from robosc.language import load_bundle
 from robosc.model.structure import Deployment
 from robosc.signatures import PublicKey, make_key_pair, read_private_key, sign, signature_file
-from robosc.supervisor import Supervisor, encode, make_supervisor
+from robosc.supervisor import Supervisor, encode
 from robosc_api.security import Scope, ServerSecurity, make_token
 from robosc_bridge.configuration import parse
 from robosc_bridge.configuration.structure import SupervisorSource

@@ -3,14 +3,15 @@
 import pytest
 
 from robosc.automata import ExecutableSystem, to_automata
+from robosc.certification import OutcomeStatus, make_supervisor
+from robosc.conditions.summary import summary_json, summary_text
 from robosc.controller_properties import Properties, check_controller
 from robosc.controller_properties.confluence import ConfluenceSearch
 from robosc.controller_properties.controller import Controller
 from robosc.controller_properties.search import search
 from robosc.errors import Severity, SynthesisCancelled
 from robosc.model.structure import Deployment
-from robosc.supervisor import OutcomeStatus, decode, encode, make_supervisor, summary_json, summary_text
-from robosc.supervisor.structure import AddedCondition, DecisionDiagram, DecisionNode
+from robosc.supervisor import AddedCondition, DecisionDiagram, DecisionNode, decode, encode
 from robosc.synthesis import synthesize
 from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle, marked_place, model_of
 

@@ -14,7 +14,7 @@ from robosc.controller_properties.search import search
 from robosc.controller_properties.silent_steps import always_end, never_conflict, stays_nonblocking
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.verification import verify_explicitly
 from support.controller_twin import twin_of
 from support.random_controllers import ONE_FIELD, random_controller, random_robot

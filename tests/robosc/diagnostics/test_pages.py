@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from robosc.certification import make_supervisor
 from robosc.diagnostics import Block, Page, Stage, codes, document, page, pages, parse_page
 from robosc.errors import Diagnostic, InternalError, LanguageError, Severity
 from robosc.language.bundle import MAXIMUM_BYTES, decode_source
@@ -16,7 +17,6 @@ from robosc.language.interfaces import find_interfaces, interface_folders
 from robosc.model import check
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, SourceFile
-from robosc.supervisor import make_supervisor
 from support.diagnostic_codes import NO_CODES, assembled_codes, reportable_codes
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "diagnostics.md"

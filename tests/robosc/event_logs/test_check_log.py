@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.event_logs import check_log
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from support.effort import examples
 from support.random_controllers import random_controller, random_robot
 from support.random_layers import random_layer

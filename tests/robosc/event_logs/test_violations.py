@@ -8,7 +8,7 @@ import pytest
 from robosc.event_logs import WrongDeploymentError, check_log, checking
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from support.execution import Bench, supervisor_of
 from support.layers import LayerBench
 from support.models import model_of

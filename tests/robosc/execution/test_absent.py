@@ -7,7 +7,7 @@ import pytest
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.protocol import ControlledSystem
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from support.generated import load_system
 from support.models import model_of
 from support.random_supervisors import CERTIFICATE

@@ -5,7 +5,7 @@ import pytest
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runner import DeploymentError, Status
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import AddedCondition, DecisionDiagram, DecisionNode
+from robosc.supervisor import AddedCondition, DecisionDiagram, DecisionNode
 from support.execution import Bench, Sent, bench, example_system, supervisor_of, system_of
 from support.models import model_of
 

@@ -16,7 +16,7 @@ from robosc.execution.runner import Status
 from robosc.expressions import BooleanType, EnumType
 from robosc.expressions.evaluate import evaluate
 from robosc.model.structure import Communication, CommunicationKind
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from support.effort import examples
 from support.generated import load_system
 from support.layer_twin import LayerTwin, TwinCall, TwinGoal

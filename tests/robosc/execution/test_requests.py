@@ -1,7 +1,7 @@
 """Semantics 3.5: when requests are issued, and with which data."""
 
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.supervisor.structure import AddedCondition, DecisionDiagram, DecisionNode
+from robosc.supervisor import AddedCondition, DecisionDiagram, DecisionNode
 from support.execution import Bench, bench, example_system, supervisor_of, system_of
 from support.models import model_of
 

@@ -20,8 +20,8 @@ from robosc.expressions import (
     Value,
 )
 from robosc.model.structure import EventKind, Model, is_tau
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
+from robosc.supervisor.predicates import state_predicates
 from support.execution import supervisor_of
 from support.models import EXAMPLE_NAMES, example_model
 from support.random_supervisors import random_supervisor

@@ -6,11 +6,10 @@ from typing import Any
 
 import pytest
 
+from robosc.certification import OutcomeStatus, make_supervisor
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.expressions.text import expression_text
 from robosc.model.structure import Deployment
-from robosc.supervisor import make_supervisor
-from robosc.supervisor.make import OutcomeStatus
 from support.generated import load_system, same
 from support.models import bundle_of, checked, model_of
 

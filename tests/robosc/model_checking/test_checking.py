@@ -23,8 +23,8 @@ from robosc.model_checking.formulas import (
     formula_text,
 )
 from robosc.source import Location
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.structure import AddedCondition
+from robosc.supervisor import AddedCondition
+from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
 from support.effort import examples
 from support.explicit_ctl import ExplicitChecker

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import pytest
 
 import robosc
-from robosc.supervisor.structure import Supervisor as CoreSupervisor
+from robosc.supervisor import Supervisor as CoreSupervisor
 from robosc.tables import MAXIMUM_ROWS, html_table, html_text
 from support.models import EMPTY, EXAMPLES
 
@@ -97,7 +97,7 @@ def test_conditions_are_told_in_words(supervisor: robosc.Supervisor) -> None:
 
 
 def test_a_condition_that_no_formula_tells_is_told_node_by_node(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robosc.supervisor.words.Formulas.formula", lambda *arguments, **options: None)
+    monkeypatch.setattr("robosc.conditions.rendering.Formulas.formula", lambda *arguments, **options: None)
     supervisor = robosc.synthesize(NAVIGATION).supervisor
     assert supervisor is not None
     condition = supervisor.conditions["navigate.request"]

@@ -4,13 +4,12 @@ import re
 
 import pytest
 
+from robosc.certification import OutcomeStatus, make_supervisor
 from robosc.formatting import format_text
 from robosc.language.words import RESERVED_WORDS
 from robosc.model import check
 from robosc.source import Bundle, SourceFile
 from robosc.starter import MAXIMUM_STEM, InvalidNameError, Starter, make_starter
-from robosc.supervisor import OutcomeStatus
-from robosc.supervisor.make import make_supervisor
 from robosc.targets import generate
 
 NAMES = (

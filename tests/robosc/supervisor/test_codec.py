@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.automata import to_automata
+from robosc.certification import make_supervisor
 from robosc.errors import InvalidSupervisorError, UnsupportedModelError
 from robosc.expressions import TRUE, Constant, Unary
 from robosc.model.structure import Deployment, Requirement, RequirementForm
+from robosc.supervisor import Supervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES, MAXIMUM_EXPRESSION_DEPTH, decode, encode
-from robosc.supervisor.make import make_supervisor
-from robosc.supervisor.structure import Supervisor
 from support.effort import examples
 from support.models import EXAMPLE_DEPLOYMENTS, example_bundle
 from support.supervisors import supervisor

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from robosc.automata.state import Subject, subjects
 from robosc.expressions import Expression, Received, leaves
 from robosc.expressions.evaluate import evaluate as evaluate_expression
+from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import diagram_domains, evaluate, validate
-from robosc.supervisor.structure import DecisionDiagram, DecisionNode
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager

@@ -14,14 +14,15 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from robosc.automata import System, to_automata
+from robosc.certification import make_supervisor
+from robosc.conditions import summary
+from robosc.conditions.rendering import Formulas, in_words
+from robosc.conditions.summary import added_lines, added_texts, summary_json
 from robosc.expressions import Expression, StateTest, Value, VariableRead, leaves
 from robosc.expressions.evaluate import evaluate as evaluate_expression
 from robosc.model import check
-from robosc.supervisor import Supervisor, make_supervisor, summary
+from robosc.supervisor import DecisionDiagram, Supervisor
 from robosc.supervisor.diagram import Domains, Subject, diagram_domains, evaluate
-from robosc.supervisor.structure import DecisionDiagram
-from robosc.supervisor.summary import added_lines, added_texts, summary_json
-from robosc.supervisor.words import Formulas, in_words
 from robosc.synthesis import synthesize
 from robosc.synthesis.engines import installed_engines
 from support.models import bundle_of
@@ -97,7 +98,7 @@ def _holds(diagram: DecisionDiagram, state: dict[Subject, int]) -> bool:
 
 def test_only_so_many_lines_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     supervisor, system = made(FOLDER / "parity.rscd")
-    monkeypatch.setattr("robosc.supervisor.summary._LINES", 10)
+    monkeypatch.setattr("robosc.conditions.summary._LINES", 10)
     assert words(supervisor, system).splitlines()[-1] == (
         "shut.request    a decision diagram of 11 nodes; --json tells it node by node"
     )

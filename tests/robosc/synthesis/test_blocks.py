@@ -9,7 +9,7 @@ from robosc.automata import DiscreteVariable, EventCondition, InputVariable, Sys
 from robosc.automata.state import Subject
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import BooleanType, Call, Conditional, Expression, IntegerType, Unary
-from robosc.supervisor.conditions import state_predicate, state_predicates
+from robosc.supervisor.predicates import state_predicate, state_predicates
 from robosc.synthesis import SynthesisStatus, blocks, diagrams, synthesize
 from robosc.synthesis.blocks import blocks_of
 from robosc.synthesis.encoding import Encoding

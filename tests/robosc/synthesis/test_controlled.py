@@ -16,8 +16,8 @@ from robosc.automata.state import subjects
 from robosc.automata.structure import Assignment, DiscreteVariable
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import TRUE, Binary, Expression, IntegerType, StateTest, Unary
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.structure import AddedCondition
+from robosc.supervisor import AddedCondition
+from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import (
     Answers,
     Cause,

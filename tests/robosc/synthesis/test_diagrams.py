@@ -10,8 +10,8 @@ from robosc.automata.compile import compile_expression
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import Expression, IntegerType, Received, leaves
+from robosc.supervisor import DecisionDiagram
 from robosc.supervisor.diagram import diagram_domains, evaluate, validate
-from robosc.supervisor.structure import DecisionDiagram
 from robosc.synthesis.blocks import Blocks
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding

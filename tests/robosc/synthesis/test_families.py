@@ -4,7 +4,7 @@ import pytest
 
 from robosc.automata import Semantics
 from robosc.automata.controlled import controlled_graph
-from robosc.supervisor.conditions import state_predicates
+from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
 from robosc.verification import Outcome, synthesize_explicit, verify_explicitly
 from support.families import FAMILIES

@@ -10,13 +10,13 @@ import pytest
 from robosc.automata import Semantics, System, to_automata
 from robosc.automata.compile import NO_DATA, compile_expression
 from robosc.automata.state import subjects
+from robosc.certification import OutcomeStatus, make_supervisor
 from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.exploration import explore
 from robosc.model import Places
 from robosc.model.structure import CommunicationKind, Deployment, EventKind, Model
 from robosc.source import Location
-from robosc.supervisor import OutcomeStatus, make_supervisor
-from robosc.supervisor.conditions import state_predicates
+from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisStatus, findings, questions_about, synthesize
 from robosc.verification import ExplicitSupervisor, synthesize_explicit
 from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle, marked_place

@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from robosc.automata import DiscreteVariable, System
 from robosc.automata.semantics import Semantics
 from robosc.automata.state import subjects
+from robosc.conditions.rendering import Formulas, in_words
 from robosc.expressions import Binary, BinaryOperator, Expression, IntegerType, StateTest
 from robosc.expressions.evaluate import evaluate as evaluate_expression
-from robosc.supervisor.conditions import state_predicates
+from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.supervisor.diagram import diagram_domains, validate
-from robosc.supervisor.structure import AddedCondition, DecisionDiagram
-from robosc.supervisor.words import Formulas, in_words
+from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisStatus, simplify, synthesize
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.nodes import restrict

@@ -13,7 +13,7 @@ from robosc.errors import SynthesisCancelled
 from robosc.expressions import BooleanType, IntegerType, Received
 from robosc.expressions.tree import Binary, Constant, VariableRead
 from robosc.model.structure import Deployment
-from robosc.supervisor.conditions import state_predicate, state_predicates
+from robosc.supervisor.predicates import state_predicate, state_predicates
 from robosc.synthesis import SynthesisProgress, SynthesisResult, SynthesisStatus, UnknownEngineError, synthesize
 from robosc.verification import Outcome, verify_explicitly
 from robosc.verification.symbolic import verify_symbolically

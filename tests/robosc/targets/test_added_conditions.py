@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from robosc.supervisor import make_supervisor
+from robosc.certification import make_supervisor
 from robosc.targets import generate
 from robosc.targets.python.text import comment
 from support.models import bundle_of

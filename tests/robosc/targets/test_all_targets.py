@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from robosc.certification import SynthesisOutcome, make_supervisor
 from robosc.cli.main import main
 from robosc.errors import Severity, UnsupportedModelError
 from robosc.model.structure import Deployment
-from robosc.supervisor import SynthesisOutcome, make_supervisor
 from robosc.targets import (
     ALL,
     GeneratedFiles,

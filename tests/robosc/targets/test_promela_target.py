@@ -8,6 +8,7 @@ import pytest
 from robosc.automata import System, to_automata
 from robosc.automata.state import Subject
 from robosc.automata.structure import DiscreteVariable, InputVariable
+from robosc.certification import make_supervisor
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import (
     Binary,
@@ -25,9 +26,8 @@ from robosc.model.structure import Deployment
 from robosc.model_checking import Property, verify_properties
 from robosc.model_checking.formulas import Condition, Finally, Formula, Globally, Joined, Not, Until
 from robosc.source import Location
-from robosc.supervisor import make_supervisor
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.structure import AddedCondition, DecisionDiagram, DecisionNode
+from robosc.supervisor import AddedCondition, DecisionDiagram, DecisionNode
+from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
 from robosc.targets import GenerateOptions, available_targets, generate
 from robosc.targets.promela import promela_model

@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robosc.certification import make_supervisor
 from robosc.errors import UnsupportedModelError
 from robosc.execution.clock import ManualClock
 from robosc.execution.event_log import MemoryLog
@@ -33,8 +34,7 @@ from robosc.model.structure import (
     Update,
     Variable,
 )
-from robosc.supervisor import decode, encode, make_supervisor
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor, decode, encode
 from robosc.targets import GenerateOptions, generate, write_files
 from robosc.targets.events import events, is_controllable
 from robosc.targets.python import changes

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate
 from support.generated import imported
 from support.models import model_of

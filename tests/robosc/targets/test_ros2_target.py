@@ -14,7 +14,7 @@ import pytest
 from robosc.errors import UnsupportedModelError
 from robosc.execution.interpreter import InterpretedSystem, describe
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_files
 from robosc.targets.ros.runtime.parameters import ParameterError, declarations, prefixed, validate
 from robosc.targets.ros.state_topic import state_topic

@@ -13,7 +13,7 @@ import pytest
 from robosc.errors import UnsupportedModelError
 from robosc.execution.interpreter import describe
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import GeneratedFiles, generate, write_files
 from robosc.targets.ros.runtime.parameters import USE_SIM_TIME, ParameterError, declarations, validate
 from robosc.targets.ros.runtime.supervised import callers_name, robots_name

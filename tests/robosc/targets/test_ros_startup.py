@@ -12,7 +12,7 @@ from robosc.execution.clock import ManualClock
 from robosc.execution.runner import Status
 from robosc.execution.settings import Settings
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate
 from robosc.targets.ros.runtime.startup import HeldMessages
 from robosc.targets.ros.runtime.startup_controller import StartupBufferingExecutor

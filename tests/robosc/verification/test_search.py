@@ -11,8 +11,8 @@ from robosc.automata.controlled import Added, controlled_graph
 from robosc.automata.state import subject_domain, subjects
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import IntegerType
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.structure import AddedCondition
+from robosc.supervisor import AddedCondition
+from robosc.supervisor.predicates import state_predicates
 from robosc.verification import packing as packing_module
 from robosc.verification import search as search_module
 from robosc.verification import synthesize_explicit, verify_explicitly

@@ -24,8 +24,8 @@ from robosc.expressions import (
     Unary,
     VariableRead,
 )
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.structure import AddedCondition, DecisionDiagram
+from robosc.supervisor import AddedCondition, DecisionDiagram
+from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
 from robosc.verification import Outcome, Verification, verify_explicitly
 from robosc.verification.symbolic import expressions, order, verify_symbolically

@@ -7,7 +7,7 @@ import pytest
 
 from robosc.automata import System
 from robosc.automata.decision import Decision
-from robosc.supervisor.conditions import state_predicate, state_predicates
+from robosc.supervisor.predicates import state_predicate, state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
 from robosc.verification import Outcome, Verification, synthesize_explicit, verify_explicitly
 from robosc.verification.symbolic import verify_symbolically

@@ -13,7 +13,7 @@ from robosc.execution.runner import Status
 from robosc.execution.settings import Settings, settings_for
 from robosc.expressions import BooleanType, DoubleType, EnumType, StringType, Type
 from robosc.model.structure import CommunicationKind, Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.c99.layer import request_parameters
 from robosc.targets.c99.layout import PLANT_LOCATIONS, event_data, make_layout
 from robosc.targets.events import has_plant_location

@@ -6,7 +6,7 @@ from typing import Any
 from robosc.execution import clock, event_log, executor, layer, settings
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.structure import Communication, CommunicationKind, Deployment, Model
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.events import events, is_controllable
 from support.equivalence.observation import FULL, NO_LOG, Entry, Issued, Observation, entry, flat
 from support.equivalence.scenario import PERIOD_S, Action, Scenario

@@ -20,7 +20,7 @@ from robosc.expressions import (
     leaves,
 )
 from robosc.model.structure import CommunicationKind, Deployment, Model
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from support.equivalence.observation import Issued, Observation
 from support.equivalence.python_targets import PythonLayer, PythonTarget, reference
 from support.equivalence.scenario import Action, Scenario

@@ -10,7 +10,7 @@ from typing import IO, Any
 import pytest
 
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.ros.topics import servers, topics
 from support.equivalence.node_target import IN_CPP, LIMIT_S, NodeTarget, given, node_parameters, set_parts
 from support.equivalence.observation import Issued

@@ -13,7 +13,7 @@ from typing import Any
 from robosc.execution.interpreter import describe
 from robosc.expressions import ObjectType
 from robosc.model.structure import CommunicationKind, Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate, write_files
 from robosc.targets.ros.runtime.supervised import robots_name
 from robosc.targets.ros.topics import Topic, servers, topics

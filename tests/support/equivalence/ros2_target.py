@@ -10,7 +10,7 @@ from typing import Any
 
 from robosc.execution.interpreter import describe
 from robosc.model.structure import CommunicationKind, Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate, write_files
 from robosc.targets.ros.runtime.messages import basic_field, load_message, load_server, message_name
 from robosc.targets.ros.topics import servers, topics

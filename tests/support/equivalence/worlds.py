@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from support.equivalence.observation import Issued, Observation
 from support.equivalence.python_targets import reference
 from support.equivalence.scenario import Action, Scenario

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from robosc.supervisor import make_supervisor
-from robosc.supervisor.structure import Supervisor
+from robosc.certification import make_supervisor
+from robosc.supervisor import Supervisor
 from support.models import bundle_of
 from support.node_logs import entries_of
 from support.rclcpp_nodes import compiled, missing, run, sent

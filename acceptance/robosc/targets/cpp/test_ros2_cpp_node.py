@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from robosc.supervisor import make_supervisor
-from robosc.supervisor.structure import Supervisor
+from robosc.certification import make_supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.c99.layout import PLANT_LOCATIONS
 from support import rclcpp_nodes
 from support.models import EXAMPLES, bundle_of

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate, write_files
 from robosc_bridge.experiments.cycles.times import LIMIT_S, OTHER, feed
 

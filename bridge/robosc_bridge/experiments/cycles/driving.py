@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from robosc.model.structure import Communication, CommunicationKind, Model
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.c99.layout import make_layout
 from robosc.targets.cpp.model import fill_name
 from robosc_bridge.experiments.cycles.alone import SCRIPTS, write_unit

@@ -3,10 +3,11 @@
 from collections.abc import Iterable
 
 from robosc.automata import to_automata
+from robosc.certification import OutcomeStatus
+from robosc.conditions.summary import added_texts, summary_text
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.source import Location
-from robosc.supervisor import OutcomeStatus, Supervisor
-from robosc.supervisor.summary import added_texts, summary_text
+from robosc.supervisor import Supervisor
 from robosc.synthesis import Statistics
 from robosc_api.v1 import synthesis_pb2 as pb
 

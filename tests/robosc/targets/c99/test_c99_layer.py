@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from robosc.errors import UnsupportedModelError
 from robosc.execution.settings import Settings
 from robosc.model.structure import CommunicationKind, Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate
 from support.c99 import GCC, SANITIZERS, WARNINGS, lonely_end, replay
 from support.c99_layer import LayerReference, compare_layer, compiled_layer

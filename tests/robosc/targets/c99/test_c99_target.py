@@ -24,7 +24,7 @@ from robosc.model.structure import (
     Update,
     Variable,
 )
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import GenerateOptions, generate
 from robosc.targets.c99.naming import member_name, prefix_for
 from robosc.targets.c99.text import safe, string_literal

@@ -3,7 +3,7 @@
 import pytest
 
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from support.cif_twin import assert_same_problem
 from support.models import model_of
 from support.random_supervisors import CERTIFICATE

@@ -10,13 +10,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from robosc.certification import make_supervisor
 from robosc.cli.main import main
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import Binary, Constant, Expression, StateTest, VariableRead, conjunction
 from robosc.model.structure import Deployment, Requirement, RequirementForm
 from robosc.source import Bundle
-from robosc.supervisor import make_supervisor
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import GenerateOptions, generate
 from robosc.targets.cif import supervisor as supervisor_module
 from support.cif_parser import CifError

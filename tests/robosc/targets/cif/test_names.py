@@ -3,7 +3,7 @@
 import pytest
 
 from robosc.model.structure import Deployment
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate
 from robosc.targets.cif.text import KEYWORDS
 from support.cif_system import CifSystem, Table

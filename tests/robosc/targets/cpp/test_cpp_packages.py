@@ -8,10 +8,10 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
+from robosc.certification import make_supervisor
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Deployment
-from robosc.supervisor import make_supervisor
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets import generate, write_files
 from robosc.targets.cpp.naming import file_name
 from robosc.targets.ros.runtime.parameters import declarations

@@ -8,9 +8,9 @@ for VLSI Synthesis", Kluwer, 1984, ch. 4 (expand, irredundant, reduce); R. L. Ru
 "Multiple-valued minimization for PLA optimization", IEEE TCAD 6(5), 1987, pp. 727-750.
 """
 
+from robosc.conditions.literals import Indices, Membership, Size, Vocabulary, merged, operands, size
+from robosc.conditions.multivalued import Cube, GaveUp, Node, Space
 from robosc.expressions import Expression, StateTest, VariableRead, leaves
-from robosc.supervisor.literals import Indices, Membership, Size, Vocabulary, merged, operands, size
-from robosc.supervisor.multivalued import Cube, GaveUp, Node, Space
 
 MAXIMUM_CUBES = 64
 """Products that a sum may have."""

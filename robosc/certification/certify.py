@@ -7,8 +7,8 @@ from robosc.automata.semantics import Semantics
 from robosc.errors import InternalError
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.structure import Certificate, CheckResult
+from robosc.supervisor import Certificate, CheckResult
+from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisResult
 from robosc.verification import Limits, Outcome, verify
 

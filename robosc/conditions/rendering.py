@@ -9,13 +9,13 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
+from robosc.conditions.formula import OPERANDS, formula_in
+from robosc.conditions.literals import Indices, Membership, Vocabulary, membership, merged, operands
+from robosc.conditions.multivalued import Effort
 from robosc.expressions import Expression
 from robosc.expressions.text import expression_text
+from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import Domains
-from robosc.supervisor.formula import OPERANDS, formula_in
-from robosc.supervisor.literals import Indices, Membership, Vocabulary, membership, merged, operands
-from robosc.supervisor.multivalued import Effort
-from robosc.supervisor.structure import DecisionDiagram, DecisionNode
 
 SHORT = 12
 """Operands up to which a formula is always preferred to its diagram; a longer one only if the diagram has as many."""

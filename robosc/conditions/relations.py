@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 from itertools import combinations, product
 from typing import Literal
 
+from robosc.conditions.cover import Words, cover
+from robosc.conditions.literals import Size, size
+from robosc.conditions.multivalued import GaveUp, Node, Space
 from robosc.expressions import MAXIMUM_INTEGER, Binary, Constant, Expression, IntegerType, VariableRead
-from robosc.supervisor.cover import Words, cover
 from robosc.supervisor.diagram import Domains
-from robosc.supervisor.literals import Size, size
-from robosc.supervisor.multivalued import GaveUp, Node, Space
 
 MAXIMUM_PLACES = 6
 """Integers up to which relations between them are looked for."""

@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robosc.conditions.formula import STEPS, to_expression
+from robosc.conditions.literals import membership, operands
+from robosc.conditions.multivalued import Effort
+from robosc.conditions.rendering import Formulas, Line, diagram_lines, in_words
 from robosc.expressions import BooleanType, EnumType, Expression, IntegerType
 from robosc.expressions.evaluate import evaluate as evaluate_expression
+from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import Subject, SubjectDomain, evaluate, validate
-from robosc.supervisor.formula import STEPS, to_expression
-from robosc.supervisor.literals import membership, operands
-from robosc.supervisor.multivalued import Effort
-from robosc.supervisor.structure import DecisionDiagram, DecisionNode
-from robosc.supervisor.words import Formulas, Line, diagram_lines, in_words
 from support.effort import examples
 
 COLOURS = ("red", "green", "blue", "white")

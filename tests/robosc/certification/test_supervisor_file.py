@@ -9,15 +9,16 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from robosc.automata import System, to_automata
+from robosc.certification import make_supervisor
+from robosc.certification.differences import MAXIMUM_DIFFERENCES, model_differences
+from robosc.certification.supervisor_file import PROPERTIES, FileVerification, verify_supervisor_file
 from robosc.errors import InvalidSupervisorError
 from robosc.expressions import Binary, Constant
 from robosc.model import check
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
-from robosc.supervisor import Supervisor, decode, encode, make_supervisor
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.differences import MAXIMUM_DIFFERENCES, model_differences
-from robosc.supervisor.recheck import PROPERTIES, FileVerification, verify_supervisor_file
+from robosc.supervisor import Supervisor, decode, encode
+from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
 from robosc.verification import Limits, Outcome, synthesize_explicit, verify
 from support.effort import examples

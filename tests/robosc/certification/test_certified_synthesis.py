@@ -5,11 +5,12 @@ from typing import Any
 import pytest
 
 from robosc.automata import System, to_automata
+from robosc.certification import OutcomeStatus, Progress, make_supervisor
+from robosc.conditions.summary import summary_json, summary_text
 from robosc.errors import InternalError, SynthesisCancelled
 from robosc.model.structure import Deployment
-from robosc.supervisor import OutcomeStatus, Progress, encode, make_supervisor, summary_json, summary_text
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.structure import AddedCondition, Certificate, DecisionDiagram
+from robosc.supervisor import AddedCondition, Certificate, DecisionDiagram, encode
+from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisResult, synthesize
 from robosc.verification import Limits, verify_explicitly
 from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle
@@ -111,7 +112,7 @@ def test_a_wrong_synthesis_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
         spoilt = tuple(AddedCondition(item.event, DecisionDiagram((), 1)) for item in result.added)
         return SynthesisResult(result.status, spoilt, result.statistics)
 
-    monkeypatch.setattr("robosc.supervisor.make.synthesize", wrong)
+    monkeypatch.setattr("robosc.certification.pipeline.synthesize", wrong)
     with pytest.raises(InternalError, match="the verifier refuses the supervisor: not safe"):
         make_supervisor(bundle_of(COUNTER))
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 import msgspec
 
 from robosc.automata import System
+from robosc.conditions.rendering import Formulas, diagram_lines, in_words, size_in_words
 from robosc.expressions import TRUE, Expression
 from robosc.model.structure import Model
+from robosc.supervisor import AddedCondition, Certificate, DecisionDiagram, Supervisor
 from robosc.supervisor.diagram import diagram_domains
-from robosc.supervisor.structure import AddedCondition, Certificate, DecisionDiagram, Supervisor
-from robosc.supervisor.words import Formulas, diagram_lines, in_words, size_in_words
 
 _WIDTH = 100
 """Columns that a condition takes in the summary for people; it goes on in the next line."""

@@ -12,13 +12,13 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
+from robosc.conditions.cover import MAXIMUM_CUBES, Words, cover
+from robosc.conditions.literals import Vocabulary, has_relation, joined, operands, size, spine
+from robosc.conditions.multivalued import Cube, Effort, GaveUp, Node, Space
+from robosc.conditions.relations import Description, Relations
 from robosc.expressions import FALSE, TRUE, BinaryOperator, Conditional, Expression, Unary
-from robosc.supervisor.cover import MAXIMUM_CUBES, Words, cover
+from robosc.supervisor import DecisionDiagram
 from robosc.supervisor.diagram import Domains
-from robosc.supervisor.literals import Vocabulary, has_relation, joined, operands, size, spine
-from robosc.supervisor.multivalued import Cube, Effort, GaveUp, Node, Space
-from robosc.supervisor.relations import Description, Relations
-from robosc.supervisor.structure import DecisionDiagram
 
 OPERANDS = 40
 """Operands up to which a condition is written as a formula."""

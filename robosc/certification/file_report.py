@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
+from robosc.certification.supervisor_file import Fault, FileVerification, StateInWords
 from robosc.errors import InvalidSupervisorError
 from robosc.json_documents import diagnostics_json
 from robosc.signatures import SignatureError
 from robosc.source import visible
-from robosc.supervisor.recheck import Fault, FileVerification, StateInWords
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.verification import Outcome
 
 

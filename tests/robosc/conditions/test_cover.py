@@ -5,13 +5,13 @@ from random import Random
 
 import pytest
 
+from robosc.conditions.cover import Words, cover
+from robosc.conditions.literals import Vocabulary
+from robosc.conditions.multivalued import Effort, Space
+from robosc.conditions.rendering import in_words
 from robosc.expressions import IntegerType
-from robosc.supervisor.cover import Words, cover
+from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import Subject, SubjectDomain
-from robosc.supervisor.literals import Vocabulary
-from robosc.supervisor.multivalued import Effort, Space
-from robosc.supervisor.structure import DecisionDiagram, DecisionNode
-from robosc.supervisor.words import in_words
 
 DOMAINS: dict[Subject, SubjectDomain] = {(name, "n"): SubjectDomain(range(4), IntegerType(0, 3)) for name in "ABC"}
 NODES = tuple(DecisionNode(name, "n", (0, 1, 2, 3), (0, 1, 0, 1)) for name in "ABC")

@@ -13,6 +13,7 @@ from robosc.automata import ExecutableSystem, Semantics, System
 from robosc.automata.compile import State
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import subjects
+from robosc.certification.differences import model_differences
 from robosc.controller_properties import check_controller
 from robosc.errors import Diagnostic, sorted_diagnostics
 from robosc.expressions import Value
@@ -21,9 +22,8 @@ from robosc.model import check
 from robosc.model.layers import layer_findings
 from robosc.model.structure import CommunicationKind, Deployment, Model
 from robosc.source import Bundle
-from robosc.supervisor.conditions import state_predicates
-from robosc.supervisor.differences import model_differences
-from robosc.supervisor.structure import Certificate, ControllerProperties, Supervisor
+from robosc.supervisor import Certificate, ControllerProperties, Supervisor
+from robosc.supervisor.predicates import state_predicates
 from robosc.verification import Limits, Outcome, Verification, VerificationReport, verify
 
 PROPERTIES = ("safe", "controllable", "nonblocking", "maximally_permissive")

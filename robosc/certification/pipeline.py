@@ -14,6 +14,7 @@ import msgspec
 
 from robosc import explanation as explanations
 from robosc.automata import ExecutableSystem, Semantics
+from robosc.certification.certify import certify
 from robosc.controller_properties import check_controller, controller_findings
 from robosc.errors import Diagnostic, NodeLimitError, sorted_diagnostics
 from robosc.model import check
@@ -21,8 +22,7 @@ from robosc.model.layers import layer_findings
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle
-from robosc.supervisor.certify import certify
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.synthesis import (
     EngineOptions,
     Statistics,

@@ -14,10 +14,10 @@ from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from typing import Self
 
+from robosc.conditions.literals import Indices, merged
 from robosc.expressions import IntegerType
+from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import Domains, Subject
-from robosc.supervisor.literals import Indices, merged
-from robosc.supervisor.structure import DecisionDiagram, DecisionNode
 
 MAXIMUM_SUBJECTS = 100
 """Places that the diagrams of one store may test."""

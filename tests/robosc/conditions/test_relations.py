@@ -8,16 +8,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robosc.conditions.cover import Words
+from robosc.conditions.formula import STEPS, to_expression
+from robosc.conditions.literals import Vocabulary, has_relation, operands
+from robosc.conditions.multivalued import Effort, Space
+from robosc.conditions.relations import MAXIMUM_PLACES, Description, Relation, Relations
+from robosc.conditions.rendering import in_words
 from robosc.expressions import Binary, Constant, Expression, IntegerType, VariableRead
 from robosc.expressions.evaluate import evaluate as evaluate_expression
-from robosc.supervisor.cover import Words
+from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import Domains, Subject, SubjectDomain, evaluate, validate
-from robosc.supervisor.formula import STEPS, to_expression
-from robosc.supervisor.literals import Vocabulary, has_relation, operands
-from robosc.supervisor.multivalued import Effort, Space
-from robosc.supervisor.relations import MAXIMUM_PLACES, Description, Relation, Relations
-from robosc.supervisor.structure import DecisionDiagram, DecisionNode
-from robosc.supervisor.words import in_words
 from support.effort import examples
 
 Predicate = Callable[..., bool]

@@ -1,0 +1,1 @@
+"""Conditions of a supervisor in words: short formulas of decision diagrams, and the summary that shows them."""

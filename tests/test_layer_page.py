@@ -5,7 +5,7 @@ from pathlib import Path
 
 from robosc.certification import make_supervisor
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.settings import OTHER_DEPLOYMENT, Settings
+from robosc.execution.runtime.settings import OTHER_DEPLOYMENT, Settings
 from robosc.model.structure import Deployment
 from support.layers import LayerBench
 from support.models import bundle_of, checked

@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from robosc import __version__
-from robosc.execution.event_log import json_line
+from robosc.execution.runtime.event_log import json_line
 from support.browser import CHROMIUM, SCREENSHOTS, running_browser
 from support.live import LiveRobot, supervisor_without_synthesis
 from support.models import EXAMPLES

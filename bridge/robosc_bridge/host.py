@@ -9,7 +9,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Protocol
 
-from robosc.execution.clock import Clock
+from robosc.execution.runtime.clock import Clock
 
 
 class Condition(Protocol):

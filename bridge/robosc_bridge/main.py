@@ -15,7 +15,7 @@ import msgspec
 
 from robosc._version import __version__
 from robosc.errors import LanguageError, RoboscError
-from robosc.execution.event_log import EventLog, NullLog, open_event_log
+from robosc.execution.runtime.event_log import EventLog, NullLog, open_event_log
 from robosc.language import load_bundle
 from robosc.model import check
 from robosc.model.layers import layer_findings

@@ -1,7 +1,7 @@
 """Event logs after the fact: read, checked against the supervisor, drawn as a sequence of events.
 
-An executor writes its log in one format whatever it runs on (`robosc.execution.event_log`): the nodes of every target,
-the bridge and the simulations. Drawing needs the extra `robosc[plot]`; reading and checking need nothing more.
+An executor writes its log in one format whatever it runs on (`robosc.execution.runtime.event_log`): the nodes of every
+target, the bridge and the simulations. Drawing needs the extra `robosc[plot]`; reading and checking need nothing more.
 """
 
 from robosc.event_logs.checking import LogCheck, Violation, WrongDeploymentError, check_log

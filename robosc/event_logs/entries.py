@@ -15,7 +15,7 @@ class LogEntry:
     Attributes:
         line: Its number in the file, from 1.
         time_s: Time, in seconds since 1970-01-01 UTC.
-        kind: `event`, `blocked`, `fault` and so on: see `robosc.execution.event_log`.
+        kind: `event`, `blocked`, `fault` and so on: see `robosc.execution.runtime.event_log`.
         event: The event that it is about; empty if it is about none.
         is_controllable: True if the controller took the event by itself.
         document: All of it, as it stands in the log. Entries share what is equal: nobody may change it.

@@ -1,4 +1,4 @@
-"""Parts that make a supervisor run: an executor, and the reference interpreter of supervisors.
+"""Parts that make a supervisor run: `runtime`, executors that generated packages carry copies of, and `interpreter`.
 
-Import from the modules: generated packages carry copies of those that run without the rest of RoboSC.
+The interpreter is the reference for what generated code does; it is not copied.
 """

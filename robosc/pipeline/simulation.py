@@ -13,7 +13,7 @@ from robosc.certification.supervisor_file import StateInWords
 from robosc.errors import RoboscError, UnknownNameError
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.interpreter.received import EnumChoice
-from robosc.execution.protocol import Reading
+from robosc.execution.runtime.protocol import Reading
 from robosc.expressions import (
     ArrayType,
     BooleanType,

@@ -9,12 +9,12 @@ from random import Random
 from typing import Any
 
 from robosc.automata.plants import communication_plant_name
-from robosc.execution.clock import ManualClock
-from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.protocol import DataDoesNotFit
-from robosc.execution.runner import Status
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.executor import Executor
+from robosc.execution.runtime.protocol import DataDoesNotFit
+from robosc.execution.runtime.runner import Status
+from robosc.execution.runtime.settings import Settings
 from robosc.expressions import (
     ArrayType,
     BooleanType,

@@ -6,10 +6,18 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from robosc.execution.layer import _A_FAULT, _AT_REST, _NOT_ALLOWED, _NOT_FINITE, _NOT_KNOWN, _STILL_RUNNING, Layer
-from robosc.execution.middleware_messages import is_finite
-from robosc.execution.runner import Status
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.layer import (
+    _A_FAULT,
+    _AT_REST,
+    _NOT_ALLOWED,
+    _NOT_FINITE,
+    _NOT_KNOWN,
+    _STILL_RUNNING,
+    Layer,
+)
+from robosc.execution.runtime.middleware_messages import is_finite
+from robosc.execution.runtime.runner import Status
+from robosc.execution.runtime.settings import Settings
 from robosc.expressions import DoubleType, Type
 from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor

@@ -10,7 +10,7 @@ from itertools import product
 from typing import Any
 
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.protocol import Reading
+from robosc.execution.runtime.protocol import Reading
 from robosc.expressions.evaluate import evaluate
 from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor

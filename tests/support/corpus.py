@@ -16,11 +16,11 @@ from typing import Any
 from robosc.automata import Semantics, System, to_automata
 from robosc.certification import make_supervisor
 from robosc.errors import Diagnostic, LanguageError
-from robosc.execution.clock import ManualClock
-from robosc.execution.event_log import Entry, MemoryLog, plain
-from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.event_log import Entry, MemoryLog, plain
+from robosc.execution.runtime.executor import Executor
+from robosc.execution.runtime.settings import Settings
 from robosc.exploration import explore, graph_json
 from robosc.language import load_bundle
 from robosc.model import check

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from robosc.certification import make_supervisor
-from robosc.execution.clock import ManualClock
-from robosc.execution.event_log import MemoryLog
+from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.event_log import MemoryLog
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc_bridge.configuration import parse, tie

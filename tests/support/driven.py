@@ -11,7 +11,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
-from robosc.execution.event_log import MemoryLog
+from robosc.execution.runtime.event_log import MemoryLog
 from robosc_bridge.configuration import parse, tie
 from robosc_bridge.daemon.assembly import Machine, assemble, safety_limits
 from robosc_bridge.daemon.states import State

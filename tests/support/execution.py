@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from typing import Any
 
-from robosc.execution.clock import ManualClock
-from robosc.execution.event_log import MemoryLog
-from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.protocol import ControlledSystem, DataDoesNotFit
-from robosc.execution.runner import Runner, Status
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.event_log import MemoryLog
+from robosc.execution.runtime.executor import Executor
+from robosc.execution.runtime.protocol import ControlledSystem, DataDoesNotFit
+from robosc.execution.runtime.runner import Runner, Status
+from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import Deployment, Model
 from robosc.supervisor import AddedCondition, Certificate, Supervisor
 from support.models import example_model, model_of

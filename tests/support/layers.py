@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from typing import Any
 
-from robosc.execution.clock import ManualClock
-from robosc.execution.event_log import MemoryLog
-from robosc.execution.layer import Layer
-from robosc.execution.protocol import ControlledSystem
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.event_log import MemoryLog
+from robosc.execution.runtime.layer import Layer
+from robosc.execution.runtime.protocol import ControlledSystem
+from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import Deployment
 from support.execution import Observed, RecordingMiddleware, Sent, system_of
 

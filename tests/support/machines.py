@@ -3,7 +3,7 @@
 import sys
 
 from robosc.certification import make_supervisor
-from robosc.execution.event_log import NullLog
+from robosc.execution.runtime.event_log import NullLog
 from robosc.supervisor import Supervisor
 from robosc_bridge.configuration import parse, tie
 from robosc_bridge.daemon.assembly import Machine, assemble

@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from robosc.execution.clock import ManualClock
-from robosc.execution.executor import Executor
+from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.executor import Executor
 from robosc_bridge.simulated import BODIES, Scene, Timebase, World
 from support.execution import RecordingMiddleware, Sent, example_system
 

@@ -10,11 +10,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from robosc.execution.clock import ManualClock
-from robosc.execution.event_log import MemoryLog
-from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.event_log import MemoryLog
+from robosc.execution.runtime.executor import Executor
+from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import Communication, CommunicationKind, EventKind, Model
 from robosc.supervisor import Supervisor
 

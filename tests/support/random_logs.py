@@ -12,10 +12,10 @@ from random import Random
 from typing import Any
 
 from robosc.event_logs import LoggedRun, read_log
-from robosc.execution.event_log import json_line
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.interpreter.received import path_text
-from robosc.execution.protocol import Reading
+from robosc.execution.runtime.event_log import json_line
+from robosc.execution.runtime.protocol import Reading
 from robosc.expressions import BooleanType, EnumType
 from robosc.model.received import converted_paths
 from robosc.model.structure import Communication, CommunicationKind

@@ -3,8 +3,8 @@
 import json
 from pathlib import Path
 
-from robosc.execution.event_log import json_line
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.runtime.event_log import json_line
 from robosc.supervisor import encode
 from robosc_bridge.experiments.scenario import Outcome
 from robosc_bridge.simulated.scene import load_scene

@@ -14,12 +14,12 @@ from types import TracebackType
 from typing import Any, Self
 
 from robosc.event_logs import check_log, read_log
-from robosc.execution.clock import ManualClock
-from robosc.execution.event_log import open_event_log
-from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.layer import Layer
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.event_log import open_event_log
+from robosc.execution.runtime.executor import Executor
+from robosc.execution.runtime.layer import Layer
+from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import Deployment
 from robosc_bridge.simulated import BODIES, Eye, Motion, MotionRecorder, Mount, Scene, Timebase, World, read_motion
 from robosc_bridge.simulated.judge import STILL_M_S, STILL_RAD_S

@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from robosc.event_logs import read_log
-from robosc.execution.event_log import json_line, plain
+from robosc.execution.runtime.event_log import json_line, plain
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.view.replay import Recording, Replay
 from support.browser import visit

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from robosc.execution.settings import Settings, settings_from
+from robosc.execution.runtime.settings import Settings, settings_from
 from robosc.expressions import Constant, Expression, Type
 from robosc.model.structure import Communication, CommunicationKind, Model, ObjectValue, ProvidedValue
 from robosc_bridge.configuration.channels import (

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import msgspec
 
-from robosc.execution.event_log import EventLog
-from robosc.execution.runner import DeploymentError
-from robosc.execution.settings import Settings, SettingsError, require_settings_of
+from robosc.execution.runtime.event_log import EventLog
+from robosc.execution.runtime.runner import DeploymentError
+from robosc.execution.runtime.settings import Settings, SettingsError, require_settings_of
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc_api.security import SecurityError, check_listening

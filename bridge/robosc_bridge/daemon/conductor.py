@@ -7,7 +7,7 @@ import logging
 from collections.abc import Callable
 from typing import assert_never
 
-from robosc.execution.clock import Clock
+from robosc.execution.runtime.clock import Clock
 from robosc_bridge.daemon.execution import Execution
 from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.latches import Latches

@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
-from robosc.execution.clock import Clock
-from robosc.execution.event_log import EventLog
-from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.layer import Layer
-from robosc.execution.protocol import requesting
+from robosc.execution.runtime.clock import Clock
+from robosc.execution.runtime.event_log import EventLog
+from robosc.execution.runtime.executor import Executor
+from robosc.execution.runtime.layer import Layer
+from robosc.execution.runtime.protocol import requesting
 from robosc.model.structure import CommunicationKind
 from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.requesters import Requesters

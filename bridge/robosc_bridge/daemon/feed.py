@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from robosc.execution.event_log import Entry, EventLog
+from robosc.execution.runtime.event_log import Entry, EventLog
 from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import State
 from robosc_bridge.devices.interface import DriveReading, Scan

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.settings import Settings
 from robosc.supervisor import Supervisor
 from robosc_bridge.configuration.ties import Ties
 

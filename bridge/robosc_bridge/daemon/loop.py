@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import assert_never
 
-from robosc.execution.clock import Clock
-from robosc.execution.event_log import EventLog
+from robosc.execution.runtime.clock import Clock
+from robosc.execution.runtime.event_log import EventLog
 from robosc_bridge.daemon.asking import Asking
 from robosc_bridge.daemon.conductor import OVER, Conductor
 from robosc_bridge.daemon.exchange import Exchange

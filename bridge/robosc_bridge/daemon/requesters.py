@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from robosc.execution.layer import Layer
+from robosc.execution.runtime.layer import Layer
 from robosc.model.structure import CommunicationKind
 from robosc_bridge.daemon.asking import Asked, Asking
 from robosc_bridge.daemon.programs import (

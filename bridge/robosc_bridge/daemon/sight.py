@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.settings import Settings
 from robosc_bridge.configuration.channels import FaultChannel, LineChannel, LineLostChannel
 from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.reports import Report

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from robosc.execution.clock import Clock
+from robosc.execution.runtime.clock import Clock
 from robosc_bridge.daemon.feed import Feed, Snapshot
 from robosc_bridge.daemon.readiness import Readiness
 from robosc_bridge.daemon.reports import SafetyNotice

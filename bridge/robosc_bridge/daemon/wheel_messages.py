@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from robosc.execution.protocol import DataDoesNotFit
+from robosc.execution.runtime.protocol import DataDoesNotFit
 from robosc_bridge.devices.interface import Velocity
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from robosc.execution.event_log import Entry
+from robosc.execution.runtime.event_log import Entry
 from robosc_bridge.daemon.feed import Snapshot
 from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import State

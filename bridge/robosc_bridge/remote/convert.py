@@ -12,7 +12,7 @@ from google.protobuf.struct_pb2 import Struct
 
 from robosc._version import __version__
 from robosc.errors import UnsupportedModelError
-from robosc.execution.event_log import Entry, plain
+from robosc.execution.runtime.event_log import Entry, plain
 from robosc.expressions import ObjectType
 from robosc.model.structure import Communication, CommunicationKind, Model
 from robosc.supervisor import Supervisor, encode

@@ -13,7 +13,7 @@ import math
 import threading
 from collections.abc import Callable
 
-from robosc.execution.clock import Clock, ManualClock, SystemClock
+from robosc.execution.runtime.clock import Clock, ManualClock, SystemClock
 
 FASTEST = 100.0
 """Largest factor of a world's speed to the clock's; a fast computer lives some hundred seconds of it in one."""

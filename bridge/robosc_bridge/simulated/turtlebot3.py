@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from robosc.execution.clock import Clock
+from robosc.execution.runtime.clock import Clock
 from robosc_bridge.simulated.camera import SimulatedCamera
 from robosc_bridge.simulated.floor import Track
 from robosc_bridge.simulated.lidar import LIDARS, Lidar

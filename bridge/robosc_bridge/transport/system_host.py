@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from robosc.execution.clock import SystemClock
+from robosc.execution.runtime.clock import SystemClock
 from robosc_bridge.transport.network_line import NetworkLine
 from robosc_bridge.transport.serial_line import SerialLine
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from robosc.execution.event_log import Entry
+from robosc.execution.runtime.event_log import Entry
 
 
 class SourceKind(StrEnum):

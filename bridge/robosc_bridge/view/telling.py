@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from robosc.execution.event_log import Entry, plain
+from robosc.execution.runtime.event_log import Entry, plain
 from robosc.explanation.blocked import RequestAvailability, Requests, StateError
 from robosc_bridge.view.definition import Robot, definition_text
 from robosc_bridge.view.facts import Happenings, LaserScan, Notice, Status

@@ -2,7 +2,7 @@
 
 from math import prod
 
-from robosc.execution.protocol import CommunicationInfo, Description
+from robosc.execution.runtime.protocol import CommunicationInfo, Description
 from robosc.expressions import conjuncts
 from robosc.model.structure import Communication, CommunicationKind, EventKind, Model, Transition, is_tau
 from robosc.supervisor import Supervisor

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from robosc.execution.interpreter.functions import Function, Path, function_of
-from robosc.execution.protocol import Reading
+from robosc.execution.runtime.protocol import Reading
 from robosc.expressions import (
     ArrayType,
     BooleanType,

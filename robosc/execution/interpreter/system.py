@@ -16,7 +16,7 @@ from robosc.execution.interpreter.rules import (
     initial_state,
     provided_function,
 )
-from robosc.execution.protocol import MATCHES, Match, Reading, batches, requesting
+from robosc.execution.runtime.protocol import MATCHES, Match, Reading, batches, requesting
 from robosc.expressions import Value, conjuncts
 from robosc.model.structure import is_tau
 from robosc.supervisor import Supervisor
@@ -38,7 +38,7 @@ class _Successor:
 
 
 class InterpretedSystem:
-    """Implementation of `robosc.execution.protocol.ControlledSystem` for any supervisor.
+    """Implementation of `robosc.execution.runtime.protocol.ControlledSystem` for any supervisor.
 
     Args:
         supervisor: Supervisor to interpret.

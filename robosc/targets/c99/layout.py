@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from robosc.automata.plants import communication_plant_name
 from robosc.errors import InternalError
 from robosc.execution.interpreter import describe
-from robosc.execution.protocol import Description
-from robosc.execution.settings import default_release_identifiers
+from robosc.execution.runtime.protocol import Description
+from robosc.execution.runtime.settings import default_release_identifiers
 from robosc.expressions import (
     ArrayType,
     BooleanType,

@@ -1,10 +1,10 @@
-"""The generated `supervisor.py`: a class that implements `robosc.execution.protocol.ControlledSystem`."""
+"""The generated `supervisor.py`: a class that implements `robosc.execution.runtime.protocol.ControlledSystem`."""
 
 from robosc._version import __version__
 from robosc.automata.plants import communication_plant_name
 from robosc.errors import InternalError, UnsupportedModelError
 from robosc.execution.interpreter import describe
-from robosc.execution.protocol import Description, batches, requesting
+from robosc.execution.runtime.protocol import Description, batches, requesting
 from robosc.expressions import DoubleType
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
@@ -39,8 +39,8 @@ def header(supervisor: Supervisor) -> str:
 
 
 RUNTIME = {
-    Deployment.CONTROLLER: ("robosc.targets.python.runtime.reading", "robosc.execution.asynchronous"),
-    Deployment.LAYER: ("robosc.targets.python.runtime.reading", "robosc.execution.layer"),
+    Deployment.CONTROLLER: ("robosc.targets.python.runtime.reading", "robosc.execution.runtime.asynchronous"),
+    Deployment.LAYER: ("robosc.targets.python.runtime.reading", "robosc.execution.runtime.layer"),
 }
 """The modules that a supervisor runs on; they bring those that they need."""
 

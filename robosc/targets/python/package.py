@@ -57,7 +57,7 @@ and `LayerMiddleware`.
 
 _MAXIMUM_NAME = 100
 
-_OF_SUPERVISOR = re.compile(r"from robosc\.(execution\.[a-z0-9_]+|expressions\.values) import ")
+_OF_SUPERVISOR = re.compile(r"from robosc\.(execution\.runtime\.[a-z0-9_]+|expressions\.values) import ")
 _OF_RUNTIME = re.compile(r"from robosc\.targets\.[a-z0-9_]+\.runtime\.(?P<module>[a-z0-9_]+) import ")
 
 

@@ -17,8 +17,8 @@ import threading
 import time
 from pathlib import Path
 
-from robosc.execution.event_log import NullLog
-from robosc.execution.executor import Executor
+from robosc.execution.runtime.event_log import NullLog
+from robosc.execution.runtime.executor import Executor
 from robosc.model.structure import Deployment
 from robosc_bridge.configuration import load, tie
 from robosc_bridge.daemon.assembly import Machine, assemble

@@ -25,8 +25,8 @@ sys.path[:0] = [str(Path(__file__).parent), str(ROOT / "tests" / "benchmarks")]
 from rig import WANDERER, WANDERER_CHANNELS, environment  # noqa: E402
 
 from figures import text_table  # noqa: E402  # found through the path above
-from robosc.execution.event_log import NullLog  # noqa: E402
-from robosc.execution.executor import Executor  # noqa: E402
+from robosc.execution.runtime.event_log import NullLog  # noqa: E402
+from robosc.execution.runtime.executor import Executor  # noqa: E402
 from robosc.model.structure import Deployment  # noqa: E402
 from robosc_bridge.configuration import parse, tie  # noqa: E402
 from robosc_bridge.daemon.assembly import Machine, assemble  # noqa: E402

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import robosc_bridge.configuration.structure as structure_module
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.settings import Settings
 from robosc_bridge.configuration import Configuration, ConfigurationError, load, parse, schema, schema_text
 from robosc_bridge.configuration.channels import (
     CHANNELS,

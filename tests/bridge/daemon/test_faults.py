@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from robosc.execution.requests import Decisions
+from robosc.execution.runtime.requests import Decisions
 from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.motion import Motion
 from robosc_bridge.daemon.states import Command, State

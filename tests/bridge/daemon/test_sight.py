@@ -5,8 +5,8 @@ import logging
 import pytest
 
 from robosc.certification import make_supervisor
-from robosc.execution.clock import ManualClock
-from robosc.execution.event_log import MemoryLog
+from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.event_log import MemoryLog
 from robosc.model.structure import Deployment
 from robosc_bridge.configuration import parse, tie
 from robosc_bridge.configuration.structure import Configuration

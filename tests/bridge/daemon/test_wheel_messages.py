@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.protocol import DataDoesNotFit
+from robosc.execution.runtime.protocol import DataDoesNotFit
 from robosc_bridge.daemon.wheel_messages import angle_of, finite, is_default, velocity_of
 from robosc_bridge.devices.interface import Velocity
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import Faults, SimulatedTurtleBot3, scene_names
 from robosc_bridge.simulated.__main__ import main
 from robosc_bridge.simulated.commands import UnknownCommandError, obey

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import DatagramLine, Timebase
 from robosc_bridge.simulated.line import Sending
 from support.waiting import PATIENCE_S, wait_until

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import SimulatedTurtleBot3, VirtualHost
 from support.descriptors import open_descriptors
 from support.waiting import wait_until

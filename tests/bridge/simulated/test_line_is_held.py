@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import BODIES, Eye, Mount, Timebase, World, load_scene
 from robosc_bridge.skills.line import LineDetector
 from robosc_bridge.skills.settings import LineSettings

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import (
     BODIES,
     Goal,

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import pytest
 from dynamixel_sdk import PacketHandler
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import Noise, OpenCr, Scene, SimulatedTurtleBot3, Walls
 from support.wire import SdkPort
 

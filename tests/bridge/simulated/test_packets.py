@@ -4,7 +4,7 @@ from dynamixel_sdk import PacketHandler
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import BODIES, OpenCr, ServoBus, Timebase, Walls, World, wheel_servos
 from robosc_bridge.simulated.packets import Request, RequestParser, crc16, status
 from support.effort import examples

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import SimulatedTurtleBot3
 from robosc_bridge.simulated.timebase import Timebase
 

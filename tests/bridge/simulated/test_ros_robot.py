@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import BODIES, Timebase, Walls, World, oval, room
 from robosc_bridge.simulated.commands import UnknownCommandError
 from robosc_bridge.simulated.ros import ros1

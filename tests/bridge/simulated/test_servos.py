@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 from dynamixel_sdk import GroupBulkRead, GroupBulkWrite, GroupSyncRead, GroupSyncWrite, PacketHandler
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import HardwareError, Servo, SimulatedTurtleBot3, Walls
 from support.wire import SdkPort
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import (
     BODIES,
     Eye,

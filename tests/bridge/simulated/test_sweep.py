@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import BODIES, Timebase, Walls, World, load_scene, maze, maze_scene, room
 from robosc_bridge.simulated.rounds import Rounds
 from robosc_bridge.simulated.sweep import BEAMS, Sweep

@@ -5,7 +5,7 @@ import threading
 import pytest
 from dynamixel_sdk import GroupSyncWrite, PacketHandler
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import BASES, BODIES, LIDARS, SimulatedTurtleBot3, VirtualHost, Walls
 from robosc_bridge.simulated.servo import Servo
 from support.wire import Host, SdkPort

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import SimulatedTurtleBot3
 from support.wire import Host
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc.execution.clock import ManualClock, SystemClock
+from robosc.execution.runtime.clock import ManualClock, SystemClock
 from robosc_bridge.simulated import BODIES, Timebase, Walls, World, maze, parse_walls, room
 from robosc_bridge.simulated.world import STEP_S
 

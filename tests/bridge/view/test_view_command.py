@@ -12,7 +12,7 @@ import pytest
 
 from robosc.cli.arguments import Parser
 from robosc.cli.output import CommandError
-from robosc.execution.event_log import json_line
+from robosc.execution.runtime.event_log import json_line
 from robosc_api.security import add_client_arguments
 from robosc_bridge.configuration import parse
 from robosc_bridge.daemon.faces import is_remote, is_startable

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.event_log import plain
+from robosc.execution.runtime.event_log import plain
 from robosc_bridge.remote import RemoteSettings, serve
 from robosc_bridge.view import server as server_module
 from robosc_bridge.view.hub import MAXIMUM_EVENTS

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 
 from robosc.event_logs import LoggedRun, read_log
-from robosc.execution.event_log import json_line, plain
+from robosc.execution.runtime.event_log import json_line, plain
 from robosc_bridge.view import ViewError
 from robosc_bridge.view.hub import Viewer
 from robosc_bridge.view.replay import HISTORY, MAXIMUM_STOPS, Player, Recording, Replay

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from robosc.cli.main import main
-from robosc.execution.event_log import json_line
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.runtime.event_log import json_line
 from robosc.supervisor import encode
 from support.execution import Bench
 from support.generated import example_supervisor

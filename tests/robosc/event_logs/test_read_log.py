@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from robosc.event_logs import LogError, read_log, reading
-from robosc.execution.event_log import open_event_log
+from robosc.execution.runtime.event_log import open_event_log
 
 STATE = {"A": {"state": "idle", "variables": {"n": 1, "x": 0.5}}}
 

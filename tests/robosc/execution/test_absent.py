@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.protocol import ControlledSystem
+from robosc.execution.runtime.protocol import ControlledSystem
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from support.generated import load_system

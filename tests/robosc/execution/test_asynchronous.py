@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.asynchronous import AsyncController, Feedback, GoalRejected
-from robosc.execution.clock import ManualClock
-from robosc.execution.event_log import MemoryLog
-from robosc.execution.runner import Status
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.asynchronous import AsyncController, Feedback, GoalRejected
+from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.event_log import MemoryLog
+from robosc.execution.runtime.runner import Status
+from robosc.execution.runtime.settings import Settings
 from support.execution import system_of
 
 ROBOT = """

@@ -3,7 +3,7 @@
 import pytest
 
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.runner import DeploymentError, Status
+from robosc.execution.runtime.runner import DeploymentError, Status
 from robosc.model.structure import Deployment
 from robosc.supervisor import AddedCondition, DecisionDiagram, DecisionNode
 from support.execution import Bench, Sent, bench, example_system, supervisor_of, system_of

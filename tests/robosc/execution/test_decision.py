@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc.execution.decision import FairPolicy, Policy, make_policy
+from robosc.execution.runtime.decision import FairPolicy, Policy, make_policy
 
 NAMES = ("a", "b", "c")
 

@@ -1,6 +1,6 @@
 """Tests of an executor's prior knowledge of a system."""
 
-from robosc.execution.protocol import CommunicationInfo
+from robosc.execution.runtime.protocol import CommunicationInfo
 from support.execution import example_system, system_of
 
 ROBOT = """

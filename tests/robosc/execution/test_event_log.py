@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc.execution.event_log import JsonLinesLog, MemoryLog, NullLog, json_line, open_event_log
+from robosc.execution.runtime.event_log import JsonLinesLog, MemoryLog, NullLog, json_line, open_event_log
 from support.execution import bench
 
 ROBOT = """

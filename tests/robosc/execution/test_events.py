@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.livelock import LivelockDetector, LivelockError
-from robosc.execution.protocol import Reading
-from robosc.execution.runner import Status
+from robosc.execution.runtime.livelock import LivelockDetector, LivelockError
+from robosc.execution.runtime.protocol import Reading
+from robosc.execution.runtime.runner import Status
 from support.execution import Bench, bench, system_of
 
 SCANNER = """

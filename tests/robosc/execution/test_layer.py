@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.runner import DeploymentError, Status
-from robosc.execution.settings import SettingsError
+from robosc.execution.runtime.runner import DeploymentError, Status
+from robosc.execution.runtime.settings import SettingsError
 from robosc.model.structure import Deployment
 from support.execution import Bench, Sent, system_of
 from support.layers import LayerBench, layer

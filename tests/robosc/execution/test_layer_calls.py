@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from robosc.execution.runner import DeploymentError, Status
+from robosc.execution.runtime.runner import DeploymentError, Status
 from robosc.model.structure import Deployment
 from support.execution import Bench, Sent, system_of
 from support.layers import LayerBench, layer

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.runner import Status
+from robosc.execution.runtime.runner import Status
 from robosc.model.structure import Deployment
 from support.execution import Broken, Sent, system_of
 from support.layers import LayerBench, layer

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.protocol import Reading
-from robosc.execution.runner import Status
+from robosc.execution.runtime.protocol import Reading
+from robosc.execution.runtime.runner import Status
 from robosc.expressions import BooleanType, EnumType
 from robosc.expressions.evaluate import evaluate
 from robosc.model.structure import Communication, CommunicationKind

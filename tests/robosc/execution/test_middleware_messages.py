@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from robosc.execution.event_log import open_event_log, plain
-from robosc.execution.middleware_messages import MAXIMUM_PARTS, fields_of, is_finite
+from robosc.execution.runtime.event_log import open_event_log, plain
+from robosc.execution.runtime.middleware_messages import MAXIMUM_PARTS, fields_of, is_finite
 
 
 class Slotted:
@@ -98,7 +98,7 @@ def test_what_has_no_numbers_is_finite() -> None:
 def test_what_cannot_be_looked_through_is_not_finite(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not is_finite(Trap())
     assert not is_finite([Trap()])
-    monkeypatch.setattr("robosc.execution.middleware_messages.MAXIMUM_PARTS", 1000)
+    monkeypatch.setattr("robosc.execution.runtime.middleware_messages.MAXIMUM_PARTS", 1000)
     assert is_finite([0.5] * 999)
     assert not is_finite([0.5] * 1000)
     assert not is_finite(Bottomless())

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 
-import robosc.execution
+import robosc.execution.runtime
 
-MODULES = sorted(path for path in Path(robosc.execution.__file__).parent.glob("*.py") if path.name != "__init__.py")
+MODULES = sorted(
+    path for path in Path(robosc.execution.runtime.__file__).parent.glob("*.py") if path.name != "__init__.py"
+)
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: path.stem)
@@ -19,7 +21,7 @@ def test_a_module_is_python_3_8(path: Path) -> None:
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: path.stem)
 def test_a_module_imports_only_its_neighbours_and_the_standard_library(path: Path) -> None:
-    siblings = {f"robosc.execution.{item.stem}" for item in MODULES}
+    siblings = {f"robosc.execution.runtime.{item.stem}" for item in MODULES}
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             assert all(alias.name in sys.stdlib_module_names for alias in node.names)

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.runner import Status
+from robosc.execution.runtime.runner import Status
 from support.execution import Bench, Broken, Sent, bench, system_of
 
 ROBOT = """

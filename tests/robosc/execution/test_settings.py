@@ -2,7 +2,7 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.settings import Settings, SettingsError, settings_for, settings_from
+from robosc.execution.runtime.settings import Settings, SettingsError, settings_for, settings_from
 from support.execution import bench, system_of
 
 ROBOT = """

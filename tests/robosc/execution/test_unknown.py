@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.runner import Status
+from robosc.execution.runtime.runner import Status
 from robosc.expressions import Binary, EnumValue, Received
 from robosc.model.structure import EnumRule
 from support.effort import examples

@@ -7,8 +7,8 @@ import hypothesis.strategies as st
 import pytest
 from hypothesis import given, settings
 
-from robosc.execution.event_log import plain
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.runtime.event_log import plain
 from robosc.explanation.blocked import MAXIMUM_NAMES, MAXIMUM_REASONS, Requests, StateError, read_value
 from robosc.expressions import BooleanType, DoubleType, EnumType, IntegerType, StringType
 from robosc.model.structure import CommunicationKind, Deployment

@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 
 from robosc.certification import make_supervisor
 from robosc.errors import UnsupportedModelError
-from robosc.execution.clock import ManualClock
-from robosc.execution.event_log import MemoryLog
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.protocol import batches
+from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.event_log import MemoryLog
+from robosc.execution.runtime.protocol import batches
 from robosc.expressions import Binary, BooleanType, Constant, DoubleType, Received
 from robosc.model.structure import (
     Behaviour,

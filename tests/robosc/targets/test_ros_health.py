@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.clock import ManualClock
-from robosc.execution.executor import Executor
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.executor import Executor
+from robosc.execution.runtime.settings import Settings
 from robosc.targets.ros.runtime.health import HealthMonitor, Level
 from support.generated import example_supervisor
 

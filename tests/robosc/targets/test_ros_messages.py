@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.protocol import DataDoesNotFit
+from robosc.execution.runtime.protocol import DataDoesNotFit
 from robosc.targets.ros.runtime.messages import (
     Sender,
     SetupError,

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.clock import ManualClock
-from robosc.execution.runner import Status
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.runner import Status
+from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets import generate

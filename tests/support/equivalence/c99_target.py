@@ -8,9 +8,9 @@ from typing import IO, Any
 
 from robosc.automata.plants import communication_plant_name
 from robosc.execution.interpreter import describe
-from robosc.execution.middleware_messages import is_finite
-from robosc.execution.runner import Status
-from robosc.execution.settings import Settings, settings_for
+from robosc.execution.runtime.middleware_messages import is_finite
+from robosc.execution.runtime.runner import Status
+from robosc.execution.runtime.settings import Settings, settings_for
 from robosc.expressions import BooleanType, DoubleType, EnumType, StringType, Type
 from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor

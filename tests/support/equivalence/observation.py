@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from robosc.execution.event_log import plain
+from robosc.execution.runtime.event_log import plain
 
 MAXIMUM_FLOAT32 = 3.4028234663852886e38
 

@@ -3,8 +3,8 @@
 from types import SimpleNamespace
 from typing import Any
 
-from robosc.execution import clock, event_log, executor, layer, settings
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.runtime import clock, event_log, executor, layer, settings
 from robosc.model.structure import Communication, CommunicationKind, Deployment, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.events import events, is_controllable

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any
 
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.settings import Settings
 
 PERIOD_S = 0.125
 """A fraction that floats and microseconds hold exactly."""

@@ -17,7 +17,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Protocol
 
-from robosc.execution.clock import ManualClock
+from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated.commands import UnknownCommandError
 from robosc_bridge.simulated.lidar import LIDARS
 from robosc_bridge.simulated.mishaps import Mishaps

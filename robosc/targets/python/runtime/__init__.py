@@ -1,1 +1,1 @@
-"""Modules that generated packages carry copies of, beside those of `robosc.execution`."""
+"""Modules that generated packages carry copies of, beside those of `robosc.execution.runtime`."""

@@ -8,8 +8,8 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import NamedTuple
 
-from robosc.execution.recorder import Counters
-from robosc.execution.runner import Runner, Status
+from robosc.execution.runtime.recorder import Counters
+from robosc.execution.runtime.runner import Runner, Status
 
 
 class Level(IntEnum):

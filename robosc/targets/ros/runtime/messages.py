@@ -16,7 +16,7 @@ import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from robosc.execution.protocol import DataDoesNotFit
+from robosc.execution.runtime.protocol import DataDoesNotFit
 
 MAXIMUM_FLOAT32 = 3.4028234663852886e38
 _INFINITY = float("inf")

@@ -10,8 +10,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from robosc.execution.protocol import Description
-from robosc.execution.settings import Settings, SettingsError, settings_for
+from robosc.execution.runtime.protocol import Description
+from robosc.execution.runtime.settings import Settings, SettingsError, settings_for
 
 _PREFIX = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+\Z")
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from robosc.execution.runner import Runner
+from robosc.execution.runtime.runner import Runner
 
 
 class Reports:

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from robosc.execution.runner import Runner
+from robosc.execution.runtime.runner import Runner
 
 
 class HeldMessages:

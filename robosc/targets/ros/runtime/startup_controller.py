@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from robosc.execution.executor import Executor
+from robosc.execution.runtime.executor import Executor
 from robosc.targets.ros.runtime.startup import StartupBufferingRunner
 
 

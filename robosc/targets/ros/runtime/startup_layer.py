@@ -5,7 +5,7 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 
 from __future__ import annotations
 
-from robosc.execution.layer import Layer
+from robosc.execution.runtime.layer import Layer
 from robosc.targets.ros.runtime.startup import StartupBufferingRunner
 
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.errors import UnsupportedModelError
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets import generate

@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from robosc.errors import UnsupportedModelError
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.settings import Settings
 from robosc.expressions import Binary, BooleanType, Constant, DoubleType, Expression, Received
 from robosc.model.structure import (
     Behaviour,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Dict, List, NamedTuple, Optional
 
-from robosc.execution.calls import Calls, Goals
+from robosc.execution.runtime.calls import Calls, Goals
 
 
 class CallerCall(NamedTuple):

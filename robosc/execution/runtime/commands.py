@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Dict, List
 
-from robosc.execution.calls import FOREVER
-from robosc.execution.release import Releases
+from robosc.execution.runtime.calls import FOREVER
+from robosc.execution.runtime.release import Releases
 
 
 class Commands:

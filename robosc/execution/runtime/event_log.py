@@ -24,7 +24,7 @@ import time
 from pathlib import Path
 from typing import Any, Dict, List, Protocol, TextIO
 
-from robosc.execution.middleware_messages import fields_of
+from robosc.execution.runtime.middleware_messages import fields_of
 
 Entry = Dict[str, Any]
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from typing import Any, Dict, Optional, Tuple
 
-from robosc.execution.calls import Goals
-from robosc.execution.livelock import LivelockDetector
-from robosc.execution.protocol import ControlledSystem, Reading, RobotSide
-from robosc.execution.recorder import Recorder
-from robosc.execution.release import Releases
-from robosc.execution.safe_stop import request_cancel
+from robosc.execution.runtime.calls import Goals
+from robosc.execution.runtime.livelock import LivelockDetector
+from robosc.execution.runtime.protocol import ControlledSystem, Reading, RobotSide
+from robosc.execution.runtime.recorder import Recorder
+from robosc.execution.runtime.release import Releases
+from robosc.execution.runtime.safe_stop import request_cancel
 
 
 class ExecutionError(Exception):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Dict, List, Optional, Sequence, Tuple
 
-from robosc.execution.falling_conditions import have_fallen
-from robosc.execution.protocol import ControlledSystem
+from robosc.execution.runtime.falling_conditions import have_fallen
+from robosc.execution.runtime.protocol import ControlledSystem
 
 
 class _Acting:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Optional
 
-from robosc.execution.clock import Clock
-from robosc.execution.decision import Policy, make_policy
-from robosc.execution.event_log import EventLog
-from robosc.execution.protocol import ControlledSystem, Middleware
-from robosc.execution.requests import Decisions
-from robosc.execution.runner import Runner
-from robosc.execution.safe_stop import describe_error
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.clock import Clock
+from robosc.execution.runtime.decision import Policy, make_policy
+from robosc.execution.runtime.event_log import EventLog
+from robosc.execution.runtime.protocol import ControlledSystem, Middleware
+from robosc.execution.runtime.requests import Decisions
+from robosc.execution.runtime.runner import Runner
+from robosc.execution.runtime.safe_stop import describe_error
+from robosc.execution.runtime.settings import Settings
 
 
 class Executor(Runner):

@@ -9,17 +9,17 @@ from __future__ import annotations
 
 from typing import Any, Callable, Dict, Optional, Sequence, Tuple
 
-from robosc.execution.callers import Callers
-from robosc.execution.clock import Clock
-from robosc.execution.commands import Commands
-from robosc.execution.event_log import EventLog
-from robosc.execution.middleware_messages import is_finite
-from robosc.execution.protocol import CommunicationInfo, ControlledSystem, LayerMiddleware, RobotSide
-from robosc.execution.requests import Request
-from robosc.execution.runner import DeploymentError, Runner, Status, guarded
-from robosc.execution.safe_stop import describe_error, request_cancel
-from robosc.execution.settings import Settings
-from robosc.execution.steps import ExecutionError
+from robosc.execution.runtime.callers import Callers
+from robosc.execution.runtime.clock import Clock
+from robosc.execution.runtime.commands import Commands
+from robosc.execution.runtime.event_log import EventLog
+from robosc.execution.runtime.middleware_messages import is_finite
+from robosc.execution.runtime.protocol import CommunicationInfo, ControlledSystem, LayerMiddleware, RobotSide
+from robosc.execution.runtime.requests import Request
+from robosc.execution.runtime.runner import DeploymentError, Runner, Status, guarded
+from robosc.execution.runtime.safe_stop import describe_error, request_cancel
+from robosc.execution.runtime.settings import Settings
+from robosc.execution.runtime.steps import ExecutionError
 
 _INCOMING_MESSAGE = "incoming message"
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any, Optional
 
-from robosc.execution.calls import OUTCOMES, Calls, Goal, Goals
-from robosc.execution.protocol import RobotSide
-from robosc.execution.recorder import Recorder
-from robosc.execution.safe_stop import request_cancel
-from robosc.execution.steps import ExecutionError, Steps
+from robosc.execution.runtime.calls import OUTCOMES, Calls, Goal, Goals
+from robosc.execution.runtime.protocol import RobotSide
+from robosc.execution.runtime.recorder import Recorder
+from robosc.execution.runtime.safe_stop import request_cancel
+from robosc.execution.runtime.steps import ExecutionError, Steps
 
 
 class Replies:

@@ -10,13 +10,13 @@ import asyncio
 from collections import deque
 from typing import Any, Awaitable, Callable, Deque, Dict, Optional, Protocol, Set, Tuple
 
-from robosc.execution.clock import Clock, SystemClock
-from robosc.execution.event_log import EventLog
-from robosc.execution.executor import Executor
-from robosc.execution.protocol import ControlledSystem
-from robosc.execution.runner import Status
-from robosc.execution.safe_stop import CANCEL_WAIT_S, describe_error
-from robosc.execution.settings import Settings
+from robosc.execution.runtime.clock import Clock, SystemClock
+from robosc.execution.runtime.event_log import EventLog
+from robosc.execution.runtime.executor import Executor
+from robosc.execution.runtime.protocol import ControlledSystem
+from robosc.execution.runtime.runner import Status
+from robosc.execution.runtime.safe_stop import CANCEL_WAIT_S, describe_error
+from robosc.execution.runtime.settings import Settings
 
 WATCH_S = 0.05
 """Longest time until it is noticed that time has passed, in seconds."""

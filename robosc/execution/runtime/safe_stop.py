@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Dict, List, Tuple
 
-from robosc.execution.calls import Goal, Goals
-from robosc.execution.protocol import RobotSide
-from robosc.execution.release import Releases
+from robosc.execution.runtime.calls import Goal, Goals
+from robosc.execution.runtime.protocol import RobotSide
+from robosc.execution.runtime.release import Releases
 
 CANCEL_WAIT_S = 0.5
 

@@ -16,18 +16,18 @@ from enum import Enum
 from functools import wraps
 from typing import Any, Callable, Optional, Tuple, TypeVar, cast
 
-from robosc.execution.calls import Calls, Goals
-from robosc.execution.clock import Clock, SystemClock
-from robosc.execution.event_log import EventLog, NullLog
-from robosc.execution.protocol import OUTGOING, ControlledSystem, Description, RobotSide, batches
-from robosc.execution.recorder import Counters, Recorder
-from robosc.execution.release import Releases
-from robosc.execution.replies import Replies
-from robosc.execution.requests import by_identifier, requests_of
-from robosc.execution.safe_stop import SafeStop, describe_error
-from robosc.execution.sensors import Sensors
-from robosc.execution.settings import Settings, require_settings_of, settings_for
-from robosc.execution.steps import ExecutionError, Steps
+from robosc.execution.runtime.calls import Calls, Goals
+from robosc.execution.runtime.clock import Clock, SystemClock
+from robosc.execution.runtime.event_log import EventLog, NullLog
+from robosc.execution.runtime.protocol import OUTGOING, ControlledSystem, Description, RobotSide, batches
+from robosc.execution.runtime.recorder import Counters, Recorder
+from robosc.execution.runtime.release import Releases
+from robosc.execution.runtime.replies import Replies
+from robosc.execution.runtime.requests import by_identifier, requests_of
+from robosc.execution.runtime.safe_stop import SafeStop, describe_error
+from robosc.execution.runtime.sensors import Sensors
+from robosc.execution.runtime.settings import Settings, require_settings_of, settings_for
+from robosc.execution.runtime.steps import ExecutionError, Steps
 
 _FAULT = "fault"
 _STOPPED_BY_HAND = "stop"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Dict, NamedTuple, Sequence
 
-from robosc.execution.clock import Clock
-from robosc.execution.event_log import EventLog
-from robosc.execution.protocol import ControlledSystem
+from robosc.execution.runtime.clock import Clock
+from robosc.execution.runtime.event_log import EventLog
+from robosc.execution.runtime.protocol import ControlledSystem
 
 
 class Counters(NamedTuple):

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from typing import Dict, NamedTuple, Optional, Sequence, Tuple
 
-from robosc.execution.calls import Calls, Goals
-from robosc.execution.decision import Policy
-from robosc.execution.protocol import CommunicationInfo, ControlledSystem, DataDoesNotFit, Middleware, requesting
-from robosc.execution.recorder import Recorder
-from robosc.execution.release import Releases
-from robosc.execution.steps import Steps
+from robosc.execution.runtime.calls import Calls, Goals
+from robosc.execution.runtime.decision import Policy
+from robosc.execution.runtime.protocol import (
+    CommunicationInfo,
+    ControlledSystem,
+    DataDoesNotFit,
+    Middleware,
+    requesting,
+)
+from robosc.execution.runtime.recorder import Recorder
+from robosc.execution.runtime.release import Releases
+from robosc.execution.runtime.steps import Steps
 
 _MESSAGE = "incoming message"
 

@@ -6,7 +6,7 @@ import difflib
 import math
 from typing import Any, Dict, Iterable, Mapping, NamedTuple, Optional, Tuple
 
-from robosc.execution.protocol import Description
+from robosc.execution.runtime.protocol import Description
 
 POLICIES = ("fair", "priority", "random")
 EVERY = ("period", "event")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
-from robosc.execution.calls import FOREVER
+from robosc.execution.runtime.calls import FOREVER
 
 
 class _Sensor:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
-from robosc.execution.falling_conditions import have_fallen, held_ever
-from robosc.execution.protocol import ControlledSystem, RobotSide
+from robosc.execution.runtime.falling_conditions import have_fallen, held_ever
+from robosc.execution.runtime.protocol import ControlledSystem, RobotSide
 
 FOREVER = float("inf")
 

@@ -27,7 +27,7 @@ from robosc.model.interfaces import check_fields
 from robosc.model.own_requests import OwnRequests
 from robosc.model.places import Places
 from robosc.model.restrictions import Restrictions
-from robosc.model.scope import Scopes
+from robosc.model.scopes import Scopes
 from robosc.model.structure import (
     Behaviour,
     Communication,
@@ -166,7 +166,7 @@ class _RobotChecker:
             part.name: component_names(part, behaviour_trees[part.name], self._types, self.findings)
             for part in self.parts
         }
-        constants = Constants(self._types, self.findings)
+        constants = Constants(self._types, self._libraries, self.findings)
         self.scopes = scopes = Scopes(self._unit, self._types, self.parts, self._libraries, names, constants)
         scopes.of(self._unit)  # Also a file whose constants nothing uses has them checked.
         enums = self._enums(scopes)

@@ -12,7 +12,7 @@ from robosc.model.expressions import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.identifiers import identifier_fault
 from robosc.model.options import build_options
-from robosc.model.scope import Scopes
+from robosc.model.scopes import Scopes
 from robosc.model.structure import Communication, CommunicationKind, Interface
 from robosc.model.types import Types
 from robosc.model.units import Part, unique

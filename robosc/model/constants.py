@@ -1,7 +1,6 @@
 """Constants: names for values that are known when a model is checked (language B.3)."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 
 from robosc.errors import RelatedPlace
 from robosc.expressions import (
@@ -20,10 +19,10 @@ from robosc.expressions import (
 from robosc.language import syntax
 from robosc.model.expressions import ExpressionChecker
 from robosc.model.findings import Findings
-from robosc.model.scope import Scopes
+from robosc.model.scope import Scope, enums_of
 from robosc.model.typed import Typed, constant_value, may_leave
 from robosc.model.types import Types
-from robosc.model.units import Unit
+from robosc.model.units import Libraries, Unit
 
 _MAXIMUM_CHAIN = 50
 """Constants that are worked out because an earlier one needs them, one inside the other."""
@@ -34,33 +33,35 @@ class Constants:
 
     Args:
         types: All types.
+        libraries: Libraries that files import from.
         findings: Findings to which faults are reported.
     """
 
-    def __init__(self, types: Types, findings: Findings) -> None:
+    def __init__(self, types: Types, libraries: Libraries, findings: Findings) -> None:
         self._types = types
+        self._libraries = libraries
         self._findings = findings
         self._found: dict[tuple[Unit, str], Typed | None] = {}
         self._checkers: dict[Unit, ExpressionChecker] = {}
         self._open: list[tuple[Unit, str]] = []
         self._has_told_depth = False
 
-    def visible_in(self, unit: Unit, scopes: Scopes) -> "VisibleConstants":
+    def visible_in(self, unit: Unit) -> "VisibleConstants":
         """The constants that a file can name; reports what is wrong with those of the file and of its libraries."""
-        visible = self._names(unit, scopes)
-        for home in dict.fromkeys((unit, *scopes.libraries_of(unit))):
+        visible = self._names(unit)
+        for home in dict.fromkeys((unit, *self._libraries.all_of(unit))):
             for name in dict.fromkeys(item.name.text for item in home.tree.items if isinstance(item, syntax.Constant)):
-                self.resolve(home, name, scopes)
+                self.resolve(home, name)
         return visible
 
-    def _names(self, unit: Unit, scopes: Scopes) -> "VisibleConstants":
+    def _names(self, unit: Unit) -> "VisibleConstants":
         """The nearest definition of each name: the file's own, then its libraries', then those they import from.
 
         A name that several equally near libraries define means nothing.
         """
         homes: dict[str, Unit] = {}
         ambiguous: dict[str, tuple[str, ...]] = {}
-        for units in ((unit,), *scopes.tiers_of(unit)):
+        for units in ((unit,), *self._libraries.tiers_of(unit)):
             near: dict[str, list[Unit]] = {}
             for home in units:
                 for name in home.constants:
@@ -72,9 +73,9 @@ class Constants:
                     homes[name] = found[0]
                 else:
                     ambiguous[name] = tuple(sorted(home.tree.name.text for home in found))
-        return VisibleConstants(self, scopes, homes, ambiguous)
+        return VisibleConstants(self, homes, ambiguous)
 
-    def resolve(self, unit: Unit, name: str, scopes: Scopes) -> Typed | None:
+    def resolve(self, unit: Unit, name: str) -> Typed | None:
         """The value of a constant, or None where it has none, which has been reported."""
         key = (unit, name)
         tree = unit.constants[name]
@@ -93,15 +94,16 @@ class Constants:
             self._found[key] = None
         if key not in self._found:
             self._open.append(key)
-            found = self._resolve(unit, tree, self._checker(unit, scopes))
+            found = self._resolve(unit, tree, self._checker(unit))
             self._open.pop()
             self._found.setdefault(key, found)
         return self._found[key]
 
-    def _checker(self, unit: Unit, scopes: Scopes) -> ExpressionChecker:
+    def _checker(self, unit: Unit) -> ExpressionChecker:
         if unit not in self._checkers:
-            visible = self._names(unit, scopes)
-            scope = replace(scopes.of_constants(unit), constants=visible, constant_places=visible.places)
+            visible = self._names(unit)
+            enums = enums_of(unit, self._types, self._libraries)
+            scope = Scope(self._types, {}, enums, constants=visible, constant_places=visible.places)
             self._checkers[unit] = ExpressionChecker(scope, self._findings)
         return self._checkers[unit]
 
@@ -169,18 +171,16 @@ class VisibleConstants(Mapping[str, Typed | None]):
     def __init__(
         self,
         constants: Constants,
-        scopes: Scopes,
         homes: Mapping[str, Unit],
         ambiguous: Mapping[str, tuple[str, ...]],
     ) -> None:
         self._constants = constants
-        self._scopes = scopes
         self._homes = homes
         self.ambiguous = ambiguous
         self.places = {name: home.constants[name].name.location for name, home in homes.items()}
 
     def __getitem__(self, name: str) -> Typed | None:
-        return self._constants.resolve(self._homes[name], name, self._scopes)
+        return self._constants.resolve(self._homes[name], name)
 
     def __contains__(self, name: object) -> bool:
         return name in self._homes  # Asking whether there is one must not resolve it.

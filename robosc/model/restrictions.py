@@ -10,7 +10,7 @@ from robosc.model.expressions import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.places import Places
 from robosc.model.requirements import ProvideBuilder, build_invariant, build_requirement
-from robosc.model.scope import Scopes
+from robosc.model.scopes import Scopes
 from robosc.model.structure import Communication, Invariant, Provide, Requirement
 from robosc.model.types import Types
 from robosc.model.units import Libraries, Part, Unit

@@ -153,6 +153,21 @@ class Libraries:
             yield unit, name
             here = unit.components[name]
 
+    def tiers_of(self, unit: Unit) -> tuple[tuple[Unit, ...], tuple[Unit, ...]]:
+        """The libraries that a file imports from, and those that they in turn have the components from."""
+        nearest: dict[Unit, None] = {}
+        further: dict[Unit, None] = {}
+        for component in unit.components.values():
+            for place, (library, _) in enumerate(self.chain(component)):
+                (further if place else nearest)[library] = None
+        direct = tuple(library for library in nearest if library is not unit)
+        return direct, tuple(library for library in further if library is not unit and library not in nearest)
+
+    def all_of(self, unit: Unit) -> tuple[Unit, ...]:
+        """Every library that the imported components of a file come from or through."""
+        direct, further = self.tiers_of(unit)
+        return (*direct, *further)
+
     def _find(self, name: syntax.Name) -> Unit | None:
         found: dict[str, syntax.File] = {}
         partly: dict[str, syntax.File] = {}

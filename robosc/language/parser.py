@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from robosc.errors import Diagnostic, RelatedPlace, sorted_diagnostics
 from robosc.language import syntax
 from robosc.language.cursor import Extent, Fault, TooManyFaults
-from robosc.language.expressions import ExpressionParser
+from robosc.language.expression_parser import ExpressionParser
 from robosc.language.limits import FRAMES_PER_LEVEL, MAXIMUM_NESTING
 from robosc.language.tokens import Kind, Places, Tokens, obstacle, readable_tokens, tokenize
 from robosc.recursion import allow_depth

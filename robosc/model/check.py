@@ -21,7 +21,7 @@ from robosc.model.communications import (
     with_conditions,
 )
 from robosc.model.constants import Constants
-from robosc.model.expressions import ExpressionChecker
+from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.interfaces import check_fields
 from robosc.model.own_requests import OwnRequests

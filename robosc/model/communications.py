@@ -8,7 +8,7 @@ import msgspec
 from robosc.errors import RelatedPlace
 from robosc.expressions import BooleanType, DoubleType, EnumType, IntegerType, NoneType, ObjectType, StringType, Type
 from robosc.language import syntax
-from robosc.model.expressions import ExpressionChecker
+from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.identifiers import identifier_fault
 from robosc.model.options import build_options

@@ -17,7 +17,7 @@ from robosc.expressions import (
     type_text,
 )
 from robosc.language import syntax
-from robosc.model.expressions import ExpressionChecker
+from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.scope import Scope, enums_of
 from robosc.model.typed import Typed, constant_value, may_leave

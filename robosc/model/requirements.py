@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from robosc.errors import RelatedPlace
 from robosc.expressions import TRUE, EnumType, NoneType, ObjectType, Type, type_text
 from robosc.language import syntax
-from robosc.model.expressions import ExpressionChecker
+from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.structure import (
     Communication,

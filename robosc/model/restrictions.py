@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from robosc.errors import RelatedPlace
 from robosc.language import syntax
-from robosc.model.expressions import ExpressionChecker
+from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.places import Places
 from robosc.model.requirements import ProvideBuilder, build_invariant, build_requirement

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.language import syntax
 from robosc.language.cursor import Fault, TooManyFaults
-from robosc.language.expressions import ExpressionParser
+from robosc.language.expression_parser import ExpressionParser
 from robosc.language.limits import FRAMES_PER_LEVEL, MAXIMUM_NESTING, MAXIMUM_SYNTAX_ERRORS
 from robosc.language.tokens import Kind, Places, Tokens, tokenize
 from robosc.recursion import allow_depth

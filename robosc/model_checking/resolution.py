@@ -11,7 +11,7 @@ from robosc.errors import Diagnostic, LanguageError, sorted_diagnostics
 from robosc.expressions import FALSE, EnumType
 from robosc.language import syntax
 from robosc.language.limits import MAXIMUM_SYNTAX_ERRORS
-from robosc.model.expressions import ExpressionChecker
+from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.scope import ComponentNames, Scope
 from robosc.model.structure import CommunicationKind, Model

@@ -27,8 +27,8 @@ from robosc.targets.c99.step import unknown_name
 from robosc.targets.c99.text import comment, safe
 from robosc.targets.c99.unit import Unit, declared
 from robosc.targets.events import has_plant_location, is_controllable, split
+from robosc.targets.model_text import requirement_text
 from robosc.targets.python.text import indent
-from robosc.targets.words import requirement_text
 
 
 def head(supervisor: Supervisor, begin: str = "/* ", rest: str = "   ", end: str = " */") -> str:

@@ -15,8 +15,8 @@ from robosc.targets.c99.expressions import TRUE_CODE, Sort, as_double, truth, va
 from robosc.targets.c99.naming import Namer
 from robosc.targets.c99.text import comment
 from robosc.targets.c99.unit import Reading, Unit, declared
+from robosc.targets.model_text import provide_text
 from robosc.targets.python.text import indent
-from robosc.targets.words import provide_text
 
 
 @dataclass

@@ -19,13 +19,13 @@ from robosc.targets.c99.unit import Unit, make_unit
 from robosc.targets.cpp.model import Writer, fill_name, received_topics, take_name
 from robosc.targets.cpp.naming import require_package_name
 from robosc.targets.files import GeneratedFiles
+from robosc.targets.model_text import requirement_text
 from robosc.targets.python.package import package_name
 from robosc.targets.python.text import printable
 from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros.package import chosen, error_context, packages, release_identifiers, require_own_names
 from robosc.targets.ros.runtime.parameters import Parameter, declarations
 from robosc.targets.ros.topics import Topic, servers, shapes_of, topics
-from robosc.targets.words import requirement_text
 
 _RUNTIME = (
     "controller.hpp",

@@ -8,6 +8,7 @@ from robosc.expressions import (
 )
 from robosc.targets import acceptance
 from robosc.targets.acceptance import InOneOf, StaysInRange, accepting_conditions, enabling_conditions
+from robosc.targets.model_text import requirement_text
 from robosc.targets.python.expressions import (
     TRUE_CODE,
     Code,
@@ -20,7 +21,6 @@ from robosc.targets.python.expressions import (
 )
 from robosc.targets.python.text import comment, docstring, indent
 from robosc.targets.python.writer import Writer
-from robosc.targets.words import requirement_text
 
 Condition = tuple[str, Code]
 """Words that explain a condition, and its code."""

@@ -9,6 +9,7 @@ from robosc.expressions import DoubleType
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets.events import has_plant_location
+from robosc.targets.model_text import requirement_text
 from robosc.targets.python.allow import allow_method, conjuncts_method, requirements_method
 from robosc.targets.python.bundle import bundle, section_title
 from robosc.targets.python.changes import (
@@ -24,7 +25,6 @@ from robosc.targets.python.step import read_method, receive_method, step_method
 from robosc.targets.python.text import indent, printable
 from robosc.targets.python.when import matches_method
 from robosc.targets.python.writer import Writer, make_writer
-from robosc.targets.words import requirement_text
 
 OLDEST_PYTHON = (3, 8)
 """Generated code runs on this version of Python and later."""

@@ -1,10 +1,10 @@
 """Generated methods that compute the data of a request at the moment it is made."""
 
 from robosc.model.structure import ObjectValue, ProvidedValue
+from robosc.targets.model_text import provide_text
 from robosc.targets.python.expressions import TRUE_CODE, Unknown, truth, value
 from robosc.targets.python.text import comment, docstring, indent
 from robosc.targets.python.writer import Writer
-from robosc.targets.words import provide_text
 
 
 def provide_method(writer: Writer, communication: str) -> list[str]:

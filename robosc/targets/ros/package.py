@@ -14,6 +14,7 @@ from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind, Deployment, Interface, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.events import has_plant_location
+from robosc.targets.model_text import requirement_text
 from robosc.targets.python.generate import header
 from robosc.targets.python.layout import make_layout
 from robosc.targets.python.naming import snake_case
@@ -23,7 +24,6 @@ from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros.runtime.parameters import Parameter
 from robosc.targets.ros.state_topic import state_topic
 from robosc.targets.ros.topics import Topic, sent_paths, shapes_of
-from robosc.targets.words import requirement_text
 
 MAXIMUM_STARTER = 100
 

@@ -10,7 +10,7 @@ from robosc.source import Bundle
 from robosc.supervisor import Certificate, CheckResult
 from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisResult
-from robosc.verification import Limits, Outcome, verify
+from robosc.verification import CheckOutcome, Limits, verify
 
 
 def certify(
@@ -69,5 +69,5 @@ def certify(
     )
 
 
-def _result(outcome: Outcome) -> CheckResult:
-    return "passed" if outcome is Outcome.PASSED else "not checked"
+def _result(outcome: CheckOutcome) -> CheckResult:
+    return "passed" if outcome is CheckOutcome.PASSED else "not checked"

@@ -9,7 +9,7 @@ from robosc.json_documents import diagnostics_json
 from robosc.signatures import SignatureError
 from robosc.source import visible
 from robosc.supervisor import Supervisor
-from robosc.verification import Outcome
+from robosc.verification import CheckOutcome
 
 
 def has_passed(found: FileVerification, *, is_strict: bool) -> bool:
@@ -79,7 +79,7 @@ def file_verification_text(
     elif document["faults"]:
         lines.append(f"{subject}failed: no right supervisor of {model}")
     elif not is_right:
-        unchecked = [name.replace("_", " ") for name, outcome in checks.items() if outcome == Outcome.NOT_CHECKED]
+        unchecked = [name.replace("_", " ") for name, outcome in checks.items() if outcome == CheckOutcome.NOT_CHECKED]
         lines.append(f"{subject}not checked: {', '.join(unchecked)}")
     else:
         lines.append(f"{subject}passed: a right supervisor of {model}")

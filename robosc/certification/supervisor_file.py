@@ -24,7 +24,7 @@ from robosc.model.structure import CommunicationKind, Deployment, Model
 from robosc.source import Bundle
 from robosc.supervisor import Certificate, ControllerProperties, Supervisor
 from robosc.supervisor.predicates import state_predicates
-from robosc.verification import Limits, Outcome, Verification, VerificationReport, verify
+from robosc.verification import CheckOutcome, Limits, Verification, VerificationReport, verify
 
 PROPERTIES = ("safe", "controllable", "nonblocking", "maximally_permissive")
 """The four properties, as certificates call them."""
@@ -93,13 +93,15 @@ class FileVerification:
     notes: tuple[str, ...]
     report: VerificationReport | None
 
-    def outcomes(self) -> dict[str, Outcome]:
+    def outcomes(self) -> dict[str, CheckOutcome]:
         """Return the outcome of each check, in order."""
         faulty = {fault.check for fault in self.faults}
-        found = {name: Outcome.FAILED if name in faulty else Outcome.PASSED for name in ("deployment", "model")}
+        found = {
+            name: CheckOutcome.FAILED if name in faulty else CheckOutcome.PASSED for name in ("deployment", "model")
+        }
         if self.report is None:
-            return found | dict.fromkeys(("certificate", *PROPERTIES), Outcome.NOT_CHECKED)
-        found["certificate"] = Outcome.FAILED if "certificate" in faulty else Outcome.PASSED
+            return found | dict.fromkeys(("certificate", *PROPERTIES), CheckOutcome.NOT_CHECKED)
+        found["certificate"] = CheckOutcome.FAILED if "certificate" in faulty else CheckOutcome.PASSED
         return found | {name: getattr(self.report.verification, name) for name in PROPERTIES}
 
     @property
@@ -109,7 +111,7 @@ class FileVerification:
 
     def unchecked(self) -> tuple[str, ...]:
         """Return the names of the checks that were not made."""
-        return tuple(name for name, outcome in self.outcomes().items() if outcome is Outcome.NOT_CHECKED)
+        return tuple(name for name, outcome in self.outcomes().items() if outcome is CheckOutcome.NOT_CHECKED)
 
 
 def verify_supervisor_file(
@@ -179,7 +181,7 @@ def verify_supervisor_file(
         properties = check_controller(
             executable,
             supervisor.added,
-            is_nonblocking=found.nonblocking is Outcome.PASSED,
+            is_nonblocking=found.nonblocking is CheckOutcome.PASSED,
             states=found.states or told,
             semantics=semantics,
             should_stop=should_stop,
@@ -220,7 +222,7 @@ def _false_claims(certificate: Certificate, found: Verification) -> list[str]:
         if told is not None and counted is not None and int(told) != counted:
             claims.append(f"it tells of {told} {what}, there are {counted}")
     for name in PROPERTIES:
-        if getattr(certificate, name) == "passed" and getattr(found, name) is Outcome.FAILED:
+        if getattr(certificate, name) == "passed" and getattr(found, name) is CheckOutcome.FAILED:
             claims.append(f"it says '{name.replace('_', ' ')}: passed', which is false")
     return claims
 
@@ -239,7 +241,7 @@ def _beliefs(certificate: Certificate, found: Verification) -> list[str]:
     claimed = [
         name.replace("_", " ")
         for name in PROPERTIES
-        if getattr(certificate, name) == "passed" and getattr(found, name) is Outcome.NOT_CHECKED
+        if getattr(certificate, name) == "passed" and getattr(found, name) is CheckOutcome.NOT_CHECKED
     ]
     return [f"the certificate says 'passed' for what was not checked here: {', '.join(claimed)}"] if claimed else []
 

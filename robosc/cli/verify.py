@@ -149,12 +149,12 @@ def _verify_supervisor(arguments: argparse.Namespace) -> int:
     if is_right and (arguments.property or arguments.properties):
         # Of a supervisor that passed only the verdicts are asked for.
         return properties.verify(arguments, supervisor)
-    return report_recheck(
+    return report_file_verification(
         arguments, file_verification_json(found, supervisor, is_strict=arguments.strict), found.diagnostics, bundle
     )
 
 
-def report_recheck(
+def report_file_verification(
     arguments: argparse.Namespace,
     document: Mapping[str, Any],
     diagnostics: Sequence[Diagnostic],

@@ -9,7 +9,7 @@ for VLSI Synthesis", Kluwer, 1984, ch. 4 (expand, irredundant, reduce); R. L. Ru
 """
 
 from robosc.conditions.literals import Indices, Membership, Size, Vocabulary, merged, operands, size
-from robosc.conditions.multivalued import Cube, GaveUp, Node, Space
+from robosc.conditions.multivalued import Cube, EffortExceededError, Node, Space
 from robosc.expressions import Expression, StateTest, VariableRead, leaves
 
 MAXIMUM_CUBES = 64
@@ -68,7 +68,7 @@ class Words:
             test = self._vocabulary.test(self._space.subjects[variable], runs)
             self._space.effort.spend(len(test.parts))
             if len(test.parts) > MAXIMUM_PARTS:
-                raise GaveUp
+                raise EffortExceededError
             found = self._tests[variable, mask] = (test, test.size)
         return found
 
@@ -89,13 +89,13 @@ def cover(space: Space, words: Words, wanted: Node, forbidden: Node, *, most: in
         most: Number of cubes that there may be before some of them are dropped.
 
     Raises:
-        GaveUp: There would be too many, or it takes too many steps.
+        EffortExceededError: There would be too many, or it takes too many steps.
     """
     cubes: list[Cube] = []
     rest = wanted
     while rest != 0:
         if len(cubes) == most:
-            raise GaveUp
+            raise EffortExceededError
         cube = _expanded(space, words, space.shortest_path(rest), forbidden)
         cubes.append(cube)
         rest = space.without(rest, space.of_cube(cube))

@@ -14,7 +14,7 @@ from functools import partial
 
 from robosc.conditions.cover import MAXIMUM_CUBES, Words, cover
 from robosc.conditions.literals import Vocabulary, has_relation, joined, operands, size, spine
-from robosc.conditions.multivalued import Cube, Effort, GaveUp, Node, Space
+from robosc.conditions.multivalued import Cube, Effort, EffortExceededError, Node, Space
 from robosc.conditions.relations import Description, Relations
 from robosc.expressions import FALSE, TRUE, BinaryOperator, Conditional, Expression, Unary
 from robosc.supervisor import DecisionDiagram
@@ -88,7 +88,7 @@ def formula_in(vocabulary: Vocabulary, diagram: DecisionDiagram, *, limit: int, 
     try:
         space = Space([diagram], vocabulary.domains, effort.part(STEPS))
         found = _Formulas(space, vocabulary, limit).shortest(space.of(diagram))
-    except GaveUp:
+    except EffortExceededError:
         return None
     return found if found is not None and operands(found) <= limit else None
 
@@ -111,7 +111,7 @@ class _Formulas:
             self._known[node] = None
             try:
                 self._known[node] = self._searched(node)
-            except GaveUp:
+            except EffortExceededError:
                 del self._known[node]
                 raise
         return self._known[node]
@@ -171,7 +171,7 @@ class _Formulas:
             with self._space.within(self._space.effort.part(self._space.effort.left // 3)):
                 for item in search():
                     found.append(item)  # what was found before it gives up is kept
-        except GaveUp:
+        except EffortExceededError:
             pass
         return found
 

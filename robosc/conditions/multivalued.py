@@ -1,7 +1,7 @@
 """Decision diagrams over finitely many values as a store of shared nodes: joined, subtracted, searched.
 
 Values that no diagram tells apart are one class, so that a node has a child for each class however large the range is.
-Every walk counts its steps: what would take too many ends with `GaveUp`, on every machine at the same place.
+Every walk counts its steps: what would take too many ends with `EffortExceededError`, at the same place everywhere.
 
 Source: A. Srinivasan, T. Kam, S. Malik and R. K. Brayton, "Algorithms for discrete function manipulation", IEEE
 ICCAD 1990, pp. 92-95.
@@ -32,7 +32,7 @@ Cube = tuple[int, ...]
 """For each place a set of classes, as bits: the states whose places all hold a value of their set."""
 
 
-class GaveUp(Exception):
+class EffortExceededError(Exception):
     """There is no result within the bounds."""
 
 
@@ -52,13 +52,13 @@ class Effort:
         """Take some steps.
 
         Raises:
-            GaveUp: There are not so many left.
+            EffortExceededError: There are not so many left.
         """
         self.left -= steps
         if self._whole is not None:
             self._whole.spend(steps)
         if self.left < 0:
-            raise GaveUp
+            raise EffortExceededError
 
     def part(self, steps: int) -> "Effort":
         """A part of it for work of its own."""
@@ -82,7 +82,7 @@ class Space:
         effort: Effort that further work may take.
 
     Raises:
-        GaveUp: They test too many places or tell too many values apart.
+        EffortExceededError: They test too many places or tell too many values apart.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Space:
         self.effort = effort
         self.subjects = _ordered(diagrams)
         if len(self.subjects) > MAXIMUM_SUBJECTS:
-            raise GaveUp
+            raise EffortExceededError
         self._variables = {subject: place for place, subject in enumerate(self.subjects)}
         nodes: dict[Subject, list[DecisionNode]] = {subject: [] for subject in self.subjects}
         for node in (node for diagram in diagrams for node in diagram.nodes):
@@ -405,7 +405,7 @@ def _ordered(diagrams: Sequence[DecisionDiagram]) -> tuple[Subject, ...]:
 def _singles(count: int, effort: Effort) -> list[Indices]:
     """Each index by itself."""
     if count > MAXIMUM_RUNS:
-        raise GaveUp
+        raise EffortExceededError
     effort.spend(count)
     return [(range(index, index + 1),) for index in range(count)]
 
@@ -414,7 +414,7 @@ def _classes(nodes: Sequence[DecisionNode], count: int, effort: Effort, *, are_r
     """The indices of a place's values in classes that none of its nodes tells apart, in the order of their first."""
     starts = sorted({start for node in nodes for start in node.starts})
     if len(starts) > MAXIMUM_RUNS:
-        raise GaveUp
+        raise EffortExceededError
     if are_ranges and count <= 2 * len(starts):
         return _singles(count, effort)
     if are_ranges:

@@ -15,7 +15,7 @@ from typing import Literal
 
 from robosc.conditions.cover import Words, cover
 from robosc.conditions.literals import Size, size
-from robosc.conditions.multivalued import GaveUp, Node, Space
+from robosc.conditions.multivalued import EffortExceededError, Node, Space
 from robosc.expressions import MAXIMUM_INTEGER, Binary, Constant, Expression, IntegerType, VariableRead
 from robosc.supervisor.diagram import Domains
 
@@ -119,7 +119,7 @@ class Relations:
             depth: Number of times that relations may be looked for inside what relations leave open.
 
         Raises:
-            GaveUp: It takes too many steps.
+            EffortExceededError: It takes too many steps.
         """
         relations = self._holding(wanted, integers)
         tried: set[tuple[Relation, ...]] = set()
@@ -153,7 +153,7 @@ class Relations:
         try:
             with self._space.within(self._space.effort.part(self._space.effort.left // 2)):
                 found = self._space.sum_of(cover(self._space, self._words, wanted, forbidden))
-        except GaveUp:
+        except EffortExceededError:
             return
         yield found
 

@@ -67,13 +67,13 @@ def check_controller(
     how = f"search of every stable state ({found.states})"
     if not found.is_complete:
         how = f"search given up after {found.states} stable states"
-    are_judged = found.is_complete
+    is_searched = found.is_complete
     if orders is not None and orders.is_exhausted:
-        are_judged = False
+        is_searched = False
         how = f"{how}; too many orders of silent steps to follow them all: more than {limit} states on their way"
     return Properties(
         finite_response=_outcome(ends, found.livelock is not None, found.is_complete),
-        confluence=_outcome(is_confluent, found.conflict is not None, are_judged),
+        confluence=_outcome(is_confluent, found.conflict is not None, is_searched),
         nonblocking=_outcome(is_live, found.blocking is not None, found.is_complete),
         method=_method(proved, how),
         livelock=found.livelock,

@@ -68,13 +68,15 @@ def _telling_states(
 
 def _breaks(requirement: Expression, component: str, transition: Transition, state: str) -> bool:
     """Return True if a requirement that may be true in a state is false after a transition from it."""
-    before = _judged(requirement, component, state, {})
-    assigned = {update.variable: _judged(update.expression, component, state, {}) for update in transition.updates}
-    after = _judged(requirement, component, transition.target or state, assigned)
+    before = _known_value(requirement, component, state, {})
+    assigned = {update.variable: _known_value(update.expression, component, state, {}) for update in transition.updates}
+    after = _known_value(requirement, component, transition.target or state, assigned)
     return before is not False and after is False
 
 
-def _judged(expression: Expression, component: str, state: str, variables: Mapping[str, Value | None]) -> Value | None:
+def _known_value(
+    expression: Expression, component: str, state: str, variables: Mapping[str, Value | None]
+) -> Value | None:
     """The value of an expression as far as one component's state and variables tell; None if they do not."""
     return evaluate(  # type: ignore[no-any-return]
         expression,

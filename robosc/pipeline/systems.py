@@ -19,8 +19,7 @@ from robosc.supervisor.predicates import state_predicate, state_predicates
 from robosc.synthesis import Statistics, SynthesisProgress, synthesize
 from robosc.synthesis import SynthesisStatus as CoreStatus
 from robosc.tables import html_table
-from robosc.verification import Limits, VerificationReport, verify, verify_explicitly
-from robosc.verification import Outcome as CheckOutcome
+from robosc.verification import CheckOutcome, Limits, VerificationReport, verify, verify_explicitly
 
 _CHECKS = ("safe", "controllable", "nonblocking", "maximally_permissive")
 INITIALLY = "the initial state"

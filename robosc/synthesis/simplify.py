@@ -17,7 +17,7 @@ from robosc.automata.state import Subject
 from robosc.conditions.cover import Words, cover
 from robosc.conditions.formula import OPERANDS, STEPS, length
 from robosc.conditions.literals import operands
-from robosc.conditions.multivalued import GaveUp, Space
+from robosc.conditions.multivalued import EffortExceededError, Space
 from robosc.conditions.relations import MAXIMUM_PLACES, Relations
 from robosc.conditions.rendering import Formulas
 from robosc.errors import UnsupportedModelError
@@ -172,7 +172,7 @@ class Simplifier:
             places = relations.integers(range(len(space.subjects)))
             pairs = [(sets[0], sets[1]), (sets[1], sets[0])]
             pairs = [pair for pair in pairs if relations.are_enough(*pair, places)] or pairs
-        except GaveUp:
+        except EffortExceededError:
             return
         for wanted, forbidden in pairs:
             try:
@@ -180,7 +180,7 @@ class Simplifier:
                     for description in relations.around(wanted, forbidden, places):
                         states = relations.states(description)
                         yield space.diagram(states if wanted == sets[0] else space.without(1, states))
-            except GaveUp:
+            except EffortExceededError:
                 continue
 
     def _sums(self, diagrams: Sequence[DecisionDiagram]) -> Iterator[DecisionDiagram]:
@@ -191,7 +191,7 @@ class Simplifier:
             sets = [space.of(diagram) for diagram in diagrams]
             # What has fewer ways to true mostly has the shorter sum.
             pairs = sorted((sets, sets[::-1]), key=lambda pair: space.paths(pair[0]))
-        except GaveUp:
+        except EffortExceededError:
             return
         for wanted, forbidden in pairs:
             try:
@@ -199,7 +199,7 @@ class Simplifier:
                     cubes = cover(space, words, wanted, forbidden)
                     found = space.sum_of(cubes)
                     yield space.diagram(found if wanted == sets[0] else space.without(1, found))
-            except GaveUp:
+            except EffortExceededError:
                 continue
             if len(cubes) == 1:
                 # The other sum would say the same the other way round.

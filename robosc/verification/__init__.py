@@ -4,15 +4,15 @@ Shares nothing with synthesis but the automata and their explicit meaning (an im
 """
 
 from robosc.verification.explicit import ExplicitSupervisor, synthesize_explicit
-from robosc.verification.explicit_check import Failure, Outcome, Verification, verify_explicitly
+from robosc.verification.explicit_check import CheckOutcome, Failure, Verification, verify_explicitly
 from robosc.verification.verify import DEFAULT_STATES, Limits, VerificationReport, verify
 
 __all__ = [
     "DEFAULT_STATES",
+    "CheckOutcome",
     "ExplicitSupervisor",
     "Failure",
     "Limits",
-    "Outcome",
     "Verification",
     "VerificationReport",
     "synthesize_explicit",

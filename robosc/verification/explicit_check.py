@@ -25,7 +25,7 @@ DEFAULT_PERMISSIVE_LIMIT = 100_000
 """States up to which the supervisor is recomputed."""
 
 
-class Outcome(StrEnum):
+class CheckOutcome(StrEnum):
     """Outcome of the check of one property."""
 
     PASSED = "passed"
@@ -70,10 +70,10 @@ class Verification:
 
     states: int | None
     transitions: int | None
-    safe: Outcome
-    controllable: Outcome
-    nonblocking: Outcome
-    maximally_permissive: Outcome
+    safe: CheckOutcome
+    controllable: CheckOutcome
+    nonblocking: CheckOutcome
+    maximally_permissive: CheckOutcome
     failures: tuple[Failure, ...] = ()
 
     @property
@@ -120,7 +120,7 @@ def verify_explicitly(
     begins = (lambda code: True) if initial is None else packing.condition(initial)
     found = search(packing, added, Effort(limit, should_stop, on_progress, "states"), begins)
     if found is None:
-        skipped = Outcome.NOT_CHECKED
+        skipped = CheckOutcome.NOT_CHECKED
         return Verification(None, None, skipped, skipped, skipped, skipped)
     search_ = _FailureSearch(found)
     failures = {"safe": search_.unsafe(), "controllable": search_.uncontrollable(), "nonblocking": search_.blocking()}
@@ -147,10 +147,10 @@ def require_known(system: System, added: Iterable[str]) -> None:
 def verification(states: int | None, transitions: int | None, found: Mapping[str, Failure | None]) -> Verification:
     """The outcome, from the first failure (or None) of each property that was checked."""
 
-    def outcome(name: str) -> Outcome:
+    def outcome(name: str) -> CheckOutcome:
         if name not in found:
-            return Outcome.NOT_CHECKED
-        return Outcome.PASSED if found[name] is None else Outcome.FAILED
+            return CheckOutcome.NOT_CHECKED
+        return CheckOutcome.PASSED if found[name] is None else CheckOutcome.FAILED
 
     return Verification(
         states=states,

@@ -7,7 +7,7 @@ from robosc.automata.controlled import TRANSITIONS_PER_STATE
 from robosc.automata.decision import Decision
 from robosc.automata.semantics import Semantics
 from robosc.automata.structure import System
-from robosc.verification.explicit_check import Outcome, Verification, verify_explicitly
+from robosc.verification.explicit_check import CheckOutcome, Verification, verify_explicitly
 
 DEFAULT_STATES = 200_000
 """States up to which the controlled system is searched one by one: some seconds."""
@@ -49,7 +49,7 @@ class VerificationReport:
     def is_complete(self) -> bool:
         """True if all was checked but permissiveness."""
         found = self.verification
-        return Outcome.NOT_CHECKED not in (found.safe, found.controllable, found.nonblocking)
+        return CheckOutcome.NOT_CHECKED not in (found.safe, found.controllable, found.nonblocking)
 
 
 def verify(
@@ -103,7 +103,7 @@ def verify(
     )
     if found.states is None:
         method = f"not checked: {reason}, and the symbolic search takes more than {limits.work} nodes"
-    elif Outcome.NOT_CHECKED in (found.safe, found.controllable, found.nonblocking):
+    elif CheckOutcome.NOT_CHECKED in (found.safe, found.controllable, found.nonblocking):
         method = f"symbolic search ({reason}), given up after {limits.work} nodes; permissiveness not recomputed"
     else:
         method = f"symbolic search ({reason}); permissiveness not recomputed"
@@ -111,7 +111,7 @@ def verify(
 
 
 def _permissiveness(found: Verification, limits: Limits) -> str:
-    if found.maximally_permissive is Outcome.NOT_CHECKED:
+    if found.maximally_permissive is CheckOutcome.NOT_CHECKED:
         return (
             f"permissiveness not recomputed: more than {limits.recomputed} states, or "
             f"{TRANSITIONS_PER_STATE * limits.recomputed} transitions"

@@ -14,7 +14,7 @@ from robosc.exploration import explore
 from robosc.model.structure import Deployment, Model
 from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
-from robosc.verification import ExplicitSupervisor, Outcome, synthesize_explicit, verify_explicitly
+from robosc.verification import CheckOutcome, ExplicitSupervisor, synthesize_explicit, verify_explicitly
 from support.models import model_of
 
 type Graph = dict[str, dict[str, str]]
@@ -56,7 +56,7 @@ def _graph(text: str, deployment: Deployment = CONTROLLER) -> Graph:
 
     added = {event.name: condition(event.name) for event in system.events if event.is_controllable}
     found = verify_explicitly(system, added)
-    assert {found.safe, found.controllable, found.nonblocking, found.maximally_permissive} == {Outcome.PASSED}
+    assert {found.safe, found.controllable, found.nonblocking, found.maximally_permissive} == {CheckOutcome.PASSED}
     graph = explore(system, added, model)
     for engine in ENGINES:
         symbolic = state_predicates(system, synthesize(system, engine=engine).added)

@@ -322,7 +322,7 @@ def _verify_supervisor(arguments: argparse.Namespace, client: Client) -> int:
     found = _verified(arguments, client, verify_task(arguments, bundle, content))
     if "properties" in found.report or found.status is VerificationStatus.PROPERTY_ERRORS:
         return _report_verdicts(arguments, found, bundle, supervisor.deployment)
-    return verify_here.report_recheck(arguments, require_recheck(found.report), found.diagnostics, bundle)
+    return verify_here.report_file_verification(arguments, require_recheck(found.report), found.diagnostics, bundle)
 
 
 def _verify_properties(arguments: argparse.Namespace, client: Client) -> int:

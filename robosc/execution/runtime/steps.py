@@ -100,7 +100,7 @@ class Steps:
             if reading.enum_unknown:
                 if may_keep and self._on_unknown == "keep":
                     return False
-                self._judge_unknown(event, unknown)
+                self._handle_unknown(event, unknown)
         self.happen(event, reading, reading.data)
         return True
 
@@ -211,8 +211,8 @@ class Steps:
     def _skip(self, event: str, skipped: Tuple[str, ...]) -> None:
         """Updates were skipped."""
         self._recorder.unknown(event, skipped)
-        self._judge_unknown(event, skipped)
+        self._handle_unknown(event, skipped)
 
-    def _judge_unknown(self, event: str, what: Tuple[str, ...]) -> None:
+    def _handle_unknown(self, event: str, what: Tuple[str, ...]) -> None:
         if self._on_unknown == "fault":
             self._pending = "unknown at {}: {}".format(event, ", ".join(what))

@@ -6,7 +6,7 @@ from typing import Any
 
 from robosc.automata.decision import Decision
 from robosc.automata.structure import System
-from robosc.verification.explicit_check import Failure, Outcome, Verification, failure, require_known, verification
+from robosc.verification.explicit_check import CheckOutcome, Failure, Verification, failure, require_known, verification
 from robosc.verification.symbolic.reach import Reachability
 from robosc.verification.symbolic.relations import Relations
 from robosc.verification.symbolic.variables import Variables
@@ -46,7 +46,7 @@ def verify_symbolically(
     try:
         return _Check(system, added, initial, engine, Work(limit, should_stop, on_progress)).verification()
     except TooMuchWorkError:
-        skipped = Outcome.NOT_CHECKED
+        skipped = CheckOutcome.NOT_CHECKED
         return Verification(None, None, skipped, skipped, skipped, skipped)
 
 

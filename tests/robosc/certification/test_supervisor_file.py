@@ -20,7 +20,7 @@ from robosc.source import Bundle
 from robosc.supervisor import Supervisor, decode, encode
 from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
-from robosc.verification import Limits, Outcome, synthesize_explicit, verify
+from robosc.verification import CheckOutcome, Limits, synthesize_explicit, verify
 from support.effort import examples
 from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle
 from support.mutants import (
@@ -90,7 +90,7 @@ def _passed(found: FileVerification) -> bool:
 
 
 def _failed_checks(found: FileVerification) -> set[str]:
-    return {name for name, outcome in found.outcomes().items() if outcome is Outcome.FAILED}
+    return {name for name, outcome in found.outcomes().items() if outcome is CheckOutcome.FAILED}
 
 
 def _read_back(mutant: Mutant[Supervisor]) -> Supervisor | None:
@@ -198,7 +198,7 @@ def test_every_mutant_of_the_model_inside_is_caught(name: str) -> None:
         found = verify_supervisor_file(handed, bundle, Limits.of(0))
         assert _failed_checks(found) == {"model"}, mutant.name
         assert found.report is None
-        assert all(outcome is Outcome.NOT_CHECKED for outcome in list(found.outcomes().values())[2:])
+        assert all(outcome is CheckOutcome.NOT_CHECKED for outcome in list(found.outcomes().values())[2:])
     assert count - refused >= 20
 
 

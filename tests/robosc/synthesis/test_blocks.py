@@ -14,7 +14,7 @@ from robosc.synthesis import SynthesisStatus, blocks, diagrams, synthesize
 from robosc.synthesis.blocks import blocks_of
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
-from robosc.verification import Outcome, verify_explicitly
+from robosc.verification import CheckOutcome, verify_explicitly
 from support.effort import examples
 from support.random_systems import explicit_supervisor, systems
 from support.systems import automaton, edge, operation, read, received, system
@@ -191,5 +191,5 @@ def test_among_each_other_or_not_the_supervisor_is_right(made: System) -> None:
         added = state_predicates(made, result.added)
         initial = None if result.initial is None else state_predicate(made, result.initial)
         found = verify_explicitly(made, added, initial=initial)
-        assert {found.safe, found.controllable, found.nonblocking, found.maximally_permissive} == {Outcome.PASSED}
+        assert {found.safe, found.controllable, found.nonblocking, found.maximally_permissive} == {CheckOutcome.PASSED}
         assert result.statistics.states == len(explicit.reachable)

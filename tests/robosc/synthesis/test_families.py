@@ -6,7 +6,7 @@ from robosc.automata import Semantics
 from robosc.automata.controlled import controlled_graph
 from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
-from robosc.verification import Outcome, synthesize_explicit, verify_explicitly
+from robosc.verification import CheckOutcome, synthesize_explicit, verify_explicitly
 from support.families import FAMILIES
 
 SMALL = [
@@ -35,7 +35,7 @@ def test_symbolic_is_explicit(family: str, size: int, engine: str) -> None:
     added = state_predicates(system, found.added)
     verified = verify_explicitly(system, added)
     outcomes = (verified.safe, verified.controllable, verified.nonblocking, verified.maximally_permissive)
-    assert outcomes == (Outcome.PASSED,) * 4, verified.message
+    assert outcomes == (CheckOutcome.PASSED,) * 4, verified.message
     graph = controlled_graph(Semantics(system), added, limit=100_000)
     assert graph is not None
     assert frozenset(graph.states) == explicit.reachable

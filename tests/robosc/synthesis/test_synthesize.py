@@ -15,7 +15,7 @@ from robosc.expressions.tree import Binary, Constant, VariableRead
 from robosc.model.structure import Deployment
 from robosc.supervisor.predicates import state_predicate, state_predicates
 from robosc.synthesis import SynthesisProgress, SynthesisResult, SynthesisStatus, UnknownEngineError, synthesize
-from robosc.verification import Outcome, verify_explicitly
+from robosc.verification import CheckOutcome, verify_explicitly
 from robosc.verification.symbolic import verify_symbolically
 from support.effort import seeds
 from support.models import EXAMPLE_NAMES, example_model
@@ -74,9 +74,9 @@ def assert_verified(system: System, result: SynthesisResult) -> None:
     initial = None if result.initial is None else state_predicate(system, result.initial)
     one_by_one = verify_explicitly(system, added, initial=initial, limit=LIMIT, permissive_limit=LIMIT)
     checked = (one_by_one.safe, one_by_one.controllable, one_by_one.nonblocking, one_by_one.maximally_permissive)
-    assert set(checked) == {Outcome.PASSED}, one_by_one.message
+    assert set(checked) == {CheckOutcome.PASSED}, one_by_one.message
     on_sets = verify_symbolically(system, added, initial=initial, limit=10**9)
-    assert {on_sets.safe, on_sets.controllable, on_sets.nonblocking} == {Outcome.PASSED}, on_sets.message
+    assert {on_sets.safe, on_sets.controllable, on_sets.nonblocking} == {CheckOutcome.PASSED}, on_sets.message
     assert one_by_one.states == on_sets.states == result.statistics.states
 
 

@@ -13,13 +13,13 @@ from robosc.automata.controlled import Added
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import IntegerType, StateTest
 from robosc.model.structure import Deployment
-from robosc.verification import ExplicitSupervisor, Failure, Outcome, Verification, verify_explicitly
+from robosc.verification import CheckOutcome, ExplicitSupervisor, Failure, Verification, verify_explicitly
 from support.effort import examples
 from support.models import EXAMPLE_NAMES, example_model
 from support.random_systems import disables_something, explicit_supervisor, systems
 from support.systems import automaton, edge, operation, read, system
 
-PASSED, FAILED, NOT_CHECKED = Outcome.PASSED, Outcome.FAILED, Outcome.NOT_CHECKED
+PASSED, FAILED, NOT_CHECKED = CheckOutcome.PASSED, CheckOutcome.FAILED, CheckOutcome.NOT_CHECKED
 
 # From the street one may fall; on the ice the environment decides.
 WALK = system(
@@ -38,7 +38,7 @@ WALK = system(
 RIGHT: dict[str, Callable[[State], bool]] = {"jump": lambda at: False, "skate": lambda at: False}
 
 
-def _outcomes(found: Verification) -> tuple[Outcome, Outcome, Outcome, Outcome]:
+def _outcomes(found: Verification) -> tuple[CheckOutcome, CheckOutcome, CheckOutcome, CheckOutcome]:
     return found.safe, found.controllable, found.nonblocking, found.maximally_permissive
 
 

@@ -27,7 +27,7 @@ from robosc.expressions import (
 from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
-from robosc.verification import Outcome, Verification, verify_explicitly
+from robosc.verification import CheckOutcome, Verification, verify_explicitly
 from robosc.verification.symbolic import expressions, order, verify_symbolically
 from robosc.verification.symbolic.order import cuthill_mckee, place_order
 from robosc.verification.symbolic.reach import Reachability
@@ -38,10 +38,10 @@ from support.random_supervisors import random_diagram
 from support.random_systems import systems
 from support.systems import automaton, edge, operation, read, received, system
 
-PASSED, FAILED, NOT_CHECKED = Outcome.PASSED, Outcome.FAILED, Outcome.NOT_CHECKED
+PASSED, FAILED, NOT_CHECKED = CheckOutcome.PASSED, CheckOutcome.FAILED, CheckOutcome.NOT_CHECKED
 
 
-def _three(found: Verification) -> tuple[Outcome, Outcome, Outcome]:
+def _three(found: Verification) -> tuple[CheckOutcome, CheckOutcome, CheckOutcome]:
     return found.safe, found.controllable, found.nonblocking
 
 

@@ -9,7 +9,7 @@ from robosc.automata import System
 from robosc.automata.decision import Decision
 from robosc.supervisor.predicates import state_predicate, state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
-from robosc.verification import Outcome, Verification, synthesize_explicit, verify_explicitly
+from robosc.verification import CheckOutcome, Verification, synthesize_explicit, verify_explicitly
 from robosc.verification.symbolic import verify_symbolically
 from support.effort import seeds
 from support.random_systems import wide_system
@@ -43,7 +43,7 @@ def test_systems_may_not_begin_where_no_supervisor_can_go_on(record_property: Ca
             continue
         added = state_predicates(made, result.added)
         one_by_one, _ = verdicts(made, added, NOWHERE)
-        assert one_by_one.maximally_permissive is Outcome.FAILED
+        assert one_by_one.maximally_permissive is CheckOutcome.FAILED
         assert "may not begin here" in one_by_one.message
         if result.initial is None:
             continue
@@ -64,4 +64,4 @@ def test_a_supervisor_may_choose_where_to_begin() -> None:
     assert begin is not None
     assert not verdicts(made, {}, state_predicate(made, begin))[0].failures
     failed, _ = verdicts(made, {}, None)
-    assert (failed.nonblocking, failed.trace, failed.failures[0].state) == (Outcome.FAILED, (), ("a",))
+    assert (failed.nonblocking, failed.trace, failed.failures[0].state) == (CheckOutcome.FAILED, (), ("a",))

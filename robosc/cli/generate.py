@@ -127,7 +127,7 @@ def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
             to write to.
     """
     from robosc.targets import CONFIG_FILE, ControllerConfigError, read_controller_config
-    from robosc.targets.python.package import require_package_name
+    from robosc.targets.code.naming import require_package_name
 
     try:
         if arguments.package is not None:

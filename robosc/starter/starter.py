@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 from robosc.errors import RoboscError
 from robosc.language.words import RESERVED_WORDS
-from robosc.targets.python.naming import snake_case
+from robosc.targets.code.naming import snake_case
 
 MAXIMUM_STEM = 200
 """Characters of a file name's stem: names of files end at 255 bytes, and what is generated adds to the stem."""

@@ -26,8 +26,8 @@ from robosc.targets.c99.expressions import (
 from robosc.targets.c99.layout import Layout
 from robosc.targets.c99.text import comment
 from robosc.targets.c99.unit import Reading, Unit, low_text
+from robosc.targets.code.text import indent
 from robosc.targets.model_text import requirement_text
-from robosc.targets.python.text import indent
 
 Condition = tuple[str, Code]
 """Words that explain a condition, and its code."""

@@ -26,9 +26,9 @@ from robosc.targets.c99.provide import request_field, request_struct
 from robosc.targets.c99.step import unknown_name
 from robosc.targets.c99.text import comment, safe
 from robosc.targets.c99.unit import Unit, declared
+from robosc.targets.code.text import indent
 from robosc.targets.events import has_plant_location, is_controllable, split
 from robosc.targets.model_text import requirement_text
-from robosc.targets.python.text import indent
 
 
 def head(supervisor: Supervisor, begin: str = "/* ", rest: str = "   ", end: str = " */") -> str:

@@ -6,7 +6,7 @@ from robosc.targets.c99.layer import request_parameters
 from robosc.targets.c99.layout import Layout
 from robosc.targets.c99.step import unknown_name
 from robosc.targets.c99.unit import Unit
-from robosc.targets.python.text import indent
+from robosc.targets.code.text import indent
 
 _BLOCKED = """\
 static bool print_blocked(void *context, const char *identifier, {prefix}_refusal_t why)

@@ -12,7 +12,7 @@ from robosc.targets.c99.received import Reader
 from robosc.targets.c99.step import unknown_name
 from robosc.targets.c99.text import comment
 from robosc.targets.c99.unit import Reading, Unit
-from robosc.targets.python.text import indent
+from robosc.targets.code.text import indent
 
 _LOOK = "look_at_clock(r, now_us);"
 

@@ -20,7 +20,7 @@ from robosc.expressions import (
 )
 from robosc.model.structure import Behaviour, Communication, CommunicationKind, Deployment, EventKind, Model
 from robosc.supervisor import Supervisor
-from robosc.targets.c99.naming import Namer, prefix_for
+from robosc.targets.c99.naming import CNamer, prefix_for
 from robosc.targets.events import events, has_plant_location, is_controllable
 
 PLANT_LOCATIONS = {
@@ -79,7 +79,7 @@ class Layout:
     converters: dict[str, str] = field(default_factory=dict)
     properties: dict[tuple[str, str], str] = field(default_factory=dict)
     request_members: dict[str, str] = field(default_factory=dict)
-    _namer: Namer = field(default_factory=Namer)
+    _namer: CNamer = field(default_factory=CNamer)
     _functions: dict[tuple[str, str], str] = field(default_factory=dict)
     _types: dict[str, str] = field(default_factory=dict)
 
@@ -197,7 +197,7 @@ def make_layout(supervisor: Supervisor, prefix: str | None = None) -> Layout:
     model = supervisor.model
     layout = Layout(supervisor, prefix or prefix_for(model.name), describe(supervisor))
     engine = {f"{start}_{name}" for start in (layout.prefix, layout.upper) for name in _ENGINE_NAMES}
-    layout._namer = Namer(frozenset(engine))
+    layout._namer = CNamer(frozenset(engine))
     name, upper = layout._namer.name, layout.upper
     for event in events(model):
         layout.events[event] = name(f"{upper}_EVENT_{event.replace('.', '_')}")
@@ -212,10 +212,10 @@ def make_layout(supervisor: Supervisor, prefix: str | None = None) -> Layout:
             layout.values[enum.name, value] = name(f"{upper}_VALUE_{enum.name}_{value}")
         layout.converters[enum.name] = name(f"{layout.prefix}_convert_{enum.name}")
     _name_state(layout)
-    requests = Namer(frozenset({"nothing"}))
+    requests = CNamer(frozenset({"nothing"}))
     layout.request_members = {item.name: requests.member(item.name) for item in layout.requests}
     for item_ in model.objects:
-        members = Namer()
+        members = CNamer()
         for part in item_.properties:
             layout.properties[item_.name, part.name] = members.member(part.name)
     return layout
@@ -226,7 +226,7 @@ def _topic_word(identifier: str) -> str:
 
 
 def _name_state(layout: Layout) -> None:
-    members = Namer()
+    members = CNamer()
     name = layout._namer.name
     for component, behaviour in layout.behaviours:
         layout.locations[component] = members.name(f"at_{component}")

@@ -2,7 +2,7 @@
 
 import re
 
-from robosc.targets.python.naming import snake_case
+from robosc.targets.code.naming import Namer, snake_case
 
 _MAXIMUM = 120
 _MAXIMUM_PREFIX = 60
@@ -47,24 +47,12 @@ def member_name(wish: str) -> str:
     return f"{'x' if name.startswith('_') else ''}{name}_" if is_reserved else name
 
 
-class Namer:
-    """Hands out distinct names; the same wishes in the same order give the same names.
+class CNamer(Namer):
+    """Hands out distinct names of C."""
 
-    Args:
-        taken: Names that must not be handed out.
-    """
-
-    def __init__(self, taken: frozenset[str] = frozenset()) -> None:
-        self._taken = set(taken)
-
-    def name(self, wish: str) -> str:
-        """A new name as close as possible to `wish`, which must be a legal identifier but for its length."""
-        base = re.sub(r"[^A-Za-z0-9_]", "_", wish)[:_MAXIMUM]
-        name, number = base, 2
-        while name in self._taken:
-            name, number = f"{base}_{number}", number + 1
-        self._taken.add(name)
-        return name
+    def legal(self, wish: str) -> str:
+        """A name of bounded length; it is legal if `wish` is, but for its length."""
+        return super().legal(wish)[:_MAXIMUM]
 
     def member(self, wish: str) -> str:
         """A new name for a member of a struct."""

@@ -14,9 +14,9 @@ from robosc.targets.c99.naming import prefix_for
 from robosc.targets.c99.readme import readme_file
 from robosc.targets.c99.source import source_file
 from robosc.targets.c99.unit import make_unit
+from robosc.targets.code.naming import package_name
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.paths import path_type
-from robosc.targets.python.package import package_name
 from robosc.targets.registry import GenerateOptions
 
 _MAXIMUM_NESTING = 200

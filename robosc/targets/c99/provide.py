@@ -12,11 +12,11 @@ from robosc.expressions import (
 )
 from robosc.model.structure import Communication, ObjectValue, ProvidedValue
 from robosc.targets.c99.expressions import TRUE_CODE, Sort, as_double, truth, value
-from robosc.targets.c99.naming import Namer
+from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.text import comment
 from robosc.targets.c99.unit import Reading, Unit, declared
+from robosc.targets.code.text import indent
 from robosc.targets.model_text import provide_text
-from robosc.targets.python.text import indent
 
 
 @dataclass
@@ -54,7 +54,7 @@ def _extend(unit: Unit, found: Field, provided: ProvidedValue) -> None:
     for name, inner in provided.properties:
         if name not in found.parts:
             taken = [word for member, part in found.parts.values() for word in (member, part.flag)]
-            namer = Namer(frozenset(taken))
+            namer = CNamer(frozenset(taken))
             member = namer.member(name)
             found.parts[name] = (member, Field(types[name], value=member, flag=namer.name(f"has_{member}")))
         _extend(unit, found.parts[name][1], inner)

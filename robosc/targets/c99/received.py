@@ -19,11 +19,11 @@ from robosc.expressions.text import expression_text
 from robosc.model.received import Path
 from robosc.model.structure import EnumDefinition
 from robosc.targets.c99.expressions import TRUE_CODE, Code, both, falsity, truth
-from robosc.targets.c99.naming import Namer
+from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.text import comment
 from robosc.targets.c99.unit import Reading, Unit, declared
+from robosc.targets.code.text import indent
 from robosc.targets.paths import path_type
-from robosc.targets.python.text import indent
 
 _ARITHMETIC = frozenset({"+", "-", "*", "/"})
 
@@ -46,7 +46,7 @@ class Reader:
     names: dict[str, None] = field(default_factory=dict)
     _lines: list[str] = field(default_factory=list)
     _codes: dict[Path, Code] = field(default_factory=dict)
-    _namer: Namer = field(default_factory=lambda: Namer(frozenset({"data", "notes", "s", "old", "skipped", "r"})))
+    _namer: CNamer = field(default_factory=lambda: CNamer(frozenset({"data", "notes", "s", "old", "skipped", "r"})))
 
     def read(self, path: Path) -> Code:
         """The code of a path."""

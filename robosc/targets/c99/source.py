@@ -16,8 +16,8 @@ from robosc.targets.c99.received import converter, converter_head
 from robosc.targets.c99.step import Stepper, unknown_name
 from robosc.targets.c99.text import string_literal
 from robosc.targets.c99.unit import Unit, low_text
+from robosc.targets.code.text import indent
 from robosc.targets.events import has_plant_location, is_controllable, split
-from robosc.targets.python.text import indent
 
 _ENGINE = tuple(f"{part}.c" for part in "log releases goals steps policies decisions rest time replies life".split())
 _LAYER_ENGINE = tuple(f"{part}.c" for part in "log releases goals steps rest callers time replies layer life".split())

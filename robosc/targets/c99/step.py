@@ -20,13 +20,13 @@ from robosc.model.structure import Behaviour, EventKind, Transition, Update, Var
 from robosc.targets.c99.conditions import Conditions, in_one_of
 from robosc.targets.c99.expressions import FALSE_CODE, TRUE_CODE, Code, Sort, as_double, either, negated, value
 from robosc.targets.c99.layout import event_data, width
-from robosc.targets.c99.naming import Namer
+from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.received import Reader
 from robosc.targets.c99.text import comment
 from robosc.targets.c99.unit import Reading, Unit, declared, low_text
+from robosc.targets.code.text import indent
 from robosc.targets.events import Branch, branches_of, has_plant_location, is_controllable, plant_step, split
 from robosc.targets.paths import path_type
-from robosc.targets.python.text import indent
 
 
 class Stepper:
@@ -44,7 +44,7 @@ class Stepper:
         self._conditions = conditions
         self.data = None if is_tau(event) else event_data(unit.layout.model, event)
         self.paths = converted_paths(unit.layout.model, event) if self.data is not None else ()
-        self._namer = Namer(frozenset({"data", "notes", "s", "old", "skipped", "r"}))
+        self._namer = CNamer(frozenset({"data", "notes", "s", "old", "skipped", "r"}))
         self._received: dict[Path, Code] = {}
         self._may_skip = False
         self._reading = Reading(unit, "old.", self._read, self._type_at)

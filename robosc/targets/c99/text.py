@@ -3,7 +3,7 @@
 import re
 import textwrap
 
-from robosc.targets.python.text import printable
+from robosc.targets.code.text import printable
 
 _WIDTH = 105
 

@@ -6,7 +6,7 @@ one gets `_2`, `_3` and so on behind its own.
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from robosc.automata import System
 from robosc.automata.inputs import connected_inputs
@@ -14,6 +14,7 @@ from robosc.automata.structure import Automaton, Event, InputVariable
 from robosc.expressions import EnumType, EnumValue, Expression, IntegerType, PathStep, Type, leaves
 from robosc.model.structure import EventKind, Model, is_tau
 from robosc.targets.cif.text import escaped
+from robosc.targets.code.naming import Namer
 
 _EVENTS = {
     EventKind.REQUEST: "c_trigger",
@@ -54,22 +55,6 @@ class Presence:
     indices: tuple[int, ...]
 
 
-@dataclass(slots=True)
-class _Space:
-    """Names in use in one automaton, or in the specification."""
-
-    hidden: Iterable[set[str]]
-    used: set[str] = field(default_factory=set)
-
-    def take(self, wanted: str) -> str:
-        """`wanted`, or something like it that is free."""
-        name, number = wanted, 2
-        while name in self.used or any(name in other for other in self.hidden):
-            name, number = f"{wanted}_{number}", number + 1
-        self.used.add(name)
-        return name
-
-
 class Names:
     """The CIF names of a model's synthesis problem.
 
@@ -84,18 +69,18 @@ class Names:
     """
 
     def __init__(self, model: Model, system: System) -> None:
-        self._top = _Space(())
-        self.plants = {item.name: self._top.take(_plant_name(item.name)) for item in system.automata}
+        self._top = Namer()
+        self.plants = {item.name: self._top.name(_plant_name(item.name)) for item in system.automata}
         self.provided = tuple(dict.fromkeys(item.communication for item in model.provides))
-        self.plants |= {data_plant(name): self._top.take(f"data_{name}") for name in self.provided}
-        self._top.take(SUPERVISOR)
+        self.plants |= {data_plant(name): self._top.name(f"data_{name}") for name in self.provided}
+        self._top.name(SUPERVISOR)
         self.enum_types = {item.name: item for item in _enum_types(model, system)}
-        self.enums = {name: self._top.take(name.replace(".", "_")) for name in self.enum_types}
-        self._spaces = {name: _Space((self._top.used,)) for name in self.plants}
+        self.enums = {name: self._top.name(name.replace(".", "_")) for name in self.enum_types}
+        self._spaces = {name: Namer(hidden=(self._top.taken,)) for name in self.plants}
         self._owners = _event_owners(system)
         self.events = {item.name: self._event(item) for item in system.events}
         self.variables = {
-            (automaton.name, variable.name): self._spaces[automaton.name].take(f"v_{variable.name}")
+            (automaton.name, variable.name): self._spaces[automaton.name].name(f"v_{variable.name}")
             for automaton in system.automata
             for variable in automaton.variables
         }
@@ -103,7 +88,7 @@ class Names:
         self.presences: dict[tuple[str, Array], Presence] = {}
         self._name_inputs(system)
         self.locations = {
-            (automaton.name, location): self._spaces[automaton.name].take(_location_name(automaton.name, location))
+            (automaton.name, location): self._spaces[automaton.name].name(_location_name(automaton.name, location))
             for automaton in system.automata
             for location in automaton.locations
         }
@@ -116,8 +101,8 @@ class Names:
 
     def diagram_node(self, number: int) -> str:
         """A free name in the specification for a node of a decision diagram."""
-        locals_ = [space.used for space in self._spaces.values()]
-        return _Space([self._top.used, *locals_], set()).take(f"bdd_{number}")
+        locals_ = [space.taken for space in self._spaces.values()]
+        return Namer(hidden=[self._top.taken, *locals_]).name(f"bdd_{number}")
 
     def reference(self, automaton: str, name: str, here: str | None) -> str:
         """Return the name of something of an automaton in the automaton `here`, or outside all of them."""
@@ -132,25 +117,25 @@ class Names:
     def _event(self, event: Event) -> str:
         kind = event.name.rpartition(".")[2]
         wanted = f"c_{kind}" if is_tau(event.name) else _EVENTS[EventKind(kind)]
-        return self._spaces[self._owners[event.name]].take(wanted)
+        return self._spaces[self._owners[event.name]].name(wanted)
 
     def _name_inputs(self, system: System) -> None:
         """Inputs stand in the plant of the communication whose event carries them."""
         for item in system.inputs:
             space = self._spaces[self._owners[item.event]]
-            self.inputs[item.event, item.path] = space.take(_input_name(item.event, item.path))
+            self.inputs[item.event, item.path] = space.name(_input_name(item.event, item.path))
         for event in dict.fromkeys(item.event for item in system.inputs):
             elements = [item for item in system.inputs if item.event == event and item.may_be_unknown]
             for group in connected_inputs(elements):
                 for array, indices in _read_indices(group).items():
-                    name = self._spaces[self._owners[event]].take(f"{_input_name(event, array)}_known")
+                    name = self._spaces[self._owners[event]].name(f"{_input_name(event, array)}_known")
                     self.presences[event, array] = Presence(name, event, array, indices)
 
     def _name_provides(self, model: Model) -> dict[str, tuple[tuple[str, str], ...]]:
         """For each communication with data the locations of its data plant, each with the event that leads there."""
         found: dict[str, tuple[tuple[str, str], ...]] = {}
         for name in self.provided:
-            take = self._spaces[data_plant(name)].take
+            take = self._spaces[data_plant(name)].name
             numbers = range(1, len(model.provides_for(name)) + 1)
             wanted = (NO_DATA, *(f"provide_{number}" for number in numbers))
             events = [take(f"c_{location}") for location in wanted]
@@ -163,17 +148,17 @@ class Names:
         count: dict[str, int] = {}
         for _, value in values:
             count[value] = count.get(value, 0) + 1
-        elsewhere = set[str]().union(*(space.used for space in self._spaces.values()))
+        elsewhere = set[str]().union(*(space.taken for space in self._spaces.values()))
 
         def is_free(name: str) -> bool:
-            return name not in elsewhere and name not in self._top.used
+            return name not in elsewhere and name not in self._top.taken
 
         plain = {(enum, value) for enum, value in values if count[value] == 1 and is_free(value)}
-        found = {(enum, value): self._top.take(value) for enum, value in values if (enum, value) in plain}
+        found = {(enum, value): self._top.name(value) for enum, value in values if (enum, value) in plain}
         self._top.hidden = (elsewhere,)
         for enum, value in values:
             if (enum, value) not in plain:
-                found[enum, value] = self._top.take(f"{self.enums[enum]}_{value}")
+                found[enum, value] = self._top.name(f"{self.enums[enum]}_{value}")
         return found
 
 

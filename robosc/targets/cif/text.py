@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 
+from robosc.targets.code.text import ascii_line
+
 KEYWORDS = frozenset(
     """
     alg alphabet and any assert attr automaton bool break case const cont continue controllable def dict disables disc
@@ -36,8 +38,7 @@ def escaped(name: str) -> str:
 
 def printable(text: str) -> str:
     """A text for a `//` comment: one line of printable ASCII, in which no comment begins or ends."""
-    shown = "".join(char if " " <= char <= "~" else char.encode("unicode_escape").decode("ascii") for char in text)
-    return shown.replace("*/", "* /").replace("/*", "/ *")
+    return ascii_line(text).replace("*/", "* /").replace("/*", "/ *")
 
 
 def shortened(text: str) -> str:

@@ -22,9 +22,9 @@ from robosc.targets.c99.layout import PLANT_LOCATIONS, Layout, event_data
 from robosc.targets.c99.provide import Field, request_field
 from robosc.targets.c99.text import comment, string_literal
 from robosc.targets.c99.unit import Unit
+from robosc.targets.code.text import indent
 from robosc.targets.cpp.naming import require_field_name
 from robosc.targets.events import has_plant_location, is_controllable
-from robosc.targets.python.text import indent
 from robosc.targets.ros.state_topic import state_topic
 
 _LITERAL = 100

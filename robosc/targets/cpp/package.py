@@ -16,12 +16,11 @@ from robosc.targets.c99.header import head, with_prefix
 from robosc.targets.c99.package import generate as generate_c
 from robosc.targets.c99.text import safe, string_literal
 from robosc.targets.c99.unit import Unit, make_unit
+from robosc.targets.code.naming import package_name
+from robosc.targets.code.text import printable
 from robosc.targets.cpp.model import Writer, fill_name, received_topics, take_name
 from robosc.targets.cpp.naming import require_package_name
 from robosc.targets.files import GeneratedFiles
-from robosc.targets.model_text import requirement_text
-from robosc.targets.python.package import package_name
-from robosc.targets.python.text import printable
 from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros.package import chosen, error_context, packages, release_identifiers, require_own_names
 from robosc.targets.ros.runtime.parameters import Parameter, declarations

@@ -1,10 +1,9 @@
 """Promela names for the places of a state: readable, distinct, and never a keyword, since each has a prefix of ours."""
 
-import re
-
 from robosc.automata.state import Subject, subject_domain, subject_type, subjects
 from robosc.automata.structure import System
 from robosc.expressions import EnumType
+from robosc.targets.code.naming import Namer
 
 
 class Names:
@@ -14,6 +13,7 @@ class Names:
         system: The system.
 
     Attributes:
+        new: Gives a name that nothing else has, as close as possible to what is asked for.
         places: Name of what holds each place of a state; locations of automata that have only one are missing.
         locations: Predicates that tell whether an automaton is in a location.
         values: Names for the values of enums, by enum and value.
@@ -21,7 +21,7 @@ class Names:
     """
 
     def __init__(self, system: System) -> None:
-        self._taken: set[str] = set()
+        self.new = Namer().name
         self.places: dict[Subject, str] = {}
         self.locations: dict[tuple[str, str], str] = {}
         self.values: dict[tuple[str, str], str] = {}
@@ -48,12 +48,3 @@ class Names:
             if (type_.name, value) not in self.values:
                 name = self.values[type_.name, value] = self.new(f"value_{type_.name}_{value}")
                 self.numbers[name] = number
-
-    def new(self, wish: str) -> str:
-        """A name that nothing else has, as close as possible to `wish`."""
-        base = re.sub(r"[^A-Za-z0-9_]", "_", wish)
-        name, number = base, 2
-        while name in self._taken:
-            name, number = f"{base}_{number}", number + 1
-        self._taken.add(name)
-        return name

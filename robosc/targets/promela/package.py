@@ -1,9 +1,9 @@
 """The files of the target `promela`: the model, and how to check it."""
 
 from robosc.supervisor import Supervisor
+from robosc.targets.code.naming import package_name
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.promela.model import promela_model
-from robosc.targets.python.package import package_name
 from robosc.targets.registry import GenerateOptions
 
 _README = """\

@@ -8,7 +8,7 @@ from robosc.expressions import (
 )
 from robosc.targets import acceptance
 from robosc.targets.acceptance import InOneOf, StaysInRange, accepting_conditions, enabling_conditions
-from robosc.targets.model_text import requirement_text
+from robosc.targets.code.text import indent
 from robosc.targets.python.expressions import (
     TRUE_CODE,
     Code,
@@ -19,7 +19,7 @@ from robosc.targets.python.expressions import (
     truth,
     value,
 )
-from robosc.targets.python.text import comment, docstring, indent
+from robosc.targets.python.text import comment, docstring
 from robosc.targets.python.writer import Writer
 
 Condition = tuple[str, Code]

@@ -9,7 +9,8 @@ it is not allowed.
 import re
 from collections.abc import Iterable, Sequence
 
-from robosc.targets.python.text import comment, indent
+from robosc.targets.code.text import indent
+from robosc.targets.python.text import comment
 
 ASKED_TOGETHER = 8
 """Up to so many requests it takes less time to ask all of them than to find out which may have changed."""

@@ -8,8 +8,10 @@ from robosc.conditions.rendering import Formulas, in_words, size_in_words
 from robosc.expressions import Value
 from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import diagram_domains
+from robosc.supervisor.words import Formulas, in_words, size_in_words
+from robosc.targets.code.text import indent
 from robosc.targets.python.expressions import FALSE_CODE, TRUE_CODE, Code, Scope, truth
-from robosc.targets.python.text import docstring, indent
+from robosc.targets.python.text import docstring
 
 
 @dataclass(slots=True)

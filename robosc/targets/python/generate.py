@@ -8,6 +8,7 @@ from robosc.execution.runtime.protocol import Description, batches, requesting
 from robosc.expressions import DoubleType
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
+from robosc.targets.code.text import indent, printable
 from robosc.targets.events import has_plant_location
 from robosc.targets.model_text import requirement_text
 from robosc.targets.python.allow import allow_method, conjuncts_method, requirements_method
@@ -22,7 +23,6 @@ from robosc.targets.python.changes import (
 from robosc.targets.python.provide import provide_method
 from robosc.targets.python.received import converter
 from robosc.targets.python.step import read_method, receive_method, step_method
-from robosc.targets.python.text import indent, printable
 from robosc.targets.python.when import matches_method
 from robosc.targets.python.writer import Writer, make_writer
 

@@ -13,7 +13,7 @@ from robosc.model.structure import (
 )
 from robosc.supervisor import Supervisor
 from robosc.targets.events import events, has_plant_location, is_controllable
-from robosc.targets.python.naming import Namer
+from robosc.targets.python.naming import PythonNamer
 
 PROTOCOL_NAMES = (
     "changes",
@@ -79,7 +79,7 @@ class Layout:
 def make_layout(supervisor: Supervisor) -> Layout:
     """Choose all names, in source order, so that the same supervisor gives the same names."""
     model = supervisor.model
-    members = Namer(PROTOCOL_NAMES)
+    members = PythonNamer(PROTOCOL_NAMES)
     locations, variables = {}, {}
     for component in model.components:
         if component.behaviour is None:
@@ -94,7 +94,7 @@ def make_layout(supervisor: Supervisor) -> Layout:
     return Layout(supervisor, locations, variables, _method_names(model, members), _converter_names(model))
 
 
-def _method_names(model: Model, members: Namer) -> dict[tuple[str, str], str]:
+def _method_names(model: Model, members: PythonNamer) -> dict[tuple[str, str], str]:
     methods = {}
     for event in events(model):
         purposes = ("allow", "step") if is_controllable(event) else ("read", "step")
@@ -113,5 +113,5 @@ def _method_names(model: Model, members: Namer) -> dict[tuple[str, str], str]:
 
 
 def _converter_names(model: Model) -> dict[str, str]:
-    functions = Namer()
+    functions = PythonNamer()
     return {item.name: functions.name(f"convert_{item.name}") for item in model.enums}

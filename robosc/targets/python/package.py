@@ -1,14 +1,12 @@
 """The target `python`: one file with the supervisor and its executor, and nothing else to install."""
 
-import keyword
 import re
 
-from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
+from robosc.targets.code.naming import package_name
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.python.generate import supervisor_module
-from robosc.targets.python.naming import snake_case
 from robosc.targets.registry import GenerateOptions
 
 _USAGE = {
@@ -55,35 +53,9 @@ and `LayerMiddleware`.
 }
 """Text that stands at the top of a module."""
 
-_MAXIMUM_NAME = 100
 
 _OF_SUPERVISOR = re.compile(r"from robosc\.(execution\.runtime\.[a-z0-9_]+|expressions\.values) import ")
 _OF_RUNTIME = re.compile(r"from robosc\.targets\.[a-z0-9_]+\.runtime\.(?P<module>[a-z0-9_]+) import ")
-
-
-def package_name(supervisor: Supervisor, options: GenerateOptions, suffix: str) -> str:
-    """The chosen name, or one made from the robot's: `line_follower_<suffix>`.
-
-    Raises:
-        UnsupportedModelError: The chosen name is no name for a package.
-    """
-    if options.package is None:
-        return f"{snake_case(supervisor.model.name)[:_MAXIMUM_NAME].rstrip('_')}_{suffix}"
-    require_package_name(options.package)
-    return options.package
-
-
-def require_package_name(name: str) -> None:
-    """Do nothing if a package of any target may be called so.
-
-    Raises:
-        UnsupportedModelError: It may not.
-    """
-    if snake_case(name) != name or keyword.iskeyword(name) or len(name) > 2 * _MAXIMUM_NAME:
-        raise UnsupportedModelError(
-            f"'{name}' is no name for a package: lower-case letters, digits and single underscores, "
-            "starting with a letter, and no keyword of Python"
-        )
 
 
 def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles:

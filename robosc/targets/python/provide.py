@@ -1,9 +1,9 @@
 """Generated methods that compute the data of a request at the moment it is made."""
 
 from robosc.model.structure import ObjectValue, ProvidedValue
-from robosc.targets.model_text import provide_text
+from robosc.targets.code.text import indent
 from robosc.targets.python.expressions import TRUE_CODE, Unknown, truth, value
-from robosc.targets.python.text import comment, docstring, indent
+from robosc.targets.python.text import comment, docstring
 from robosc.targets.python.writer import Writer
 
 

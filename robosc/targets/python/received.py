@@ -20,6 +20,7 @@ from robosc.expressions import (
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path
 from robosc.model.structure import EnumDefinition
+from robosc.targets.code.text import indent
 from robosc.targets.paths import path_text, path_type
 from robosc.targets.python.expressions import (
     TRUE_CODE,
@@ -33,8 +34,8 @@ from robosc.targets.python.expressions import (
     truth,
 )
 from robosc.targets.python.layout import Layout
-from robosc.targets.python.naming import Namer
-from robosc.targets.python.text import comment, indent
+from robosc.targets.python.naming import PythonNamer
+from robosc.targets.python.text import comment
 
 _PLAIN: dict[type, str] = {
     DoubleType: "read_double",
@@ -56,9 +57,9 @@ def received_unknown(type_: Type, path: Path) -> Unknown:
             return Unknown.NONE
 
 
-def reader_namer() -> Namer:
+def reader_namer() -> PythonNamer:
     """Names for a method's locals."""
-    return Namer(("data", "path", "self", "skipped", "found"))
+    return PythonNamer(("data", "path", "self", "skipped", "found"))
 
 
 @dataclass(slots=True)
@@ -79,7 +80,7 @@ class Reader:
     used: set[str]
     words: list[str] = field(default_factory=list)
     enum_flags: list[str] = field(default_factory=list)
-    namer: Namer = field(default_factory=reader_namer)
+    namer: PythonNamer = field(default_factory=reader_namer)
     _lines: list[str] = field(default_factory=list)
     _sources: dict[Path, str] = field(default_factory=dict)
     _codes: dict[Path, Code] = field(default_factory=dict)

@@ -23,14 +23,15 @@ from robosc.expressions import (
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
 from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
+from robosc.targets.code.text import indent
 from robosc.targets.events import Branch, branches_of, has_plant_location, is_controllable, plant_step, split
 from robosc.targets.paths import path_text, path_type
 from robosc.targets.python.allow import accepted
 from robosc.targets.python.changes import noted_change, noted_write
 from robosc.targets.python.expressions import TRUE_CODE, Code, Scope, Sort, Unknown, code_for, negated, value
-from robosc.targets.python.naming import Namer
+from robosc.targets.python.naming import PythonNamer
 from robosc.targets.python.received import Reader, reader_namer, received_unknown
-from robosc.targets.python.text import comment, docstring, indent
+from robosc.targets.python.text import comment, docstring
 from robosc.targets.python.writer import Writer
 
 
@@ -117,7 +118,7 @@ class _StepWriter:
     def __init__(self, writer: Writer, event: str) -> None:
         self.writer = writer
         self.event = event
-        self.namer = Namer(("self", "skipped"))
+        self.namer = PythonNamer(("self", "skipped"))
         self.paths = converted_paths(writer.model, event)
         self.received: dict[Path, Code] = {}
         self.copies: dict[str, str] = {}

@@ -4,9 +4,10 @@ from robosc.errors import InternalError
 from robosc.expressions.text import expression_text
 from robosc.model.received import received_paths
 from robosc.model.structure import Communication
+from robosc.targets.code.text import indent
 from robosc.targets.python.expressions import Scope, truth
 from robosc.targets.python.received import Reader, no_location, no_variable
-from robosc.targets.python.text import comment, docstring, indent
+from robosc.targets.python.text import comment, docstring
 from robosc.targets.python.writer import Writer
 
 

@@ -13,13 +13,13 @@ from robosc._version import __version__
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind, Deployment, Interface, Model
 from robosc.supervisor import Supervisor
+from robosc.targets.code.naming import snake_case
+from robosc.targets.code.text import printable
 from robosc.targets.events import has_plant_location
 from robosc.targets.model_text import requirement_text
 from robosc.targets.python.generate import header
 from robosc.targets.python.layout import make_layout
-from robosc.targets.python.naming import snake_case
 from robosc.targets.python.package import beside_supervisor, python_text
-from robosc.targets.python.text import printable
 from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros.runtime.parameters import Parameter
 from robosc.targets.ros.state_topic import state_topic

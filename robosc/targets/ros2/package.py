@@ -4,8 +4,8 @@ from functools import partial
 
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
+from robosc.targets.code.naming import package_name
 from robosc.targets.files import GeneratedFiles
-from robosc.targets.python.package import package_name
 from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros.layer import remapped_names, require_names_of_a_layer
 from robosc.targets.ros.package import (

@@ -1,6 +1,5 @@
 """The files that every C++ package has, and what the templates of a package speak of."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -8,7 +7,6 @@ from importlib import resources
 
 import jinja2
 
-from robosc._version import __version__
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind, Deployment, EventKind, Interface
 from robosc.supervisor import Supervisor
@@ -16,8 +14,9 @@ from robosc.targets.c99.header import head, with_prefix
 from robosc.targets.c99.package import generate as generate_c
 from robosc.targets.c99.text import safe, string_literal
 from robosc.targets.c99.unit import Unit, make_unit
+from robosc.targets.code import templates
 from robosc.targets.code.naming import package_name
-from robosc.targets.code.text import printable
+from robosc.targets.code.templates import shared_values
 from robosc.targets.cpp.model import Writer, fill_name, received_topics, take_name
 from robosc.targets.cpp.naming import require_package_name
 from robosc.targets.files import GeneratedFiles
@@ -65,7 +64,7 @@ class Middleware:
     without: frozenset[str]
 
 
-def generate_package(supervisor: Supervisor, options: GenerateOptions, middleware: Middleware) -> GeneratedFiles:
+def generate_package(middleware: Middleware, supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles:
     """The files of a package.
 
     Raises:
@@ -124,7 +123,7 @@ def _context(
     middleware: Middleware,
 ) -> dict[str, object]:
     """Return the values that the templates refer to."""
-    model, layout = supervisor.model, unit.layout
+    layout = unit.layout
     released = release_identifiers(found)
     types = [("msg", topic.interface) for topic in found]
     types += [(_kind(item), item.interface) for item in asked if item.interface]
@@ -134,19 +133,11 @@ def _context(
 
     numbers = {identifier: number for number, identifier in enumerate(received_topics(layout))}
     return {
-        "version": __version__,
-        "model": model.name,
-        "package": package,
+        **shared_values(supervisor, package),
         "prefix": layout.prefix,
         "upper": layout.upper,
-        "digest": supervisor.certificate.bundle_sha256,
         "top": head(supervisor),
         "hash_top": head(supervisor, "# ", "# ", ""),
-        "certificate": {
-            field: printable(str(getattr(supervisor.certificate, field)))
-            for field in ("safe", "controllable", "nonblocking", "maximally_permissive", "method", "states")
-        },
-        "requirements": [printable(requirement_text(item)) for item in model.requirements],
         "includes": sorted({middleware.include(kind, type_) for kind, type_ in (*types, *_own_types())}),
         "packages": sorted({type_.package for _, type_ in (*types, *_own_types())}),
         "has_actions": any(item.kind is CommunicationKind.ACTION for item in asked),
@@ -237,23 +228,9 @@ def declaration(parameter: Parameter) -> str:
 
 @cache
 def _environment(module: str) -> jinja2.Environment:
-    environment = jinja2.Environment(
-        loader=jinja2.ChoiceLoader([jinja2.PackageLoader(module), jinja2.PackageLoader("robosc.targets.cpp")]),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        # Escapes what goes into XML; every other value is escaped by a filter or is a checked name.
-        autoescape=jinja2.select_autoescape(enabled_extensions=("xml.j2", "launch.j2")),
-    )
     filters: dict[str, Callable[..., object]] = {
         "declaration": declaration,
-        "json": json.dumps,
         "literal": string_literal,
-        "printable": printable,
         "safe_comment": safe,
-        "quality": lambda quality: f"{quality[0].replace('_', ' ')}, depth {quality[1]}",
-        "split_lines": str.splitlines,
     }
-    environment.filters.update(filters)
-    return environment
+    return templates.environment(module, "robosc.targets.cpp", filters=filters)

@@ -1,25 +1,16 @@
-"""Parts of the packages for ROS 2 and ROS 1: values that templates refer to, filters that escape, copied modules."""
+"""Parts of the packages for ROS 2 and ROS 1, in Python and C++: checks, and values that templates refer to."""
 
-import json
-import pprint
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
-from importlib import resources
 
-import jinja2
-
-from robosc._version import __version__
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind, Deployment, Interface, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.code.naming import snake_case
-from robosc.targets.code.text import printable
+from robosc.targets.code.templates import shared_values
 from robosc.targets.events import has_plant_location
-from robosc.targets.model_text import requirement_text
 from robosc.targets.python.generate import header
 from robosc.targets.python.layout import make_layout
-from robosc.targets.python.package import beside_supervisor, python_text
 from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros.runtime.parameters import Parameter
 from robosc.targets.ros.state_topic import state_topic
@@ -89,17 +80,9 @@ def context(
     tables = state_topic(model)
     requested = [item for item in model.communications if item.kind is not CommunicationKind.OUTGOING_MESSAGE]
     return {
-        "version": __version__,
-        "model": model.name,
-        "package": package,
+        **shared_values(supervisor, package),
         "title": _TITLES[supervisor.deployment],
-        "digest": supervisor.certificate.bundle_sha256,
         "header": header(supervisor),
-        "certificate": {
-            field: printable(str(getattr(supervisor.certificate, field)))
-            for field in ("safe", "controllable", "nonblocking", "maximally_permissive", "method", "states")
-        },
-        "requirements": [printable(requirement_text(item)) for item in model.requirements],
         "topics": found,
         "release_identifiers": release_identifiers(found),
         "servers": asked,
@@ -130,48 +113,3 @@ def chosen(parameters: tuple[Parameter, ...], options: GenerateOptions) -> tuple
     if options.log_events:
         values["log_folder"] = EVENT_LOG_FOLDER
     return tuple(item._replace(default=values.get(item.name, item.default)) for item in parameters)
-
-
-def python_files(supervisor: Supervisor, package: str, modules: Mapping[str, str]) -> dict[str, str]:
-    """Return a package's Python files without a template, by path: the supervisor, and what a node runs on.
-
-    Args:
-        supervisor: Supervisor to generate.
-        package: The package's name.
-        modules: Runtime modules, such as `early`, with the packages that they are copied from.
-    """
-    top = header(supervisor)
-    files = {
-        f"{package}/__init__.py": f'{top}"""The supervisor of the robot {supervisor.model.name} and its node."""\n',
-        f"{package}/supervisor.py": python_text(supervisor, f"{package}.supervisor"),
-        f"{package}/runtime/__init__.py": f'{top}"""Runtime of the node: no part of it depends on the model."""\n',
-    }
-    for module, folder in modules.items():
-        text = resources.files(folder).joinpath(f"{module}.py").read_text(encoding="utf-8")
-        files[f"{package}/runtime/{module}.py"] = top + beside_supervisor(text)
-    return files
-
-
-@cache
-def environment(target: str) -> jinja2.Environment:
-    """Templates of a target's package, and those that all packages share."""
-    found = jinja2.Environment(
-        loader=jinja2.ChoiceLoader([jinja2.PackageLoader(target), jinja2.PackageLoader(__package__)]),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        # Escapes what goes into XML; every other value is escaped by a filter or is a checked name.
-        autoescape=jinja2.select_autoescape(enabled_extensions=("xml.j2", "launch.j2")),
-    )
-    filters: dict[str, Callable[..., object]] = {
-        "json": json.dumps,
-        "literal": ascii,
-        "names": lambda communications: tuple(item.name for item in communications),
-        "printable": printable,
-        "quality": lambda quality: f"{quality[0].replace('_', ' ')}, depth {quality[1]}",
-        "pretty": lambda value: pprint.pformat(value, width=110, sort_dicts=False),
-        "split_lines": str.splitlines,
-    }
-    found.filters.update(filters)
-    return found

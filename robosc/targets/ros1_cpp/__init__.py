@@ -1,11 +1,14 @@
 """The target `ros1-cpp`."""
 
+from functools import partial
+
+from robosc.targets.cpp.package import generate_package
 from robosc.targets.registry import GENERAL_ERRORS, Target, TargetInfo
-from robosc.targets.ros1_cpp.package import generate
+from robosc.targets.ros1_cpp.package import MIDDLEWARE
 
 TARGET = Target(
     TargetInfo("ros1-cpp", "a complete ROS 1 package (catkin): a roscpp node around the supervisor in C99"),
-    generate,
+    partial(generate_package, MIDDLEWARE),
     errors=GENERAL_ERRORS | {"invalid-identifier"},
 )
 

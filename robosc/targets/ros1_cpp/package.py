@@ -1,10 +1,7 @@
-"""The target `ros1-cpp`: a catkin package with a roscpp node around the generated supervisor in C99."""
+"""The record of the target `ros1-cpp`: catkin, with a roscpp node around a supervisor in C99."""
 
 from robosc.model.structure import Interface
-from robosc.supervisor import Supervisor
-from robosc.targets.cpp.package import Middleware, generate_package
-from robosc.targets.files import GeneratedFiles
-from robosc.targets.registry import GenerateOptions
+from robosc.targets.cpp.package import Middleware
 from robosc.targets.ros.runtime.parameters import USE_SIM_TIME
 
 _ENDINGS = {
@@ -22,7 +19,7 @@ def _ended(kind: str, type_: Interface) -> str:
     return type_.type + _ENDINGS.get(kind, "")
 
 
-_MIDDLEWARE = Middleware(
+MIDDLEWARE = Middleware(
     target="ros1-cpp",
     include=lambda kind, type_: f"{type_.package}/{_ended(kind, type_)}.h",
     type_name=lambda kind, type_: f"::{type_.package}::{_ended(kind, type_)}",
@@ -39,12 +36,3 @@ _MIDDLEWARE = Middleware(
     # In ROS 1 it is a parameter of the whole graph, read by the client library.
     without=frozenset({USE_SIM_TIME}),
 )
-
-
-def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles:
-    """The package's files.
-
-    Raises:
-        UnsupportedModelError: The model has something that this target cannot do.
-    """
-    return generate_package(supervisor, options, _MIDDLEWARE)

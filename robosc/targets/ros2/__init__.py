@@ -1,11 +1,14 @@
 """The target `ros2`."""
 
+from functools import partial
+
 from robosc.targets.registry import GENERAL_ERRORS, Target, TargetInfo
-from robosc.targets.ros2.package import generate
+from robosc.targets.ros.middleware import generate_package
+from robosc.targets.ros2.package import MIDDLEWARE
 
 TARGET = Target(
     TargetInfo("ros2", "a complete ROS 2 package (ament_python): controller or layer node, launch file, parameters"),
-    generate,
+    partial(generate_package, MIDDLEWARE),
     errors=GENERAL_ERRORS | {"invalid-identifier"},
 )
 

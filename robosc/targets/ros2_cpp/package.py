@@ -1,11 +1,8 @@
-"""The target `ros2-cpp`: an ament_cmake package with an rclcpp node around the generated supervisor in C99."""
+"""The record of the target `ros2-cpp`: ament_cmake, with an rclcpp node around a supervisor in C99."""
 
 from robosc.model.structure import Interface
-from robosc.supervisor import Supervisor
 from robosc.targets.cpp.naming import file_name
-from robosc.targets.cpp.package import Middleware, generate_package
-from robosc.targets.files import GeneratedFiles
-from robosc.targets.registry import GenerateOptions
+from robosc.targets.cpp.package import Middleware
 from robosc.targets.ros.runtime.parameters import USE_SIM_TIME
 
 _PARTS = {
@@ -23,7 +20,7 @@ def _type_name(kind: str, type_: Interface) -> str:
     return f"::{type_.package}::{folder}::{type_.type}{ending}"
 
 
-_MIDDLEWARE = Middleware(
+MIDDLEWARE = Middleware(
     target="ros2-cpp",
     include=lambda kind, type_: f"{type_.package}/{kind}/{file_name(type_.type)}.hpp",
     type_name=_type_name,
@@ -40,12 +37,3 @@ _MIDDLEWARE = Middleware(
     # Every ROS 2 node has it by itself.
     without=frozenset({USE_SIM_TIME}),
 )
-
-
-def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles:
-    """The package's files.
-
-    Raises:
-        UnsupportedModelError: The model has something that this target cannot do.
-    """
-    return generate_package(supervisor, options, _MIDDLEWARE)

@@ -1,0 +1,164 @@
+"""The packages of a middleware in Python, given a record of what sets it apart: ROS 1 or ROS 2."""
+
+import pprint
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cache, partial
+from importlib import resources
+
+import jinja2
+
+from robosc.model.structure import Communication, Deployment
+from robosc.supervisor import Supervisor
+from robosc.targets.code import templates
+from robosc.targets.code.naming import package_name
+from robosc.targets.files import GeneratedFiles
+from robosc.targets.python.generate import header
+from robosc.targets.python.package import beside_supervisor, python_text
+from robosc.targets.registry import GenerateOptions
+from robosc.targets.ros.layer import Renamed, remapped_names, require_names_of_a_layer
+from robosc.targets.ros.package import chosen, context, error_context, packages, release_identifiers, require_own_names
+from robosc.targets.ros.runtime.parameters import Parameter, declarations
+from robosc.targets.ros.runtime.supervised import callers_name, robots_name
+from robosc.targets.ros.topics import Topic, servers, topics
+
+_SHARED = "robosc.targets.ros"
+
+_MODULES = ("startup", "health", "messages", "parameters", "presence", "reports", "scans")
+_MODULES_OF = {
+    Deployment.CONTROLLER: ("startup_controller",),
+    Deployment.LAYER: ("children", "startup_layer", "supervised"),
+}
+_OWN_MODULES_OF = {Deployment.CONTROLLER: (), Deployment.LAYER: ("defaults", "remapping", "servers")}
+
+# A file's template has the file's name; of these a layer has another one than a controller.
+_FILES = (
+    "README.md",
+    "config/parameters.yaml",
+    "package.xml",
+    "setup.py",
+    "test/test_supervisor.py",
+    "{package}/connections.py",
+    "{package}/diagnostics.py",
+    "{package}/host.py",
+    "{package}/interfaces.py",
+    "{package}/node.py",
+    "{package}/parameter_file.py",
+    "{package}/start.py",
+    "{package}/state_topic.py",
+)
+_FILES_OF = {
+    Deployment.CONTROLLER: ("{package}/middleware.py",),
+    Deployment.LAYER: ("test/test_layer.py", "{package}/caller.py", "{package}/robot.py"),
+}
+_TEMPLATES_OF_A_LAYER = {"README.md": "README_layer.md", "node.py": "layer_node.py", "start.py": "start_layer.py"}
+
+
+def _nothing_more(found: tuple[Topic, ...], asked: tuple[Communication, ...], deployment: Deployment) -> None:
+    """Every name that ROS 2 takes is one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Middleware:
+    """Description of a target's middleware.
+
+    Attributes:
+        target: Name of the target.
+        package: The Python package that has its runtime and its templates.
+        dependencies: Packages that every generated package needs.
+        modules: Its own modules of the runtime.
+        files: Paths of its own files from templates.
+        launch: Ending of a launch file.
+        remapped: Names everything that an existing controller has to call otherwise, given messages and services, and
+            actions.
+        require_names: Raises UnsupportedModelError for what is no name in this middleware.
+        parameters: Its own parameters.
+        without: Parameters that its nodes have in another way, or not at all.
+        script: Template of the programs, or nothing where something else makes them.
+        markers: Paths of its files without content.
+    """
+
+    target: str
+    package: str
+    dependencies: tuple[str, ...]
+    modules: tuple[str, ...]
+    files: tuple[str, ...]
+    launch: str
+    remapped: Callable[[Iterable[str], Iterable[str]], Renamed]
+    require_names: Callable[[tuple[Topic, ...], tuple[Communication, ...], Deployment], None] = _nothing_more
+    parameters: tuple[Parameter, ...] = ()
+    without: frozenset[str] = frozenset()
+    script: str = ""
+    markers: tuple[str, ...] = ()
+
+
+def generate_package(middleware: Middleware, supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles:
+    """The files of a package.
+
+    Raises:
+        UnsupportedModelError: The model has something that this version cannot do on this middleware.
+    """
+    deployment = supervisor.deployment
+    name = package_name(supervisor, options, str(deployment))
+    with error_context(middleware.target):
+        found, asked = topics(supervisor.model), servers(supervisor.model)
+        require_own_names(name, found, asked)
+        middleware.require_names(found, asked, deployment)
+        if deployment is Deployment.LAYER:
+            require_names_of_a_layer(found, asked)
+        values = context(supervisor, name, found, asked)
+    declared = (*declarations(release_identifiers(found), str(deployment)), *middleware.parameters)
+    values["dependencies"] = sorted({*middleware.dependencies, *packages(found, asked)})
+    values["parameters"] = [item for item in chosen(declared, options) if item.name not in middleware.without]
+    values["supervised"] = options.supervised
+    values["remapped"] = remapped_names(found, asked, middleware.remapped)
+    files = _python_files(supervisor, name, middleware)
+    get_template = _environment(middleware.package).get_template
+    replaced = _TEMPLATES_OF_A_LAYER if deployment is Deployment.LAYER else {}
+    for path in (*_FILES, *_FILES_OF[deployment], *middleware.files, f"launch/{deployment}{middleware.launch}"):
+        file = path.rpartition("/")[2]
+        files[path.format(package=name)] = get_template(f"{replaced.get(file, file)}.j2").render(values)
+    files |= {path.format(package=name): "" for path in middleware.markers}
+    scripts = _scripts(supervisor, str(values["starter"])) if middleware.script else {}
+    for path, (module, purpose) in scripts.items():
+        files[path] = get_template(middleware.script).render(values, module=module, purpose=purpose)
+    return GeneratedFiles(files, frozenset(scripts))
+
+
+def _scripts(supervisor: Supervisor, starter: str) -> dict[str, tuple[str, str]]:
+    """Path of each program, the module that it runs, and its purpose."""
+    purpose = f"The {supervisor.deployment} of the robot {supervisor.model.name}"
+    return {
+        f"scripts/{supervisor.deployment}": ("node", f"{purpose}."),
+        f"scripts/{starter}": ("start", f"{purpose} with its parameter file."),
+    }
+
+
+def _python_files(supervisor: Supervisor, package: str, middleware: Middleware) -> dict[str, str]:
+    """A package's Python files without a template, by path: the supervisor, and what a node runs on."""
+    top = header(supervisor)
+    files = {
+        f"{package}/__init__.py": f'{top}"""The supervisor of the robot {supervisor.model.name} and its node."""\n',
+        f"{package}/supervisor.py": python_text(supervisor, f"{package}.supervisor"),
+        f"{package}/runtime/__init__.py": f'{top}"""Runtime of the node: no part of it depends on the model."""\n',
+    }
+    shared = (*_MODULES, *_MODULES_OF[supervisor.deployment])
+    own = (*middleware.modules, *_OWN_MODULES_OF[supervisor.deployment])
+    for folder, modules in ((_SHARED, shared), (middleware.package, own)):
+        for module in modules:
+            text = resources.files(f"{folder}.runtime").joinpath(f"{module}.py").read_text(encoding="utf-8")
+            files[f"{package}/runtime/{module}.py"] = top + beside_supervisor(text)
+    return files
+
+
+@cache
+def _environment(package: str) -> jinja2.Environment:
+    """Templates of a middleware's packages, and those that all of them share."""
+    filters: dict[str, Callable[..., object]] = {
+        "callers": partial(callers_name, ""),
+        "literal": ascii,
+        "names": lambda communications: tuple(item.name for item in communications),
+        "pretty": lambda value: pprint.pformat(value, width=110, sort_dicts=False),
+        "robots": partial(robots_name, ""),
+    }
+    return templates.environment(package, _SHARED, filters=filters)

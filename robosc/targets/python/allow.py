@@ -8,17 +8,10 @@ from robosc.expressions import (
 )
 from robosc.targets import acceptance
 from robosc.targets.acceptance import InOneOf, StaysInRange, accepting_conditions, enabling_conditions
+from robosc.targets.code.expressions import TRUE_CODE, Code, Sort, call, integer, literal, operation
 from robosc.targets.code.text import indent
-from robosc.targets.python.expressions import (
-    TRUE_CODE,
-    Code,
-    Precedence,
-    Unknown,
-    either,
-    falsity,
-    truth,
-    value,
-)
+from robosc.targets.python.changes import reads
+from robosc.targets.python.expressions import PYTHON, Precedence, code_text
 from robosc.targets.python.text import comment, docstring
 from robosc.targets.python.writer import Writer
 
@@ -29,8 +22,10 @@ Condition = tuple[str, Code]
 def allow_method(writer: Writer, event: str) -> list[str]:
     """The method that tells whether `event` is allowed: plants, ranges, requirements, then the supervisor."""
     conditions = [item for item in _conditions(writer, event) if item[1] != TRUE_CODE]
+    name = writer.layout.methods["allow", event]
+    writer.reads[f"self.{name}"] = reads(code for _, code in conditions)
     return [
-        f"def {writer.layout.methods['allow', event]}(self):",
+        f"def {name}(self):",
         f"    {docstring(f'Return True if {event} is allowed now.')}",
         *indent(_return_all(conditions)),
     ]
@@ -42,7 +37,7 @@ def requirements_method(writer: Writer, communication: str) -> list[str]:
     body = []
     for requirement in requirements:
         body += comment(requirement_text(requirement))
-        body.append(f"{truth(requirement.condition, writer.scope).text},")
+        body.append(f"{code_text(writer.scope.truth(requirement.condition))},")
     words = f"Return for each requirement on {communication} whether it holds."
     return _tuple_method(writer, ("requirements", communication), words, body)
 
@@ -50,7 +45,7 @@ def requirements_method(writer: Writer, communication: str) -> list[str]:
 def conjuncts_method(writer: Writer, communication: str) -> list[str]:
     """The method that tells for each top-level conjunct of the requirements whether it holds."""
     body = [
-        f"{truth(part, writer.scope).text},"
+        f"{code_text(writer.scope.truth(part))},"
         for requirement in writer.model.requirements_on(communication)
         for part in conjuncts(requirement.condition)
     ]
@@ -68,7 +63,7 @@ def _return_all(conditions: list[Condition]) -> list[str]:
         return ["return True"]
     lines = ["return ("]
     for place, (words, code) in enumerate(conditions):
-        text = code.text if len(conditions) == 1 else code.within(Precedence.AND)
+        text = code_text(code) if len(conditions) == 1 else PYTHON.within(code, Precedence.AND)
         lines += indent([*comment(words), text if place == 0 else f"and {text}"])
     return [*lines, ")"]
 
@@ -92,29 +87,29 @@ def _code(writer: Writer, condition: acceptance.Condition) -> Code:
             fits = _fits(writer, type_, expression)
             if fits == TRUE_CODE or state is None:
                 return fits
-            return either(falsity(StateTest(component, state), writer.scope), fits)
+            return writer.scope.either(writer.scope.falsity(StateTest(component, state)), fits)
         case _:
-            return truth(condition, writer.scope)
+            return writer.scope.truth(condition)
 
 
 def _in_one_of(writer: Writer, automaton: str, names: tuple[str, ...]) -> Code:
     if len(names) == 1:
-        return truth(StateTest(automaton, names[0]), writer.scope)
-    return Code(f"{writer.scope.location(automaton)} in {names!r}", Precedence.COMPARISON)
+        return writer.scope.state_code(automaton, names[0])
+    return operation("in", writer.scope.location_code(automaton), literal(repr(names), Sort.TEXT))
 
 
 def _fits(writer: Writer, type_: IntegerType, expression: Expression) -> Code:
     """Return code for whether an update keeps a synthesis variable in range; an unknown value leaves it alone."""
     low, high = type_.low, type_.high
-    code = value(expression, writer.scope)
+    code = writer.scope.value(expression)
     if low is None or high is None:
         return TRUE_CODE
-    if code.unknown is not Unknown.NEVER:
+    if not code.is_known:
         writer.used.add("stays_in_range")
-        return Code(f"stays_in_range({code.text}, {low}, {high})")
-    if low <= code.low and code.high <= high:
+        return call("stays_in_range", code, integer(low), integer(high))
+    if code.is_within(low, high):
         return TRUE_CODE
-    return Code(f"{low} <= {code.within(Precedence.SUM)} <= {high}", Precedence.COMPARISON)
+    return operation("between", integer(low), code, integer(high))
 
 
 def _added_condition(writer: Writer, event: str) -> list[Condition]:

@@ -6,54 +6,45 @@ to an attribute that decides whether that event is allowed. Only such events are
 it is not allowed.
 """
 
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
+from robosc.targets.code.expressions import Code, Kind
 from robosc.targets.code.text import indent
 from robosc.targets.python.text import comment
 
 ASKED_TOGETHER = 8
 """Up to so many requests it takes less time to ask all of them than to find out which may have changed."""
 
-_ATTRIBUTE = re.compile(r"\bself\.(\w+)")
+
+def reads(codes: Iterable[Code]) -> set[str]:
+    """Return what some expressions read, and the functions that they call: `self.attribute`, `self.method`."""
+    return {piece.word for code in codes for piece in code.pieces() if piece.kind in (Kind.PLACE, Kind.CALL)}
 
 
-def stale_bits(allows: Sequence[str], methods: Iterable[Sequence[str]]) -> dict[str, int]:
+def stale_bits(allows: Sequence[str], read: Mapping[str, set[str]]) -> dict[str, int]:
     """For each attribute the bits of the events whose permission reads it, itself or through another method.
-
-    The text of the methods tells; what stands in their comments too can only make it a superset.
 
     Args:
         allows: The methods that tell whether an event is allowed; the first one's bit is the lowest.
-        methods: The lines of these, and of those that they call.
+        read: For each of these, and of those that they call, what its expressions read and call.
     """
-    named = {_name(lines): set(_ATTRIBUTE.findall("\n".join(lines[1:]))) for lines in methods}
     bits: dict[str, int] = {}
-    for place, allow in enumerate(allows):
-        for attribute in sorted(_read(allow, named)):
-            bits[attribute] = bits.get(attribute, 0) | 1 << place
+    for number, allow in enumerate(allows):
+        seen: set[str] = set()
+        to_do = [f"self.{allow}"]
+        while to_do:
+            word = to_do.pop()
+            if word not in seen:
+                seen.add(word)
+                to_do += read.get(word, ())
+        for word in seen:
+            bits[word] = bits.get(word, 0) | 1 << number
     return bits
-
-
-def _name(lines: Sequence[str]) -> str:
-    return lines[0].removeprefix("def ").partition("(")[0]
-
-
-def _read(method: str, named: dict[str, set[str]]) -> set[str]:
-    """Return the names that a method and all methods that it calls read."""
-    seen: set[str] = set()
-    to_do = [method]
-    while to_do:
-        name = to_do.pop()
-        if name not in seen:
-            seen.add(name)
-            to_do += named.get(name, ())
-    return seen - named.keys()
 
 
 def noted_change(place: str, bits: dict[str, int]) -> list[str]:
     """Statements that follow from another value of an attribute, given as `self.attribute`."""
-    stale = bits.get(place.removeprefix("self."), 0)
+    stale = bits.get(place, 0)
     return ["self.changes += 1", *([f"self._stale |= {stale:#x}"] if stale else [])]
 
 

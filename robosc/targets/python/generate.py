@@ -136,7 +136,7 @@ def _class(writer: Writer) -> list[str]:
     allows = [allow_method(writer, event) for event in writer.layout.controllable]
     description = describe(writer.layout.supervisor)
     requests, silent = _allow_names(writer, description)
-    writer.stale = stale_bits([*requests, *silent], [*allows, *(lines for _, lines in writer.diagrams.methods)])
+    writer.stale = stale_bits([*requests, *silent], writer.reads)
     methods = [
         _constructor(writer, description),
         _restart(writer, len(requests), len(silent)),

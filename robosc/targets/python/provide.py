@@ -1,8 +1,9 @@
 """Generated methods that compute the data of a request at the moment it is made."""
 
 from robosc.model.structure import ObjectValue, ProvidedValue
+from robosc.targets.code.expressions import TRUE_CODE
 from robosc.targets.code.text import indent
-from robosc.targets.python.expressions import TRUE_CODE, Unknown, truth, value
+from robosc.targets.python.expressions import code_text
 from robosc.targets.python.text import comment, docstring
 from robosc.targets.python.writer import Writer
 
@@ -14,12 +15,12 @@ def provide_method(writer: Writer, communication: str) -> list[str]:
         f"    {docstring(f'Data of a request of {communication}: (is known, data); None is the default message.')}",
     ]
     for statement in writer.model.provides_for(communication):
-        condition = TRUE_CODE if statement.condition is None else truth(statement.condition, writer.scope)
+        condition = TRUE_CODE if statement.condition is None else writer.scope.truth(statement.condition)
         lines += indent(comment(provide_text(statement)))
         result = _result(writer, statement.value)
         if condition == TRUE_CODE:
             return [*lines, *indent(result)]
-        lines += [f"    if {condition.text}:", *indent(result, 2)]
+        lines += [f"    if {code_text(condition)}:", *indent(result, 2)]
     return [*lines, "    return True, None"]
 
 
@@ -38,9 +39,9 @@ def _literal(writer: Writer, provided: ProvidedValue, locals_: list[tuple[str, s
     if isinstance(provided, ObjectValue):
         entries = (f"{name!r}: {_literal(writer, item, locals_)}" for name, item in provided.properties)
         return "{" + ", ".join(entries) + "}"
-    code = value(provided, writer.scope)
-    if code.unknown is Unknown.NEVER:
-        return code.text
+    code = writer.scope.value(provided)
+    if code.is_known:
+        return code_text(code)
     name = f"data_{len(locals_) + 1}"
-    locals_.append((name, code.text))
+    locals_.append((name, code_text(code)))
     return name

@@ -20,19 +20,10 @@ from robosc.expressions import (
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path
 from robosc.model.structure import EnumDefinition
+from robosc.targets.code.expressions import TRUE_CODE, Code, Sort, Unknown, place
 from robosc.targets.code.text import indent
 from robosc.targets.paths import path_text, path_type
-from robosc.targets.python.expressions import (
-    TRUE_CODE,
-    Code,
-    Scope,
-    Sort,
-    Unknown,
-    both,
-    code_for,
-    falsity,
-    truth,
-)
+from robosc.targets.python.expressions import Scope, code_text
 from robosc.targets.python.layout import Layout
 from robosc.targets.python.naming import PythonNamer
 from robosc.targets.python.text import comment
@@ -54,7 +45,7 @@ def received_unknown(type_: Type, path: Path) -> Unknown:
         case EnumType() if not any(isinstance(step, int) for step in path):
             return Unknown.NEVER  # Whatever came, the rules make a value of it; an element may be absent.
         case _:
-            return Unknown.NONE
+            return Unknown.VALUE
 
 
 def reader_namer() -> PythonNamer:
@@ -103,11 +94,11 @@ class Reader:
         """Text of a path's value as the event log shows it: as it came, None where nothing fitting came."""
         code = self.read(path)
         if code.unknown is not Unknown.NAN:
-            return code.text
+            return code.word
         if code.sort is Sort.INTEGER:
-            return self._call("known", code.text)
+            return self._call("known", code.word)
         # A NaN that came is shown as one.
-        return f"{code.text} if {code.text} == {code.text} else {self._call('read_double', self._access(path))}"
+        return f"{code.word} if {code.word} == {code.word} else {self._call('read_double', self._access(path))}"
 
     def take_lines(self) -> list[str]:
         """The statements since the last call."""
@@ -163,9 +154,9 @@ class Reader:
             case IntegerType():
                 return self._assign(path, type_, self._call("integer", self._access(path)), Unknown.NAN)
             case BooleanType():
-                return self._assign(path, type_, self._call("read_boolean", self._access(path)), Unknown.NONE)
+                return self._assign(path, type_, self._call("read_boolean", self._access(path)), Unknown.VALUE)
             case StringType():
-                return self._assign(path, type_, self._call("read_string", self._access(path)), Unknown.NONE)
+                return self._assign(path, type_, self._call("read_string", self._access(path)), Unknown.VALUE)
             case EnumType(name=enum):
                 return self._read_enum(path, type_, enum)
             case ArrayType(element=element):
@@ -179,12 +170,15 @@ class Reader:
         if plain is not None:
             self.used.add(plain)
             text = self._call("plain_elements", self._access(path), plain)
-            return self._assign(path, type_, text, Unknown.NONE)
+            return self._assign(path, type_, text, Unknown.VALUE)
         notes = self._local(path, "_notes")
         self._lines.append(f"{notes} = []")
         convert = f"lambda item, path, notes: {self._element(element, 'item', 'path', 1)}"
         code = self._assign(
-            path, type_, self._call("elements", self._access(path), repr(path_text(path)), notes, convert), Unknown.NONE
+            path,
+            type_,
+            self._call("elements", self._access(path), repr(path_text(path)), notes, convert),
+            Unknown.VALUE,
         )
         self.words.append(self._call("words_of", notes))
         self.enum_flags.append(self._call("flag_of", notes))
@@ -223,12 +217,12 @@ class Reader:
         self._lines.append(f"{name}, {words}, {flag} = {call}")
         self.words.append(words)
         self.enum_flags.append(flag)
-        return code_for(name, type_, received_unknown(type_, path))
+        return place(name, type_, received_unknown(type_, path))
 
     def _assign(self, path: Path, type_: Type, text: str, unknown: Unknown) -> Code:
         name = self._local(path)
         self._lines.append(f"{name} = {text}")
-        return code_for(name, type_, unknown)
+        return place(name, type_, unknown)
 
 
 def converter(layout: Layout, enum: EnumDefinition, used: set[str]) -> list[str]:
@@ -239,17 +233,17 @@ def converter(layout: Layout, enum: EnumDefinition, used: set[str]) -> list[str]
     body = ["if data is ABSENT:", "    return None, (), False"]
     all_false = TRUE_CODE
     for rule in enum.rules:
-        fires = truth(rule.condition, scope)
-        all_false = both(all_false, falsity(rule.condition, scope))
+        fires = scope.truth(rule.condition)
+        all_false = scope.both(all_false, scope.falsity(rule.condition))
         # What only a later rule needs is not read before that rule's turn.
         body += reader.take_lines()
         body += comment(f"{expression_text(rule.condition)} -> {rule.value}")
-        body += [f"if {fires.text}:", f"    return {rule.value!r}, {reader.all_words}, {reader.all_flags}"]
+        body += [f"if {code_text(fires)}:", f"    return {rule.value!r}, {reader.all_words}, {reader.all_flags}"]
     body += comment(f"default -> {enum.default}")
     if _may_be_unknown([rule.condition for rule in enum.rules]):
         words = f"path + {f' is {enum.default} by default: an earlier rule is unknown'!r}"
         earlier = [*reader.words, f"({words},)"]
-        body.append(f"if not ({all_false.text}):")
+        body.append(f"if not ({code_text(all_false)}):")
         body.append(f"    return {enum.default!r}, {' + '.join(earlier)}, True")
     body.append(f"return {enum.default!r}, {reader.all_words}, {reader.all_flags}")
     return [

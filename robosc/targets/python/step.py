@@ -23,12 +23,13 @@ from robosc.expressions import (
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
 from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
+from robosc.targets.code.expressions import TRUE_CODE, Code, Sort, place
 from robosc.targets.code.text import indent
 from robosc.targets.events import Branch, branches_of, has_plant_location, is_controllable, plant_step, split
 from robosc.targets.paths import path_text, path_type
 from robosc.targets.python.allow import accepted
 from robosc.targets.python.changes import noted_change, noted_write
-from robosc.targets.python.expressions import TRUE_CODE, Code, Scope, Sort, Unknown, code_for, negated, value
+from robosc.targets.python.expressions import Scope, code_text
 from robosc.targets.python.naming import PythonNamer
 from robosc.targets.python.received import Reader, reader_namer, received_unknown
 from robosc.targets.python.text import comment, docstring
@@ -44,7 +45,7 @@ def read_method(writer: Writer, event: str) -> list[str]:
     reader = Reader(writer.layout, _event_type(writer, event), writer.used)
     codes = [reader.read(path) for path in paths]
     entries = ", ".join(f"{path_text(path)!r}: {reader.seen(path)}" for path in paths if not _is_array(reader, path))
-    values = "".join(f"{code.text}, " for code in codes).strip()
+    values = "".join(f"{code.word}, " for code in codes).strip()
     return [
         *head,
         f"    {docstring(f'Convert the data of {event}.')}",
@@ -70,7 +71,7 @@ def receive_method(writer: Writer, identifier: str, batch: tuple[str, ...]) -> l
         values = ""
         if paths:
             reader = Reader(writer.layout, _event_type(writer, event), writer.used, namer=namer)
-            values = ", ".join(reader.read(path).text for path in paths)
+            values = ", ".join(reader.read(path).word for path in paths)
             statements += reader.take_lines()
             words += reader.words
         step = f"self.{writer.layout.methods['step', event]}({values})"
@@ -136,7 +137,7 @@ class _StepWriter:
         body = [
             line for component, behaviour, branches in blocks for line in self._block(component, behaviour, branches)
         ]
-        parameters = "".join(f", {code.text}" for code in self.received.values())
+        parameters = "".join(f", {code.word}" for code in self.received.values())
         lines = [f"def {self.writer.layout.methods['step', self.event]}(self{parameters}):"]
         lines.append(f"    {docstring(f'Take {self.event}.')}")
         lines += indent([*self._refusals(), *self._plant(), *self._copied()])
@@ -151,7 +152,7 @@ class _StepWriter:
         for path in self.paths:
             name = self.namer.name("_".join(["value", *map(str, path)]))
             type_ = path_type(self.writer.model, root, path)
-            self.received[path] = code_for(name, type_, received_unknown(type_, path))
+            self.received[path] = place(name, type_, received_unknown(type_, path))
 
     def _refusals(self) -> list[str]:
         """Return None where the event is not accepted, before anything changes."""
@@ -163,7 +164,7 @@ class _StepWriter:
         if is_controllable(self.event):
             for words, code in accepted(self.writer, self.event):
                 if code != TRUE_CODE:
-                    lines += [*comment(words), f"if {negated(code).text}:", "    return None"]
+                    lines += [*comment(words), f"if {code_text(self.scope.negated(code))}:", "    return None"]
         return lines
 
     def _plant(self) -> list[str]:
@@ -257,14 +258,14 @@ class _StepWriter:
         return lines
 
     def _update(self, component: str, variable: Variable, update: Update) -> list[str]:
-        place, _ = self.writer.scope.variable(component, variable.name)
-        code, may_skip = self._assigned(variable.type, value(update.expression, self.scope))
+        attribute, _ = self.writer.scope.variable(component, variable.name)
+        code, may_skip = self._assigned(variable.type, self.scope.value(update.expression))
         words = comment(f"{component}: do {variable.name} := {expression_text(update.expression)}")
         if not may_skip and code.isidentifier():
-            return [*words, *noted_write(place, code, self.writer.stale)]
+            return [*words, *noted_write(attribute, code, self.writer.stale)]
         new = self.namer.name(f"new_{variable.name}")
         if not may_skip:
-            return [*words, f"{new} = {code}", *noted_write(place, new, self.writer.stale)]
+            return [*words, f"{new} = {code}", *noted_write(attribute, new, self.writer.stale)]
         self.may_skip = True
         skipped = f"{component}.{variable.name}"
         return [
@@ -273,7 +274,7 @@ class _StepWriter:
             f"if {new} is None:",
             f"    skipped += ({skipped!r},)",
             "else:",
-            *indent(noted_write(place, new, self.writer.stale)),
+            *indent(noted_write(attribute, new, self.writer.stale)),
         ]
 
     def _assigned(self, type_: Type, code: Code) -> tuple[str, bool]:
@@ -284,18 +285,18 @@ class _StepWriter:
             case IntegerType():
                 low = MINIMUM_INTEGER if type_.low is None else type_.low
                 high = MAXIMUM_INTEGER if type_.high is None else type_.high
-                if code.unknown is Unknown.NEVER and low <= code.low and code.high <= high:
-                    return code.text, False
+                if code.is_within(low, high):
+                    return code_text(code), False
                 self.writer.used.add("assignable_integer")
-                return f"assignable_integer({code.text}, {low}, {high})", True
+                return f"assignable_integer({code_text(code)}, {low}, {high})", True
             case _:
-                return code.text, code.unknown is not Unknown.NEVER
+                return code_text(code), not code.is_known
 
     def _assigned_double(self, code: Code) -> tuple[str, bool]:
-        if code.unknown is not Unknown.NEVER:
+        if not code.is_known:
             self.writer.used.add("assignable_double")
-            return f"assignable_double({code.text})", True
-        return (f"float({code.text})" if code.sort is Sort.INTEGER else code.text), False
+            return f"assignable_double({code_text(code)})", True
+        return (f"float({code_text(code)})" if code.sort is Sort.INTEGER else code_text(code)), False
 
 
 def _protocol(writer: Writer, event: str) -> tuple[str, tuple[str, ...], str | None] | None:

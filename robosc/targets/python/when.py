@@ -5,7 +5,7 @@ from robosc.expressions.text import expression_text
 from robosc.model.received import received_paths
 from robosc.model.structure import Communication
 from robosc.targets.code.text import indent
-from robosc.targets.python.expressions import Scope, truth
+from robosc.targets.python.expressions import Scope, code_text
 from robosc.targets.python.received import Reader, no_location, no_variable
 from robosc.targets.python.text import comment, docstring
 from robosc.targets.python.writer import Writer
@@ -23,11 +23,11 @@ def matches_method(writer: Writer, communication: Communication) -> list[str]:
     for path in received_paths(condition):
         reader.read(path)
     scope = Scope(no_variable, no_location, reader.read, writer.used.add, reader.type_at, reader.type_below)
-    holds = truth(condition, scope)
+    holds = scope.truth(condition)
     return [
         f"def {writer.layout.methods['matches', communication.name]}(self, data):",
         f"    {docstring(f'Tell whether a message is {communication.name}.')}",
         *indent(reader.take_lines()),
         *indent(comment(f"when: {expression_text(condition)}")),
-        f"    return Match({holds.text}, {reader.all_words}, {reader.all_flags})",
+        f"    return Match({code_text(holds)}, {reader.all_words}, {reader.all_flags})",
     ]

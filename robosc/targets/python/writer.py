@@ -8,8 +8,9 @@ from robosc.errors import InternalError
 from robosc.expressions import PathStep, Type
 from robosc.model.structure import Model
 from robosc.supervisor import Supervisor
+from robosc.targets.code.expressions import Code
 from robosc.targets.python.diagrams import Diagrams
-from robosc.targets.python.expressions import Code, Scope
+from robosc.targets.python.expressions import Scope
 from robosc.targets.python.layout import Layout, make_layout
 
 
@@ -31,6 +32,7 @@ class Writer:
         used: Functions of the runtime modules that the generated code calls.
         scope: Scope for writing expressions over the state.
         diagrams: Writer of the supervisor's added conditions.
+        reads: For each method that tells whether an event is allowed, or helps one, what it reads and calls, so far.
         stale: For each attribute the bits of the events whose permission reads it, once that is known.
         skipping: Events whose step may skip an update, so far.
     """
@@ -40,12 +42,15 @@ class Writer:
     used: set[str] = field(default_factory=set)
     scope: Scope = field(init=False)
     diagrams: Diagrams = field(init=False)
+    reads: dict[str, set[str]] = field(default_factory=dict)
     stale: dict[str, int] = field(default_factory=dict)
     skipping: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.scope = Scope(self._variable, self._location, _no_received, self.used.add, _no_type, _no_type)
-        self.diagrams = Diagrams(self.system, self.scope, frozenset(item.name for item in self.model.components))
+        self.diagrams = Diagrams(
+            self.system, self.scope, frozenset(item.name for item in self.model.components), self.reads
+        )
 
     @property
     def model(self) -> Model:

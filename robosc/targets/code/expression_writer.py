@@ -1,0 +1,313 @@
+"""RoboSC expressions as code: native operations where nothing can be unknown, Kleene functions where it can.
+
+Three readings of one boolean expression: `truth` (is it true?), `falsity` (is it false?) and `value`
+(true, false or unknown). Conditions hold only when they are true (language B.4), so that most of the
+generated code needs `truth` alone and stays ordinary code even over data that may be unknown.
+
+A number that is unknown as NaN is compared natively: the comparisons of IEEE 754 are false for it, as `truth` and
+`falsity` want. Whether an integer result can leave 32 bits is decided by interval arithmetic.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import replace
+
+from robosc.expressions import (
+    MAXIMUM_INTEGER,
+    MINIMUM_INTEGER,
+    Binary,
+    Call,
+    Conditional,
+    Constant,
+    Element,
+    EnumValue,
+    Expression,
+    PathStep,
+    Quantifier,
+    Received,
+    Reduction,
+    StateTest,
+    Unary,
+    VariableRead,
+)
+from robosc.expressions.bounds import call_bounds
+from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, Kind, Sort, Unknown, operation
+
+COMPARISONS = ("=", "!=", "<", "<=", ">", ">=")
+OPPOSITE = {"=": "!=", "!=": "=", "<": ">=", "<=": ">", ">": "<=", ">=": "<"}
+
+_LEAST_NATIVE_DIVISOR = 1e-6
+"""A 32-bit integer divided by something this large or larger stays finite."""
+
+
+class ExpressionWriter(ABC):
+    """Writes expressions in one language, at one place of the generated code."""
+
+    # What the expressions read
+
+    @abstractmethod
+    def constant_code(self, constant: bool | int | float | str) -> Code:
+        """The code of a constant."""
+
+    @abstractmethod
+    def enum_code(self, enum: str, value: str) -> Code:
+        """The code of an enum's value."""
+
+    @abstractmethod
+    def variable_code(self, component: str, variable: str) -> Code:
+        """The code that reads a variable."""
+
+    @abstractmethod
+    def state_code(self, automaton: str, state: str, is_in: bool = True) -> Code:
+        """Return the code that tests whether an automaton is in a location, or is not."""
+
+    @abstractmethod
+    def received_code(self, path: tuple[PathStep, ...]) -> Code:
+        """The code that reads received data."""
+
+    @abstractmethod
+    def element_code(self, level: int, path: tuple[PathStep, ...]) -> Code:
+        """The code of a part of a quantifier's element."""
+
+    @abstractmethod
+    def reduction_code(self, expression: Reduction) -> Code:
+        """The code of a reduction."""
+
+    @abstractmethod
+    def quantifier_code(self, expression: Quantifier) -> Code:
+        """The code of a quantifier."""
+
+    # What the language offers
+
+    @abstractmethod
+    def call(self, function: str, *arguments: Code, sort: Sort = Sort.BOOLEAN) -> Code:
+        """A call of a Kleene function, named like the operator or function of RoboSC; its result may be unknown."""
+
+    @abstractmethod
+    def function_code(self, function: str, arguments: list[Code]) -> Code:
+        """The code of a function of numbers: known wherever its arguments are, unless it leaves 32 bits."""
+
+    @abstractmethod
+    def nan_comparison(self, operator: str, left: Code, right: Code) -> Code | None:
+        """A native comparison that is false where a number is NaN, or None if there is none."""
+
+    def alike(self, left: Code, right: Code) -> tuple[Code, Code]:
+        """Two operands as native operations take them."""
+        return left, right
+
+    def as_double(self, code: Code) -> Code:
+        """A number as an operation on doubles takes it."""
+        return code
+
+    def joined_unknown(self, left: Code, right: Code) -> Unknown:
+        """Way in which something is unknown that is one of two codes."""
+        return left.unknown if left.unknown is right.unknown else Unknown.VALUE
+
+    def compare(self, operator: str, left: Code, right: Code) -> Code:
+        """A native comparison of known values."""
+        return operation(operator, left, right)
+
+    def join(self, operator: str, operands: tuple[Code, ...]) -> Code:
+        """A native conjunction or disjunction of known conditions, none of which is constant."""
+        return operation(operator, *operands)
+
+    def negate_condition(self, code: Code) -> Code:
+        """Native negation of a known condition that is not constant."""
+        return operation("not", code)
+
+    def kleene_comparison(self, operator: str, left: Code, right: Code) -> Code:
+        """A comparison of values that may be unknown."""
+        return self.call(operator, left, right)
+
+    def kleene_implication(self, left: Code, right: Code) -> Code:
+        """An implication between conditions that may be unknown."""
+        return self.call("implies", left, right)
+
+    # The three readings
+
+    def value(self, expression: Expression) -> Code:
+        """The value of an expression."""
+        match expression:
+            case Constant(value=constant):
+                return self.constant_code(constant)
+            case EnumValue(enum=enum, value=name):
+                return self.enum_code(enum, name)
+            case VariableRead(component=component, variable=variable):
+                return self.variable_code(component, variable)
+            case StateTest(component=component, state=state):
+                return self.state_code(component, state)
+            case Received(path=path):
+                return self.received_code(path)
+            case Unary(operator="holds", operand=operand):
+                return self.truth(operand)
+            case Unary(operator="not", operand=operand):
+                return self.kleene_not(self.value(operand))
+            case Unary(operand=operand):
+                return self._negate(self.value(operand))
+            case Binary(operator=operator, left=left, right=right):
+                return self._binary(operator, self.value(left), self.value(right), right)
+            case Conditional(condition=condition, then=then, otherwise=otherwise):
+                return self._conditional(self.value(condition), self.value(then), self.value(otherwise))
+            case Call(function=function, arguments=arguments):
+                return self.function_code(function, [self.value(item) for item in arguments])
+            case Element(level=level, path=path):
+                return self.element_code(level, path)
+            case Reduction():
+                return self.reduction_code(expression)
+            case Quantifier():
+                return self.quantifier_code(expression)
+
+    def truth(self, expression: Expression) -> Code:
+        """Return the code that tests whether a boolean expression is true; never unknown."""
+        return self._test(expression, True)
+
+    def falsity(self, expression: Expression) -> Code:
+        """Return the code that tests whether a boolean expression is false; never unknown."""
+        return self._test(expression, False)
+
+    def _test(self, expression: Expression, wanted: bool) -> Code:
+        """Return the code that tests whether a boolean expression is `wanted`."""
+        match expression:
+            case Unary(operator="not", operand=operand):
+                return self._test(operand, not wanted)
+            case Unary(operator="holds", operand=operand):
+                return self.truth(operand) if wanted else self.negated(self.truth(operand))
+            case StateTest(component=component, state=state):
+                return self.state_code(component, state, wanted)
+            case Binary(operator="and" | "or" | "implies" as operator, left=left, right=right):
+                join = self.both if (operator == "and") is wanted else self.either
+                return join(self._test(left, wanted is not (operator == "implies")), self._test(right, wanted))
+            case Binary(operator=operator, left=left, right=right) if operator in COMPARISONS:
+                return self._comparison_is(operator, self.value(left), self.value(right), wanted)
+        return self._is(self.value(expression), wanted)
+
+    # Conditions
+
+    def both(self, left: Code, right: Code) -> Code:
+        """Native conjunction of two known conditions, simplified."""
+        return self._joined("and", left, right, TRUE_CODE, FALSE_CODE)
+
+    def either(self, left: Code, right: Code) -> Code:
+        """Native disjunction of two known conditions, simplified."""
+        return self._joined("or", left, right, FALSE_CODE, TRUE_CODE)
+
+    def _joined(self, operator: str, left: Code, right: Code, neutral: Code, decisive: Code) -> Code:
+        if decisive in (left, right):
+            return decisive
+        if neutral in (left, right):
+            return right if left == neutral else left
+        sides = (item.operands if _is_chain(item, operator) else (item,) for item in (left, right))
+        return self.join(operator, tuple(operand for side in sides for operand in side))
+
+    def negated(self, code: Code) -> Code:
+        """Native negation of a known condition, simplified."""
+        if code in (TRUE_CODE, FALSE_CODE):
+            return FALSE_CODE if code == TRUE_CODE else TRUE_CODE
+        return self.negate_condition(code)
+
+    def kleene_not(self, operand: Code) -> Code:
+        """Negation of a condition that may be unknown."""
+        return self.negated(operand) if operand.is_known else self.call("not", operand)
+
+    def _is(self, code: Code, wanted: bool) -> Code:
+        """Return a test that a boolean value is `wanted`."""
+        if code.is_known:
+            return code if wanted else self.negated(code)
+        return operation("is true" if wanted else "is false", code)
+
+    def _comparison_is(self, operator: str, left: Code, right: Code, wanted: bool) -> Code:
+        """Return a test that a comparison is `wanted`, with native operators wherever NaN stands for unknown."""
+        left, right = self.alike(left, right)
+        wanted_operator = operator if wanted else OPPOSITE[operator]
+        if left.is_known and right.is_known:
+            return self.compare(wanted_operator, left, right)
+        if Unknown.VALUE not in (left.unknown, right.unknown):
+            native = self.nan_comparison(wanted_operator, left, right)
+            if native is not None:
+                return native
+        return self._is(self.kleene_comparison(operator, left, right), wanted)
+
+    # Values
+
+    def _conditional(self, condition: Code, then: Code, otherwise: Code) -> Code:
+        """A conditional expression; both branches are pure, so it does not matter whether both are worked out."""
+        then, otherwise = self.alike(then, otherwise)
+        if condition.is_known:
+            unknown = self.joined_unknown(then, otherwise)
+            code = operation("if", condition, then, otherwise, sort=then.sort, unknown=unknown)
+        else:
+            code = self.call("if", condition, then, otherwise, sort=then.sort)
+        return replace(code, low=min(then.low, otherwise.low), high=max(then.high, otherwise.high))
+
+    def bounded_call(self, function: str, arguments: list[Code], code: Code) -> Code:
+        """The call of a function with what is known about its result."""
+        low, high = MINIMUM_INTEGER, MAXIMUM_INTEGER
+        if all(item.sort is Sort.INTEGER for item in arguments):
+            low, high = call_bounds(function, [(item.low, item.high) for item in arguments])
+        is_known = all(item.is_known for item in arguments) and high <= MAXIMUM_INTEGER
+        unknown = Unknown.NEVER if is_known else code.unknown
+        return replace(code, unknown=unknown, low=low, high=min(high, MAXIMUM_INTEGER))
+
+    def _negate(self, operand: Code) -> Code:
+        low, high = -operand.high, -operand.low
+        # Minus a received infinity is unknown, as is minus the least integer.
+        if operand.sort is Sort.INTEGER:
+            is_native = operand.unknown is not Unknown.VALUE and high <= MAXIMUM_INTEGER
+        else:
+            is_native = operand.is_known
+        if not is_native:
+            return self.call("negate", operand, sort=operand.sort)
+        return Code(Kind.OPERATION, "negate", (operand,), operand.sort, operand.unknown, low, high)
+
+    def _binary(self, operator: str, left: Code, right: Code, divisor: Expression) -> Code:
+        is_known = left.is_known and right.is_known
+        if operator in COMPARISONS:
+            left, right = self.alike(left, right)
+            return (self.compare if is_known else self.kleene_comparison)(operator, left, right)
+        if operator not in ("and", "or", "implies"):
+            return self._arithmetic(operator, left, right, divisor)
+        if not is_known:
+            return self.kleene_implication(left, right) if operator == "implies" else self.call(operator, left, right)
+        if operator == "and":
+            return self.both(left, right)
+        return self.either(self.negated(left) if operator == "implies" else left, right)
+
+    def _arithmetic(self, operator: str, left: Code, right: Code, divisor: Expression) -> Code:
+        is_integer = left.sort is right.sort is Sort.INTEGER and operator != "/"
+        is_native = Unknown.VALUE not in (left.unknown, right.unknown)
+        unknown = Unknown.NAN if Unknown.NAN in (left.unknown, right.unknown) else Unknown.NEVER
+        low, high = MINIMUM_INTEGER, MAXIMUM_INTEGER
+        if is_integer:
+            low, high = arithmetic_bounds(operator, (left.low, left.high), (right.low, right.high))
+            is_native = is_native and low >= MINIMUM_INTEGER and high <= MAXIMUM_INTEGER
+        else:
+            is_native = is_native and operator == "/" and left.sort is Sort.INTEGER and _is_safe_divisor(divisor)
+            left, right = self.as_double(left), self.as_double(right)
+        sort = Sort.INTEGER if is_integer else Sort.DOUBLE
+        if not is_native:
+            return self.call(operator, left, right, sort=sort)
+        return Code(Kind.OPERATION, operator, (left, right), sort, unknown, low, high)
+
+
+def _is_chain(code: Code, operator: str) -> bool:
+    return code.kind is Kind.OPERATION and code.word == operator
+
+
+def _is_safe_divisor(divisor: Expression) -> bool:
+    """Return True if every 32-bit integer divided by it is a finite number."""
+    match divisor:
+        case Constant(value=int() | float() as constant):
+            return abs(constant) >= _LEAST_NATIVE_DIVISOR
+        case _:
+            return False
+
+
+def arithmetic_bounds(operator: str, left: tuple[int, int], right: tuple[int, int]) -> tuple[int, int]:
+    """Least and greatest result of `+`, `-` or `*` on integers."""
+    match operator:
+        case "+":
+            return left[0] + right[0], left[1] + right[1]
+        case "-":
+            return left[0] - right[1], left[1] - right[0]
+        case _:
+            products = [a * b for a in left for b in right]
+            return min(products), max(products)

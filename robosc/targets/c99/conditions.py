@@ -5,7 +5,6 @@ from robosc.expressions import (
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
     IntegerType,
-    StateTest,
     conjuncts,
 )
 from robosc.model.structure import Model
@@ -13,19 +12,11 @@ from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import diagram_domains
 from robosc.targets import acceptance
 from robosc.targets.acceptance import InOneOf, StaysInRange, accepting_conditions, enabling_conditions
-from robosc.targets.c99.expressions import (
-    FALSE_CODE,
-    TRUE_CODE,
-    Code,
-    either,
-    falsity,
-    negated,
-    truth,
-    value,
-)
+from robosc.targets.c99.expressions import code_text
 from robosc.targets.c99.layout import Layout
 from robosc.targets.c99.text import comment
-from robosc.targets.c99.unit import Reading, Unit, low_text
+from robosc.targets.c99.unit import Reading, Unit, low_text, number_code
+from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, Kind, call
 from robosc.targets.code.text import indent
 from robosc.targets.model_text import requirement_text
 
@@ -65,9 +56,7 @@ class Conditions:
         conditions = [item for item in self._conditions(event) if item[1] != TRUE_CODE]
         lines = [f"static bool {self._layout.function('allows', event)}({_SIGNATURE})", "{", "    (void)s;"]
         for words, code in conditions:
-            lines += indent(
-                [*(comment(words) if words else []), f"if ({negated(code).text}) {{", "    return false;", "}"]
-            )
+            lines += indent([*(comment(words) if words else []), *self._reading.unless(code, "return false;")])
         return [*lines, "    return true;", "}"]
 
     def requirements_function(self, communication: str) -> list[str]:
@@ -75,7 +64,7 @@ class Conditions:
         body = []
         for place, requirement in enumerate(self._model.requirements_on(communication)):
             body += comment(requirement_text(requirement))
-            body.append(f"holds[{place}] = {truth(requirement.condition, self._reading.scope).text};")
+            body.append(f"holds[{place}] = {code_text(self._reading.truth(requirement.condition))};")
         return self._filling("requirements", communication, body)
 
     def conjuncts_function(self, communication: str) -> list[str]:
@@ -85,7 +74,7 @@ class Conditions:
             for requirement in self._model.requirements_on(communication)
             for part in conjuncts(requirement.condition)
         ]
-        body = [f"holds[{place}] = {truth(part, self._reading.scope).text};" for place, part in enumerate(parts)]
+        body = [f"holds[{place}] = {code_text(self._reading.truth(part))};" for place, part in enumerate(parts)]
         return self._filling("conjuncts", communication, body)
 
     def _filling(self, purpose: str, communication: str, body: list[str]) -> list[str]:
@@ -104,22 +93,22 @@ class Conditions:
         """Return the code that tests whether a condition holds."""
         match condition:
             case InOneOf(automaton=automaton, locations=locations):
-                return in_one_of(reading, automaton, locations)
+                return reading.in_one_of(automaton, locations)
             case StaysInRange(component=component, state=state, expression=expression, type=type_):
-                fits = self._fits(value(expression, reading.scope), type_)
+                fits = self._fits(reading.value(expression), type_)
                 if fits == TRUE_CODE or state is None:
                     return fits
-                return either(falsity(StateTest(component, state), reading.scope), fits)
+                return reading.either(reading.state_code(component, state, False), fits)
             case _:
-                return truth(condition, reading.scope)
+                return reading.truth(condition)
 
     def _fits(self, code: Code, type_: IntegerType) -> Code:
         """Return the code that tests whether a value is in a range; an unknown one leaves the variable alone."""
         low = MINIMUM_INTEGER if type_.low is None else type_.low
         high = MAXIMUM_INTEGER if type_.high is None else type_.high
-        if not code.may_be_unknown and low <= code.low and code.high <= high:
+        if code.is_within(low, high):
             return TRUE_CODE
-        return Code(f"stays_in_range({code.text}, {low_text(low)}, {low_text(high)})")
+        return call("stays_in_range", code, number_code(low), number_code(high))
 
     def _added_condition(self, event: str) -> list[Condition]:
         diagram = self._layout.supervisor.added_condition(event)
@@ -133,14 +122,14 @@ class Conditions:
         expression = self._formulas.formula(diagram)
         if expression is not None:
             components = frozenset(item.name for item in self._model.components)
-            return in_words(expression, components), truth(expression, self._reading.scope)
+            return in_words(expression, components), self._reading.truth(expression)
         codes = [FALSE_CODE, TRUE_CODE]
         for node in diagram.nodes:
             codes.append(self._node(node, codes))
         return size_in_words(diagram), codes[diagram.root]
 
     def _node(self, node: DecisionNode, codes: list[Code]) -> Code:
-        branches = tuple(codes[child].text for child in node.children)
+        branches = tuple(code_text(codes[child]) for child in node.children)
         key = (node.automaton, node.variable, node.starts, branches)
         if len(branches) == 1:
             return codes[node.children[0]]
@@ -148,7 +137,7 @@ class Conditions:
             name = f"node_{len(self._names) + 1}"
             self._names[key] = name
             self.nodes[name] = self._node_function(name, node, branches)
-        return Code(f"{self._names[key]}(s)")
+        return call(self._names[key], Code(Kind.PLACE, "s"))
 
     def _node_function(self, name: str, node: DecisionNode, branches: tuple[str, ...]) -> list[str]:
         words = node.automaton if node.variable is None else f"{node.automaton}.{node.variable}"
@@ -173,11 +162,3 @@ class Conditions:
         if isinstance(domain[0], bool):
             return f"!{text}"
         return f"{text} < {low_text(int(domain[end])) if isinstance(type_, IntegerType) else end}"
-
-
-def in_one_of(reading: Reading, automaton: str, names: tuple[str, ...]) -> Code:
-    """Return the code that tests whether an automaton is in one of some locations."""
-    result = FALSE_CODE
-    for name in names:
-        result = either(result, reading.in_state(automaton, name))
-    return result

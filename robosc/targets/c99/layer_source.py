@@ -4,14 +4,14 @@ from robosc.errors import InternalError
 from robosc.expressions.text import expression_text
 from robosc.model.received import received_paths
 from robosc.model.structure import Communication, CommunicationKind, EventKind
-from robosc.targets.c99.expressions import truth
+from robosc.targets.c99.expressions import code_text
 from robosc.targets.c99.header import reply_head
 from robosc.targets.c99.layer import call_head, cancel_head, goal_head, request_head, request_parameters
 from robosc.targets.c99.layout import Layout, event_data, possible_messages, request_data, told_apart
 from robosc.targets.c99.received import Reader
 from robosc.targets.c99.step import unknown_name
 from robosc.targets.c99.text import comment
-from robosc.targets.c99.unit import Reading, Unit
+from robosc.targets.c99.unit import Lvalue, Reading, Unit
 from robosc.targets.code.text import indent
 
 _LOOK = "look_at_clock(r, now_us);"
@@ -53,10 +53,10 @@ def _match_function(unit: Unit, item: Communication) -> list[str]:
         raise InternalError(f"{item.name} has no condition")
     parameters = [f"{layout.prefix}_t *r", *([] if data is None else [layout.parameter(data, "data")]), "bool *is_this"]
     lines = ["notes_t notes = {false, false};"]
-    scope = Reading(unit, None).scope
+    reading = Reading(unit, None)
     if data is not None:
         is_pointer = layout.is_by_pointer(data)
-        reader = Reader(unit, data, "(*data)" if is_pointer else "data", "&notes")
+        reader = Reader(unit, data, Lvalue("data", is_pointer), "&notes")
         for path in received_paths(item.when):
             reader.read(path)
         if is_pointer:
@@ -65,14 +65,13 @@ def _match_function(unit: Unit, item: Communication) -> list[str]:
             lines.append("(void)data;")
         lines += reader.take_lines()
         lines += [f"(void){name};" for name in reader.names]
-        scope = Reading(unit, None, reader.read, reader.type_at).scope
-    holds = truth(item.when, scope)
+        reading = Reading(unit, None, reader.read, reader.type_at)
     return [
         f"static int {layout.function('matches', item.name)}({', '.join(parameters)})",
         "{",
         *indent(lines),
         *indent(comment(f"when: {expression_text(item.when)}")),
-        f"    *is_this = {holds.text};",
+        f"    *is_this = {code_text(reading.truth(item.when))};",
         f"    return judge_notes(r, {layout.events[item.event(EventKind.REQUEST)]}, &notes);",
         "}",
     ]

@@ -11,10 +11,11 @@ from robosc.expressions import (
     Type,
 )
 from robosc.model.structure import Communication, ObjectValue, ProvidedValue
-from robosc.targets.c99.expressions import TRUE_CODE, Sort, as_double, truth, value
+from robosc.targets.c99.expressions import atom_text, code_text
 from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.text import comment
-from robosc.targets.c99.unit import Reading, Unit, declared
+from robosc.targets.c99.unit import Reading, Unit, declared, local
+from robosc.targets.code.expressions import TRUE_CODE, Sort
 from robosc.targets.code.text import indent
 from robosc.targets.model_text import provide_text
 
@@ -96,12 +97,12 @@ def provide_function(unit: Unit, item: Communication) -> list[str]:
     lines = [head, "{", "    (void)s;", "    (void)request;"]
     root = request_field(unit, item)
     for statement in unit.layout.model.provides_for(item.name):
-        condition = TRUE_CODE if statement.condition is None else truth(statement.condition, reading.scope)
+        condition = TRUE_CODE if statement.condition is None else reading.truth(statement.condition)
         lines += indent(comment(provide_text(statement)))
         result = _result(unit, item, root, statement.value)
         if condition == TRUE_CODE:
             return [*lines, *indent(result), "}"]
-        lines += [f"    if ({condition.text}) {{", *indent(result, 2), "    }"]
+        lines += [f"    if ({code_text(condition)}) {{", *indent(result, 2), "    }"]
     return [*lines, "    return true;", "}"]
 
 
@@ -129,14 +130,14 @@ def _store(
             else:
                 _store(unit, part, inner, place, into)
         return
-    scope = Reading(unit).scope
-    code = value(provided, scope)
+    reading = Reading(unit)
+    code = reading.value(provided)
     if isinstance(found.type, DoubleType):
-        code = as_double(code)
-    text = code.text
-    if code.may_be_unknown:
+        code = reading.as_double(code)
+    text = code_text(code)
+    if not code.is_known:
         text = f"data_{len(tests) + 1}"
-        lines.append(f"{'' if code.sort is Sort.TEXT else 'const '}{declared(code.sort.c_type, text)} = {code.text};")
+        lines.append(local(code, text))
         tests.append(
             {
                 Sort.DOUBLE: f"!isfinite({text})",
@@ -146,7 +147,7 @@ def _store(
         )
     stores.append(f"{place}.{found.flag} = true;")
     stores.append(
-        f"{place}.{found.value} = {_stored(unit, found.type, text, code.atom if not code.may_be_unknown else text)};"
+        f"{place}.{found.value} = {_stored(unit, found.type, text, atom_text(code) if code.is_known else text)};"
     )
 
 

@@ -18,10 +18,11 @@ from robosc.expressions import (
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path
 from robosc.model.structure import EnumDefinition
-from robosc.targets.c99.expressions import TRUE_CODE, Code, both, falsity, truth
+from robosc.targets.c99.expressions import c_type, code_text
 from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.text import comment
-from robosc.targets.c99.unit import Reading, Unit, declared
+from robosc.targets.c99.unit import Lvalue, Reading, Unit, declared
+from robosc.targets.code.expressions import TRUE_CODE, Code
 from robosc.targets.code.text import indent
 from robosc.targets.paths import path_type
 
@@ -41,7 +42,7 @@ class Reader:
 
     unit: Unit
     root: Type
-    lvalue: str
+    lvalue: Lvalue
     notes: str
     names: dict[str, None] = field(default_factory=dict)
     _lines: list[str] = field(default_factory=list)
@@ -68,22 +69,22 @@ class Reader:
         name = self._namer.name("_".join(["value", *map(str, path)]))
         self.names[name] = None
         is_array = isinstance(type_, ArrayType)
-        c_type = f"const {self.unit.layout.raw(type_)} *" if is_array else code.sort.c_type
+        held = f"const {self.unit.layout.raw(type_)} *" if is_array else c_type(code.sort)
         # The text itself is constant already; of everything else the local variable is.
-        constant = "" if is_array or c_type.endswith("*") else "const "
-        self._lines.append(f"{constant}{declared(c_type, name)} = {code.text};")
+        constant = "" if is_array or held.endswith("*") else "const "
+        self._lines.append(f"{constant}{declared(held, name)} = {code_text(code)};")
         if is_array:
             notable = note_function(self.unit, type_)
             if notable:
                 self._lines.append(f"{notable}({name}, {self.notes});")
-        return Code(name, code.sort, code.may_be_unknown, low=code.low, high=code.high)
+        return code.held_in(name)
 
 
 def note_function(unit: Unit, type_: Type) -> str | None:
     """The function that notes what is unknown in an array's elements, or None if nothing can be noted."""
     if not isinstance(type_, ArrayType):
         return None
-    body = _notes_on(unit, "array->items[k]", type_.element)
+    body = _notes_on(unit, Lvalue("array->items[k]"), type_.element)
     if not body:
         return None
     lines = [
@@ -98,19 +99,19 @@ def note_function(unit: Unit, type_: Type) -> str | None:
     return unit.function("note", "\n".join(lines))
 
 
-def _notes_on(unit: Unit, lvalue: str, type_: Type) -> list[str]:
+def _notes_on(unit: Unit, lvalue: Lvalue, type_: Type) -> list[str]:
     match type_:
         case IntegerType(low=int(), high=int()) | EnumType():
-            return [f"(void){unit.conversion(lvalue, type_, 'notes').text};"]
+            return [f"(void){code_text(unit.conversion(lvalue, type_, 'notes'))};"]
         case ObjectType(name=name):
             return [
                 line
                 for item in unit.layout.model.object(name).properties
-                for line in _notes_on(unit, f"{lvalue}.{unit.layout.properties[name, item.name]}", item.type)
+                for line in _notes_on(unit, lvalue.member(unit.layout.properties[name, item.name]), item.type)
             ]
         case ArrayType():
             inner = note_function(unit, type_)
-            return [f"{inner}(&{lvalue}, notes);"] if inner else []
+            return [f"{inner}({lvalue.address}, notes);"] if inner else []
         case _:
             return []
 
@@ -123,23 +124,23 @@ def converter_head(unit: Unit, enum: EnumDefinition) -> str:
 
 def converter(unit: Unit, enum: EnumDefinition) -> list[str]:
     """The function that makes an enum out of received data, as a readable chain of conditions."""
-    lvalue = "(*data)" if unit.layout.is_by_pointer(enum.source) else "data"
+    lvalue = Lvalue("data", unit.layout.is_by_pointer(enum.source))
     reader = Reader(unit, enum.source, lvalue, "notes")
     reading = Reading(unit, None, reader.read, reader.type_at)
     values = unit.layout.values
     body = ["(void)data;", "(void)notes;"]
     all_false = TRUE_CODE
     for rule in enum.rules:
-        fires = truth(rule.condition, reading.scope)
-        all_false = both(all_false, falsity(rule.condition, reading.scope))
+        fires = reading.truth(rule.condition)
+        all_false = reading.both(all_false, reading.falsity(rule.condition))
         # What only a later rule needs is not read before that rule's turn.
         body += _declared_and_used(reader)
         body += comment(f"{expression_text(rule.condition)} -> {rule.value}")
-        body += [f"if ({fires.text}) {{", f"    return {values[enum.name, rule.value]};", "}"]
+        body += [f"if ({code_text(fires)}) {{", f"    return {values[enum.name, rule.value]};", "}"]
     body += comment(f"default -> {enum.default}")
     if any(_may_be_unknown(rule.condition) for rule in enum.rules):
         body += [
-            f"if (notes != NULL && !({all_false.text})) {{",
+            f"if (notes != NULL && !({code_text(all_false)})) {{",
             "    notes->is_unknown = true;",
             "    notes->is_enum_unknown = true;",
             "}",

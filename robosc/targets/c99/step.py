@@ -17,13 +17,14 @@ from robosc.expressions import (
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
 from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
-from robosc.targets.c99.conditions import Conditions, in_one_of
-from robosc.targets.c99.expressions import FALSE_CODE, TRUE_CODE, Code, Sort, as_double, either, negated, value
+from robosc.targets.c99.conditions import Conditions
+from robosc.targets.c99.expressions import atom_text, c_type, code_text
 from robosc.targets.c99.layout import event_data, width
 from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.received import Reader
 from robosc.targets.c99.text import comment
-from robosc.targets.c99.unit import Reading, Unit, declared, low_text
+from robosc.targets.c99.unit import Lvalue, Reading, Unit, declared, local, low_text
+from robosc.targets.code.expressions import TRUE_CODE, Code, Sort
 from robosc.targets.code.text import indent
 from robosc.targets.events import Branch, branches_of, has_plant_location, is_controllable, plant_step, split
 from robosc.targets.paths import path_type
@@ -54,9 +55,9 @@ class Stepper:
         """Parameters of the step function after the state: one value for each path."""
         self._name_received()
         return [
-            f"const {self.unit.layout.raw(self._type_at(path))} *{code.text}"
+            f"const {self.unit.layout.raw(self._type_at(path))} *{code.word}"
             if isinstance(self._type_at(path), ArrayType)
-            else declared(code.sort.c_type, code.text)
+            else declared(c_type(code.sort), code.word)
             for path, code in self._received.items()
         ]
 
@@ -68,7 +69,7 @@ class Stepper:
             body += self._block(component, behaviour, branches)
         text = "\n".join(body)
         head = ", ".join(["state_t *s", *parameters])
-        unused = [code.text for code in self._received.values()]
+        unused = [code.word for code in self._received.values()]
         return [
             f"static int {self.unit.layout.function('takes', self.event)}({head})",
             "{",
@@ -92,8 +93,8 @@ class Stepper:
             lines.append("    (void)data;")
             if self.paths:
                 is_pointer = layout.is_by_pointer(self.data)
-                reader = Reader(self.unit, self.data, "(*data)" if is_pointer else "data", "&notes")
-                arguments += [reader.read(path).text for path in self.paths]
+                reader = Reader(self.unit, self.data, Lvalue("data", is_pointer), "&notes")
+                arguments += [reader.read(path).word for path in self.paths]
                 lines.append("    notes_t notes = {false, false};")
                 if is_pointer:
                     lines += indent(["if (data == NULL) {", f"    data = &{unknown_name(layout.raw(self.data))};", "}"])
@@ -119,8 +120,8 @@ class Stepper:
             if path not in self._received:
                 name = self._namer.name("_".join(["value", *map(str, path)]))
                 # The declared code of the reader has the same bounds: it is made of the same path.
-                code = Reader(self.unit, self._root, "(*data)", "NULL").read(path)
-                self._received[path] = Code(name, code.sort, code.may_be_unknown, low=code.low, high=code.high)
+                code = Reader(self.unit, self._root, Lvalue("data", True), "NULL").read(path)
+                self._received[path] = code.held_in(name)
 
     @property
     def _root(self) -> Type:
@@ -140,12 +141,12 @@ class Stepper:
         if not is_tau(self.event) and has_plant_location(self.unit.layout.model.communication(name)):
             communication = self.unit.layout.model.communication(name)
             sources, _ = plant_step(communication, EventKind(kind))
-            code = in_one_of(self._reading, communication_plant_name(communication), sources)
-            lines += [f"if ({negated(code).text}) {{", "    return REFUSED;", "}"]
+            code = self._reading.in_one_of(communication_plant_name(communication), sources)
+            lines += self._reading.unless(code, "return REFUSED;")
         if is_controllable(self.event):
             for words, code in self._conditions.accepted(self.event, self._reading):
                 if code != TRUE_CODE:
-                    lines += [*comment(words), f"if ({negated(code).text}) {{", "    return REFUSED;", "}"]
+                    lines += [*comment(words), *self._reading.unless(code, "return REFUSED;")]
         return lines
 
     def _plant(self) -> list[str]:
@@ -168,10 +169,8 @@ class Stepper:
             if body and len(states) == len(behaviour.states):
                 lines += body
             elif body:
-                test = FALSE_CODE
-                for state in states:
-                    test = either(test, self._reading.in_state(component, state))
-                lines += [f"if ({test.text}) {{", *indent(body), "}"]
+                test = self._reading.in_one_of(component, states)
+                lines += [f"if ({code_text(test)}) {{", *indent(body), "}"]
         return lines
 
     def _transition(
@@ -187,20 +186,19 @@ class Stepper:
 
     def _update(self, component: str, variable: Variable, update: Update) -> list[str]:
         place = f"s->{self.unit.layout.variables[component, variable.name][0]}"
-        code = value(update.expression, self._reading.scope)
+        code = self._reading.value(update.expression)
         words = comment(f"{component}: do {variable.name} := {expression_text(update.expression)}")
         if isinstance(variable.type, DoubleType):
-            code = as_double(code)
+            code = self._reading.as_double(code)
         fits = self._fits(variable.type, code)
         cast = stored_cast(variable.type)
         if fits is None:
-            return [*words, f"{place} = {cast}{code.atom if cast else code.text};"]
+            return [*words, f"{place} = {cast}{atom_text(code) if cast else code_text(code)};"]
         self._may_skip = True
         new = self._namer.name(f"new_{variable.name}")
-        constant = "" if code.sort is Sort.TEXT else "const "
         return [
             *words,
-            f"{constant}{declared(code.sort.c_type, new)} = {code.text};",
+            local(code, new),
             f"if ({fits.replace('@', new)}) {{",
             f"    {place} = {cast}{f'({new} != 0)' if isinstance(variable.type, BooleanType) else new};",
             "} else {",
@@ -214,10 +212,10 @@ class Stepper:
         if isinstance(type_, IntegerType):
             low = MINIMUM_INTEGER if type_.low is None else type_.low
             high = MAXIMUM_INTEGER if type_.high is None else type_.high
-            if not code.may_be_unknown and low <= code.low and code.high <= high:
+            if code.is_within(low, high):
                 return None
             return f"@ >= {low_text(low)} && @ <= {low_text(high)}"
-        if not code.may_be_unknown:
+        if code.is_known:
             return None
         if code.sort is Sort.DOUBLE:
             return "isfinite(@)"

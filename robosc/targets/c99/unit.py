@@ -1,14 +1,14 @@
 """Things that all parts of one generated C file share, and the reading of expressions in it."""
 
-import re
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
 
 from robosc.automata import System
 from robosc.errors import InternalError
 from robosc.expressions import (
     ArrayPart,
     ArrayType,
+    BooleanType,
     DoubleType,
     Element,
     EnumType,
@@ -25,9 +25,47 @@ from robosc.expressions import (
 )
 from robosc.model.received import Path
 from robosc.supervisor import Supervisor
-from robosc.targets.c99.expressions import TRUE_CODE, Code, Scope, Sort, code_for, equality, sort_of, value
+from robosc.targets.c99.expressions import CWriter, c_type, code_text, unknown_as, unknown_text
 from robosc.targets.c99.layout import Layout, make_layout
+from robosc.targets.code.expressions import (
+    FALSE_CODE,
+    TRUE_CODE,
+    Code,
+    Kind,
+    Sort,
+    Unknown,
+    call,
+    literal,
+    operation,
+    place,
+    sort_of,
+)
 from robosc.targets.paths import path_type
+
+
+@dataclass(frozen=True, slots=True)
+class Lvalue:
+    """A place that holds received data.
+
+    Attributes:
+        name: Its name, or that of a pointer to it.
+        is_pointed_to: True if it is a pointer's.
+    """
+
+    name: str
+    is_pointed_to: bool = False
+
+    def __str__(self) -> str:
+        return f"(*{self.name})" if self.is_pointed_to else self.name
+
+    def member(self, name: str) -> "Lvalue":
+        """A member of a struct."""
+        return Lvalue(f"{self.name}{'->' if self.is_pointed_to else '.'}{name}")
+
+    @property
+    def address(self) -> str:
+        """Text of its address."""
+        return self.name if self.is_pointed_to else f"&{self.name}"
 
 
 @dataclass
@@ -51,57 +89,49 @@ class Unit:
             self.functions[template] = (name, template.replace("@", name))
         return self.functions[template][0]
 
-    def conversion(self, lvalue: str, type_: Type, notes: str) -> Code:
+    def conversion(self, lvalue: Lvalue, type_: Type, notes: str) -> Code:
         """The value of a type that is made of received data; what must be noted goes to `notes`."""
+        read, noted = Code(Kind.PLACE, str(lvalue)), Code(Kind.PLACE, notes)
         match type_:
             case IntegerType(low=int(low), high=int(high)):
-                return code_for(f"clamped({lvalue}, {low_text(low)}, {low_text(high)}, {notes})", type_, True)
+                code = call("clamped", read, number_code(low), number_code(high), noted)
             case IntegerType():
-                return code_for(f"whole({lvalue})", type_, True)
+                code = call("whole", read)
             case EnumType(name=name):
-                argument = address(lvalue) if self.layout.is_by_pointer(type_) else lvalue
-                return code_for(f"{self.layout.converters[name]}({argument}, {notes})", type_)
+                argument = Code(Kind.PLACE, lvalue.address) if self.layout.is_by_pointer(type_) else read
+                return call(self.layout.converters[name], argument, noted).typed(type_)
             case ArrayType():
-                return Code(address(lvalue), Sort.TEXT)
+                return place(lvalue.address, type_)
             case ObjectType():
                 raise InternalError(f"{lvalue} is no single value")
-        if sort_of(type_) is Sort.BOOLEAN:
-            return code_for(f"boolean_of({lvalue})", type_, True)
-        return code_for(lvalue, type_, True)
+            case BooleanType():
+                code = call("boolean_of", read)
+            case _:
+                code = read
+        return code.typed(type_, unknown_as(sort_of(type_)))
 
-    def access(self, lvalue: str, type_: Type, path: Path) -> tuple[list[str], str, Type]:
+    def access(self, lvalue: Lvalue, type_: Type, path: Path) -> tuple[list[Code], Lvalue, Type]:
         """Return the conditions for a part of received data to be there, its place and its type."""
         guards = []
         for step in path:
             if isinstance(step, int):
-                guards.append(f"{member(lvalue, 'items')} != NULL && {member(lvalue, 'length')} > {step}U")
-                lvalue = f"{member(lvalue, 'items')}[{step}]"
+                read = (Code(Kind.PLACE, str(lvalue.member(name))) for name in ("items", "length"))
+                guards.append(operation("has element", *read, literal(f"{step}U", Sort.INTEGER)))
+                lvalue = Lvalue(f"{lvalue.member('items')}[{step}]")
             elif isinstance(type_, ObjectType):
-                lvalue = member(lvalue, self.layout.properties[type_.name, step])
+                lvalue = lvalue.member(self.layout.properties[type_.name, step])
             type_ = path_type(self.layout.model, type_, (step,))
         return guards, lvalue, type_
 
-    def part(self, lvalue: str, type_: Type, path: Path, notes: str) -> Code:
+    def part(self, lvalue: Lvalue, type_: Type, path: Path, notes: str) -> Code:
         """The value of a part of received data; unknown where it is absent."""
-        guards, place, inner = self.access(lvalue, type_, path)
-        code = self.conversion(place, inner, notes)
+        guards, found, inner = self.access(lvalue, type_, path)
+        code = self.conversion(found, inner, notes)
         if not guards:
             return code
-        absent = "NULL" if isinstance(inner, ArrayType) else code.sort.unknown
-        text = f"({' && '.join(guards)}) ? {code.atom} : {absent}"
-        return Code(text, code.sort, True, is_atom=False, low=code.low, high=code.high)
-
-
-def member(lvalue: str, name: str) -> str:
-    """A member of a struct."""
-    found = re.fullmatch(r"\(\*(\w+)\)", lvalue)
-    return f"{found.group(1)}->{name}" if found else f"{lvalue}.{name}"
-
-
-def address(lvalue: str) -> str:
-    """Return the address of something."""
-    found = re.fullmatch(r"\(\*(\w+)\)", lvalue)
-    return found.group(1) if found else f"&{lvalue}"
+        is_there = guards[0] if len(guards) == 1 else operation("and", *guards)
+        absent = literal(unknown_text(code.sort), code.sort)
+        return operation("if there", is_there, code, absent).typed(inner, unknown_as(code.sort))
 
 
 def low_text(number: int) -> str:
@@ -109,9 +139,20 @@ def low_text(number: int) -> str:
     return str(number) if number > -(2**31) else "(-2147483647 - 1)"
 
 
+def number_code(number: int) -> Code:
+    """A 32-bit number without the suffix of 64 bits, as an argument of a function."""
+    return literal(low_text(number), Sort.INTEGER, number)
+
+
 def declared(c_type: str, name: str) -> str:
     """A declaration of one name."""
     return f"{c_type}{name}" if c_type.endswith("*") else f"{c_type} {name}"
+
+
+def local(code: Code, name: str) -> str:
+    """The declaration of a local variable that holds the value of an expression; a text is constant already."""
+    constant = "" if code.sort is Sort.TEXT else "const "
+    return f"{constant}{declared(c_type(code.sort), name)} = {code_text(code)};"
 
 
 def pointer_to(raw: str, name: str) -> str:
@@ -128,8 +169,8 @@ def _no_type(path: Path) -> Type:
 
 
 @dataclass(frozen=True)
-class Reading:
-    """Reading of expressions at one place of the generated code.
+class Reading(CWriter):
+    """Writer of expressions at one place of the generated code.
 
     Attributes:
         unit: The file.
@@ -143,54 +184,59 @@ class Reading:
     base: str | None = "s->"
     received: Callable[[Path], Code] = _no_received
     received_type: Callable[[Path], Type] = _no_type
-    elements: tuple[tuple[str, Type], ...] = ()
-
-    @property
-    def scope(self) -> Scope:
-        """The scope of expressions."""
-        return Scope(
-            variable=self.variable,
-            in_state=self.in_state,
-            enum_value=lambda enum, name: self.unit.layout.values[enum, name],
-            received=self.received,
-            element=self._element,
-            reduction=self._reduction,
-            quantifier=self._quantifier,
-        )
+    elements: tuple[tuple[Lvalue, Type], ...] = ()
 
     def variable(self, component: str, name: str) -> tuple[str, Type]:
         """Text and type of a variable."""
         attribute, type_ = self.unit.layout.variables[component, name]
         return f"{self.base}{attribute}", type_
 
-    def in_state(self, automaton: str, state: str) -> Code:
-        """Return the code that tests whether an automaton is in a location."""
+    def enum_code(self, enum: str, value: str) -> Code:
+        """The code of an enum's value."""
+        return literal(self.unit.layout.values[enum, value], Sort.ENUM)
+
+    def state_code(self, automaton: str, state: str, is_in: bool = True) -> Code:
+        """Return the code that tests whether an automaton is in a location, or is not."""
         if automaton not in self.unit.layout.locations:
-            return TRUE_CODE  # A message's plant has one location.
-        return equality(self.location(automaton), self.unit.layout.location_names[automaton, state], True)
+            return TRUE_CODE if is_in else FALSE_CODE  # A message's plant has one location.
+        name = literal(self.unit.layout.location_names[automaton, state], Sort.ENUM)
+        return operation("=" if is_in else "!=", Code(Kind.PLACE, self.location(automaton)), name)
+
+    def unless(self, code: Code, statement: str) -> list[str]:
+        """A statement that is executed where a known condition does not hold."""
+        return [f"if ({code_text(self.negated(code))}) {{", f"    {statement}", "}"]
+
+    def in_one_of(self, automaton: str, states: Iterable[str]) -> Code:
+        """Return the code that tests whether an automaton is in one of some locations."""
+        result = FALSE_CODE
+        for state in states:
+            result = self.either(result, self.state_code(automaton, state))
+        return result
+
+    def received_code(self, path: tuple[PathStep, ...]) -> Code:
+        """The code that reads received data."""
+        return self.received(path)
 
     def location(self, automaton: str) -> str:
         """Text of an automaton's location."""
         return f"{self.base}{self.unit.layout.locations[automaton]}"
 
-    def _element(self, level: int, path: tuple[PathStep, ...]) -> Code:
+    def element_code(self, level: int, path: tuple[PathStep, ...]) -> Code:
+        """The code of a part of a quantifier's element."""
         lvalue, type_ = self.elements[level]
         return self.unit.part(lvalue, type_, path, "NULL")
 
-    def _array(self, part: ArrayPart) -> tuple[str, ArrayType]:
+    def _array(self, part: ArrayPart) -> tuple[Code, ArrayType]:
         """Address and type of an array; the address is NULL where it is absent."""
         match part.array:
             case Received(path=path):
-                text, type_ = self.received(path).text, self.received_type(path)
+                code, type_ = self.received(path), self.received_type(path)
             case Element(level=level, path=path):
-                lvalue, outer = self.elements[level]
-                text, type_ = (
-                    self.unit.part(lvalue, outer, path, "NULL").text,
-                    path_type(self.unit.layout.model, outer, path),
-                )
+                code = self.element_code(level, path)
+                type_ = path_type(self.unit.layout.model, self.elements[level][1], path)
         if not isinstance(type_, ArrayType):
-            raise InternalError(f"{text} is no array")
-        return text, type_
+            raise InternalError(f"{code_text(code)} is no array")
+        return code, type_
 
     def _loop(self, part: ArrayPart) -> tuple[str, str]:
         """Return the number of elements that are looked at, and the place of the one with number `k`."""
@@ -199,8 +245,9 @@ class Reading:
         bounds = f"array->length, {part.low}U"
         return f"part_count({bounds}, {part.high}U)", f"part_index({bounds}, k)"
 
-    def _reduction(self, expression: Reduction) -> Code:
-        text, type_ = self._array(expression.part)
+    def reduction_code(self, expression: Reduction) -> Code:
+        """The code of a reduction."""
+        array, type_ = self._array(expression.part)
         count, index = self._loop(expression.part)
         raw = self.unit.layout.raw(type_)
         nothing = "array == NULL || array->items == NULL"
@@ -210,21 +257,21 @@ class Reading:
                 f"static int64_t @(const {raw} *array)\n{{\n"
                 f"    return ({nothing}) ? INT64_MIN : (int64_t)({count});\n}}",
             )
-            return Code(f"{name}({text})", Sort.INTEGER, True, low=0)
-        element = self.unit.conversion("array->items[place]", type_.element, "NULL")
-        code = code_for("", type_.element, True)
-        unknown, sort = code.sort.unknown, code.sort
+            return replace(call(name, array, sort=Sort.INTEGER, unknown=Unknown.VALUE), low=0)
+        element = self.unit.conversion(Lvalue("array->items[place]"), type_.element, "NULL")
+        sort = sort_of(type_.element)
+        unknown, held = unknown_text(sort), c_type(sort)
         skip = "isnan(item)" if isinstance(type_.element, DoubleType) else None
         operator = "<" if expression.function == "min" else ">"
         lines = [
-            f"static {sort.c_type} @(const {raw} *array)",
+            f"static {held} @(const {raw} *array)",
             "{",
-            f"    {sort.c_type} found = {unknown};",
+            f"    {held} found = {unknown};",
             "    bool is_found = false;",
             f"    const size_t count = ({nothing}) ? 0 : {count};",
             "    for (size_t k = 0; k < count; k++) {",
             f"        const size_t place = {index};",
-            f"        const {sort.c_type} item = {element.text};",
+            f"        const {held} item = {code_text(element)};",
         ]
         if skip is None:
             lines += [f"        if (item == {unknown}) {{", f"            return {unknown};", "        }"]
@@ -241,32 +288,33 @@ class Reading:
             "}",
         ]
         name = self.unit.function(expression.function + "imum", "\n".join(lines))
-        return Code(f"{name}({text})", sort, True, low=code.low, high=code.high)
+        return call(name, array).typed(type_.element, unknown_as(sort))
 
-    def _quantifier(self, expression: Quantifier) -> Code:
-        text, type_ = self._array(expression.part)
+    def quantifier_code(self, expression: Quantifier) -> Code:
+        """The code of a quantifier."""
+        array, type_ = self._array(expression.part)
         count, index = self._loop(expression.part)
         raw = self.unit.layout.raw
-        parameters, arguments = [f"const {raw(type_)} *array"], [text]
+        parameters, arguments = [f"const {raw(type_)} *array"], [array]
         found = leaves(expression.condition)
         if any(isinstance(leaf, VariableRead | StateTest) for leaf in found):
             parameters.append("const state_t *s")
-            arguments.append("s" if self.base == "s->" else "&old")
+            arguments.append(Code(Kind.PLACE, "s" if self.base == "s->" else "&old"))
         codes: dict[Path, Code] = {}
         for path in dict.fromkeys(leaf.path for leaf in found if isinstance(leaf, Received)):
             outer, name = self.received(path), f"value_{len(codes) + 1}"
             is_array = isinstance(self.received_type(path), ArrayType)
-            c_type = f"const {raw(self.received_type(path))} *" if is_array else outer.sort.c_type
-            parameters.append(declared(c_type, name))
-            arguments.append(outer.text)
-            codes[path] = Code(name, outer.sort, outer.may_be_unknown, low=outer.low, high=outer.high)
-        elements: list[tuple[str, Type]] = [("(*item)", type_.element)]
+            held = f"const {raw(self.received_type(path))} *" if is_array else c_type(outer.sort)
+            parameters.append(declared(held, name))
+            arguments.append(outer)
+            codes[path] = outer.held_in(name)
+        elements: list[tuple[Lvalue, Type]] = [(Lvalue("item", True), type_.element)]
         for number, (lvalue, outer_type) in enumerate(self.elements):
             parameters.append(pointer_to(raw(outer_type), f"outer_{number + 1}"))
-            arguments.append(address(lvalue))
-            elements.append((f"(*outer_{number + 1})", outer_type))
+            arguments.append(Code(Kind.PLACE, lvalue.address))
+            elements.append((Lvalue(f"outer_{number + 1}", True), outer_type))
         inner = Reading(self.unit, "s->", codes.__getitem__, self.received_type, tuple(elements))
-        condition = value(expression.condition, inner.scope)
+        condition = inner.value(expression.condition)
         ends = int(expression.word == "any")
         lines = [
             f"static int @({', '.join(parameters)})",
@@ -276,7 +324,7 @@ class Reading:
             *(f"    (void){item.rpartition(' ')[2].lstrip('*')};" for item in parameters[1:]),
             "    for (size_t k = 0; k < count; k++) {",
             f"        {pointer_to(raw(type_.element), 'item')} = &array->items[{index}];",
-            f"        const int holds = {condition.text};",
+            f"        const int holds = {code_text(condition)};",
             "        (void)item;",
             f"        if (holds == {ends}) {{",
             f"            return {ends};",
@@ -288,9 +336,8 @@ class Reading:
             "    return result;",
             "}",
         ]
-        return Code(
-            f"{self.unit.function(expression.word, chr(10).join(lines))}({', '.join(arguments)})", Sort.BOOLEAN, True
-        )
+        name = self.unit.function(expression.word, "\n".join(lines))
+        return call(name, *arguments, unknown=Unknown.VALUE)
 
 
 def make_unit(supervisor: Supervisor, prefix: str | None) -> Unit:

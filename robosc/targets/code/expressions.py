@@ -81,6 +81,10 @@ class Code:
         """The same expression, which yields a value of a type."""
         return replace(self, sort=sort_of(type_), unknown=unknown, low=bounds_of(type_)[0], high=bounds_of(type_)[1])
 
+    def held_in(self, name: str) -> "Code":
+        """The code of a local variable that holds its value."""
+        return replace(self, kind=Kind.PLACE, word=name, operands=())
+
     def pieces(self) -> Iterator["Code"]:
         """The expression and everything in it."""
         stack = [self]

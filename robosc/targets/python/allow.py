@@ -10,6 +10,7 @@ from robosc.targets import acceptance
 from robosc.targets.acceptance import InOneOf, StaysInRange, accepting_conditions, enabling_conditions
 from robosc.targets.code.expressions import TRUE_CODE, Code, Sort, call, integer, literal, operation
 from robosc.targets.code.text import indent
+from robosc.targets.model_text import requirement_text
 from robosc.targets.python.changes import reads
 from robosc.targets.python.expressions import PYTHON, Precedence, code_text
 from robosc.targets.python.text import comment, docstring

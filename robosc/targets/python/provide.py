@@ -3,6 +3,7 @@
 from robosc.model.structure import ObjectValue, ProvidedValue
 from robosc.targets.code.expressions import TRUE_CODE
 from robosc.targets.code.text import indent
+from robosc.targets.model_text import provide_text
 from robosc.targets.python.expressions import code_text
 from robosc.targets.python.text import comment, docstring
 from robosc.targets.python.writer import Writer

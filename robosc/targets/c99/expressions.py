@@ -96,6 +96,16 @@ def unknown_as(sort: Sort) -> Unknown:
     return Unknown.NAN if sort is Sort.DOUBLE else Unknown.VALUE
 
 
+def low_text(number: int) -> str:
+    """A 32-bit number as C, the least one too."""
+    return str(number) if number > MINIMUM_INTEGER else "(-2147483647 - 1)"
+
+
+def number_code(number: int) -> Code:
+    """A 32-bit number without the suffix of 64 bits, as an argument of a function."""
+    return literal(low_text(number), Sort.INTEGER, number)
+
+
 def atom_text(code: Code) -> str:
     """The text of an expression, in parentheses unless it needs none."""
     return C.within(code, ATOM)
@@ -129,8 +139,7 @@ class CWriter(ExpressionWriter):
     def variable(self, component: str, name: str) -> tuple[str, Type]:
         """Text and type of a variable."""
 
-    def constant_code(self, constant: bool | int | float | str) -> Code:
-        """The code of a constant."""
+    def _constant_code(self, constant: bool | int | float | str) -> Code:
         match constant:
             case bool():
                 return TRUE_CODE if constant else FALSE_CODE
@@ -151,13 +160,11 @@ class CWriter(ExpressionWriter):
             return operation("int64", place(text, type_)).typed(type_)
         return place(text, type_)
 
-    def call(self, function: str, *arguments: Code, sort: Sort = Sort.BOOLEAN) -> Code:
-        """A call of a function of the unit; its result may be unknown."""
+    def _kleene_call(self, function: str, *arguments: Code, sort: Sort = Sort.BOOLEAN) -> Code:
         name = f"{_FUNCTIONS.get(function, function)}_{_TYPES[arguments[-1].sort][1]}"
         return call(name, *arguments, sort=sort, unknown=unknown_as(sort))
 
-    def function_code(self, function: str, arguments: list[Code]) -> Code:
-        """The code of a function of numbers: known wherever its arguments are, unless it leaves 32 bits."""
+    def _function_code(self, function: str, arguments: list[Code]) -> Code:
         first = arguments[0]
         if function == "double":
             return self.as_double(first)
@@ -169,7 +176,7 @@ class CWriter(ExpressionWriter):
         is_integer = all(item.sort is Sort.INTEGER for item in arguments)
         sort = Sort.INTEGER if is_integer else Sort.DOUBLE
         codes = arguments if is_integer else [self.as_double(item) for item in arguments]
-        return self.bounded_call(function, arguments, self.call(function, *codes, sort=sort))
+        return self._bounded_call(function, arguments, self._kleene_call(function, *codes, sort=sort))
 
     def as_double(self, code: Code) -> Code:
         """A number as a double."""
@@ -179,30 +186,25 @@ class CWriter(ExpressionWriter):
             return call("double_of", code, sort=Sort.DOUBLE, unknown=Unknown.NAN)
         return operation("double", code, sort=Sort.DOUBLE)
 
-    def alike(self, left: Code, right: Code) -> tuple[Code, Code]:
-        """Two codes of one sort: where one is a double, both are."""
+    def _alike(self, left: Code, right: Code) -> tuple[Code, Code]:
         if left.sort is right.sort or Sort.DOUBLE not in (left.sort, right.sort):
             return left, right
         return self.as_double(left), self.as_double(right)
 
-    def joined_unknown(self, left: Code, right: Code) -> Unknown:
-        """Way in which something is unknown that is one of two codes."""
+    def _joined_unknown(self, left: Code, right: Code) -> Unknown:
         return left.unknown if right.is_known else right.unknown
 
-    def join(self, operator: str, operands: tuple[Code, ...]) -> Code:
-        """A native conjunction or disjunction of known conditions, none of which is constant."""
+    def _join(self, operator: str, operands: tuple[Code, ...]) -> Code:
         if _is_decided(operator, operands):
             return FALSE_CODE if operator == "and" else TRUE_CODE
         return operation(operator, *operands)
 
-    def negate_condition(self, code: Code) -> Code:
-        """Native negation of a known condition that is not constant."""
+    def _negate_condition(self, code: Code) -> Code:
         if _tested(code) is None or code.kind is Kind.PLACE:
             return operation("not", code)
         return code.operands[0] if code.word == "not" else operation(OPPOSITE[code.word], *code.operands)
 
-    def compare(self, operator: str, left: Code, right: Code) -> Code:
-        """A native comparison of known values."""
+    def _compare(self, operator: str, left: Code, right: Code) -> Code:
         if left == right:  # Compilers warn about a comparison of something with itself.
             return TRUE_CODE if operator in ("=", "<=", ">=") else FALSE_CODE
         if left.sort is Sort.INTEGER and (decided := _by_bounds(operator, left, right)) is not None:
@@ -211,22 +213,22 @@ class CWriter(ExpressionWriter):
             return operation(operator, call("strcmp", left, right), literal("0", Sort.TEXT))
         return operation(operator, left, right)
 
-    def nan_comparison(self, operator: str, left: Code, right: Code) -> Code | None:
-        """A native comparison that is false where a number is NaN, or None if there is none."""
+    def _stays_in_range(self, code: Code, low: int, high: int) -> Code:
+        return call("stays_in_range", code, number_code(low), number_code(high))
+
+    def _nan_comparison(self, operator: str, left: Code, right: Code) -> Code | None:
         is_native = left.sort is Sort.DOUBLE and operator != "!=" and left != right  # `!=` is true for NaN.
         return operation(operator, left, right) if is_native else None
 
-    def kleene_comparison(self, operator: str, left: Code, right: Code) -> Code:
-        """A comparison of values that may be unknown."""
+    def _kleene_comparison(self, operator: str, left: Code, right: Code) -> Code:
         if operator == "!=":
-            return self.kleene_not(self.call("=", left, right))
+            return self._kleene_not(self._kleene_call("=", left, right))
         if operator in (">", ">="):
-            return self.call({">": "<", ">=": "<="}[operator], right, left)
-        return self.call(operator, left, right)
+            return self._kleene_call({">": "<", ">=": "<="}[operator], right, left)
+        return self._kleene_call(operator, left, right)
 
-    def kleene_implication(self, left: Code, right: Code) -> Code:
-        """An implication between conditions that may be unknown."""
-        return self.call("or", self.kleene_not(left), right)
+    def _kleene_implication(self, left: Code, right: Code) -> Code:
+        return self._kleene_call("or", self._kleene_not(left), right)
 
 
 def _by_bounds(operator: str, left: Code, right: Code) -> Code | None:

@@ -4,16 +4,10 @@ from dataclasses import dataclass, field
 
 from robosc.expressions import (
     ArrayType,
-    Binary,
-    Call,
     EnumType,
-    Expression,
     IntegerType,
     ObjectType,
-    Received,
     Type,
-    Unary,
-    children,
 )
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path
@@ -22,11 +16,10 @@ from robosc.targets.c99.expressions import c_type, code_text
 from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.text import comment
 from robosc.targets.c99.unit import Lvalue, Reading, Unit, declared
+from robosc.targets.code.expression_writer import may_compute
 from robosc.targets.code.expressions import TRUE_CODE, Code
 from robosc.targets.code.text import indent
 from robosc.targets.paths import path_type
-
-_ARITHMETIC = frozenset({"+", "-", "*", "/"})
 
 
 @dataclass
@@ -138,7 +131,7 @@ def converter(unit: Unit, enum: EnumDefinition) -> list[str]:
         body += comment(f"{expression_text(rule.condition)} -> {rule.value}")
         body += [f"if ({code_text(fires)}) {{", f"    return {values[enum.name, rule.value]};", "}"]
     body += comment(f"default -> {enum.default}")
-    if any(_may_be_unknown(rule.condition) for rule in enum.rules):
+    if may_compute(rule.condition for rule in enum.rules):
         body += [
             f"if (notes != NULL && !({code_text(all_false)})) {{",
             "    notes->is_unknown = true;",
@@ -154,15 +147,3 @@ def _declared_and_used(reader: Reader) -> list[str]:
     lines = reader.take_lines()
     names, reader.names = list(reader.names), {}
     return [*lines, *(f"(void){name};" for name in names)]
-
-
-def _may_be_unknown(condition: Expression) -> bool:
-    """Return True if a condition reads received data or computes: even constants can leave 32 bits."""
-    stack = [condition]
-    while stack:
-        node = stack.pop()
-        computes = isinstance(node, Binary | Unary) and node.operator in _ARITHMETIC
-        if computes or isinstance(node, Received | Call):
-            return True
-        stack.extend(children(node))
-    return False

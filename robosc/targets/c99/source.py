@@ -6,7 +6,8 @@ from robosc.automata.plants import communication_plant_name
 from robosc.expressions import ArrayType, BooleanType, DoubleType, EnumType, IntegerType, NoneType, ObjectType, Type
 from robosc.model.received import converted_paths
 from robosc.model.structure import CommunicationKind, EventKind, is_tau
-from robosc.targets.c99.conditions import Conditions
+from robosc.targets.c99.conditions import CConditions
+from robosc.targets.c99.expressions import low_text
 from robosc.targets.c99.header import batch, batch_parameters, counts, head, receive_head, reply_head, runtime_text
 from robosc.targets.c99.helpers import HELPERS
 from robosc.targets.c99.layer_source import happen_call, reply_functions, request_functions
@@ -15,7 +16,7 @@ from robosc.targets.c99.provide import default_function, provide_function
 from robosc.targets.c99.received import converter, converter_head
 from robosc.targets.c99.step import Stepper, unknown_name
 from robosc.targets.c99.text import string_literal
-from robosc.targets.c99.unit import Unit, low_text
+from robosc.targets.c99.unit import Unit
 from robosc.targets.code.text import indent
 from robosc.targets.events import has_plant_location, is_controllable, split
 
@@ -27,9 +28,9 @@ _LAYER_ENGINE = tuple(f"{part}.c" for part in "log releases goals steps rest cal
 def source_file(unit: Unit) -> str:
     """The text of `<robot>.c`."""
     layout = unit.layout
-    conditions = Conditions(unit)
+    conditions = CConditions(unit)
     allows = [conditions.allow_function(event) for event in layout.controllable]
-    steppers = [Stepper(unit, conditions, event) for event in layout.events if not _never_taken(layout, event)]
+    steppers = [Stepper(unit, event) for event in layout.events if not _never_taken(layout, event)]
     steps = [item.step_function() for item in steppers]
     happens = [item.happen_function() for item in steppers if _happens(layout, item.event)]
     messages = layout.of_kind(CommunicationKind.INCOMING_MESSAGE)

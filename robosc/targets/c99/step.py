@@ -17,14 +17,14 @@ from robosc.expressions import (
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
 from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
-from robosc.targets.c99.conditions import Conditions
-from robosc.targets.c99.expressions import atom_text, c_type, code_text
+from robosc.targets.c99.expressions import atom_text, c_type, code_text, low_text
 from robosc.targets.c99.layout import event_data, width
 from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.received import Reader
 from robosc.targets.c99.text import comment
-from robosc.targets.c99.unit import Lvalue, Reading, Unit, declared, local, low_text
-from robosc.targets.code.expressions import TRUE_CODE, Code, Sort
+from robosc.targets.c99.unit import Lvalue, Reading, Unit, declared, local
+from robosc.targets.code.conditions import accepted
+from robosc.targets.code.expressions import Code, Sort
 from robosc.targets.code.text import indent
 from robosc.targets.events import Branch, branches_of, has_plant_location, is_controllable, plant_step, split
 from robosc.targets.paths import path_type
@@ -35,14 +35,12 @@ class Stepper:
 
     Args:
         unit: The file.
-        conditions: Tells where controllable events are accepted.
         event: The event.
     """
 
-    def __init__(self, unit: Unit, conditions: Conditions, event: str) -> None:
+    def __init__(self, unit: Unit, event: str) -> None:
         self.unit = unit
         self.event = event
-        self._conditions = conditions
         self.data = None if is_tau(event) else event_data(unit.layout.model, event)
         self.paths = converted_paths(unit.layout.model, event) if self.data is not None else ()
         self._namer = CNamer(frozenset({"data", "notes", "s", "old", "skipped", "r"}))
@@ -144,9 +142,8 @@ class Stepper:
             code = self._reading.in_one_of(communication_plant_name(communication), sources)
             lines += self._reading.unless(code, "return REFUSED;")
         if is_controllable(self.event):
-            for words, code in self._conditions.accepted(self.event, self._reading):
-                if code != TRUE_CODE:
-                    lines += [*comment(words), *self._reading.unless(code, "return REFUSED;")]
+            for words, code in accepted(self.unit.layout.model, self.event, self._reading):
+                lines += [*comment(words), *self._reading.unless(code, "return REFUSED;")]
         return lines
 
     def _plant(self) -> list[str]:

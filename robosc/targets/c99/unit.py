@@ -1,6 +1,6 @@
 """Things that all parts of one generated C file share, and the reading of expressions in it."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from robosc.automata import System
@@ -25,8 +25,9 @@ from robosc.expressions import (
 )
 from robosc.model.received import Path
 from robosc.supervisor import Supervisor
-from robosc.targets.c99.expressions import CWriter, c_type, code_text, unknown_as, unknown_text
+from robosc.targets.c99.expressions import CWriter, c_type, code_text, number_code, unknown_as, unknown_text
 from robosc.targets.c99.layout import Layout, make_layout
+from robosc.targets.code.expression_writer import read_nothing
 from robosc.targets.code.expressions import (
     FALSE_CODE,
     TRUE_CODE,
@@ -134,16 +135,6 @@ class Unit:
         return operation("if there", is_there, code, absent).typed(inner, unknown_as(code.sort))
 
 
-def low_text(number: int) -> str:
-    """A 32-bit number as C, the least one too."""
-    return str(number) if number > -(2**31) else "(-2147483647 - 1)"
-
-
-def number_code(number: int) -> Code:
-    """A 32-bit number without the suffix of 64 bits, as an argument of a function."""
-    return literal(low_text(number), Sort.INTEGER, number)
-
-
 def declared(c_type: str, name: str) -> str:
     """A declaration of one name."""
     return f"{c_type}{name}" if c_type.endswith("*") else f"{c_type} {name}"
@@ -160,14 +151,6 @@ def pointer_to(raw: str, name: str) -> str:
     return f"{raw}const *{name}" if raw.endswith("*") else f"const {raw} *{name}"
 
 
-def _no_received(path: Path) -> Code:
-    raise InternalError("a condition on the state reads received data")
-
-
-def _no_type(path: Path) -> Type:
-    raise InternalError("a condition on the state reads received data")
-
-
 @dataclass(frozen=True)
 class Reading(CWriter):
     """Writer of expressions at one place of the generated code.
@@ -182,8 +165,8 @@ class Reading(CWriter):
 
     unit: Unit
     base: str | None = "s->"
-    received: Callable[[Path], Code] = _no_received
-    received_type: Callable[[Path], Type] = _no_type
+    received: Callable[[Path], Code] = read_nothing
+    received_type: Callable[[Path], Type] = read_nothing
     elements: tuple[tuple[Lvalue, Type], ...] = ()
 
     def variable(self, component: str, name: str) -> tuple[str, Type]:
@@ -191,8 +174,7 @@ class Reading(CWriter):
         attribute, type_ = self.unit.layout.variables[component, name]
         return f"{self.base}{attribute}", type_
 
-    def enum_code(self, enum: str, value: str) -> Code:
-        """The code of an enum's value."""
+    def _enum_code(self, enum: str, value: str) -> Code:
         return literal(self.unit.layout.values[enum, value], Sort.ENUM)
 
     def state_code(self, automaton: str, state: str, is_in: bool = True) -> Code:
@@ -206,23 +188,14 @@ class Reading(CWriter):
         """A statement that is executed where a known condition does not hold."""
         return [f"if ({code_text(self.negated(code))}) {{", f"    {statement}", "}"]
 
-    def in_one_of(self, automaton: str, states: Iterable[str]) -> Code:
-        """Return the code that tests whether an automaton is in one of some locations."""
-        result = FALSE_CODE
-        for state in states:
-            result = self.either(result, self.state_code(automaton, state))
-        return result
-
-    def received_code(self, path: tuple[PathStep, ...]) -> Code:
-        """The code that reads received data."""
+    def _received_code(self, path: tuple[PathStep, ...]) -> Code:
         return self.received(path)
 
     def location(self, automaton: str) -> str:
         """Text of an automaton's location."""
         return f"{self.base}{self.unit.layout.locations[automaton]}"
 
-    def element_code(self, level: int, path: tuple[PathStep, ...]) -> Code:
-        """The code of a part of a quantifier's element."""
+    def _element_code(self, level: int, path: tuple[PathStep, ...]) -> Code:
         lvalue, type_ = self.elements[level]
         return self.unit.part(lvalue, type_, path, "NULL")
 
@@ -232,7 +205,7 @@ class Reading(CWriter):
             case Received(path=path):
                 code, type_ = self.received(path), self.received_type(path)
             case Element(level=level, path=path):
-                code = self.element_code(level, path)
+                code = self._element_code(level, path)
                 type_ = path_type(self.unit.layout.model, self.elements[level][1], path)
         if not isinstance(type_, ArrayType):
             raise InternalError(f"{code_text(code)} is no array")
@@ -245,8 +218,7 @@ class Reading(CWriter):
         bounds = f"array->length, {part.low}U"
         return f"part_count({bounds}, {part.high}U)", f"part_index({bounds}, k)"
 
-    def reduction_code(self, expression: Reduction) -> Code:
-        """The code of a reduction."""
+    def _reduction_code(self, expression: Reduction) -> Code:
         array, type_ = self._array(expression.part)
         count, index = self._loop(expression.part)
         raw = self.unit.layout.raw(type_)
@@ -290,8 +262,7 @@ class Reading(CWriter):
         name = self.unit.function(expression.function + "imum", "\n".join(lines))
         return call(name, array).typed(type_.element, unknown_as(sort))
 
-    def quantifier_code(self, expression: Quantifier) -> Code:
-        """The code of a quantifier."""
+    def _quantifier_code(self, expression: Quantifier) -> Code:
         array, type_ = self._array(expression.part)
         count, index = self._loop(expression.part)
         raw = self.unit.layout.raw

@@ -9,8 +9,11 @@ A number that is unknown as NaN is compared natively: the comparisons of IEEE 75
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import replace
+from typing import NoReturn
 
+from robosc.errors import InternalError
 from robosc.expressions import (
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
@@ -28,15 +31,38 @@ from robosc.expressions import (
     StateTest,
     Unary,
     VariableRead,
+    children,
 )
 from robosc.expressions.bounds import call_bounds
-from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, Kind, Sort, Unknown, operation
+from robosc.targets.acceptance import Condition, InOneOf, StaysInRange
+from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, Kind, Sort, Unknown, bounds_of, operation
 
+_ARITHMETIC = frozenset({"+", "-", "*", "/"})
 COMPARISONS = ("=", "!=", "<", "<=", ">", ">=")
 OPPOSITE = {"=": "!=", "!=": "=", "<": ">=", "<=": ">", ">": "<=", ">=": "<"}
 
 _LEAST_NATIVE_DIVISOR = 1e-6
 """A 32-bit integer divided by something this large or larger stays finite."""
+
+
+def read_nothing(*what: object) -> NoReturn:
+    """The meaning of what cannot be read at a place of the generated code.
+
+    Raises:
+        InternalError: Always.
+    """
+    raise InternalError(f"an expression reads what it cannot: {what}")
+
+
+def may_compute(conditions: Iterable[Expression]) -> bool:
+    """Return True if a condition reads received data or computes: even constants can leave 32 bits."""
+    stack = list(conditions)
+    while stack:
+        node = stack.pop()
+        if isinstance(node, Received | Call) or getattr(node, "operator", None) in _ARITHMETIC:
+            return True
+        stack.extend(children(node))
+    return False
 
 
 class ExpressionWriter(ABC):
@@ -45,11 +71,11 @@ class ExpressionWriter(ABC):
     # What the expressions read
 
     @abstractmethod
-    def constant_code(self, constant: bool | int | float | str) -> Code:
+    def _constant_code(self, constant: bool | int | float | str) -> Code:
         """The code of a constant."""
 
     @abstractmethod
-    def enum_code(self, enum: str, value: str) -> Code:
+    def _enum_code(self, enum: str, value: str) -> Code:
         """The code of an enum's value."""
 
     @abstractmethod
@@ -61,36 +87,40 @@ class ExpressionWriter(ABC):
         """Return the code that tests whether an automaton is in a location, or is not."""
 
     @abstractmethod
-    def received_code(self, path: tuple[PathStep, ...]) -> Code:
+    def _received_code(self, path: tuple[PathStep, ...]) -> Code:
         """The code that reads received data."""
 
     @abstractmethod
-    def element_code(self, level: int, path: tuple[PathStep, ...]) -> Code:
+    def _element_code(self, level: int, path: tuple[PathStep, ...]) -> Code:
         """The code of a part of a quantifier's element."""
 
     @abstractmethod
-    def reduction_code(self, expression: Reduction) -> Code:
+    def _reduction_code(self, expression: Reduction) -> Code:
         """The code of a reduction."""
 
     @abstractmethod
-    def quantifier_code(self, expression: Quantifier) -> Code:
+    def _quantifier_code(self, expression: Quantifier) -> Code:
         """The code of a quantifier."""
 
     # What the language offers
 
     @abstractmethod
-    def call(self, function: str, *arguments: Code, sort: Sort = Sort.BOOLEAN) -> Code:
+    def _kleene_call(self, function: str, *arguments: Code, sort: Sort = Sort.BOOLEAN) -> Code:
         """A call of a Kleene function, named like the operator or function of RoboSC; its result may be unknown."""
 
     @abstractmethod
-    def function_code(self, function: str, arguments: list[Code]) -> Code:
+    def _function_code(self, function: str, arguments: list[Code]) -> Code:
         """The code of a function of numbers: known wherever its arguments are, unless it leaves 32 bits."""
 
     @abstractmethod
-    def nan_comparison(self, operator: str, left: Code, right: Code) -> Code | None:
+    def _stays_in_range(self, code: Code, low: int, high: int) -> Code:
+        """Return the code that tests whether an integer is in a range; an unknown one leaves its variable alone."""
+
+    @abstractmethod
+    def _nan_comparison(self, operator: str, left: Code, right: Code) -> Code | None:
         """A native comparison that is false where a number is NaN, or None if there is none."""
 
-    def alike(self, left: Code, right: Code) -> tuple[Code, Code]:
+    def _alike(self, left: Code, right: Code) -> tuple[Code, Code]:
         """Two operands as native operations take them."""
         return left, right
 
@@ -98,29 +128,29 @@ class ExpressionWriter(ABC):
         """A number as an operation on doubles takes it."""
         return code
 
-    def joined_unknown(self, left: Code, right: Code) -> Unknown:
+    def _joined_unknown(self, left: Code, right: Code) -> Unknown:
         """Way in which something is unknown that is one of two codes."""
         return left.unknown if left.unknown is right.unknown else Unknown.VALUE
 
-    def compare(self, operator: str, left: Code, right: Code) -> Code:
+    def _compare(self, operator: str, left: Code, right: Code) -> Code:
         """A native comparison of known values."""
         return operation(operator, left, right)
 
-    def join(self, operator: str, operands: tuple[Code, ...]) -> Code:
+    def _join(self, operator: str, operands: tuple[Code, ...]) -> Code:
         """A native conjunction or disjunction of known conditions, none of which is constant."""
         return operation(operator, *operands)
 
-    def negate_condition(self, code: Code) -> Code:
+    def _negate_condition(self, code: Code) -> Code:
         """Native negation of a known condition that is not constant."""
         return operation("not", code)
 
-    def kleene_comparison(self, operator: str, left: Code, right: Code) -> Code:
+    def _kleene_comparison(self, operator: str, left: Code, right: Code) -> Code:
         """A comparison of values that may be unknown."""
-        return self.call(operator, left, right)
+        return self._kleene_call(operator, left, right)
 
-    def kleene_implication(self, left: Code, right: Code) -> Code:
+    def _kleene_implication(self, left: Code, right: Code) -> Code:
         """An implication between conditions that may be unknown."""
-        return self.call("implies", left, right)
+        return self._kleene_call("implies", left, right)
 
     # The three readings
 
@@ -128,19 +158,19 @@ class ExpressionWriter(ABC):
         """The value of an expression."""
         match expression:
             case Constant(value=constant):
-                return self.constant_code(constant)
+                return self._constant_code(constant)
             case EnumValue(enum=enum, value=name):
-                return self.enum_code(enum, name)
+                return self._enum_code(enum, name)
             case VariableRead(component=component, variable=variable):
                 return self.variable_code(component, variable)
             case StateTest(component=component, state=state):
                 return self.state_code(component, state)
             case Received(path=path):
-                return self.received_code(path)
+                return self._received_code(path)
             case Unary(operator="holds", operand=operand):
                 return self.truth(operand)
             case Unary(operator="not", operand=operand):
-                return self.kleene_not(self.value(operand))
+                return self._kleene_not(self.value(operand))
             case Unary(operand=operand):
                 return self._negate(self.value(operand))
             case Binary(operator=operator, left=left, right=right):
@@ -148,13 +178,13 @@ class ExpressionWriter(ABC):
             case Conditional(condition=condition, then=then, otherwise=otherwise):
                 return self._conditional(self.value(condition), self.value(then), self.value(otherwise))
             case Call(function=function, arguments=arguments):
-                return self.function_code(function, [self.value(item) for item in arguments])
+                return self._function_code(function, [self.value(item) for item in arguments])
             case Element(level=level, path=path):
-                return self.element_code(level, path)
+                return self._element_code(level, path)
             case Reduction():
-                return self.reduction_code(expression)
+                return self._reduction_code(expression)
             case Quantifier():
-                return self.quantifier_code(expression)
+                return self._quantifier_code(expression)
 
     def truth(self, expression: Expression) -> Code:
         """Return the code that tests whether a boolean expression is true; never unknown."""
@@ -196,17 +226,17 @@ class ExpressionWriter(ABC):
         if neutral in (left, right):
             return right if left == neutral else left
         sides = (item.operands if _is_chain(item, operator) else (item,) for item in (left, right))
-        return self.join(operator, tuple(operand for side in sides for operand in side))
+        return self._join(operator, tuple(operand for side in sides for operand in side))
 
     def negated(self, code: Code) -> Code:
         """Native negation of a known condition, simplified."""
         if code in (TRUE_CODE, FALSE_CODE):
             return FALSE_CODE if code == TRUE_CODE else TRUE_CODE
-        return self.negate_condition(code)
+        return self._negate_condition(code)
 
-    def kleene_not(self, operand: Code) -> Code:
+    def _kleene_not(self, operand: Code) -> Code:
         """Negation of a condition that may be unknown."""
-        return self.negated(operand) if operand.is_known else self.call("not", operand)
+        return self.negated(operand) if operand.is_known else self._kleene_call("not", operand)
 
     def _is(self, code: Code, wanted: bool) -> Code:
         """Return a test that a boolean value is `wanted`."""
@@ -216,29 +246,50 @@ class ExpressionWriter(ABC):
 
     def _comparison_is(self, operator: str, left: Code, right: Code, wanted: bool) -> Code:
         """Return a test that a comparison is `wanted`, with native operators wherever NaN stands for unknown."""
-        left, right = self.alike(left, right)
+        left, right = self._alike(left, right)
         wanted_operator = operator if wanted else OPPOSITE[operator]
         if left.is_known and right.is_known:
-            return self.compare(wanted_operator, left, right)
+            return self._compare(wanted_operator, left, right)
         if Unknown.VALUE not in (left.unknown, right.unknown):
-            native = self.nan_comparison(wanted_operator, left, right)
+            native = self._nan_comparison(wanted_operator, left, right)
             if native is not None:
                 return native
-        return self._is(self.kleene_comparison(operator, left, right), wanted)
+        return self._is(self._kleene_comparison(operator, left, right), wanted)
+
+    def condition(self, condition: Condition) -> Code:
+        """Return the code that tests whether a condition for an event holds."""
+        match condition:
+            case InOneOf(automaton=automaton, locations=locations):
+                return self.in_one_of(automaton, locations)
+            case StaysInRange(component=component, state=state, expression=expression, type=type_):
+                code, (low, high) = self.value(expression), bounds_of(type_)
+                fits = TRUE_CODE if code.is_within(low, high) else self._stays_in_range(code, low, high)
+                if fits == TRUE_CODE or state is None:
+                    return fits
+                return self.either(self.state_code(component, state, False), fits)
+            case _:
+                return self.truth(condition)
+
+    def in_one_of(self, automaton: str, locations: tuple[str, ...]) -> Code:
+        """Return the code that tests whether an automaton is in one of some locations."""
+        result = FALSE_CODE
+        for location in locations:
+            result = self.either(result, self.state_code(automaton, location))
+        return result
 
     # Values
 
     def _conditional(self, condition: Code, then: Code, otherwise: Code) -> Code:
         """A conditional expression; both branches are pure, so it does not matter whether both are worked out."""
-        then, otherwise = self.alike(then, otherwise)
+        then, otherwise = self._alike(then, otherwise)
         if condition.is_known:
-            unknown = self.joined_unknown(then, otherwise)
+            unknown = self._joined_unknown(then, otherwise)
             code = operation("if", condition, then, otherwise, sort=then.sort, unknown=unknown)
         else:
-            code = self.call("if", condition, then, otherwise, sort=then.sort)
+            code = self._kleene_call("if", condition, then, otherwise, sort=then.sort)
         return replace(code, low=min(then.low, otherwise.low), high=max(then.high, otherwise.high))
 
-    def bounded_call(self, function: str, arguments: list[Code], code: Code) -> Code:
+    def _bounded_call(self, function: str, arguments: list[Code], code: Code) -> Code:
         """The call of a function with what is known about its result."""
         low, high = MINIMUM_INTEGER, MAXIMUM_INTEGER
         if all(item.sort is Sort.INTEGER for item in arguments):
@@ -255,18 +306,22 @@ class ExpressionWriter(ABC):
         else:
             is_native = operand.is_known
         if not is_native:
-            return self.call("negate", operand, sort=operand.sort)
+            return self._kleene_call("negate", operand, sort=operand.sort)
         return Code(Kind.OPERATION, "negate", (operand,), operand.sort, operand.unknown, low, high)
 
     def _binary(self, operator: str, left: Code, right: Code, divisor: Expression) -> Code:
         is_known = left.is_known and right.is_known
         if operator in COMPARISONS:
-            left, right = self.alike(left, right)
-            return (self.compare if is_known else self.kleene_comparison)(operator, left, right)
+            left, right = self._alike(left, right)
+            return (self._compare if is_known else self._kleene_comparison)(operator, left, right)
         if operator not in ("and", "or", "implies"):
             return self._arithmetic(operator, left, right, divisor)
         if not is_known:
-            return self.kleene_implication(left, right) if operator == "implies" else self.call(operator, left, right)
+            return (
+                self._kleene_implication(left, right)
+                if operator == "implies"
+                else self._kleene_call(operator, left, right)
+            )
         if operator == "and":
             return self.both(left, right)
         return self.either(self.negated(left) if operator == "implies" else left, right)
@@ -284,7 +339,7 @@ class ExpressionWriter(ABC):
             left, right = self.as_double(left), self.as_double(right)
         sort = Sort.INTEGER if is_integer else Sort.DOUBLE
         if not is_native:
-            return self.call(operator, left, right, sort=sort)
+            return self._kleene_call(operator, left, right, sort=sort)
         return Code(Kind.OPERATION, operator, (left, right), sort, unknown, low, high)
 
 

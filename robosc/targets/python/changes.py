@@ -6,19 +6,13 @@ to an attribute that decides whether that event is allowed. Only such events are
 it is not allowed.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
-from robosc.targets.code.expressions import Code, Kind
 from robosc.targets.code.text import indent
 from robosc.targets.python.text import comment
 
 ASKED_TOGETHER = 8
 """Up to so many requests it takes less time to ask all of them than to find out which may have changed."""
-
-
-def reads(codes: Iterable[Code]) -> set[str]:
-    """Return what some expressions read, and the functions that they call: `self.attribute`, `self.method`."""
-    return {piece.word for code in codes for piece in code.pieces() if piece.kind in (Kind.PLACE, Kind.CALL)}
 
 
 def stale_bits(allows: Sequence[str], read: Mapping[str, set[str]]) -> dict[str, int]:

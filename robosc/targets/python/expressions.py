@@ -10,7 +10,7 @@ from enum import IntEnum
 
 from robosc.errors import InternalError
 from robosc.expressions import ArrayPart, ArrayType, Element, PathStep, Quantifier, Received, Reduction, Type
-from robosc.targets.code.expression_writer import ExpressionWriter
+from robosc.targets.code.expression_writer import ExpressionWriter, read_nothing
 from robosc.targets.code.expressions import (
     FALSE_CODE,
     TRUE_CODE,
@@ -110,25 +110,24 @@ class Scope(ExpressionWriter):
     """Writer of expressions in Python, with the meanings of names in the generated code.
 
     Attributes:
+        used: Function called with the name of each function of `values` that the code needs.
         variable: Text and type of a variable, given component and variable.
         location: Text of an automaton's current location.
         received: The code that reads received data of a path.
-        used: Function called with the name of each function of `values` that the code needs.
         received_type: The type of received data of a path.
         type_below: The type of a part of a type.
         elements: Local name and type of what the quantifiers around look at, the innermost first.
     """
 
-    variable: Callable[[str, str], tuple[str, Type]]
-    location: Callable[[str], str]
-    received: Callable[[tuple[PathStep, ...]], Code]
     used: Callable[[str], None]
-    received_type: Callable[[tuple[PathStep, ...]], Type]
-    type_below: Callable[[Type, tuple[PathStep, ...]], Type]
+    variable: Callable[[str, str], tuple[str, Type]] = read_nothing
+    location: Callable[[str], str] = read_nothing
+    received: Callable[[tuple[PathStep, ...]], Code] = read_nothing
+    received_type: Callable[[tuple[PathStep, ...]], Type] = read_nothing
+    type_below: Callable[[Type, tuple[PathStep, ...]], Type] = read_nothing
     elements: tuple[tuple[str, Type], ...] = ()
 
-    def constant_code(self, constant: bool | int | float | str) -> Code:
-        """The code of a constant."""
+    def _constant_code(self, constant: bool | int | float | str) -> Code:
         match constant:
             case bool():
                 return TRUE_CODE if constant else FALSE_CODE
@@ -139,8 +138,7 @@ class Scope(ExpressionWriter):
             case str():
                 return literal(ascii(constant), Sort.TEXT)
 
-    def enum_code(self, enum: str, value: str) -> Code:
-        """The code of an enum's value."""
+    def _enum_code(self, enum: str, value: str) -> Code:
         return literal(repr(value), Sort.ENUM)
 
     def variable_code(self, component: str, variable: str) -> Code:
@@ -155,17 +153,26 @@ class Scope(ExpressionWriter):
         """Return the code that tests whether an automaton is in a location, or is not."""
         return operation("=" if is_in else "!=", self.location_code(automaton), literal(repr(state), Sort.ENUM))
 
-    def received_code(self, path: tuple[PathStep, ...]) -> Code:
-        """The code that reads received data."""
+    def in_one_of(self, automaton: str, locations: tuple[str, ...]) -> Code:
+        """Return the code that tests whether an automaton is in one of some locations."""
+        if len(locations) == 1:
+            return self.state_code(automaton, locations[0])
+        return operation("in", self.location_code(automaton), literal(repr(locations), Sort.ENUM))
+
+    def _stays_in_range(self, code: Code, low: int, high: int) -> Code:
+        if code.is_known:
+            return operation("between", integer(low), code, integer(high))
+        return self._helper("stays_in_range", code, integer(low), integer(high))
+
+    def _received_code(self, path: tuple[PathStep, ...]) -> Code:
         return self.received(path)
 
-    def element_code(self, level: int, path: tuple[PathStep, ...]) -> Code:
-        """A converted element of an array, or a part of it; None where it is unknown."""
+    def _element_code(self, level: int, path: tuple[PathStep, ...]) -> Code:
         name, type_ = self.elements[level]
         code = place(name, type_, Unknown.VALUE)
         for step in path:
             function = "read_element" if isinstance(step, int) else "read_property"
-            code = self._call(function, code, literal(repr(step), Sort.TEXT))
+            code = self._helper(function, code, literal(repr(step), Sort.TEXT))
         return code.typed(self.type_below(type_, path), Unknown.VALUE)
 
     def _array(self, part: ArrayPart) -> tuple[Code, Type]:
@@ -174,52 +181,47 @@ class Scope(ExpressionWriter):
             case Received(path=path):
                 code, type_ = self.received(path), self.received_type(path)
             case Element(level=level, path=path):
-                code, type_ = self.element_code(level, path), self.type_below(self.elements[level][1], path)
+                code, type_ = self._element_code(level, path), self.type_below(self.elements[level][1], path)
         if not isinstance(type_, ArrayType):
             raise InternalError(f"{code_text(code)} is no array")
         if part.low is not None and part.high is not None:
-            code = self._call("array_part", code, integer(part.low), integer(part.high))
+            code = self._helper("array_part", code, integer(part.low), integer(part.high))
         return code, type_.element
 
-    def reduction_code(self, expression: Reduction) -> Code:
-        """The code of a reduction."""
+    def _reduction_code(self, expression: Reduction) -> Code:
         array, element = self._array(expression.part)
-        code = self._call(_REDUCTIONS[expression.function], array)
+        code = self._helper(_REDUCTIONS[expression.function], array)
         if expression.function == "length":
             return replace(code, sort=Sort.INTEGER, unknown=Unknown.VALUE, low=0)
         return code.typed(element, Unknown.VALUE)
 
-    def quantifier_code(self, expression: Quantifier) -> Code:
-        """The code of a quantifier."""
+    def _quantifier_code(self, expression: Quantifier) -> Code:
         array, element = self._array(expression.part)
         name = f"x{len(self.elements) + 1}"
         inner = replace(self, elements=((name, element), *self.elements))
         condition = operation("lambda", place(name, element), inner.value(expression.condition))
-        return replace(self._call(f"{expression.word}_of", array, condition), unknown=Unknown.VALUE)
+        return replace(self._helper(f"{expression.word}_of", array, condition), unknown=Unknown.VALUE)
 
-    def call(self, function: str, *arguments: Code, sort: Sort = Sort.BOOLEAN) -> Code:
-        """A call of a function of `values`; its result may be unknown."""
-        return replace(self._call(_FUNCTIONS.get(function, function), *arguments), sort=sort, unknown=Unknown.VALUE)
+    def _kleene_call(self, function: str, *arguments: Code, sort: Sort = Sort.BOOLEAN) -> Code:
+        return replace(self._helper(_FUNCTIONS.get(function, function), *arguments), sort=sort, unknown=Unknown.VALUE)
 
-    def _call(self, function: str, *arguments: Code) -> Code:
+    def _helper(self, function: str, *arguments: Code) -> Code:
         self.used(function)
         return call(function, *arguments)
 
-    def function_code(self, function: str, arguments: list[Code]) -> Code:
-        """The code of a function of numbers: known wherever its arguments are, unless it leaves 32 bits."""
+    def _function_code(self, function: str, arguments: list[Code]) -> Code:
         first = arguments[0]
         if function not in ("integer", "double"):
-            return self.bounded_call(function, arguments, self.call(function, *arguments, sort=first.sort))
+            return self._bounded_call(function, arguments, self._kleene_call(function, *arguments, sort=first.sort))
         sort = Sort.INTEGER if function == "integer" else Sort.DOUBLE
-        code = self.call(function, first, sort=sort)
+        code = self._kleene_call(function, first, sort=sort)
         if first.sort is Sort.INTEGER is sort:
             code = replace(code, low=first.low, high=first.high)
         return replace(code, unknown=Unknown.NEVER) if first.is_known else code
 
-    def nan_comparison(self, operator: str, left: Code, right: Code) -> Code | None:
-        """A native comparison that is false where a number is NaN, or None if there is none."""
+    def _nan_comparison(self, operator: str, left: Code, right: Code) -> Code | None:
         if left.sort not in (Sort.INTEGER, Sort.DOUBLE):
             return None
         if operator == "!=":  # `!=` is true for NaN.
-            return self.either(self.compare("<", left, right), self.compare(">", left, right))
-        return self.compare(operator, left, right)
+            return self.either(self._compare("<", left, right), self._compare(">", left, right))
+        return self._compare(operator, left, right)

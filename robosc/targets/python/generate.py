@@ -10,8 +10,6 @@ from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets.code.text import indent, printable
 from robosc.targets.events import has_plant_location
-from robosc.targets.model_text import requirement_text
-from robosc.targets.python.allow import allow_method, conjuncts_method, requirements_method
 from robosc.targets.python.bundle import bundle, section_title
 from robosc.targets.python.changes import (
     asked_lines,
@@ -131,12 +129,12 @@ def _supervisor_title(writer: Writer) -> list[str]:
 
 
 def _class(writer: Writer) -> list[str]:
-    model = writer.model
+    model, conditions = writer.model, writer.conditions
     requested = [item.name for item in model.communications if ("provide", item.name) in writer.layout.methods]
-    allows = [allow_method(writer, event) for event in writer.layout.controllable]
+    allows = [conditions.allow_method(event) for event in writer.layout.controllable]
     description = describe(writer.layout.supervisor)
     requests, silent = _allow_names(writer, description)
-    writer.stale = stale_bits([*requests, *silent], writer.reads)
+    writer.stale = stale_bits([*requests, *silent], conditions.reads)
     methods = [
         _constructor(writer, description),
         _restart(writer, len(requests), len(silent)),
@@ -152,10 +150,11 @@ def _class(writer: Writer) -> list[str]:
     methods += [step_method(writer, event) for event in (*writer.layout.controllable, *writer.layout.uncontrollable)]
     for identifier, batch in batches(description.communications).items():
         methods.append(receive_method(writer, identifier, tuple(event for _, event in batch)))
-    for make in (provide_method, requirements_method, conjuncts_method):
-        methods += [make(writer, name) for name in requested]
+    methods += [provide_method(writer, name) for name in requested]
+    methods += [conditions.requirements_method(name) for name in requested]
+    methods += [conditions.conjuncts_method(name) for name in requested]
     methods += [matches_method(writer, item) for item in model.communications if item.when is not None]
-    methods += [method for _, method in writer.diagrams.methods]
+    methods += conditions.nodes.values()
     lines = [
         "class Supervisor:",
         f'    """Plants, requirements and supervisor of {model.name}, with their current state."""',

@@ -6,20 +6,17 @@ from robosc.errors import InternalError
 from robosc.expressions import (
     ArrayType,
     BooleanType,
-    Call,
     DoubleType,
     EnumType,
-    Expression,
     IntegerType,
     ObjectType,
-    Received,
     StringType,
     Type,
-    children,
 )
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path
 from robosc.model.structure import EnumDefinition
+from robosc.targets.code.expression_writer import may_compute
 from robosc.targets.code.expressions import TRUE_CODE, Code, Sort, Unknown, place
 from robosc.targets.code.text import indent
 from robosc.targets.paths import path_text, path_type
@@ -81,6 +78,11 @@ class Reader:
         if path not in self._codes:
             self._codes[path] = self._read(path, path_type(self.layout.model, self.root_type, path))
         return self._codes[path]
+
+    @property
+    def scope(self) -> Scope:
+        """The scope of conditions on the datum."""
+        return Scope(self.used.add, received=self.read, received_type=self.type_at, type_below=self.type_below)
 
     def type_at(self, path: Path) -> Type:
         """The type of a path."""
@@ -228,7 +230,7 @@ class Reader:
 def converter(layout: Layout, enum: EnumDefinition, used: set[str]) -> list[str]:
     """The function that makes an enum out of received data, as a readable chain of conditions."""
     reader = Reader(layout, enum.source, used)
-    scope = Scope(no_variable, no_location, reader.read, used.add, reader.type_at, reader.type_below)
+    scope = reader.scope
     used.add("ABSENT")
     body = ["if data is ABSENT:", "    return None, (), False"]
     all_false = TRUE_CODE
@@ -240,7 +242,7 @@ def converter(layout: Layout, enum: EnumDefinition, used: set[str]) -> list[str]
         body += comment(f"{expression_text(rule.condition)} -> {rule.value}")
         body += [f"if {code_text(fires)}:", f"    return {rule.value!r}, {reader.all_words}, {reader.all_flags}"]
     body += comment(f"default -> {enum.default}")
-    if _may_be_unknown([rule.condition for rule in enum.rules]):
+    if may_compute(rule.condition for rule in enum.rules):
         words = f"path + {f' is {enum.default} by default: an earlier rule is unknown'!r}"
         earlier = [*reader.words, f"({words},)"]
         body.append(f"if not ({code_text(all_false)}):")
@@ -251,30 +253,3 @@ def converter(layout: Layout, enum: EnumDefinition, used: set[str]) -> list[str]
         f'    """{enum.name} from received data; in words what was unknown; whether that decided an enum."""',
         *indent(body),
     ]
-
-
-_ARITHMETIC = frozenset({"+", "-", "*", "/"})
-
-
-def _may_be_unknown(conditions: list[Expression]) -> bool:
-    """Return True if a condition reads received data or computes: even constants can leave 32 bits."""
-    stack = list(conditions)
-    while stack:
-        node = stack.pop()
-        if isinstance(node, Received | Call) or getattr(node, "operator", None) in _ARITHMETIC:
-            return True
-        stack.extend(children(node))
-    return False
-
-
-def no_variable(component: str, variable: str) -> tuple[str, Type]:
-    """The scope of a condition on received data has no variables."""
-    raise InternalError(f"a condition on received data reads the variable {component}.{variable}")
-
-
-def no_location(automaton: str) -> str:
-    """Nor states."""
-    raise InternalError(f"a condition on received data reads the state of {automaton}")
-
-
-__all__ = ["Reader", "converter", "no_location", "no_variable", "reader_namer", "received_unknown"]

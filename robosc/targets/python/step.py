@@ -23,11 +23,11 @@ from robosc.expressions import (
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
 from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
-from robosc.targets.code.expressions import TRUE_CODE, Code, Sort, place
+from robosc.targets.code.conditions import accepted
+from robosc.targets.code.expressions import Code, Sort, place
 from robosc.targets.code.text import indent
 from robosc.targets.events import Branch, branches_of, has_plant_location, is_controllable, plant_step, split
 from robosc.targets.paths import path_text, path_type
-from robosc.targets.python.allow import accepted
 from robosc.targets.python.changes import noted_change, noted_write
 from robosc.targets.python.expressions import Scope, code_text
 from robosc.targets.python.naming import PythonNamer
@@ -125,7 +125,7 @@ class _StepWriter:
         self.copies: dict[str, str] = {}
         self.may_skip = False
         self.scope = Scope(
-            self._variable, self._location, self._received, writer.used.add, self._received_type, self._type_below
+            writer.used.add, self._variable, self._location, self._received, self._received_type, self._type_below
         )
         self._protocol = _protocol(writer, event)
 
@@ -162,9 +162,9 @@ class _StepWriter:
             test = f"!= {sources[0]!r}" if len(sources) == 1 else f"not in {sources!r}"
             lines += [f"if {location} {test}:", "    return None"]
         if is_controllable(self.event):
-            for words, code in accepted(self.writer, self.event):
-                if code != TRUE_CODE:
-                    lines += [*comment(words), f"if {code_text(self.scope.negated(code))}:", "    return None"]
+            for words, code in accepted(self.writer.model, self.event, self.writer.scope):
+                refused = code_text(self.scope.negated(code))
+                lines += [*comment(words), f"if {refused}:", "    return None"]
         return lines
 
     def _plant(self) -> list[str]:

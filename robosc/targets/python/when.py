@@ -5,8 +5,8 @@ from robosc.expressions.text import expression_text
 from robosc.model.received import received_paths
 from robosc.model.structure import Communication
 from robosc.targets.code.text import indent
-from robosc.targets.python.expressions import Scope, code_text
-from robosc.targets.python.received import Reader, no_location, no_variable
+from robosc.targets.python.expressions import code_text
+from robosc.targets.python.received import Reader
 from robosc.targets.python.text import comment, docstring
 from robosc.targets.python.writer import Writer
 
@@ -22,7 +22,7 @@ def matches_method(writer: Writer, communication: Communication) -> list[str]:
     reader = Reader(writer.layout, type_, writer.used)
     for path in received_paths(condition):
         reader.read(path)
-    scope = Scope(no_variable, no_location, reader.read, writer.used.add, reader.type_at, reader.type_below)
+    scope = reader.scope
     holds = scope.truth(condition)
     return [
         f"def {writer.layout.methods['matches', communication.name]}(self, data):",

@@ -1,0 +1,83 @@
+"""Conditions that allow a controllable event as code: those of the model, and those that the supervisor adds."""
+
+from abc import ABC, abstractmethod
+
+from robosc.automata import System
+from robosc.conditions.rendering import Formulas, in_words, size_in_words
+from robosc.model.structure import Model
+from robosc.supervisor import DecisionDiagram, DecisionNode, Supervisor
+from robosc.supervisor.diagram import diagram_domains
+from robosc.targets.acceptance import accepting_conditions, enabling_conditions
+from robosc.targets.code.expression_writer import ExpressionWriter
+from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code
+
+Condition = tuple[str, Code]
+"""Words that explain a condition, and its code."""
+
+
+def accepted(model: Model, event: str, scope: ExpressionWriter) -> list[Condition]:
+    """Return the conditions for behaviours to accept a controllable event and keep synthesis variables in range."""
+    found = ((words, scope.condition(item)) for words, item in accepting_conditions(model, event))
+    return [item for item in found if item[1] != TRUE_CODE]
+
+
+class Conditions(ABC):
+    """Writes conditions over the state; equal nodes of all decision diagrams share one function.
+
+    Args:
+        supervisor: The supervisor.
+        system: Its automata, for the domains of the diagrams.
+        scope: Writes expressions over the state.
+
+    Attributes:
+        nodes: Lines of each node's function so far, by its name.
+    """
+
+    def __init__(self, supervisor: Supervisor, system: System, scope: ExpressionWriter) -> None:
+        self._supervisor = supervisor
+        self._scope = scope
+        self._formulas = Formulas(diagram_domains(system))
+        self._numbers: dict[tuple[object, ...], int] = {}
+        self.nodes: dict[str, list[str]] = {}
+
+    @abstractmethod
+    def _node_call(self, number: int) -> Code:
+        """A call of the function of a node."""
+
+    @abstractmethod
+    def _node_function(self, number: int, node: DecisionNode, branches: tuple[Code, ...]) -> list[str]:
+        """The function of a node; its last branch needs no test, since a subject always has a value of its domain."""
+
+    def enabling(self, event: str) -> list[Condition]:
+        """Return the conditions for an event to be allowed: plants, ranges, requirements, then the supervisor's."""
+        found = [(words, self._scope.condition(item)) for words, item in enabling_conditions(self._supervisor, event)]
+        diagram = self._supervisor.added_condition(event)
+        if diagram is not None:
+            words, code = self._diagram(diagram)
+            found.append((f"added by the supervisor: {words}", code))
+        return [item for item in found if item[1] != TRUE_CODE]
+
+    def _diagram(self, diagram: DecisionDiagram) -> Condition:
+        """A formula where it is short, else functions that share nodes."""
+        expression = self._formulas.formula(diagram)
+        if expression is not None:
+            components = frozenset(item.name for item in self._supervisor.model.components)
+            return in_words(expression, components), self._scope.truth(expression)
+        codes = [FALSE_CODE, TRUE_CODE]
+        for node in diagram.nodes:
+            codes.append(self._node(node, tuple(codes[child] for child in node.children)))
+        return size_in_words(diagram), codes[diagram.root]
+
+    def _node(self, node: DecisionNode, branches: tuple[Code, ...]) -> Code:
+        key = (node.automaton, node.variable, node.starts, branches)
+        is_new = key not in self._numbers
+        number = self._numbers.setdefault(key, len(self._numbers))
+        code = self._node_call(number)
+        if is_new:
+            self.nodes[code.word] = self._node_function(number, node, branches)
+        return code
+
+
+def node_words(node: DecisionNode) -> str:
+    """A node of a decision diagram in words."""
+    return f"Node of the decision diagrams: {node.automaton}{'' if node.variable is None else f'.{node.variable}'}."

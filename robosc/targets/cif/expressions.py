@@ -1,36 +1,27 @@
 """Expressions of a synthesis problem as CIF expressions, exactly or not at all.
 
-CIF knows no unknown value. So a condition becomes two predicates, where it is true and where it is false, and a value
-comes with a predicate that tells where it is known (strong Kleene logic, as in `robosc.expressions.values`). Functions
-become `if` expressions. What CIF cannot compute is tabulated (`robosc.targets.cif.tables`); what is too large for that
-is refused.
+CIF knows no unknown value: see `robosc.targets.code.predicates`. Functions become `if` expressions. What CIF cannot
+compute is tabulated (`robosc.targets.cif.tables`); what is too large for that is refused.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import groupby
 
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import (
     Binary,
     BooleanType,
     Call,
-    Conditional,
-    Constant,
     EnumType,
-    EnumValue,
     Expression,
     Received,
-    StateTest,
-    Unary,
     VariableRead,
     children,
 )
 from robosc.recursion import allow_depth
-from robosc.targets.cif.logic import Predicate, Symbol, connected, implication, opposite, same_truth
+from robosc.targets.cif.logic import LOGIC, Symbol
 from robosc.targets.cif.numbers import Number, Term, combined, comparison, fits, number_text, scaled
-from robosc.targets.cif.subjects import Place, Reader, Source
-from robosc.targets.cif.tables import TableTooLargeError, tabulate
+from robosc.targets.cif.subjects import Place, Reader
+from robosc.targets.cif.tables import Table, TableTooLargeError, tabulate
 from robosc.targets.cif.text import (
     FALSE,
     TRUE,
@@ -43,6 +34,7 @@ from robosc.targets.cif.text import (
     negated,
 )
 from robosc.targets.cif.words import expression_words
+from robosc.targets.code.predicates import Predicate, PredicateWriter
 
 MAXIMUM_REPEATED = 5_000
 """Longest text that is written several times in one expression."""
@@ -54,7 +46,7 @@ MAXIMUM_TEXT = 1_000_000
 """Longest text of one expression."""
 
 
-Result = Predicate | Number | Symbol
+Result = Predicate[Text] | Number | Symbol
 
 
 class Translator:
@@ -70,7 +62,7 @@ class Translator:
         # its result, so that no other one ever gets its id.
         self._known: dict[tuple[int, Place], tuple[Expression, Result]] = {}
 
-    def predicate(self, expression: Expression, place: Place) -> Predicate:
+    def predicate(self, expression: Expression, place: Place) -> Predicate[Text]:
         """A condition.
 
         Raises:
@@ -99,121 +91,66 @@ def _too_large(expression: Expression, place: Place) -> UnsupportedModelError:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Translation:
+class _Translation(PredicateWriter[Text, Number | Symbol]):
     """The translation of one expression.
 
-    Its methods return None for a number that CIF cannot compute: a double, or more than 32 bits.
-
-    Attributes:
+    Args:
         reader: Writer of what is read.
         place: Place of the expression.
         root: The expression.
     """
 
-    reader: Reader
-    place: Place
-    root: Expression
+    logic = LOGIC
+
+    def __init__(self, reader: Reader, place: Place, root: Expression) -> None:
+        self.reader = reader
+        self.place = place
+        self.root = root
 
     def whole(self) -> Result:
         """The result of the root."""
         allow_depth(_levels(self.root), _FRAMES_PER_LEVEL)
-        result = self._result(self.root)
+        result = self.result(self.root)
         if result is None:
-            result = self._tabulated_number(self.root)
+            result = self._table(self.root).number()
         _require_short(self._texts(result), MAXIMUM_TEXT, self)
         return result
 
     @staticmethod
     def _texts(result: Result) -> list[Text]:
         match result:
-            case Predicate(true=true, false=false):
-                return [true] if false is None else [true, false]
+            case Predicate(true=true, false=false, is_known=is_known):
+                return [true] if is_known else [true, false]
             case Symbol(value=value, known=known):
                 return [value, known]
             case Number(terms=terms, known=known):
                 return [*(term.atom for term in terms), known]
 
-    def _result(self, expression: Expression) -> Result | None:
-        """The result of an expression; a chain of operators, which leans left, is taken by a loop."""
-        spine: list[Binary] = []
-        node = expression
-        while isinstance(node, Binary):
-            spine.append(node)
-            node = node.left
-        result = self._operand(node)
-        for operator, group in groupby(reversed(spine), key=lambda item: item.operator):
-            items = tuple(group)
-            if operator in ("and", "or"):
-                operands = [result, *(self._result(item.right) for item in items)]
-                result = connected(operator, [item for item in operands if isinstance(item, Predicate)])
-                continue
-            for item in items:
-                result = self._binary(item, result, self._result(item.right))
-        return result
+    def _location(self, automaton: str, location: str) -> Text:
+        return self.reader.location(automaton, location, self.place)
 
-    def _operand(self, expression: Expression) -> Result | None:
-        match expression:
-            case Constant(value=bool(value)):
-                return Predicate(TRUE if value else FALSE)
-            case Constant(value=int(value)):
-                return Number((), value)
-            case EnumValue(enum=enum, value=value):
-                return Symbol(self.reader.literal(enum, value))
-            case StateTest(component=automaton, state=location):
-                return Predicate(self.reader.location(automaton, location, self.place))
-            case VariableRead() | Received():
-                return self._read(self.reader.source(expression, self.place))
-            case Unary(operator=operator, operand=operand):
-                return self._unary(operator, self._result(operand))
-            case Conditional(condition=condition, then=then, otherwise=otherwise):
-                return self._conditional(self._condition(condition), self._result(then), self._result(otherwise))
-            case Call():
-                return self._call(expression)
-            case _:  # A double or a text.
-                return None
+    def _integer(self, value: int) -> Number:
+        return Number((), value)
 
-    def _condition(self, expression: Expression) -> Predicate:
-        result = self._result(expression)
-        assert isinstance(result, Predicate)  # noqa: S101  # the check has typed it
-        return result
+    def _enum_value(self, enum: str, value: str) -> Symbol:
+        return Symbol(self.reader.literal(enum, value))
 
-    def _read(self, source: Source) -> Result:
-        known = self.reader.known(source, self.place)
+    def _read(self, leaf: VariableRead | Received) -> Result:
+        source = self.reader.source(leaf, self.place)
         match self.reader.type(source):
             case BooleanType():
-                value = self.reader.reference(source, self.place)
-                if known == TRUE:
-                    return Predicate(value)
-                return Predicate(all_of([known, value]), all_of([known, negated(value)]))
+                return LOGIC.where(self.reader.known(source, self.place), self.reader.reference(source, self.place))
             case EnumType():
-                return Symbol(self.reader.reference(source, self.place), known)
+                return Symbol(self.reader.reference(source, self.place), self.reader.known(source, self.place))
             case _:
                 return self.reader.number(source, self.place)
 
-    def _unary(self, operator: str, operand: Result | None) -> Result | None:
-        match operator, operand:
-            case "not", Predicate():
-                return opposite(operand)
-            case "holds", Predicate(true=true):
-                return Predicate(true)
-            case "-", Number(known=known):
-                return _fitting(scaled(operand, -1, known))
-            case _:
-                return None
+    def _negative(self, operand: Number | Symbol) -> Number | None:
+        return _fitting(scaled(operand, -1, operand.known)) if isinstance(operand, Number) else None
 
-    def _binary(self, node: Binary, left: Result | None, right: Result | None) -> Result | None:
-        match node.operator, left, right:
-            case "implies", Predicate(), Predicate():
-                return implication(left, right)
-            case "+" | "-" | "*", Number(), Number():
-                return self._arithmetic(node.operator, left, right)
-            case "+" | "-" | "*" | "/", _, _:
-                return None
-        compared = self._compared(node.operator, left, right)
-        return self._tabulated_predicate(node) if compared is None else compared
-
-    def _arithmetic(self, operator: str, left: Number, right: Number) -> Number | None:
+    def _arithmetic(self, operator: str, left: Number | Symbol, right: Number | Symbol) -> Number | None:
+        if isinstance(left, Symbol) or isinstance(right, Symbol):
+            return None
         known = all_of([left.known, right.known])
         if operator in ("+", "-"):
             return _fitting(combined(left, right, 1 if operator == "+" else -1, known))
@@ -225,54 +162,46 @@ class _Translation:
         atom = Text(f"{first.within(Level.PRODUCT)} * {second.within(Level.UNARY)}", Level.PRODUCT)
         return _fitting(Number((Term(atom, min(ends), max(ends)),), 0, known))
 
-    def _compared(self, operator: str, left: Result | None, right: Result | None) -> Predicate | None:
+    def _values_compared(self, operator: str, left: Number | Symbol, right: Number | Symbol) -> Predicate[Text] | None:
         match left, right:
             case Number(), Number():
-                difference = combined(left, right, -1, TRUE)
-                if not fits(difference):
+                if not fits(combined(left, right, -1, TRUE)):
                     return None
-                known, test = all_of([left.known, right.known]), comparison(operator, left, right)
+                test = comparison(operator, left, right)
             case Symbol(), Symbol():
-                known, test = all_of([left.known, right.known]), _same_symbol(left.value, right.value, self.reader)
+                test = _same_symbol(left.value, right.value, self.reader)
                 test = test if operator == "=" else negated(test)
-            case Predicate(), Predicate():
-                if left.false is not None or right.false is not None:
-                    texts = [left.true, left.is_false, right.true, right.is_false]
-                    _require_short(texts, MAXIMUM_REPEATED, self)
-                same = same_truth(left, right)
-                return same if operator == "=" else opposite(same)
             case _:
                 return None
-        return Predicate(test) if known == TRUE else Predicate(all_of([known, test]), all_of([known, negated(test)]))
+        return LOGIC.where(all_of([left.known, right.known]), test)
 
-    def _conditional(self, test: Predicate, then: Result | None, otherwise: Result | None) -> Result | None:
-        def branches(first: Text, second: Text) -> Text:
-            """Return the condition under which the choice is something that has a property."""
-            if test.false is not None or TRUE in (first, second) or FALSE in (first, second):
-                _require_short([test.true, test.is_false], MAXIMUM_REPEATED, self)
-                if test.false is None and first == TRUE:
-                    return any_of([test.true, second])
-                if test.false is None and second == TRUE:
-                    return any_of([test.is_false, first])
-                return any_of([all_of([test.true, first]), all_of([test.is_false, second])])
+    def _truths_compared(self, operator: str, left: Predicate[Text], right: Predicate[Text]) -> Predicate[Text]:
+        if not (left.is_known and right.is_known):
+            _require_short([left.true, left.false, right.true, right.false], MAXIMUM_REPEATED, self)
+        return super()._truths_compared(operator, left, right)
+
+    def _branches(self, test: Predicate[Text], first: Text, second: Text) -> Text:
+        """Return the condition under which a choice has a property, given that for each branch."""
+        if test.is_known and not (TRUE in (first, second) or FALSE in (first, second)):
             return chosen([(test.true, first)], second)
+        _require_short([test.true, test.false], MAXIMUM_REPEATED, self)
+        if test.is_known and first == TRUE:
+            return any_of([test.true, second])
+        if test.is_known and second == TRUE:
+            return any_of([test.false, first])
+        return super()._branches(test, first, second)
 
-        def known(first: Text, second: Text) -> Text:
-            return test.known if first == second == TRUE else branches(first, second)
-
+    def _value_chosen(
+        self, test: Predicate[Text], then: Number | Symbol, otherwise: Number | Symbol
+    ) -> Number | Symbol | None:
         match then, otherwise:
-            case Predicate(), Predicate():
-                true = branches(then.true, otherwise.true)
-                if test.false is None and then.false is None and otherwise.false is None:
-                    return Predicate(true)
-                return Predicate(true, branches(then.is_false, otherwise.is_false))
             case Symbol(), Symbol():
                 value = chosen([(test.true, then.value)], otherwise.value)
-                return Symbol(value, known(then.known, otherwise.known))
+                return Symbol(value, self._choice_known(test, then.known, otherwise.known))
             case Number(), Number():
                 ends = (*then.bounds, *otherwise.bounds)
                 value = chosen([(test.true, number_text(then))], number_text(otherwise))
-                is_known = known(then.known, otherwise.known)
+                is_known = self._choice_known(test, then.known, otherwise.known)
                 if test.true in (TRUE, FALSE):
                     chosen_number = then if test.true == TRUE else otherwise
                     return Number(chosen_number.terms, chosen_number.constant, is_known)
@@ -282,14 +211,10 @@ class _Translation:
             case _:
                 return None
 
-    def _call(self, node: Call) -> Number | None:
-        arguments = [self._result(item) for item in node.arguments]
-        numbers = [item for item in arguments if isinstance(item, Number)]
-        if node.function == "double":
-            return None
-        if len(numbers) < len(arguments):
-            return self._tabulated_number(node) if node.function == "integer" else None
-        match node.function, numbers:
+    def _function(self, node: Call, arguments: Sequence[Number | Symbol]) -> Number | None:
+        match node.function, [item for item in arguments if isinstance(item, Number)]:
+            case "double", _:
+                return None
             case "integer", [number]:
                 return number
             case "abs", [number]:
@@ -318,17 +243,19 @@ class _Translation:
         ends = (*a.bounds, *b.bounds)
         return Number((Term(chosen([(test, first)], second), min(ends), max(ends)),), 0, known)
 
-    def _tabulated_predicate(self, node: Expression) -> Predicate:
-        try:
-            table = tabulate(node, self.reader, self.place)
-        except TableTooLargeError:
-            raise _too_large(node, self.place) from None
+    def _tabulated(self, node: Expression) -> Predicate[Text]:
+        table = self._table(node)
         true = table.where(lambda value: value is True)
-        return Predicate(true, table.where(lambda value: value is False) if None in table.results() else None)
+        if None not in table.results():
+            return LOGIC.known(true)
+        return Predicate(true, table.where(lambda value: value is False))
 
-    def _tabulated_number(self, node: Expression) -> Number:
+    def _uncomputed(self, node: Call) -> Number | None:
+        return self._table(node).number() if node.function == "integer" else None
+
+    def _table(self, node: Expression) -> Table:
         try:
-            return tabulate(node, self.reader, self.place).number()
+            return tabulate(node, self.reader, self.place)
         except TableTooLargeError:
             raise _too_large(node, self.place) from None
 

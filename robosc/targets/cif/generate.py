@@ -9,7 +9,6 @@ from robosc.expressions import Expression, Unary
 from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets.cif.expressions import Translator
-from robosc.targets.cif.logic import Predicate
 from robosc.targets.cif.names import Names
 from robosc.targets.cif.plants import Plants
 from robosc.targets.cif.subjects import Place, Reader
@@ -17,6 +16,7 @@ from robosc.targets.cif.supervisor import supervisor_lines
 from robosc.targets.cif.table import table_lines
 from robosc.targets.cif.text import Text, all_of, comment
 from robosc.targets.cif.words import expression_words
+from robosc.targets.code.predicates import Predicate
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.registry import GenerateOptions
 
@@ -145,11 +145,11 @@ class _Writer:
             yield f"requirement invariant {predicate.true};"
 
 
-def _requirement(event: str, condition: Expression, predicate: Predicate) -> str:
+def _requirement(event: str, condition: Expression, predicate: Predicate[Text]) -> str:
     """`event needs p`, or `p disables event` where that says the same."""
     match condition:
-        case Unary(operator="not") if predicate.false is None:
-            return f"requirement {predicate.is_false} disables {event};"
+        case Unary(operator="not") if predicate.is_known:
+            return f"requirement {predicate.false} disables {event};"
         case _:
             return f"requirement {event} needs {predicate.true};"
 

@@ -8,11 +8,12 @@ from robosc.errors import UnsupportedModelError
 from robosc.expressions import MAXIMUM_INTEGER, BooleanType, EnumType, IntegerType, Type, Value
 from robosc.model.structure import Model
 from robosc.targets.cif.expressions import Translator
-from robosc.targets.cif.logic import Predicate, Symbol
+from robosc.targets.cif.logic import Symbol
 from robosc.targets.cif.names import data_plant, declared_events, shift
 from robosc.targets.cif.numbers import Number, comparison, fits, number_text
 from robosc.targets.cif.subjects import Place
 from robosc.targets.cif.text import TRUE, Text, all_of, any_of, chosen, escaped, implied, negated
+from robosc.targets.code.predicates import Predicate
 
 MAXIMUM_DATA_EDGES = 100_000
 """Edges of one data plant beyond which it is refused: each statement has one from every other."""
@@ -180,9 +181,9 @@ class Plants:
         place = self._update_place(automaton, edge, update, automaton.name)
         old = Text(name)
         match self._translator.value(update.expression, place):
-            case Predicate(true=true, false=None):
+            case Predicate(true=true, is_known=True):
                 value = true
-            case Predicate(true=true, false=Text() as false):
+            case Predicate(true=true, false=false):
                 value = chosen([(true, TRUE), (false, Text("false"))], old)
             case Symbol(value=new, known=known):
                 value = chosen([(known, new)], old)

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable
 
 from robosc.errors import UnsupportedModelError
-from robosc.supervisor.structure import Supervisor
+from robosc.supervisor import Supervisor
 from robosc.targets.registry import GenerateOptions
 
 _MAXIMUM_NAME = 100

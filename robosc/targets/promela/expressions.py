@@ -1,8 +1,7 @@
 """Expressions as Promela text, with three truth values and exact numbers.
 
-Promela computes with C integers and knows no unknown values, so a boolean is a pair of texts (where it is true, where
-it is false) and a number a text with another one that tells where it is known. What computes with doubles, or could go
-beyond 32 bits, is listed value by value of what it reads: only values of finite types take part.
+Promela computes with C integers and knows no unknown values: see `robosc.targets.code.predicates`. What computes with
+doubles, or could go beyond 32 bits, is listed value by value of what it reads: only values of finite types take part.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,24 +16,21 @@ from robosc.errors import UnsupportedModelError
 from robosc.expressions import (
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
-    Binary,
     BooleanType,
     Call,
-    Conditional,
-    Constant,
     EnumType,
-    EnumValue,
     Expression,
     IntegerType,
     Received,
-    StateTest,
     Type,
-    Unary,
     Value,
     VariableRead,
     domain,
 )
+from robosc.expressions.bounds import call_bounds
 from robosc.expressions.text import expression_text
+from robosc.targets.code.expression_writer import arithmetic_bounds
+from robosc.targets.code.predicates import Logic, Predicate, PredicateWriter
 from robosc.targets.promela.names import Names
 
 MAXIMUM_TEXT = 1_000_000
@@ -43,46 +39,31 @@ MAXIMUM_TEXT = 1_000_000
 MAXIMUM_TABLE = 20_000
 """Combinations of values that one condition may be listed for."""
 
+TRUE = "true"
+
 _COMPARISONS = {"=": "==", "!=": "!=", "<": "<", "<=": "<=", ">": ">", ">=": ">="}
 
 
 @dataclass(frozen=True, slots=True)
-class Truth:
-    """A boolean: where it is true, and where it is false, or None where it is always one of the two."""
-
-    true: str
-    false_text: str | None = None
-
-    @property
-    def false(self) -> str:
-        """Text that holds where it is false."""
-        return negated(self.true) if self.false_text is None else self.false_text
-
-
-@dataclass(frozen=True, slots=True)
 class Number:
-    """An integer, or the index of an enum's value: its text, where it is known (None: always), and its bounds."""
+    """An integer, or the index of an enum's value: its text, where it is known, and its bounds."""
 
     text: str
-    known: str | None
+    known: str
     low: int
     high: int
 
 
 @dataclass(frozen=True, slots=True)
 class Datum:
-    """Received data: what holds it, where it is known (None: always), and its type."""
+    """Received data: what holds it, where it is known, and its type."""
 
     name: str
-    known: str | None
+    known: str
     type: Type
 
 
-class _NotIntegers(Exception):
-    """The expression needs more than 32-bit integers: list its values."""
-
-
-class Translator:
+class Translator(PredicateWriter[str, Number]):
     """Translates the expressions of one system.
 
     Args:
@@ -92,195 +73,90 @@ class Translator:
     """
 
     def __init__(self, system: System, names: Names, data: Mapping[Path, Datum] | None = None) -> None:
+        self.logic = LOGIC
         self._system = system
         self._names = names
         self._data = data or {}
 
     def condition(self, expression: Expression) -> str:
         """Return the text that holds where a condition is true (not unknown)."""
-        return self._truth(expression).true
+        return self.truth(expression).true
 
     def value(self, expression: Expression, type_: Type) -> Number:
         """Return the number that an update writes: 0 or 1, an integer, or the index of an enum's value."""
-        if isinstance(type_, BooleanType):
-            truth = self._truth(expression)
-            known = None if truth.false_text is None else any_of([truth.true, truth.false])
-            return Number(truth.true, known, 0, 1)
-        try:
-            return self._number(expression)
-        except _NotIntegers:
-            return self._listed_number(expression, type_)
-
-    # Booleans
-
-    def _truth(self, expression: Expression) -> Truth:
-        match expression:
-            case Constant(value=value):
-                return Truth("true" if value is True else "false")
-            case StateTest(component=component, state=state):
-                return Truth(self._names.locations[component, state])
-            case VariableRead(component=component, variable=variable):
-                return Truth(self._names.places[Subject(component, variable)])
-            case Received(path=path):
-                datum = self._data[path]
-                if datum.known is None:
-                    return Truth(datum.name)
-                return Truth(all_of([datum.known, datum.name]), all_of([datum.known, negated(datum.name)]))
-            case Unary(operator="not", operand=operand):
-                inner = self._truth(operand)
-                return Truth(inner.false, None if inner.false_text is None else inner.true)
-            case Unary(operator="holds", operand=operand):
-                return Truth(self._truth(operand).true)
-            case Binary(operator="and" | "or" as operator):
-                return self._chain(operator, expression)
-            case Binary(operator="implies", left=left, right=right):
-                first, second = self._truth(left), self._truth(right)
-                is_known = first.false_text is None and second.false_text is None
-                return Truth(
-                    any_of([first.false, second.true]), None if is_known else all_of([first.true, second.false])
-                )
-            case Conditional(condition=condition, then=then, otherwise=otherwise):
-                return self._choice(*(self._truth(item) for item in (condition, then, otherwise)))
-            case Binary(operator=operator, left=left, right=right):
-                if operator in ("=", "!=") and self._is_boolean(left):
-                    return self._same(operator, self._truth(left), self._truth(right))
-                try:
-                    return self._compared(operator, self._number(left), self._number(right))
-                except _NotIntegers:
-                    return self._listed_truth(expression)
+        match self.result(expression):
+            case Number() as number:
+                return number
+            case Predicate() as truth:
+                return Number(truth.true, LOGIC.knownness(truth), 0, 1)
             case _:
-                return self._listed_truth(expression)
+                return self._listed_number(expression, type_)
 
-    def _chain(self, operator: str, expression: Expression) -> Truth:
-        """Operands of a chain together: it can be longer than the stack is deep."""
-        operands: list[Expression] = []
-        while isinstance(expression, Binary) and expression.operator == operator:
-            operands.append(expression.right)
-            expression = expression.left
-        parts = [self._truth(item) for item in (expression, *reversed(operands))]
-        joined, other = (all_of, any_of) if operator == "and" else (any_of, all_of)
-        is_known = all(part.false_text is None for part in parts)
-        return Truth(joined([part.true for part in parts]), None if is_known else other([part.false for part in parts]))
+    def _location(self, automaton: str, location: str) -> str:
+        return self._names.locations[automaton, location]
 
-    @staticmethod
-    def _choice(test: Truth, then: Truth, otherwise: Truth) -> Truth:
-        is_known = test.false_text is None and then.false_text is None and otherwise.false_text is None
-        true = any_of([all_of([test.true, then.true]), all_of([test.false, otherwise.true])])
-        return Truth(
-            true, None if is_known else any_of([all_of([test.true, then.false]), all_of([test.false, otherwise.false])])
-        )
+    def _read(self, leaf: VariableRead | Received) -> Predicate[str] | Number:
+        if isinstance(leaf, VariableRead):
+            subject = Subject(leaf.component, leaf.variable)
+            datum = Datum(self._names.places[subject], TRUE, subject_type(self._system, subject))
+        else:
+            datum = self._data[leaf.path]
+        if isinstance(datum.type, BooleanType):
+            return LOGIC.where(datum.known, datum.name)
+        return Number(datum.name, datum.known, *_bounds(datum.type))
 
-    @staticmethod
-    def _same(operator: str, first: Truth, second: Truth) -> Truth:
-        if first.false_text is None and second.false_text is None:
-            return Truth(_checked(f"({first.true} {_COMPARISONS[operator]} {second.true})"))
-        same = any_of([all_of([first.true, second.true]), all_of([first.false, second.false])])
-        other = any_of([all_of([first.true, second.false]), all_of([first.false, second.true])])
-        return Truth(same, other) if operator == "=" else Truth(other, same)
+    def _integer(self, value: int) -> Number:
+        return Number(integer_text(value), TRUE, value, value)
 
-    @staticmethod
-    def _compared(operator: str, first: Number, second: Number) -> Truth:
-        text = _checked(f"({first.text} {_COMPARISONS[operator]} {second.text})")
-        known = _both_known(first, second)
-        return Truth(text) if known is None else Truth(all_of([known, text]), all_of([known, negated(text)]))
+    def _enum_value(self, enum: str, value: str) -> Number:
+        return Number(self._names.values[enum, value], TRUE, 0, 0)
 
-    def _is_boolean(self, expression: Expression) -> bool:
-        match expression:
-            case Constant(value=value):
-                return isinstance(value, bool)
-            case VariableRead(component=component, variable=variable):
-                return isinstance(subject_type(self._system, Subject(component, variable)), BooleanType)
-            case Received(path=path):
-                return isinstance(self._data[path].type, BooleanType)
-            case Unary(operator=operator):
-                return operator != "-"
-            case Binary(operator=operator):
-                return operator in _COMPARISONS or operator in ("and", "or", "implies")
-            case Conditional(then=then):
-                return self._is_boolean(then)
-            case _:
-                return isinstance(expression, StateTest)
+    def _negative(self, operand: Number) -> Number | None:
+        return _number(f"(-{operand.text})", operand.known, -operand.high, -operand.low)
 
-    # Integers and enums
+    def _arithmetic(self, operator: str, left: Number, right: Number) -> Number | None:
+        bounds = arithmetic_bounds(operator, (left.low, left.high), (right.low, right.high))
+        return _number(f"({left.text} {operator} {right.text})", all_of([left.known, right.known]), *bounds)
 
-    def _number(self, expression: Expression) -> Number:
-        match expression:
-            case Constant(value=int(value)) if not isinstance(value, bool):
-                return Number(integer_text(value), None, value, value)
-            case EnumValue(enum=enum, value=value):
-                return Number(self._names.values[enum, value], None, 0, 0)
-            case VariableRead(component=component, variable=variable):
-                subject = Subject(component, variable)
-                return Number(self._names.places[subject], None, *_bounds(subject_type(self._system, subject)))
-            case Received(path=path):
-                datum = self._data[path]
-                return Number(datum.name, datum.known, *_bounds(datum.type))
-            case Unary(operator="-", operand=operand):
-                inner = self._number(operand)
-                return _number(f"(-{inner.text})", inner.known, -inner.high, -inner.low)
-            case Binary(operator="+" | "-" | "*" as operator, left=left, right=right):
-                return self._arithmetic(operator, self._number(left), self._number(right))
-            case Conditional(condition=condition, then=then, otherwise=otherwise):
-                return self._chosen(self._truth(condition), self._number(then), self._number(otherwise))
-            case Call(function="integer", arguments=(argument,)):
-                return self._number(argument)
-            case Call(function="abs", arguments=(argument,)):
-                inner = self._number(argument)
-                low, high = sorted((abs(inner.low), abs(inner.high)))
-                low = 0 if inner.low <= 0 <= inner.high else low
-                return _number(f"({inner.text} < 0 -> -{inner.text} : {inner.text})", inner.known, low, high)
-            case Call(function="min" | "max" as function, arguments=(first, second)):
-                return self._extreme(function, self._number(first), self._number(second))
-            case Call(function="clamp", arguments=(number, low, high)):
-                raised = self._extreme("max", self._number(number), self._number(low))
-                return self._extreme("min", raised, self._number(high))
-            case _:
-                raise _NotIntegers
+    def _function(self, node: Call, arguments: Sequence[Number]) -> Number | None:
+        match node.function, arguments:
+            case "integer", [number]:
+                return number
+            case "abs", [number]:
+                low, high = call_bounds("abs", [(number.low, number.high)])
+                return _number(f"({number.text} < 0 -> -{number.text} : {number.text})", number.known, low, high)
+            case "min" | "max" as function, [first, second]:
+                return _extreme(function, first, second)
+            case "clamp", [number, low_end, high_end]:
+                raised = _extreme("max", number, low_end)
+                return None if raised is None else _extreme("min", raised, high_end)
+        return None
 
-    @staticmethod
-    def _arithmetic(operator: str, first: Number, second: Number) -> Number:
-        match operator:
-            case "+":
-                bounds = (first.low + second.low, first.high + second.high)
-            case "-":
-                bounds = (first.low - second.high, first.high - second.low)
-            case _:
-                corners = [a * b for a in (first.low, first.high) for b in (second.low, second.high)]
-                bounds = (min(corners), max(corners))
-        return _number(f"({first.text} {operator} {second.text})", _both_known(first, second), *bounds)
+    def _values_compared(self, operator: str, left: Number, right: Number) -> Predicate[str]:
+        text = _checked(f"({left.text} {_COMPARISONS[operator]} {right.text})")
+        return LOGIC.where(all_of([left.known, right.known]), text)
 
-    @staticmethod
-    def _extreme(function: str, first: Number, second: Number) -> Number:
-        comparison, choose = ("<=", min) if function == "min" else (">=", max)
-        text = f"({first.text} {comparison} {second.text} -> {first.text} : {second.text})"
-        bounds = choose(first.low, second.low), choose(first.high, second.high)
-        return _number(text, _both_known(first, second), *bounds)
-
-    @staticmethod
-    def _chosen(test: Truth, then: Number, otherwise: Number) -> Number:
-        known = None
-        if test.false_text is not None or then.known is not None or otherwise.known is not None:
-            known = any_of([all_of([test.true, then.known or "true"]), all_of([test.false, otherwise.known or "true"])])
+    def _value_chosen(self, test: Predicate[str], then: Number, otherwise: Number) -> Number | None:
+        known = self._choice_known(test, then.known, otherwise.known)
         text = f"({test.true} -> {then.text} : {otherwise.text})"
         return _number(text, known, min(then.low, otherwise.low), max(then.high, otherwise.high))
 
     # Lists of values
 
-    def _listed_truth(self, expression: Expression) -> Truth:
-        cases = self._cases(expression)
-        unknown = cases.pop(None, [])
+    def _tabulated(self, node: Expression) -> Predicate[str]:
+        cases = self._cases(node)
         true = any_of(cases.get(True, []))
-        return Truth(true, any_of(cases.get(False, [])) if unknown else None)
+        return Predicate(true, any_of(cases.get(False, []))) if cases.get(None) else LOGIC.known(true)
 
     def _listed_number(self, expression: Expression, type_: Type) -> Number:
         cases = self._cases(expression)
         unknown = cases.pop(None, [])
         values = {index_of(value, type_): tests for value, tests in cases.items()}
-        known = any_of([test for tests in values.values() for test in tests]) if unknown else None
+        known = any_of([test for tests in values.values() for test in tests]) if unknown else TRUE
         text = "0"
         for value, tests in values.items():
             text = f"({any_of(tests)} -> {integer_text(value)} : {text})"
-        return _number(text, known, min(values, default=0), max(values, default=0))
+        return Number(_checked(text), known, min(values, default=0), max(values, default=0))
 
     def _cases(self, expression: Expression) -> dict[Value | None, list[str]]:
         """For each value of an expression, None for unknown, the tests of what it reads that lead to it."""
@@ -312,12 +188,11 @@ class Translator:
     def _data_cases(self, path: Path) -> list[tuple[Value | None, str]]:
         """Every value of a received datum, and the test for it."""
         datum = self._data[path]
-        known = [] if datum.known is None else [datum.known]
         found: list[tuple[Value | None, str]] = [
-            (value, all_of([*known, f"({datum.name} == {integer_text(index_of(value, datum.type))})"]))
+            (value, all_of([datum.known, f"({datum.name} == {integer_text(index_of(value, datum.type))})"]))
             for value in domain(datum.type)
         ]
-        return found if datum.known is None else [*found, (None, negated(datum.known))]
+        return found if datum.known == TRUE else [*found, (None, negated(datum.known))]
 
 
 def index_of(value: Value | None, type_: Type) -> int:
@@ -332,10 +207,16 @@ def integer_text(value: int) -> str:
     return str(value) if value >= 0 else f"(-{-value})"
 
 
-def _number(text: str, known: str | None, low: int, high: int) -> Number:
-    if low < MINIMUM_INTEGER or high > MAXIMUM_INTEGER:
-        raise _NotIntegers
-    return Number(_checked(text), known, low, high)
+def _number(text: str, known: str, low: int, high: int) -> Number | None:
+    """A number, or None if it can exceed 32 bits."""
+    return Number(_checked(text), known, low, high) if low >= MINIMUM_INTEGER and high <= MAXIMUM_INTEGER else None
+
+
+def _extreme(function: str, first: Number, second: Number) -> Number | None:
+    comparison = "<=" if function == "min" else ">="
+    text = f"({first.text} {comparison} {second.text} -> {first.text} : {second.text})"
+    bounds = call_bounds(function, [(first.low, first.high), (second.low, second.high)])
+    return _number(text, all_of([first.known, second.known]), *bounds)
 
 
 def _bounds(type_: Type) -> tuple[int, int]:
@@ -346,11 +227,6 @@ def _bounds(type_: Type) -> tuple[int, int]:
             return 0, len(values) - 1
         case _:
             return 0, 1
-
-
-def _both_known(first: Number, second: Number) -> str | None:
-    known = [item for item in (first.known, second.known) if item is not None]
-    return all_of(known) if known else None
 
 
 def negated(text: str) -> str:
@@ -366,6 +242,14 @@ def all_of(parts: Sequence[str]) -> str:
 def any_of(parts: Sequence[str]) -> str:
     """A disjunction."""
     return _joined(parts, "||", "false", "true")
+
+
+def _implied(condition: str, result: str) -> str:
+    return any_of([negated(condition), result])
+
+
+def _equal(operator: str, left: str, right: str) -> str:
+    return _checked(f"({left} {_COMPARISONS[operator]} {right})")
 
 
 def _joined(parts: Sequence[str], operator: str, neutral: str, decisive: str) -> str:
@@ -388,3 +272,6 @@ def _checked(text: str) -> str:
 def _shortened(expression: Expression) -> str:
     text = expression_text(expression)
     return text if len(text) <= 80 else f"{text[:80]}..."
+
+
+LOGIC = Logic(TRUE, "false", all_of, any_of, negated, _implied, _equal)

@@ -17,7 +17,7 @@ from robosc.errors import UnsupportedModelError
 from robosc.expressions import BooleanType, IntegerType, Type, Value, domain
 from robosc.supervisor import AddedCondition, DecisionNode
 from robosc.supervisor.diagram import evaluate
-from robosc.targets.promela.expressions import Datum, Translator, all_of, any_of, index_of, integer_text, negated
+from robosc.targets.promela.expressions import TRUE, Datum, Translator, all_of, any_of, index_of, integer_text, negated
 from robosc.targets.promela.names import Names
 
 
@@ -174,7 +174,7 @@ class _Writer:
             number = self._translator.value(update.expression, type_)
             outside = _outside(number.text, number.low, number.high, type_)
             if outside != "false":
-                leaves = all_of([self._taken(edge, automaton), number.known or "true", outside])
+                leaves = all_of([self._taken(edge, automaton), number.known, outside])
                 yield negated(leaves)
 
     def _data(self, event: Event, edges: Sequence[Edge]) -> tuple[list[_Choice], dict[Path, Datum]]:
@@ -193,7 +193,7 @@ class _Writer:
         for number, item in enumerate(inputs):
             name = f"data_{number}"
             known = [f"({lengths[array][0]} > {index})" for array, index in _arrays(item)]
-            data[item.path] = Datum(name, all_of(known) if known else None, item.type)
+            data[item.path] = Datum(name, all_of(known), item.type)
             choices.append(_Choice(name, *_range(item.type)))
         self._used_data |= dict.fromkeys(choice.name for choice in choices)
         return choices, data
@@ -246,7 +246,7 @@ class _Writer:
             type_, name = subject_type(self._system, subject), self._next[subject]
             number = translator.value(update.expression, type_)
             text = number.text
-            if number.known is not None:
+            if number.known != TRUE:
                 text = f"({number.known} -> {text} : {self._names.places[subject]})"
             lines = [f"{name} = {text};"]
             outside = _outside(name, number.low, number.high, type_)

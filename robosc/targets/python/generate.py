@@ -10,6 +10,7 @@ from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets.code.text import indent, printable
 from robosc.targets.events import has_plant_location
+from robosc.targets.model_text import requirement_text
 from robosc.targets.python.bundle import bundle, section_title
 from robosc.targets.python.changes import (
     asked_lines,

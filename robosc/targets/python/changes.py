@@ -8,7 +8,9 @@ it is not allowed.
 
 from collections.abc import Mapping, Sequence
 
+from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code
 from robosc.targets.code.text import indent
+from robosc.targets.python.expressions import code_text
 from robosc.targets.python.text import comment
 
 ASKED_TOGETHER = 8
@@ -42,13 +44,16 @@ def noted_change(place: str, bits: dict[str, int]) -> list[str]:
     return ["self.changes += 1", *([f"self._stale |= {stale:#x}"] if stale else [])]
 
 
-def noted_write(place: str, code: str, bits: dict[str, int]) -> list[str]:
-    """Statements that write an attribute; `code` is a name or a literal.
+def noted_write(attribute: str, code: Code, bits: dict[str, int]) -> list[str]:
+    """Statements that write an attribute; `code` is a local variable or a constant.
 
     It is written also if nothing changes: of equal numbers, too, the new one counts, such as -0.0 after 0.0.
     """
-    differs = {"True": f"not {place}", "False": place}.get(code, f"{place} != {code}")
-    return [f"if {differs}:", *indent(noted_change(place, bits)), f"{place} = {code}"]
+    if code in (TRUE_CODE, FALSE_CODE):
+        differs = f"not {attribute}" if code == TRUE_CODE else attribute
+    else:
+        differs = f"{attribute} != {code_text(code)}"
+    return [f"if {differs}:", *indent(noted_change(attribute, bits)), f"{attribute} = {code_text(code)}"]
 
 
 def asked_lines(requests: Sequence[str], silent: Sequence[str], allows: Sequence[str]) -> list[str]:

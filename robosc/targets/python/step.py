@@ -8,8 +8,6 @@ from collections.abc import Iterator
 
 from robosc.automata.plants import communication_plant_name
 from robosc.expressions import (
-    MAXIMUM_INTEGER,
-    MINIMUM_INTEGER,
     ArrayType,
     DoubleType,
     Expression,
@@ -24,7 +22,19 @@ from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
 from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
 from robosc.targets.code.conditions import accepted
-from robosc.targets.code.expressions import Code, Sort, place
+from robosc.targets.code.expressions import (
+    FALSE_CODE,
+    TRUE_CODE,
+    Code,
+    Kind,
+    Sort,
+    Unknown,
+    bounds_of,
+    call,
+    integer,
+    literal,
+    place,
+)
 from robosc.targets.code.text import indent
 from robosc.targets.events import Branch, branches_of, has_plant_location, is_controllable, plant_step, split
 from robosc.targets.paths import path_text, path_type
@@ -173,7 +183,7 @@ class _StepWriter:
             return []
         location, sources, target = self._protocol
         if target in sources:
-            return noted_write(location, repr(target), self.writer.stale)
+            return noted_write(location, literal(repr(target), Sort.ENUM), self.writer.stale)
         return [f"{location} = {target!r}", *noted_change(location, self.writer.stale)]
 
     def _copy_what_is_overwritten(self, blocks: list[tuple[str, Behaviour, list[Branch]]]) -> None:
@@ -252,51 +262,48 @@ class _StepWriter:
         if transition.target is not None and states != (transition.target,):
             location = self.writer.scope.location(component)
             if transition.target in states:
-                lines += noted_write(location, repr(transition.target), self.writer.stale)
+                lines += noted_write(location, literal(repr(transition.target), Sort.ENUM), self.writer.stale)
             else:
                 lines += [f"{location} = {transition.target!r}", *noted_change(location, self.writer.stale)]
         return lines
 
     def _update(self, component: str, variable: Variable, update: Update) -> list[str]:
         attribute, _ = self.writer.scope.variable(component, variable.name)
-        code, may_skip = self._assigned(variable.type, self.scope.value(update.expression))
-        words = comment(f"{component}: do {variable.name} := {expression_text(update.expression)}")
-        if not may_skip and code.isidentifier():
-            return [*words, *noted_write(attribute, code, self.writer.stale)]
-        new = self.namer.name(f"new_{variable.name}")
-        if not may_skip:
-            return [*words, f"{new} = {code}", *noted_write(attribute, new, self.writer.stale)]
+        code = self._assigned(variable.type, self.scope.value(update.expression))
+        lines = comment(f"{component}: do {variable.name} := {expression_text(update.expression)}")
+        if not (code.is_known and self._is_at_hand(code)):
+            new = code.held_in(self.namer.name(f"new_{variable.name}"))
+            lines.append(f"{new.word} = {code_text(code)}")
+            code = new
+        written = noted_write(attribute, code, self.writer.stale)
+        if code.is_known:
+            return [*lines, *written]
         self.may_skip = True
         skipped = f"{component}.{variable.name}"
-        return [
-            *words,
-            f"{new} = {code}",
-            f"if {new} is None:",
-            f"    skipped += ({skipped!r},)",
-            "else:",
-            *indent(noted_write(attribute, new, self.writer.stale)),
-        ]
+        return [*lines, f"if {code.word} is None:", f"    skipped += ({skipped!r},)", "else:", *indent(written)]
 
-    def _assigned(self, type_: Type, code: Code) -> tuple[str, bool]:
-        """The value that a variable takes, and whether it can be None: the update is then skipped."""
+    def _is_at_hand(self, code: Code) -> bool:
+        """Return True if a value is a local variable or a truth value."""
+        is_local = code.word in self.copies.values() or code in self.received.values()
+        return code in (TRUE_CODE, FALSE_CODE) or (code.kind is Kind.PLACE and is_local)
+
+    def _assigned(self, type_: Type, code: Code) -> Code:
+        """The value that a variable takes; the update is skipped where it is None."""
         match type_:
+            case DoubleType() if not code.is_known:
+                return self._checked("assignable_double", code)
             case DoubleType():
-                return self._assigned_double(code)
+                return call("float", code) if code.sort is Sort.INTEGER else code
             case IntegerType():
-                low = MINIMUM_INTEGER if type_.low is None else type_.low
-                high = MAXIMUM_INTEGER if type_.high is None else type_.high
-                if code.is_within(low, high):
-                    return code_text(code), False
-                self.writer.used.add("assignable_integer")
-                return f"assignable_integer({code_text(code)}, {low}, {high})", True
+                low, high = bounds_of(type_)
+                is_within = code.is_within(low, high)
+                return code if is_within else self._checked("assignable_integer", code, integer(low), integer(high))
             case _:
-                return code_text(code), not code.is_known
+                return code
 
-    def _assigned_double(self, code: Code) -> tuple[str, bool]:
-        if not code.is_known:
-            self.writer.used.add("assignable_double")
-            return f"assignable_double({code_text(code)})", True
-        return (f"float({code_text(code)})" if code.sort is Sort.INTEGER else code_text(code)), False
+    def _checked(self, function: str, *arguments: Code) -> Code:
+        self.writer.used.add(function)
+        return call(function, *arguments, unknown=Unknown.VALUE)
 
 
 def _protocol(writer: Writer, event: str) -> tuple[str, tuple[str, ...], str | None] | None:

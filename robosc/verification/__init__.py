@@ -3,8 +3,8 @@
 Shares nothing with synthesis but the automata and their explicit meaning (an import contract says so).
 """
 
-from robosc.verification.explicit import ExplicitSupervisor, synthesize_explicit
 from robosc.verification.explicit_check import CheckOutcome, Failure, Verification, verify_explicitly
+from robosc.verification.explicit_synthesis import ExplicitSupervisor, synthesize_explicit
 from robosc.verification.verify import DEFAULT_STATES, Limits, VerificationReport, verify
 
 __all__ = [

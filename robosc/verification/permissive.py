@@ -1,6 +1,6 @@
 """The maximally permissive supervisor once more, on packed states: for the comparison with one that was handed in.
 
-The same fixed point as `explicit`, for some ten times as many states; the tests compare the two.
+The same fixed point as `explicit_synthesis`, for some ten times as many states; the tests compare the two.
 """
 
 from array import array

@@ -330,9 +330,9 @@ class Semantics:
 
     def bad(self, state: State) -> bool:
         """Return True if a state violates an invariant, or an uncontrollable event of it a condition or range."""
-        return bool(self.trouble(state))
+        return bool(self.bad_reason(state))
 
-    def trouble(self, state: State) -> str | None:
+    def bad_reason(self, state: State) -> str | None:
         """Return the reason why a state is bad, in words, or None if it is not."""
         for number, invariant in enumerate(self._invariants):
             if invariant(state, NO_DATA) is not True:

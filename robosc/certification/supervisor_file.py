@@ -65,7 +65,7 @@ class Fault:
     Attributes:
         check: `deployment`, `model`, `certificate`, or the property that does not hold.
         message: The fault, in words.
-        trace: Events of a run into the trouble, or None where none belongs to it.
+        trace: Events of a run into the failure, or None where none belongs to it.
         is_shortest: True if there is certainly no shorter run.
         state: The state that it leads to, or None where none belongs to it.
     """

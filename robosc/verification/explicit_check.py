@@ -39,7 +39,7 @@ class Failure:
 
     Attributes:
         property: `safe`, `controllable`, `nonblocking` or `maximally permissive`.
-        trace: Events of a shortest run from an initial state into the trouble.
+        trace: Events of a shortest run from an initial state into the failure.
         state: The state that it leads to, in the order of `subjects`.
         reason: Fault in that state, in words.
         message: The same, and the state.
@@ -65,7 +65,7 @@ class Verification:
         controllable: No uncontrollable event that the plant enables is disabled.
         nonblocking: From every reachable state a marked state is reachable.
         maximally_permissive: Nothing more is disabled than needed.
-        failures: For each property that failed the first trouble found, in the order above.
+        failures: For each property that failed the first failure found, in the order above.
     """
 
     states: int | None
@@ -78,12 +78,12 @@ class Verification:
 
     @property
     def trace(self) -> tuple[str, ...]:
-        """Events into the first trouble; none if nothing failed."""
+        """Events into the first failure; none if nothing failed."""
         return self.failures[0].trace if self.failures else ()
 
     @property
     def message(self) -> str:
-        """The first trouble in words; empty if nothing failed."""
+        """The first failure in words; empty if nothing failed."""
         return f"not {self.failures[0].property}: {self.failures[0].message}" if self.failures else ""
 
 
@@ -181,14 +181,14 @@ class _FailureSearch:
         """A reachable bad state."""
         packing = self.found.packing
         broken = packing.broken_invariants()
-        # Each table has seen every state, so most have no trouble at all.
-        tables = [table for table in self.found.tables if table.trouble]
+        # Each table has seen every state, so most have no bad state at all.
+        tables = [table for table in self.found.tables if table.bad]
         if not broken and not tables:
             return None
         for number, code in enumerate(self.found.codes):
             if any(test(code) for test in broken) or any(table.is_bad(code) for table in tables):
-                trouble = packing.semantics.trouble(packing.decode(code))
-                return self._failure("safe", number, str(trouble))
+                reason = packing.semantics.bad_reason(packing.decode(code))
+                return self._failure("safe", number, str(reason))
         return None
 
     def uncontrollable(self) -> Failure | None:

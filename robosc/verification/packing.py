@@ -147,7 +147,7 @@ class EventTable:
         field: The bits that tell what it does, those that it changes included.
         known: For the values of these bits met so far, what each possible step changes: bits to turn over. Nothing
             where the plants, the ranges or, for a controllable event, its conditions do not let it happen.
-        trouble: The values with which the event makes a state bad.
+        bad: The values with which the event makes a state bad.
         condition: Condition that the supervisor adds, or None.
     """
 
@@ -158,7 +158,7 @@ class EventTable:
         self._places = sorted(packing.places[subject] for subject in _touched(packing.system, event.name))
         self.field = packing.field(self._places)
         self.known: dict[int, tuple[int, ...]] = {}
-        self.trouble: set[int] = set()
+        self.bad: set[int] = set()
         self.condition = None if added is None else packing.condition(added)
 
     def _fresh(self) -> Semantics:
@@ -187,7 +187,7 @@ class EventTable:
             changes: list[int] = []
         else:
             if not self.event.is_controllable and self._semantics.bad(state):
-                self.trouble.add(key)
+                self.bad.add(key)
             targets = self._semantics.targets(state, name)
             changes = sorted(key ^ self._packing.part(target, self._places) for target in targets)
         if len(self.known) >= REMEMBERED:
@@ -203,7 +203,7 @@ class EventTable:
 
     def is_bad(self, code: int) -> bool:
         """Return True if the event makes a state bad whose changes have been asked for."""
-        return code & self.field in self.trouble
+        return code & self.field in self.bad
 
 
 def _touched(system: System, event: str) -> set[Subject]:

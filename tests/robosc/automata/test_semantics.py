@@ -77,7 +77,7 @@ def test_a_condition_that_is_not_true_forbids_a_controllable_event_and_makes_an_
     assert not subject.condition(("idle",), "go")
     assert not subject.bad(("idle",))
     assert subject.bad(("busy",))
-    assert subject.trouble(("busy",)) == "u_end can happen against its requirement"
+    assert subject.bad_reason(("busy",)) == "u_end can happen against its requirement"
 
 
 def test_updates_read_the_old_state_and_happen_together() -> None:
@@ -113,7 +113,7 @@ def test_leaving_the_range_with_an_uncontrollable_event_is_bad() -> None:
     subject = Semantics(system(automaton("A", [count], variables=[DiscreteVariable("x", DIGIT, (1,))])))
     assert not subject.bad(("l", 1))
     assert subject.enabled(("l", 0), "u_count")
-    assert subject.trouble(("l", 0)) == "u_count can take a variable out of its range"
+    assert subject.bad_reason(("l", 0)) == "u_count can take a variable out of its range"
 
 
 def test_one_datum_out_of_range_among_many_is_enough_for_a_bad_state() -> None:

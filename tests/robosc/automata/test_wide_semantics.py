@@ -68,12 +68,12 @@ def test_a_requirement_automaton_watches_and_forbids() -> None:
     assert semantics.enabled(("here", "alert"), "go")
     assert not semantics.condition(("here", "alert"), "go")
     assert semantics.targets(("here", "alert"), "go") == {("here", "alert")}
-    assert semantics.trouble(("here", "alert")) is None
+    assert semantics.bad_reason(("here", "alert")) is None
 
 
 def test_an_uncontrollable_event_against_a_requirement_automaton_is_bad() -> None:
     semantics = Semantics(requirement("R", "calm -u_seen-> alert"))
-    assert semantics.trouble(("here", "alert")) == "u_seen can happen against its requirement"
+    assert semantics.bad_reason(("here", "alert")) == "u_seen can happen against its requirement"
     assert synthesize(requirement("R", "calm -u_seen-> alert")).status is SynthesisStatus.EMPTY
 
 

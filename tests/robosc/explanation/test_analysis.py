@@ -134,16 +134,16 @@ def test_what_would_follow_runs_into_trouble() -> None:
             for event in twin.system.events:
                 kinds = {item.kind for item in twin.analysis.hindrances(event.name, here)}
                 if HindranceKind.SUPERVISOR in kinds:
-                    trouble = twin.analysis.counterexample_after(
+                    counterexample = twin.analysis.counterexample_after(
                         twin.analysis.lost_after(event.name, here, twin.analysis.good)
                     )
-                    start = trouble.run.states[0]
+                    start = counterexample.run.states[0]
                     assert start in twin.semantics.targets(state, event.name)
                     assert start not in twin.supervisor.good
-                    assert trouble.run.states[-1] not in twin.supervisor.good
-                    assert trouble.is_blocking == (not twin.semantics.bad(trouble.run.states[-1]))
-                    forced = all(not twin.system.event(name).is_controllable for name in trouble.run.events)
-                    assert trouble.is_forced == forced
+                    assert counterexample.run.states[-1] not in twin.supervisor.good
+                    assert counterexample.is_blocking == (not twin.semantics.bad(counterexample.run.states[-1]))
+                    forced = all(not twin.system.event(name).is_controllable for name in counterexample.run.events)
+                    assert counterexample.is_forced == forced
                     met["forced" if forced else "not forced"] += 1
-                    met["blocking" if trouble.is_blocking else "bad"] += 1
+                    met["blocking" if counterexample.is_blocking else "bad"] += 1
     assert all(met[name] for name in ("forced", "blocking", "bad")), met

@@ -43,7 +43,7 @@ class Symbolic:
         self.constraints = relaxable_constraints(system)
         self.problems = Problems(self.encoding, self.monitor)
 
-    def trouble(self, dropped: Iterable[RelaxableConstraint] = ()) -> Counterexample:
+    def counterexample(self, dropped: Iterable[RelaxableConstraint] = ()) -> Counterexample:
         analysis = Analysis(self.encoding, self.monitor, self.problems, self.constraints, self.manager.false, dropped)
         return analysis.counterexample_after(initial_states(self.encoding))
 
@@ -180,10 +180,10 @@ def test_trouble_is_real_and_the_run_is_shortest() -> None:
     met: Counter[str] = Counter()
     for seed in seeds(2 * EXAMPLES):
         system = empty_system(seed)
-        trouble, other = (Symbolic(system, engine).trouble() for engine in ENGINES)
-        assert trouble.run == other.run
+        counterexample, other = (Symbolic(system, engine).counterexample() for engine in ENGINES)
+        assert counterexample.run == other.run
         search = Search(system)
-        run = trouble.run
+        run = counterexample.run
         assert run.is_shortest
         assert run.states[0] == search.semantics.initial
         for event, (before, after) in zip(run.events, pairwise(run.states), strict=True):
@@ -191,15 +191,15 @@ def test_trouble_is_real_and_the_run_is_shortest() -> None:
         last = run.states[-1]
         assert last in search.troubled
         forced = search.distance(uncontrollable_only=True)
-        assert trouble.is_forced == (forced is not None)
+        assert counterexample.is_forced == (forced is not None)
         assert len(run.events) == (search.distance(uncontrollable_only=False) if forced is None else forced)
-        assert trouble.is_blocking == (not search.bad(last))
-        met["forced" if trouble.is_forced else "not forced"] += 1
-        met["blocking" if trouble.is_blocking else "bad"] += 1
+        assert counterexample.is_blocking == (not search.bad(last))
+        met["forced" if counterexample.is_forced else "not forced"] += 1
+        met["blocking" if counterexample.is_blocking else "bad"] += 1
         met["long"] += len(run.events) > 1
-        _check_what_is_broken(system, search, trouble, last, met)
-        if trouble.is_blocking:
-            _check_detour(system, search, trouble, last, met)
+        _check_what_is_broken(system, search, counterexample, last, met)
+        if counterexample.is_blocking:
+            _check_detour(system, search, counterexample, last, met)
     assert all(met[name] for name in ("forced", "not forced", "blocking", "bad", "long", "invariant", "range")), met
     assert all(met[name] for name in ("condition", "no way", *map(str, HindranceKind))), met
 
@@ -217,26 +217,30 @@ def test_trouble_without_some_obstacles_speaks_of_the_others_alone() -> None:
         constraints = symbolic[0].constraints
         kept = [constraints[place] for place in blame.conflict]
         dropped = [item for item in constraints if item not in kept]
-        trouble, other = (item.trouble(dropped) for item in symbolic)
-        assert (trouble.run, trouble.is_forced, trouble.unmarked) == (other.run, other.is_forced, other.unmarked)
+        counterexample, other = (item.counterexample(dropped) for item in symbolic)
+        assert (counterexample.run, counterexample.is_forced, counterexample.unmarked) == (
+            other.run,
+            other.is_forced,
+            other.unmarked,
+        )
         search = Search(without(system, dropped))
-        assert trouble.run.states[-1] in search.troubled
-        steps = list(zip(trouble.run.events, pairwise(trouble.run.states), strict=True))
+        assert counterexample.run.states[-1] in search.troubled
+        steps = list(zip(counterexample.run.events, pairwise(counterexample.run.states), strict=True))
         assert all((name, after) in list(search.steps(before)) for name, (before, after) in steps)
-        _check_run_of_the_robot(system, search, trouble, met)
+        _check_run_of_the_robot(system, search, counterexample, met)
         named = {place for item in kept for place in item.conditions}
-        hindrances = () if trouble.detour is None else trouble.detour.hindrances
-        assert {place for _, place in trouble.forbidden} <= named
+        hindrances = () if counterexample.detour is None else counterexample.detour.hindrances
+        assert {place for _, place in counterexample.forbidden} <= named
         assert {item.condition for item in hindrances if item.condition is not None} <= named
-        assert set(trouble.invariants) <= {place for item in kept for place in item.invariants}
-        assert {item for _, item in trouble.leaving} <= set(kept)
+        assert set(counterexample.invariants) <= {place for item in kept for place in item.invariants}
+        assert {item for _, item in counterexample.leaving} <= set(kept)
         assert {item.range for item in hindrances if item.range is not None} <= set(kept)
-        assert set(trouble.unmarked) <= {item.marking for item in kept}
-        met["another story"] += trouble.run != symbolic[0].trouble().run
+        assert set(counterexample.unmarked) <= {item.marking for item in kept}
+        met["another story"] += counterexample.run != symbolic[0].counterexample().run
     assert all(met[name] for name in ("another story", "real", "range dropped", "shortest")), met
 
 
-def _check_run_of_the_robot(system: System, search: Search, trouble: Counterexample, met: Counter[str]) -> None:
+def _check_run_of_the_robot(system: System, search: Search, counterexample: Counterexample, met: Counter[str]) -> None:
     """No update of the run stops at the end of a range, if there is such a run; and no shorter run is there."""
     free = Semantics(
         without(system, [item for item in relaxable_constraints(system) if item.kind is not ConstraintKind.RANGE])
@@ -257,35 +261,35 @@ def _check_run_of_the_robot(system: System, search: Search, trouble: Counterexam
     forced = distance(True)
     shortest = distance(False) if forced is None else forced
     if shortest is not None:
-        assert len(trouble.run.events) == shortest
-        for name, (before, after) in zip(trouble.run.events, pairwise(trouble.run.states), strict=True):
-            assert (name, after) in list(really(before, is_forced=trouble.is_forced))
+        assert len(counterexample.run.events) == shortest
+        for name, (before, after) in zip(counterexample.run.events, pairwise(counterexample.run.states), strict=True):
+            assert (name, after) in list(really(before, is_forced=counterexample.is_forced))
         met["shortest"] += shortest > 0
         met["real"] += 1
     met["range dropped"] += search.system.automata != system.automata
 
 
 def _check_what_is_broken(
-    system: System, search: Search, trouble: Counterexample, last: State, met: Counter[str]
+    system: System, search: Search, counterexample: Counterexample, last: State, met: Counter[str]
 ) -> None:
     places = {subject: place for place, subject in enumerate(subjects(system))}
     broken = [compile_expression(item, places)(last, NO_DATA) is not True for item in system.invariants]
-    assert trouble.invariants == tuple(place for place, is_broken in enumerate(broken) if is_broken)
+    assert counterexample.invariants == tuple(place for place, is_broken in enumerate(broken) if is_broken)
     met["invariant"] += any(broken)
     for place, condition in enumerate(system.conditions):
         if not system.event(condition.event).is_controllable:
             is_broken = compile_expression(condition.condition, places)(last, NO_DATA) is not True
             expected = is_broken and search.semantics.enabled(last, condition.event)
-            assert ((condition.event, place) in trouble.forbidden) == expected
+            assert ((condition.event, place) in counterexample.forbidden) == expected
             met["condition"] += expected
-    for event, constraint in trouble.leaving:
+    for event, constraint in counterexample.leaving:
         # With all other ranges left out and no condition or invariant, the state is still bad because of this one.
         others = [item for item in relaxable_constraints(system) if item != constraint]
-        assert Semantics(without(system, others)).trouble(last) is not None
+        assert Semantics(without(system, others)).bad_reason(last) is not None
         assert not system.event(event).is_controllable
         met["range"] += 1
     free = [item for item in relaxable_constraints(system) if item.kind is not ConstraintKind.RANGE]
-    assert Semantics(without(system, free)).bad(last) == bool(trouble.leaving)
+    assert Semantics(without(system, free)).bad(last) == bool(counterexample.leaving)
 
 
 def _distance(
@@ -303,7 +307,9 @@ def _distance(
     return None
 
 
-def _check_detour(system: System, search: Search, trouble: Counterexample, last: State, met: Counter[str]) -> None:
+def _check_detour(
+    system: System, search: Search, counterexample: Counterexample, last: State, met: Counter[str]
+) -> None:
     """The plants alone would have this way, and up to the event named all of it is allowed."""
     free = Semantics(
         without(system, [item for item in relaxable_constraints(system) if item.kind is not ConstraintKind.MARKING])
@@ -317,21 +323,21 @@ def _check_detour(system: System, search: Search, trouble: Counterexample, last:
     found = _distance(inside, lambda state: (target for _, target in search.steps(state)), free.is_marked)
     if found is None:
         found = _distance(inside, freely, free.is_marked)
-    assert (trouble.detour is None) == (found is None)
-    if trouble.detour is None:
+    assert (counterexample.detour is None) == (found is None)
+    if counterexample.detour is None:
         met["no way"] += 1
         return
     # From wherever what is allowed leads to, no way of the plants alone is shorter.
-    assert len(trouble.detour.events) - trouble.detour.stopped_at == found
+    assert len(counterexample.detour.events) - counterexample.detour.stopped_at == found
     states = {last}
-    for event in trouble.detour.events[: trouble.detour.stopped_at]:
+    for event in counterexample.detour.events[: counterexample.detour.stopped_at]:
         states = {target for state in states for name, target in search.steps(state) if name == event}
         states = {state for state in states if not search.bad(state)}
-    here, event = trouble.detour.state, trouble.detour.events[trouble.detour.stopped_at]
+    here, event = counterexample.detour.state, counterexample.detour.events[counterexample.detour.stopped_at]
     assert here in states
     assert here in inside
     semantics = search.semantics
-    kinds = {item.kind for item in trouble.detour.hindrances}
+    kinds = {item.kind for item in counterexample.detour.hindrances}
     met.update(map(str, kinds))
     if system.event(event).is_controllable:
         assert (HindranceKind.REQUIREMENT in kinds) == (not semantics.condition(here, event))

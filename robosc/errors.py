@@ -4,7 +4,7 @@
     |-- LanguageError            the model has errors; carries every Diagnostic
     |-- UnsupportedModelError    a correct model outside what a stage or target handles
     |-- InvalidSupervisorError   a supervisor file that cannot be trusted or read
-    |-- NodeLimitError           decision diagrams grew beyond what they may have
+    |-- NodeLimitError           decision diagrams exceeded the limit of nodes
     |-- UnknownNameError         a name that nothing has; a KeyError
     |-- SynthesisCancelled       the caller asked long work to stop
     `-- InternalError            a fault of RoboSC itself; asks for a report
@@ -164,7 +164,7 @@ class NondeterministicEventError(InvalidSystemError):
 
 
 class NodeLimitError(RoboscError):
-    """Decision diagrams grew beyond the number of nodes that they may have."""
+    """The decision diagrams exceeded the limit of nodes."""
 
 
 class SynthesisCancelled(RoboscError):

@@ -1,4 +1,4 @@
-"""Findings about a supervisor that was handed over, for machines and for people."""
+"""Report on the verification of a supervisor file, as JSON values and as text."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""Check that a supervisor that is handed over is right for a model, whoever made it and whatever it claims.
+"""Verification of an untrusted supervisor file against its model.
 
 Nothing in the file is believed: its model is compared with the one that is read anew from the texts, its added
 conditions are verified on that one, and its certificate is compared with what is found. A digest in a file proves
@@ -79,7 +79,7 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class FileVerification:
-    """The outcome of checking a supervisor anew.
+    """The outcome of the verification of a supervisor file.
 
     Attributes:
         diagnostics: Reasons why the texts hold no model that the supervisor could be for; empty where they do.

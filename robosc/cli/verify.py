@@ -1,4 +1,4 @@
-"""`robosc verify`: whether a supervisor that someone hands over is right for a model, and properties of its robot."""
+"""`robosc verify`: verification of a supervisor file against its model, and of properties of its robot."""
 
 import argparse
 import sys

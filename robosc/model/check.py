@@ -119,7 +119,7 @@ def inspect(bundle: Bundle) -> Inspected:
     if parsed.tree is not None:
         checked = _checked(checker, parsed.tree)
     else:
-        # What is missing has left faults behind that are none: they are not told.
+        # Suppress follow-on errors: missing syntax causes faults that are none.
         checker.model()
         checked = Checked(None, parsed.diagnostics, bindings=checker.findings.bindings)
     return Inspected(checked, parsed, checker.parts, checker.scopes, checker.units, checker.communications)

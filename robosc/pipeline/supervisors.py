@@ -40,7 +40,7 @@ class Supervisor(CoreSupervisor, frozen=True, dict=True):
 
     @classmethod
     def read(cls, file: FileName) -> Self:
-        """Read a supervisor's file (`.rsup`); it is validated, and whether it is right for a model is not judged.
+        """Read a supervisor's file (`.rsup`); it is validated, but not verified against a model.
 
         Raises:
             FileAccessError: The file cannot be read.

@@ -1,4 +1,4 @@
-"""Verification: of properties of the robot under its supervisor, and of supervisors that somebody hands over."""
+"""Verification of properties of the robot under its supervisor, and of supervisor files."""
 
 from collections.abc import Callable, Sequence
 from typing import overload

@@ -61,7 +61,7 @@ def encode(supervisor: Supervisor) -> bytes:
 
 
 def decode(data: bytes) -> Supervisor:
-    """The supervisor in a file's bytes, consistent in itself; whether it is right for a model is not judged here.
+    """The supervisor in a file's bytes, consistent in itself; it is not verified against a model here.
 
     Raises:
         InvalidSupervisorError: The bytes are no supervisor of a known version; says where in one sentence.

@@ -238,7 +238,7 @@ def node_check(manager: Manager, maximum_nodes: int | None) -> Callable[[], None
 
 def node_limit_error(maximum_nodes: int) -> NodeLimitError:
     """Return the error for diagrams that have become too large."""
-    return NodeLimitError(f"the decision diagrams need more than the {maximum_nodes} nodes that they may have")
+    return NodeLimitError(f"the limit of {maximum_nodes} nodes of the decision diagrams is exceeded")
 
 
 def is_compiled(manager: Manager) -> bool:

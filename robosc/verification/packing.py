@@ -19,7 +19,7 @@ REMEMBERED = 200_000
 """Values of what an event depends on that are remembered at a time."""
 
 ORDINARY_STEPS = 100
-"""Steps of one event in one state that nobody counts."""
+"""Steps of one event in one state that are exempt from the counter."""
 
 CodeTest = Callable[[int], bool]
 """A predicate over packed states."""

@@ -44,7 +44,7 @@ MAXIMUM_CHOICES = 20_000
 
 
 @dataclass(frozen=True, slots=True)
-class Option:
+class PossibleData:
     """Data that an event can carry.
 
     Attributes:
@@ -59,7 +59,7 @@ class Option:
     may_be_left_out: bool
 
 
-Choice = tuple[tuple[Option, ...], ...]
+Choice = tuple[tuple[PossibleData, ...], ...]
 """For each event of a batch the data that it can carry, given some values of what several of them read."""
 
 
@@ -214,10 +214,12 @@ class _Event:
         self.free_choices = prod(len(domain(one.type)) + one.may_be_unknown for one in self._free)
         self.terms = tuple(dict.fromkeys(key for reading in self._readings for key, _ in reading.slots))
 
-    def options(self, terms: _Terms, shared: Sequence[Hashable]) -> dict[tuple[Value | None, ...], tuple[Option, ...]]:
+    def options(
+        self, terms: _Terms, shared: Sequence[Hashable]
+    ) -> dict[tuple[Value | None, ...], tuple[PossibleData, ...]]:
         """The data for each choice of values of the shared terms that it reads."""
         free = [tuple(data.items()) for data in valuations(self._free)]
-        found: dict[tuple[Value | None, ...], dict[Option, None]] = {}
+        found: dict[tuple[Value | None, ...], dict[PossibleData, None]] = {}
         for values in product(*(terms.values(key) for key in self.terms)):
             known = dict(zip(self.terms, values, strict=True))
             data: list[tuple[Path, Value | None]] = []
@@ -229,7 +231,7 @@ class _Event:
                     data.append((reading.path, value))
             options = found.setdefault(tuple(known[key] for key in shared if key in known), {})
             may_be_left_out = is_unknown or self._may_be_left_out
-            options.update((Option((*data, *more), is_unknown, may_be_left_out), None) for more in free)
+            options.update((PossibleData((*data, *more), is_unknown, may_be_left_out), None) for more in free)
         return {values: tuple(options) for values, options in found.items()}
 
     def _reading(self, path: Path, type_: Type) -> _Reading:

@@ -89,11 +89,11 @@ def is_provided(logged: object, data: object) -> bool:
     return type(logged) is type(data) and logged == data
 
 
-class NotTold:
+class NotLogged:
     """The log tells nothing of it."""
 
 
-NOT_TOLD: Final = NotTold()
+NOT_TOLD: Final = NotLogged()
 
 
 class Received:

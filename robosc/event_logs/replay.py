@@ -11,7 +11,7 @@ from typing import Any
 from robosc.automata import ExecutableSystem, Semantics
 from robosc.automata.compile import Carried, State
 from robosc.automata.state import Subject, subject_domain, subjects
-from robosc.event_logs.data import MISFIT, NOT_TOLD, Misfit, NotTold, Received, is_same, path_text, value_of
+from robosc.event_logs.data import MISFIT, NOT_TOLD, Misfit, NotLogged, Received, is_same, path_text, value_of
 from robosc.expressions import DoubleType, IntegerType, PathStep, Value
 from robosc.expressions.evaluate import evaluate
 from robosc.expressions.values import assignable_double, assignable_integer
@@ -32,7 +32,7 @@ _WITH_RESET = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 _NAMES_SHOWN = 3
 
 
-class _NotToldError(Exception):
+class _NotLoggedError(Exception):
     """A value depends on something that the log leaves out."""
 
 
@@ -251,7 +251,7 @@ class Replay:
                     variable = next(v for v in participant.behaviour.variables if v.name == update.variable)
                     try:
                         value = _assigned(variable, self._value(update.expression, event, data))
-                    except _NotToldError:
+                    except _NotLoggedError:
                         unknown.append((component, update.variable))
                     else:
                         if value is not None:
@@ -262,8 +262,8 @@ class Replay:
     def _value(self, expression: Any, event: str, data: Any) -> Any:
         def received(path: tuple[PathStep, ...]) -> Any:
             value = self._received.value(event, data, path)
-            if isinstance(value, Misfit | NotTold):
-                raise _NotToldError
+            if isinstance(value, Misfit | NotLogged):
+                raise _NotLoggedError
             return value
 
         return evaluate(

@@ -2,22 +2,22 @@
 
 from robosc.synthesis.engines import EngineOptions, UnknownEngineError, engine_names, register, resolve_engine
 from robosc.synthesis.findings import findings, questions_about
-from robosc.synthesis.questions import Answers, Cause, Never, Questions, Restriction, Together
+from robosc.synthesis.questions import Answers, Cause, EnabledTogether, NeverEnabled, Questions, Restriction
 from robosc.synthesis.result import Statistics, SynthesisProgress, SynthesisResult, SynthesisStatus
 from robosc.synthesis.synthesize import synthesize
 
 __all__ = [
     "Answers",
     "Cause",
+    "EnabledTogether",
     "EngineOptions",
-    "Never",
+    "NeverEnabled",
     "Questions",
     "Restriction",
     "Statistics",
     "SynthesisProgress",
     "SynthesisResult",
     "SynthesisStatus",
-    "Together",
     "UnknownEngineError",
     "engine_names",
     "findings",

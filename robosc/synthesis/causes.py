@@ -9,7 +9,7 @@ from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import FixedPoint, Problem, allowed, initial_states, safe_states
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.questions import Cause, Never
+from robosc.synthesis.questions import Cause, NeverEnabled
 from robosc.synthesis.step import Step
 from robosc.synthesis.transitions import Steps
 
@@ -35,19 +35,19 @@ class Causes:
         self._good = good
         self._reachable = reachable
 
-    def of(self, steps: Steps) -> Never:
+    def of(self, steps: Steps) -> NeverEnabled:
         """Return the cause why an event of the problem can never happen in the controlled system."""
         event = steps.event.name
         if self._is_nowhere(steps.plant) or self._is_nowhere(steps.plant & self._by_plants):
-            return Never(event, Cause.PLANT, is_reached=False)
+            return NeverEnabled(event, Cause.PLANT, is_reached=False)
         enabled = steps.plant & self._under_conditions
         if self._is_nowhere(enabled & steps.condition):
-            return Never(event, Cause.REQUIREMENT, is_reached=not self._is_nowhere(enabled))
+            return NeverEnabled(event, Cause.REQUIREMENT, is_reached=not self._is_nowhere(enabled))
         enabled = self._reachable & steps.plant & steps.condition
         is_reached = not self._is_nowhere(enabled)
         if not self._is_possible_without_invariants(steps):
-            return Never(event, Cause.SUPERVISOR, is_reached)
-        return Never(event, Cause.INVARIANT, is_reached, self._broken(steps.image(enabled)))
+            return NeverEnabled(event, Cause.SUPERVISOR, is_reached)
+        return NeverEnabled(event, Cause.INVARIANT, is_reached, self._broken(steps.image(enabled)))
 
     def _is_nowhere(self, states: Any) -> bool:
         return bool(states == self._false)

@@ -9,7 +9,7 @@ from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import FixedPoint, Problem, allowed, initial_states, safe_states
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.questions import Answers, Never, Questions, Restriction, Together
+from robosc.synthesis.questions import Answers, EnabledTogether, NeverEnabled, Questions, Restriction
 from robosc.synthesis.runs import ShortestRuns
 from robosc.synthesis.transitions import Steps
 
@@ -64,7 +64,7 @@ class ControlledSystem:
             found = self._known[event] = self._reachable & steps.plant & allowed(steps, self._good)
         return found
 
-    def _never(self, events: Iterable[str]) -> Iterator[Never]:
+    def _never(self, events: Iterable[str]) -> Iterator[NeverEnabled]:
         for event in events:
             if self._possible(event) == self._manager.false:
                 yield self._causes.of(self._steps[event])
@@ -155,14 +155,14 @@ class ControlledSystem:
 
     # Rivals
 
-    def _together(self, groups: Iterable[Sequence[str]]) -> tuple[Together, ...]:
+    def _together(self, groups: Iterable[Sequence[str]]) -> tuple[EnabledTogether, ...]:
         pairs = list(self._pairs(groups))
         if not pairs:
             return ()
         possible = {name: self._reachable & allowed(steps, self._good) for name, steps in self._steps.items()}
         start = initial_states(self._encoding) & self._good
         runs = ShortestRuns(self._encoding, self._monitor, self._problem.steps, possible, start)
-        return tuple(Together(first, second, runs.trace_to(states)) for first, second, states in pairs)
+        return tuple(EnabledTogether(first, second, runs.trace_to(states)) for first, second, states in pairs)
 
     def _pairs(self, groups: Iterable[Sequence[str]]) -> Iterator[tuple[str, str, Any]]:
         """Rivals that are possible together, and where: the first `MAXIMUM_TOGETHER` of them."""

@@ -32,7 +32,7 @@ from robosc.model.structure import (
     is_tau,
 )
 from robosc.source import Location
-from robosc.synthesis.questions import Answers, Cause, Never, Questions, Restriction, Together
+from robosc.synthesis.questions import Answers, Cause, EnabledTogether, NeverEnabled, Questions, Restriction
 
 MAXIMUM_EVENTS = 12
 """Events of a run that a message shows."""
@@ -143,7 +143,7 @@ _NEVER_TAKEN = (
 )
 
 
-def _never_requested(model: Model, places: Places, never: Mapping[str, Never]) -> Iterator[Diagnostic]:
+def _never_requested(model: Model, places: Places, never: Mapping[str, NeverEnabled]) -> Iterator[Diagnostic]:
     """Findings about the events of communications."""
     reactions = {item.event for component in model.components for item in _transitions(component)}
     for item in model.communications:
@@ -156,7 +156,7 @@ def _never_requested(model: Model, places: Places, never: Mapping[str, Never]) -
             yield _warning("never-enabled", f"{what}: {why}", places.communications[item.name], fix, related)
 
 
-def _blamed(model: Model, places: Places, communication: str | None, never: Never) -> tuple[RelatedPlace, ...]:
+def _blamed(model: Model, places: Places, communication: str | None, never: NeverEnabled) -> tuple[RelatedPlace, ...]:
     """The first requirements that are the cause, where it is known which."""
     if never.cause is Cause.REQUIREMENT and never.is_reached and communication is not None:
         return _requirements_on(model, places, communication)
@@ -174,7 +174,7 @@ def _requirements_on(model: Model, places: Places, communication: str) -> tuple[
     return tuple(islice(found, MAXIMUM_NAMES))
 
 
-def _never_taken(model: Model, places: Places, never: Mapping[str, Never]) -> Iterator[Diagnostic]:
+def _never_taken(model: Model, places: Places, never: Mapping[str, NeverEnabled]) -> Iterator[Diagnostic]:
     """Findings about tau transitions."""
     for component in model.components:
         for location, transition in zip(
@@ -213,7 +213,7 @@ def _unused(model: Model, places: Places, number: int) -> Diagnostic:
 # Requests that compete
 
 
-def _competing(model: Model, places: Places, pair: Together) -> Diagnostic:
+def _competing(model: Model, places: Places, pair: EnabledTogether) -> Diagnostic:
     first, second = (event.rpartition(".")[0] for event in (pair.first, pair.second))
     identifier = next(item.identifier for item in model.communications if item.name == second)
     return _warning(

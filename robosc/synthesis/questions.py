@@ -20,7 +20,7 @@ class Cause(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Never:
+class NeverEnabled:
     """An event that can never happen.
 
     Attributes:
@@ -70,7 +70,7 @@ class Questions:
 
 
 @dataclass(frozen=True, slots=True)
-class Together:
+class EnabledTogether:
     """Two rivals that can both happen in one state.
 
     Attributes:
@@ -94,6 +94,6 @@ class Answers:
         together: Rivals that are possible together, by group, then by the second, then by the first.
     """
 
-    never: tuple[Never, ...] = ()
+    never: tuple[NeverEnabled, ...] = ()
     unused: tuple[int, ...] = ()
-    together: tuple[Together, ...] = ()
+    together: tuple[EnabledTogether, ...] = ()

@@ -173,7 +173,7 @@ def failure(
 
 @dataclass(frozen=True, slots=True)
 class _FailureSearch:
-    """Looks for the first trouble of each kind, nearest to the initial state."""
+    """Looks for the first failure of each kind, nearest to the initial state."""
 
     found: Reached
 

@@ -11,7 +11,7 @@ from typing import Any, Callable, Dict, Optional, Sequence, Tuple
 
 from robosc.execution.runtime.callers import Callers
 from robosc.execution.runtime.clock import Clock
-from robosc.execution.runtime.commands import Commands
+from robosc.execution.runtime.command_timeouts import CommandTimeouts
 from robosc.execution.runtime.event_log import EventLog
 from robosc.execution.runtime.middleware_messages import is_finite
 from robosc.execution.runtime.protocol import CommunicationInfo, ControlledSystem, LayerMiddleware, RobotSide
@@ -67,7 +67,7 @@ class Layer(Runner):
         self._named = {request.name: request for request in self._requests}
         self._messages = _messages(system.description.communications)
         self._callers = Callers(self._calls, self._goals)
-        self._commands = Commands(self._releases, self.settings.command_timeout_s)
+        self._command_timeouts = CommandTimeouts(self._releases, self.settings.command_timeout_s)
 
     # What comes from the existing controller.
 
@@ -86,7 +86,7 @@ class Layer(Runner):
         why: Optional[str] = _A_FAULT
         try:
             self._look_at_clock()
-            self._commands.arrived(identifier, self._now_s)
+            self._command_timeouts.arrived(identifier, self._now_s)
             why = self._let_message_through(names, message)
         finally:
             if why is not None:
@@ -188,10 +188,10 @@ class Layer(Runner):
         self._finish()
 
     def _next_deadline(self, now: float) -> float:
-        return min(super()._next_deadline(now), self._commands.deadline_s())
+        return min(super()._next_deadline(now), self._command_timeouts.deadline_s())
 
     def _end_what_is_over(self, now: float) -> None:
-        for identifier in self._commands.silent(now):
+        for identifier in self._command_timeouts.silent(now):
             self._steps.release(identifier)
         super()._end_what_is_over(now)
         # What is over ends for the caller before anything that comes at the same moment.

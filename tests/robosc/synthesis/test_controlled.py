@@ -21,11 +21,11 @@ from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import (
     Answers,
     Cause,
-    Never,
+    EnabledTogether,
+    NeverEnabled,
     Questions,
     Restriction,
     SynthesisProgress,
-    Together,
     synthesize,
 )
 from robosc.verification import ExplicitSupervisor
@@ -93,14 +93,14 @@ class Twin:
     def _is_never(self, event: str) -> bool:
         return not any(self.can_happen(state, event) for state in self.supervisor.reachable)
 
-    def _cause(self, event: str) -> Never:
+    def _cause(self, event: str) -> NeverEnabled:
         enabled, condition = self.semantics.enabled, self.semantics.condition
         if not any(enabled(state, event) for state in self._reached(enabled)):
-            return Never(event, Cause.PLANT, False)
+            return NeverEnabled(event, Cause.PLANT, False)
         under = self._reached(lambda state, other: enabled(state, other) and condition(state, other))
         allowed = [condition(state, event) for state in under if enabled(state, event)]
         if not any(allowed):
-            return Never(event, Cause.REQUIREMENT, bool(allowed))
+            return NeverEnabled(event, Cause.REQUIREMENT, bool(allowed))
         here = [state for state in self.supervisor.reachable if enabled(state, event) and condition(state, event)]
         free = explicit(replace(self.system, invariants=()))
         if self.system.event(event).is_controllable:
@@ -108,12 +108,12 @@ class Twin:
         else:
             is_free = any(enabled(state, event) for state in free.reachable)
         if not is_free:
-            return Never(event, Cause.SUPERVISOR, bool(here))
+            return NeverEnabled(event, Cause.SUPERVISOR, bool(here))
         after = {target for state in here for target in self.semantics.targets(state, event)}
         holds = [compile_expression(item, self._places) for item in self.system.invariants]
         broken = [place for place, item in enumerate(holds) if any(item(state, NO_DATA) is not True for state in after)]
         self.met["broken"] += bool(broken)
-        return Never(event, Cause.INVARIANT, bool(here), tuple(broken))
+        return NeverEnabled(event, Cause.INVARIANT, bool(here), tuple(broken))
 
     def _reached(self, is_possible: Callable[[State, str], bool]) -> set[State]:
         """The states that are reached through some events, whatever synthesis makes of them."""
@@ -163,7 +163,7 @@ class Twin:
         allowed = {(state, event) for state, event in supervisor.allowed if state in supervisor.reachable}
         return supervisor.reachable, allowed
 
-    def _pairs(self, group: Sequence[str]) -> list[Together]:
+    def _pairs(self, group: Sequence[str]) -> list[EnabledTogether]:
         """Traces are those of another breadth-first search: only their lengths need to agree."""
         graph = controlled_graph(self.semantics, self._added, limit=LIMIT)
         assert graph is not None
@@ -176,10 +176,10 @@ class Twin:
                     if {first, second} <= {event for event, _ in steps}
                 ]
                 if numbers:
-                    found.append(Together(first, second, min(map(graph.trace, numbers), key=len)))
+                    found.append(EnabledTogether(first, second, min(map(graph.trace, numbers), key=len)))
         return found
 
-    def replay(self, pair: Together) -> None:
+    def replay(self, pair: EnabledTogether) -> None:
         """The trace is a run, and at its end both can happen."""
         states = {self.semantics.initial}
         for event in pair.trace:
@@ -283,8 +283,8 @@ def test_a_trace_is_as_long_as_the_shortest_run(engine: str, length: int) -> Non
     questions = Questions(rivals=(("first", "second"), ("second", "first", "up")))
     answers = synthesize(chain(length), engine=engine, questions=questions).answers
     assert answers.together == (
-        Together("first", "second", ("up",) * length),
-        Together("second", "first", ("up",) * length),
+        EnabledTogether("first", "second", ("up",) * length),
+        EnabledTogether("second", "first", ("up",) * length),
     )
 
 
@@ -344,26 +344,41 @@ def trap() -> System:
 
 def test_causes(engine: str) -> None:
     answers = synthesize(trap(), engine=engine, questions=Questions(events=("climb", "jump", "walk"))).answers
-    assert answers.never == (Never("climb", Cause.REQUIREMENT, True), Never("jump", Cause.SUPERVISOR, True))
+    assert answers.never == (
+        NeverEnabled("climb", Cause.REQUIREMENT, True),
+        NeverEnabled("jump", Cause.SUPERVISOR, True),
+    )
     stuck = replace(trap(), conditions=(EventCondition("jump", StateTest("A", "pit")),))
     answers = synthesize(stuck, engine=engine, questions=Questions(events=("climb", "jump", "walk"))).answers
-    assert answers.never == (Never("climb", Cause.REQUIREMENT, False), Never("jump", Cause.REQUIREMENT, True))
+    assert answers.never == (
+        NeverEnabled("climb", Cause.REQUIREMENT, False),
+        NeverEnabled("jump", Cause.REQUIREMENT, True),
+    )
 
 
 def test_causes_of_what_is_cut_by_invariants_and_by_synthesis(engine: str) -> None:
     questions = Questions(events=("climb", "jump", "walk"))
     dry = replace(trap(), conditions=(), invariants=(StateTest("A", "ground"),))
     answers = synthesize(dry, engine=engine, questions=questions).answers
-    assert answers.never == (Never("climb", Cause.INVARIANT, False), Never("jump", Cause.INVARIANT, True, (0,)))
+    assert answers.never == (
+        NeverEnabled("climb", Cause.INVARIANT, False),
+        NeverEnabled("jump", Cause.INVARIANT, True, (0,)),
+    )
     lost = automaton("A", ["ground -jump-> pit", "pit -climb-> pit", "ground -walk-> ground"], marked=["ground"])
     answers = synthesize(replace(dry, automata=(lost,), invariants=()), engine=engine, questions=questions).answers
-    assert answers.never == (Never("climb", Cause.SUPERVISOR, False), Never("jump", Cause.SUPERVISOR, True))
+    assert answers.never == (
+        NeverEnabled("climb", Cause.SUPERVISOR, False),
+        NeverEnabled("jump", Cause.SUPERVISOR, True),
+    )
     # Without the invariant it would be just as lost.
     answers = synthesize(replace(dry, automata=(lost,)), engine=engine, questions=questions).answers
-    assert answers.never == (Never("climb", Cause.SUPERVISOR, False), Never("jump", Cause.SUPERVISOR, True))
+    assert answers.never == (
+        NeverEnabled("climb", Cause.SUPERVISOR, False),
+        NeverEnabled("jump", Cause.SUPERVISOR, True),
+    )
     apart = automaton("A", ["pit -jump-> ground", "pit -climb-> ground", "ground -walk-> ground"], initial="ground")
     answers = synthesize(replace(dry, automata=(apart,)), engine=engine, questions=questions).answers
-    assert answers.never == (Never("climb", Cause.PLANT, False), Never("jump", Cause.PLANT, False))
+    assert answers.never == (NeverEnabled("climb", Cause.PLANT, False), NeverEnabled("jump", Cause.PLANT, False))
 
 
 def test_a_condition_that_synthesis_looks_ahead_to_is_used(engine: str) -> None:
@@ -401,7 +416,7 @@ def test_an_update_that_always_leaves_its_range_is_the_plants_own_fault(engine: 
         variables=[DiscreteVariable("n", IntegerType(0, 3), (0,))],
     )
     answers = synthesize(system_of(plant), engine=engine, questions=Questions(events=("go", "stay"))).answers
-    assert answers.never == (Never("go", Cause.PLANT, False),)
+    assert answers.never == (NeverEnabled("go", Cause.PLANT, False),)
 
 
 def test_many_rivals_are_told_by_the_first_hundred_pairs(engine: str) -> None:

@@ -8,8 +8,8 @@ from robosc.execution.runtime.calls import FOREVER
 from robosc.execution.runtime.release import Releases
 
 
-class Commands:
-    """Tells on which release identifiers the existing controller has fallen silent while its last message acts.
+class CommandTimeouts:
+    """Detector of release identifiers whose last message acts while the existing controller has fallen silent there.
 
     Args:
         releases: Messages that keep acting.

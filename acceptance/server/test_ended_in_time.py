@@ -61,7 +61,7 @@ def busy_worker_of(server: int) -> int:
     found: list[int] = []
 
     def is_busy() -> bool:
-        workers = [worker for template in children_of(server) for worker in children_of(template)]
+        workers = [worker for fork_server in children_of(server) for worker in children_of(fork_server)]
         with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # One that was ready may be gone again.
             found[:] = [worker for worker in workers if cpu_ticks(worker) > _BUSY_TICKS]
         return bool(found)

@@ -56,8 +56,8 @@ class Server:
 
     def busy_workers(self) -> list[int]:
         """Processes of tasks that have worked for a third of a second."""
-        templates = children_of(self._pid)
-        workers = [worker for template in templates for worker in children_of(template)]
+        fork_servers = children_of(self._pid)
+        workers = [worker for fork_server in fork_servers for worker in children_of(fork_server)]
         return [worker for worker in workers if _ticks(worker) > 30]
 
 

@@ -83,8 +83,8 @@ def busy(cluster: Cluster) -> dict[int, "subprocess.Popen[bytes]"]:
     """The processes that are at tasks, and the worker of the cluster that each belongs to."""
     found = {}
     for worker in cluster.workers:
-        for template in children_of(worker.pid):
-            for pid in children_of(template):
+        for fork_server in children_of(worker.pid):
+            for pid in children_of(fork_server):
                 try:
                     if cpu_ticks(pid) >= _BUSY_TICKS:
                         found[pid] = worker

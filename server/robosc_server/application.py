@@ -16,7 +16,6 @@ from robosc_api.layers import Layers
 from robosc_api.malformed import MalformedRequests
 from robosc_api.prompt import REFLECTION_METHODS, PromptRequests
 from robosc_api.security import Guard, Rule, Scope, SecurityError, TokenFile, add_port, caller_of, token_or_host_of
-from robosc_server.desk import Desk
 from robosc_server.jobs import (
     JOB_METHODS,
     JOB_SERVICE_NAME,
@@ -30,22 +29,23 @@ from robosc_server.jobs import (
 )
 from robosc_server.operations.drain import drain, stop
 from robosc_server.operations.health import Health
+from robosc_server.operations.instrumented_workers import InstrumentedWorkers
 from robosc_server.operations.interceptor import CallInterceptor
 from robosc_server.operations.metrics import Metrics, MetricsEndpoint, check_metrics_address
-from robosc_server.operations.observed import ObservedWorkers
 from robosc_server.operations.open_calls import HEALTH_CALLS, CallLimits, OpenCalls
 from robosc_server.operations.quotas import Quotas
 from robosc_server.operations.settings import Confinement, Settings
 from robosc_server.operations.tracing import TracingError, open_tracing
-from robosc_server.outgoing import Outgoing
+from robosc_server.result_sender import ResultSender
 from robosc_server.signing import SigningError, read_signing_key, signed
 from robosc_server.store import StoreError, StoreUnavailableError, open_store
 from robosc_server.synthesis_service import METHODS, SERVICE_NAME, SynthesisService
+from robosc_server.task_dispatcher import TaskDispatcher
 from robosc_server.tasks.describe import server_limits, targets_response, version_response
 from robosc_server.tasks.requests import QUICK_BYTES, RequestLimits, accepted
 from robosc_server.tasks.task import Result, TaskKind
 from robosc_server.workers import Workers, WorkersError
-from robosc_server.workers.opening import open_workers
+from robosc_server.workers.factory import open_workers
 
 _RULE = Rule(frozenset({Scope.SYNTHESIZE}))
 
@@ -150,7 +150,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         must_be_confined=settings.confinement is Confinement.REQUIRED,
     )
     await stack.enter_async_context(workers)
-    observed = ObservedWorkers(workers, metrics, tracing)
+    observed = InstrumentedWorkers(workers, metrics, tracing)
     quotas = Quotas(tokens)
     scheduler = Scheduler(
         observed,
@@ -172,16 +172,20 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
             tracing=tracing,
         )
     )
-    outgoing = Outgoing(2 * settings.result_bytes, _UNREAD_RESULTS * settings.result_bytes)
+    sender = ResultSender(2 * settings.result_bytes, _UNREAD_RESULTS * settings.result_bytes)
     targets, version = await asyncio.to_thread(_descriptions, settings, request_limits)
     synthesis = SynthesisService(
-        Desk(results, scheduler, quotas, settings.task_limits, metrics), outgoing, request_limits, targets, version
+        TaskDispatcher(results, scheduler, quotas, settings.task_limits, metrics),
+        sender,
+        request_limits,
+        targets,
+        version,
     )
     jobs = JobService(
         manager,
         lambda kind, request: accepted(kind, request, request_limits),
         admit=quotas.admit,
-        send=outgoing.send_each,
+        send=sender.send_each,
         limits=request_limits,
     )
 
@@ -214,7 +218,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         scheduler.close()
         await asyncio.gather(
             manager.drain(settings.drain_seconds),
-            drain(server, health, calls, settings.drain_seconds, _IDLE_METHODS, lambda: outgoing.unread_bytes),
+            drain(server, health, calls, settings.drain_seconds, _IDLE_METHODS, lambda: sender.unread_bytes),
         )
 
     await server.start()

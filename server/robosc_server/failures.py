@@ -5,7 +5,7 @@ from typing import Any, NoReturn
 import grpc
 
 from robosc_api.failures import failure_metadata
-from robosc_server.operations.logs import tell_fault
+from robosc_server.operations.logs import log_fault
 from robosc_server.tasks.task import Failure, Reason
 
 MAXIMUM_MESSAGE_BYTES = 1000
@@ -68,14 +68,14 @@ async def abort(context: Any, error: RefusedError) -> NoReturn:
     raise AssertionError("unreachable: abort raises")
 
 
-def for_callers(failure: Failure) -> Failure:
+def public_failure(failure: Failure) -> Failure:
     """A failure as it is told to callers; what only the log should know goes there, under an id that they are told."""
     if not failure.details:
         return failure
-    fault = tell_fault(failure.details, failure.reason)
-    return Failure(failure.reason, f"{failure.message}; {fault_words(fault)}")
+    fault = log_fault(failure.details, failure.reason)
+    return Failure(failure.reason, f"{failure.message}; {fault_message(fault)}")
 
 
-def fault_words(identity: str) -> str:
+def fault_message(identity: str) -> str:
     """Return the words for a caller about a fault that the log has under an id."""
     return f"internal error {identity}, please report it with the server's log"

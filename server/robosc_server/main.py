@@ -10,9 +10,9 @@ from collections.abc import Sequence
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 from robosc_server.operations.commands import run_command
-from robosc_server.operations.ending import Ending
-from robosc_server.operations.logs import set_up_logs
+from robosc_server.operations.logs import configure_logging
 from robosc_server.operations.settings import Settings, load_settings
+from robosc_server.operations.shutdown import ShutdownSignals
 from robosc_server.workers.kernel import keep_memory_private
 
 
@@ -23,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if status is not None:
         return status
     settings = load_settings(words)
-    set_up_logs(settings.log_format, settings.log_level)
+    configure_logging(settings.log_format, settings.log_level)
     keep_memory_private()
     return _serve(settings)
 
@@ -33,13 +33,13 @@ def _serve(settings: Settings) -> int:
     # Other commands, such as the health check of a container, need nothing of it, and it takes a while to import.
     from robosc_server.application import StartError, running_server
 
-    ending = Ending(settings.drain_seconds)
+    shutdown = ShutdownSignals(settings.drain_seconds)
 
     async def serve_until_signal() -> None:
-        ending.listen()
+        shutdown.listen()
         async with running_server(settings) as address:
             _tell(address)
-            await ending.wanted()
+            await shutdown.requested()
 
     try:
         asyncio.run(serve_until_signal())
@@ -47,7 +47,7 @@ def _serve(settings: Settings) -> int:
         sys.stderr.write(f"robosc-server: {error}\n")
         return 1
     finally:
-        ending.over()
+        shutdown.finished()
     return 0
 
 

@@ -15,8 +15,8 @@ from google.protobuf.message import DecodeError
 from robosc_api.security import caller_of
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.failures import RefusedError
-from robosc_server.outgoing import Outgoing
-from robosc_server.tasks.requests import NOT_A_MESSAGE, QUICK_BYTES, RecentRequests, RequestLimits, require_short
+from robosc_server.result_sender import ResultSender
+from robosc_server.tasks.requests import NOT_A_MESSAGE, QUICK_BYTES, RequestCache, RequestLimits, require_short
 from robosc_server.tasks.task import Reason, Report, Result, Task, TaskKind
 
 _SERVICE = pb.DESCRIPTOR.services_by_name["SynthesisService"]
@@ -38,10 +38,10 @@ _STREAMS = {
 }
 
 
-class Desk(Protocol):
-    """Desk that gives an accepted task its result."""
+class ResultProvider(Protocol):
+    """ResultProvider that gives an accepted task its result."""
 
-    def kept(self, key: str) -> Result | None:
+    def cached(self, key: str) -> Result | None:
         """The result of an equal task, if it is in memory."""
 
     async def result(self, task: Task, caller: str, on_report: OnReport) -> Result:
@@ -56,17 +56,19 @@ class SynthesisService:
     """Implementation of the service, which answers its calls.
 
     Args:
-        desk: Desk that has tasks done.
-        outgoing: Sender of results.
+        provider: ResultProvider that has tasks done.
+        sender: Sender of results.
         limits: Limits of a request.
         targets: The answer of ListTargets, serialized.
         version: The answer of GetVersion, serialized.
     """
 
-    def __init__(self, desk: Desk, outgoing: Outgoing, limits: RequestLimits, targets: bytes, version: bytes) -> None:
-        self._desk = desk
-        self._outgoing = outgoing
-        self._requests = RecentRequests(limits)
+    def __init__(
+        self, provider: ResultProvider, sender: ResultSender, limits: RequestLimits, targets: bytes, version: bytes
+    ) -> None:
+        self._provider = provider
+        self._sender = sender
+        self._requests = RequestCache(limits)
         self._fixed = {"ListTargets": (pb.ListTargetsRequest, targets), "GetVersion": (pb.GetVersionRequest, version)}
 
     def handler(self) -> grpc.GenericRpcHandler:
@@ -85,10 +87,10 @@ class SynthesisService:
     def _unary(self, kind: TaskKind) -> Any:
         async def answer(request: bytes, context: Context) -> bytes:
             task = self._requests.accepted(kind, request)
-            result = self._desk.kept(task.key)
+            result = self._provider.cached(task.key)
             if result is None:
-                result = await self._desk.result(task, caller_of(context), _drop)
-            self._outgoing.hold(context, result.messages)
+                result = await self._provider.result(task, caller_of(context), _drop)
+            self._sender.hold(context, result.messages)
             return result.messages[0]
 
         return answer
@@ -96,14 +98,14 @@ class SynthesisService:
     def _stream(self, kind: TaskKind) -> Any:
         async def answer(request: bytes, context: Context) -> bytes:
             task = self._requests.accepted(kind, request)
-            result = self._desk.kept(task.key)
+            result = self._provider.cached(task.key)
             if result is None:
                 async with _Progress(context) as progress:
-                    result = await self._desk.result(task, caller_of(context), progress.tell)
+                    result = await self._provider.result(task, caller_of(context), progress.tell)
                     # Now: a caller that does not read its reports has the result wait.
-                    self._outgoing.hold(context, result.messages)
+                    self._sender.hold(context, result.messages)
             else:
-                self._outgoing.hold(context, result.messages)
+                self._sender.hold(context, result.messages)
             *first, last = result.messages
             for message in first:
                 await context.write(message)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from robosc_server.operations.ending import END_S
 from robosc_server.operations.settings import Settings
+from robosc_server.operations.shutdown import END_S
 from support.containers import TOP
 from support.units import read_unit
 

@@ -29,7 +29,7 @@ from robosc_client.main import main as robosc_client
 from robosc_server.application import StartError
 from robosc_server.main import main
 from robosc_server.tasks.task import Outcome, Result, Task, TaskLimits
-from robosc_server.workers import OnReport, OnSpent, uncounted
+from robosc_server.workers import OnCpuTime, OnReport, ignore_cpu_time
 from support.certificates import Authority
 from support.job_workers import task_message
 from support.service import bundle_of, secured, served, server_process
@@ -47,7 +47,9 @@ class Quick:
     async def __aexit__(self, *_: object) -> None:
         pass
 
-    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:
+    async def run(
+        self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime = ignore_cpu_time
+    ) -> Outcome:
         return Result((b"",))
 
 

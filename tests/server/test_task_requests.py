@@ -15,7 +15,7 @@ import robosc_server.tasks.requests as requests_module
 from robosc.verification import DEFAULT_STATES
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.failures import RefusedError
-from robosc_server.tasks.requests import NOT_A_MESSAGE, RecentRequests, RequestLimits, accepted
+from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestCache, RequestLimits, accepted
 from robosc_server.tasks.task import Reason, Task, TaskKind
 from support.effort import examples
 from support.models import EXAMPLES
@@ -495,7 +495,7 @@ class TestKeys:
 
 class TestRecentRequests:
     def test_says_the_same_as_a_look_at_each(self) -> None:
-        recent = RecentRequests(LIMITS)
+        recent = RequestCache(LIMITS)
         contents = [small_request(kind).SerializeToString() for kind in MESSAGES] + [b"", b"\xff", b"no message"]
         for _ in range(2):
             for kind in MESSAGES:
@@ -503,14 +503,14 @@ class TestRecentRequests:
                     assert told(recent.accepted, kind, content) == told(partial(accepted, limits=LIMITS), kind, content)
 
     def test_one_that_came_before_is_not_looked_at_again(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        recent = RecentRequests(LIMITS)
+        recent = RequestCache(LIMITS)
         content = small_request(TaskKind.CHECK).SerializeToString()
         task = recent.accepted(TaskKind.CHECK, content)
         monkeypatch.setattr(requests_module, "accepted", None)
         assert recent.accepted(TaskKind.CHECK, bytes(bytearray(content))) is task
 
     def test_is_bounded_and_forgets_what_was_asked_for_longest_ago(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        recent = RecentRequests(LIMITS)
+        recent = RequestCache(LIMITS)
         requests = [
             pb.CheckRequest(bundle=pb.Bundle(main=pb.SourceFile(name="m", text=f"{number:060000}"))).SerializeToString()
             for number in range(100)
@@ -525,7 +525,7 @@ class TestRecentRequests:
         assert recent.accepted(TaskKind.CHECK, requests[-1]) is tasks[-1]
 
     def test_many_small_ones_are_bounded_too(self) -> None:
-        recent = RecentRequests(LIMITS)
+        recent = RequestCache(LIMITS)
         for number in range(10_000):
             file = pb.SourceFile(name="m", text=str(number))
             recent.accepted(TaskKind.CHECK, pb.CheckRequest(bundle=pb.Bundle(main=file)).SerializeToString())
@@ -533,7 +533,7 @@ class TestRecentRequests:
         assert len(recent_contents(recent)) < 8500
 
     def test_a_long_one_is_looked_at_each_time(self) -> None:
-        recent = RecentRequests(LIMITS)
+        recent = RequestCache(LIMITS)
         bundle = pb.Bundle(main=pb.SourceFile(name="m", text="x" * 70_000))
         content = pb.CheckRequest(bundle=bundle).SerializeToString()
         assert recent.accepted(TaskKind.CHECK, content) is not recent.accepted(TaskKind.CHECK, content)
@@ -548,6 +548,6 @@ def told(accept: Callable[[TaskKind, bytes], Task], kind: TaskKind, content: byt
         return error.reason, error.message
 
 
-def recent_contents(recent: RecentRequests) -> list[bytes]:
+def recent_contents(recent: RequestCache) -> list[bytes]:
     """The requests that are remembered."""
     return [content for _, content in recent._tasks]

@@ -17,9 +17,9 @@ from robosc.language import load_bundle
 from robosc.model.structure import Deployment
 from robosc.targets import available_targets
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_server.tasks.convert.pieces import CHUNK_BYTES
+from robosc_server.tasks.convert.chunks import CHUNK_BYTES
 from robosc_server.tasks.describe import server_limits, targets_response, version_response
-from robosc_server.tasks.pace import PAUSE_S, PacedReports
+from robosc_server.tasks.pace import PAUSE_S, ThrottledReports
 from robosc_server.tasks.requests import RequestLimits, accepted
 from robosc_server.tasks.run import run_task
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
@@ -463,7 +463,7 @@ class TestReports:
     def test_each_stage_is_told_once_if_it_is_short(self) -> None:
         now_s = [0.0]
         told: list[Report] = []
-        paced = PacedReports(told.append, lambda: now_s[0])
+        paced = ThrottledReports(told.append, lambda: now_s[0])
         for stage, message, pause_s in [
             ("check", "1", 0.0),
             ("check", "2", PAUSE_S / 2),

@@ -65,7 +65,7 @@ class Choices:
     """Choices for making the parts."""
 
     url: str = ""
-    limits: JobLimits = field(default_factory=lambda: JobLimits(look_s=0.02, sweep_s=3600.0))
+    limits: JobLimits = field(default_factory=lambda: JobLimits(poll_s=0.02, sweep_s=3600.0))
     queue: QueueLimits = field(default_factory=QueueLimits)
     capacity: int = 2
     memory_bytes: int = 2**20
@@ -96,7 +96,7 @@ def sweep_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
         """Nothing is swept unless the test says so."""
         await asyncio.Event().wait()
 
-    monkeypatch.setattr(Retention, "sweep_often", never)
+    monkeypatch.setattr(Retention, "sweep_forever", never)
 
 
 @asynccontextmanager

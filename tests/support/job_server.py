@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from robosc_server.application import running_server
-from robosc_server.operations.logs import set_up_logs
+from robosc_server.operations.logs import configure_logging
 from robosc_server.operations.settings import Settings
 from robosc_server.workers.local import LocalWorkers
 from support.fake_tasks import TASK_FUNCTION
@@ -28,7 +28,7 @@ _PREFIX = "listening on "
 async def serve(folder: str, url: str, workers: str) -> None:
     chosen: dict[str, Any] = {"port": 0, "state_dir": Path(folder), "database_url": url or None}
     settings = Settings(**chosen, waiting_tasks_per_caller=1000)
-    set_up_logs(settings.log_format, settings.log_level)
+    configure_logging(settings.log_format, settings.log_level)
     kinds: dict[str, Callable[[int], Any]] = {
         "scripted": StartedWorkers,
         "local": LocalWorkers,

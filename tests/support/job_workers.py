@@ -14,7 +14,7 @@ from typing import Self
 from robosc_api.v1 import jobs_pb2 as jobs
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, Task, TaskKind, TaskLimits
-from robosc_server.workers import OnReport, OnSpent, WorkerLostError, WorkersError, uncounted
+from robosc_server.workers import OnCpuTime, OnReport, WorkerLostError, WorkersError, ignore_cpu_time
 
 _LOOK_S = 0.005
 
@@ -34,7 +34,9 @@ class ScriptedWorkers:
         self.most_running = 0
         self.killed = 0
 
-    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:
+    async def run(
+        self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime = ignore_cpu_time
+    ) -> Outcome:
         if self.is_away:
             raise WorkersError("the workers are away")
         assert self.running < self.capacity
@@ -49,7 +51,7 @@ class ScriptedWorkers:
             raise
         finally:
             self.running -= 1
-            on_spent(sum(float(line.split()[1]) for line in text.splitlines() if line.startswith("spend ")))
+            on_cpu_time(sum(float(line.split()[1]) for line in text.splitlines() if line.startswith("spend ")))
 
     async def _do(self, text: str, kind: TaskKind, on_report: OnReport) -> Outcome:
         size = 0

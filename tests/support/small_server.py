@@ -12,7 +12,7 @@ import grpc.aio
 import structlog
 from google.rpc import error_details_pb2, status_pb2
 
-from robosc_server.operations.logs import set_up_logs
+from robosc_server.operations.logs import configure_logging
 from robosc_server.operations.settings import LogFormat, LogLevel
 from support.waiting import PATIENCE_S
 
@@ -108,7 +108,7 @@ def logged(level: LogLevel = LogLevel.DEBUG, form: LogFormat = LogFormat.JSON) -
     before, names = root.level, ("asyncio", "distributed", "opentelemetry", "sqlalchemy")
     levels = {name: logging.getLogger(name).level for name in names}
     stream = io.StringIO()
-    set_up_logs(form, level, stream)
+    configure_logging(form, level, stream)
     try:
         yield ReadLog(stream)
     finally:

@@ -228,7 +228,7 @@ def test_real_workers_die_with_their_server_and_their_jobs_run_again(tmp_path: P
 
 
 def children_of_session(folder_of: int) -> list[int]:
-    """Processes whose command line names the server that has died: its templates and workers."""
+    """Processes whose command line names the server that has died: its fork servers and workers."""
     found = []
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():

@@ -20,7 +20,7 @@ from support.waiting import until
 pytestmark = pytest.mark.smoke
 
 _NEVER = "until /nowhere/never"
-_LIMITS = JobLimits(look_s=0.02, lease_s=15.0, sweep_s=3600.0)
+_LIMITS = JobLimits(poll_s=0.02, lease_s=15.0, sweep_s=3600.0)
 
 
 async def replicas(stack: AsyncExitStack, url: str, times: Times, number: int = 2) -> list[Parts]:
@@ -30,9 +30,9 @@ async def replicas(stack: AsyncExitStack, url: str, times: Times, number: int = 
 
 def fall_silent(made: Parts) -> None:
     """Have a server do nothing any more, as if it had been stopped."""
-    for task in (*made.manager._keepers, *made.manager._carrying._tasks):
+    for task in (*made.manager._background, *made.manager._runner._tasks):
         task.cancel()
-    made.manager._keepers = []
+    made.manager._background = []
     made.manager._has_left = True
 
 
@@ -92,7 +92,7 @@ def test_a_job_is_cancelled_at_another_server_and_its_worker_stopped(database_ur
 def test_who_watches_a_job_that_is_forgotten_elsewhere_is_told(database_url: str) -> None:
     async def test() -> None:
         times = Times()
-        by_hand = JobLimits(look_s=3600.0, sweep_s=3600.0)
+        by_hand = JobLimits(poll_s=3600.0, sweep_s=3600.0)
         async with (
             parts(Path("unused"), Choices(database_url, by_hand, times=times)) as ours,
             parts(Path("unused"), Choices(database_url, by_hand, times=times)) as theirs,
@@ -110,7 +110,7 @@ def test_who_watches_a_job_that_is_forgotten_elsewhere_is_told(database_url: str
             await ours.manager.cancel(job.id, ME)
             times.wall_s += 1.0
             await ours.manager.sweep()
-            await theirs.manager.look()
+            await theirs.manager.poll()
             with pytest.raises(RefusedError, match="no job of that id"):
                 await following
 
@@ -133,13 +133,13 @@ def test_jobs_of_a_server_that_falls_silent_are_adopted_after_its_lease_and_run_
             gate.touch()
 
             async def has_looked() -> bool:
-                return bool(living.manager._lookout.seen)
+                return bool(living.manager._lease_monitor.seen)
 
             await until(has_looked)
             # Not before its lease has passed.
             times.monotonic_s += 14.0
             for _ in range(3):
-                await living.manager.look()
+                await living.manager.poll()
             assert (await living.manager.get(jobs[1].id, ME)).replica == seen.replica
             times.monotonic_s += 2.0
             done = [await ended(living.manager, job.id) for job in jobs]
@@ -153,7 +153,7 @@ def test_jobs_of_a_server_that_falls_silent_are_adopted_after_its_lease_and_run_
 def test_servers_that_go_on_are_not_taken_for_dead_however_long_it_takes(database_url: str) -> None:
     async def test() -> None:
         times = Times()
-        by_hand = JobLimits(look_s=3600.0, lease_s=15.0, sweep_s=3600.0)
+        by_hand = JobLimits(poll_s=3600.0, lease_s=15.0, sweep_s=3600.0)
         choices = Choices(database_url, by_hand, times=times)
         async with parts(Path("unused"), choices) as ours, parts(Path("unused"), choices) as theirs:
             jobs = [(await made.manager.submit(task_of(f"{_NEVER}\n{made}"), ME))[0] for made in (ours, theirs)]
@@ -161,7 +161,7 @@ def test_servers_that_go_on_are_not_taken_for_dead_however_long_it_takes(databas
             await until(lambda: has_begun(theirs, jobs[1].id))
             for _ in range(10):
                 for made in (ours, theirs):
-                    await made.manager.look()
+                    await made.manager.poll()
                 times.monotonic_s += 7.0
             for job, made in zip(jobs, (ours, theirs), strict=True):
                 record = await made.manager.get(job.id, ME)
@@ -181,17 +181,17 @@ def test_a_job_that_servers_die_on_fails_at_last(database_url: str) -> None:
             await until(lambda: is_in(living.manager, job.id, JobState.RUNNING))
             dying[1].workers.capacity = 1
             fall_silent(dying[0])
-            for keeper in living.manager._keepers:
+            for keeper in living.manager._background:
                 keeper.cancel()  # The other one adopts it.
-            await dying[1].manager.look()
+            await dying[1].manager.poll()
             times.monotonic_s += 16.0
             await until(lambda: _is_second_attempt(dying[1], job.id))
             fall_silent(dying[1])
             # The first look finds that it was taken for dead itself, the second one sees who is there.
             for _ in range(2):
-                await living.manager.look()
+                await living.manager.poll()
             times.monotonic_s += 16.0
-            await living.manager.look()
+            await living.manager.poll()
             done = await living.manager.get(job.id, ME)
             assert done.failure is not None
             assert (done.state, done.failure.reason, done.attempts) == (JobState.FAILED, Reason.SERVER_DIED, 2)
@@ -214,16 +214,16 @@ def test_a_server_that_was_taken_for_dead_stops_its_work_and_takes_part_again(
             gate = tmp_path / "gate"
             job, _ = await stalled.manager.submit(task_of(f"until {gate}"), ME)
             await until(lambda: has_begun(stalled, job.id))
-            (looking, sweeping) = stalled.manager._keepers
+            (looking, sweeping) = stalled.manager._background
             looking.cancel()
-            await living.manager.look()
+            await living.manager.poll()
             times.monotonic_s += 16.0
             await until(lambda: _is_second_attempt(living, job.id))
             # It wakes up, with a worker at a job that is another's now.
-            stalled.manager._keepers = [asyncio.create_task(stalled.manager._lookout.look_often()), sweeping]
+            stalled.manager._background = [asyncio.create_task(stalled.manager._lease_monitor.poll_forever()), sweeping]
 
             async def has_stopped() -> bool:
-                return stalled.workers.killed == 1 and stalled.manager.carried == 0
+                return stalled.workers.killed == 1 and stalled.manager.active_jobs == 0
 
             await until(has_stopped)
             gate.touch()
@@ -270,7 +270,7 @@ def test_what_waits_at_a_server_that_ends_is_done_by_others_while_its_own_work_g
                 assert (await ended(living.manager, job.id)).state is JobState.SUCCEEDED
             assert (await watching).state is JobState.SUCCEEDED
             assert not draining.done()
-            assert ending.manager.carried == 1
+            assert ending.manager.active_jobs == 1
             gate.touch()
             await draining
             done = await ended(living.manager, running.id)
@@ -299,7 +299,7 @@ def test_many_jobs_are_adopted_a_few_at_a_time(database_url: str, monkeypatch: p
             await dying.manager.drain(0.0)
 
             async def has_all() -> bool:
-                return living.manager.carried == len(jobs)
+                return living.manager.active_jobs == len(jobs)
 
             await until(has_all)
             living.workers.capacity = 1

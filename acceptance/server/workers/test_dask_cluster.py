@@ -114,7 +114,7 @@ def running(cluster: Cluster) -> Iterator[Running]:
 
 
 def dask_worker_of(cluster: Cluster, pid: int) -> "subprocess.Popen[bytes]":
-    """The worker of the cluster that a task's process belongs to: the parent of its template."""
+    """The worker of the cluster that a task's process belongs to: the parent of its fork_server."""
     for _ in range(2):
         pid = parent_of(pid)
     return next(worker for worker in cluster.workers if worker.pid == pid)

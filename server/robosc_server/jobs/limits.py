@@ -13,7 +13,7 @@ class JobLimits:
             that jobs do refer to are as large, jobs that have ended are forgotten before their time, and new ones are
             refused until then. Each time, those of the caller who has most are chosen.
         jobs_per_owner: Kept jobs of one caller; beyond it, those that ended first are forgotten.
-        look_s: Period, in seconds, at which a server that shares its database looks for what others have done there;
+        poll_s: Period, in seconds, at which a server that shares its database looks for what others have done there;
             one that has a database of its own needs it only after that was away.
         lease_s: Time without a sign of life, in seconds, after which a server is taken for dead by those that share
             its database.
@@ -23,6 +23,6 @@ class JobLimits:
     retention_s: float = 7 * 86400.0
     results_bytes: int = 2 * 2**30
     jobs_per_owner: int = 10_000
-    look_s: float = 0.5
+    poll_s: float = 0.5
     lease_s: float = 15.0
     sweep_s: float = 30.0

@@ -1,10 +1,10 @@
 """Jobs from their acceptance to their end, in one of the servers that share a database.
 
-What is told about a job is on disk before. A job belongs to one server, which has a place in its line for it and
-carries it to its end; others read it in the database, and cancel it there: whatever its server tells about it after
-that comes too late, and it finds out at its next look. A server that is taken for dead has its jobs adopted by another.
-Here callers are answered; `carrying` has the jobs of this server, `lookout` looks what others have done, and
-`retention` deletes what need not be kept.
+Callers are informed of a change of a job only after it is on disk. A job belongs to one server, which queues and runs
+it. Other servers read it in the database and cancel it there; its own server finds out at its next poll, and later
+reports of it are ignored. The jobs of a server that is taken for dead are adopted by another. This module answers
+callers; `runner` runs the jobs of this server, `lease_monitor` follows the other servers, and `retention` deletes
+expired jobs and results.
 """
 
 import asyncio
@@ -16,13 +16,13 @@ from typing import Self
 from robosc_server.clock import monotonic
 from robosc_server.failures import RefusedError
 from robosc_server.jobs.callers import Caller
-from robosc_server.jobs.carrying import Carrying, new_id
+from robosc_server.jobs.lease_monitor import LeaseMonitor
 from robosc_server.jobs.limits import JobLimits
-from robosc_server.jobs.lookout import Lookout
 from robosc_server.jobs.results import Results
 from robosc_server.jobs.retention import Retention
+from robosc_server.jobs.runner import JobRunner, new_id
 from robosc_server.jobs.scheduler import Scheduler
-from robosc_server.jobs.watching import Watchers
+from robosc_server.jobs.watchers import Watchers
 from robosc_server.operations.tracing import NO_TRACING, Tracing
 from robosc_server.store import JobFilter, JobRecord, JobState, Store, StoreUnavailableError
 from robosc_server.store.records import messages_of
@@ -30,18 +30,18 @@ from robosc_server.tasks.task import Reason, Task, TaskKind, TaskLimits
 
 _log = logging.getLogger(__name__)
 
-_LEFT = "the server ends; ask another one, or later"
+_LEFT = "the server is shutting down; call another server, or try again later"
 
 
 class JobManager:
     """The jobs of one server.
 
-    Inside the context it carries on what was left, and looks after its jobs.
+    Inside the context it resumes unfinished jobs and runs new ones.
 
     Args:
         store: The database.
-        scheduler: The queue before the workers, in which direct calls wait, too.
-        results: Results that were worked out before.
+        scheduler: Queue in front of the workers, which jobs share with direct calls.
+        results: Cache of results.
         task_limits: Limits of one task.
         limits: Limits of jobs.
         clock: Seconds of a monotonic clock, for leases.
@@ -61,16 +61,16 @@ class JobManager:
         self._store, self._scheduler, self._results, self._limits = store, scheduler, results, limits
         self._watchers = Watchers()
         self._retention = Retention(store, limits)
-        self._carrying = Carrying(store, scheduler, results, task_limits, self._retention, self._watchers, tracing)
-        self._lookout = Lookout(store, self._carrying, self._watchers, limits, clock)
-        self._keepers: list[asyncio.Task[None]] = []
+        self._runner = JobRunner(store, scheduler, results, task_limits, self._retention, self._watchers, tracing)
+        self._lease_monitor = LeaseMonitor(store, self._runner, self._watchers, limits, clock)
+        self._background: list[asyncio.Task[None]] = []
         self._is_draining = False
         self._has_left = False
 
     async def __aenter__(self) -> Self:
-        await self._carrying.enter()
-        keepers = self._lookout.look_often(), self._retention.sweep_often()
-        self._keepers = [asyncio.create_task(keeper) for keeper in keepers]
+        await self._runner.enter()
+        loops = self._lease_monitor.poll_forever(), self._retention.sweep_forever()
+        self._background = [asyncio.create_task(loop) for loop in loops]
         return self
 
     async def __aexit__(
@@ -85,9 +85,9 @@ class JobManager:
         return self._retention.counts
 
     @property
-    def carried(self) -> int:
+    def active_jobs(self) -> int:
         """Number of jobs of this server that have not ended."""
-        return len(self._carrying)
+        return len(self._runner)
 
     async def submit(
         self,
@@ -98,12 +98,12 @@ class JobManager:
         label: str = "",
         retention_s: float | None = None,
     ) -> tuple[JobRecord, bool]:
-        """Accept a job; when this returns, it is kept.
+        """Accept a job; it is stored when this returns.
 
         Args:
             task: Task to be done.
             caller: Caller whose job it is.
-            idempotency_key: Key that answers with the same job when it is given again; empty: no such care.
+            idempotency_key: Key by which a repeated submission returns the same job; empty: none.
             label: Owner's name for the job.
             retention_s: Time that it is kept after its end, in seconds; None, or too long: as long as jobs are kept.
 
@@ -111,7 +111,7 @@ class JobManager:
             The job, and whether it was there before.
 
         Raises:
-            RefusedError: It is not accepted. After STORE_UNAVAILABLE it is not known whether it was.
+            RefusedError: It is not accepted; after STORE_UNAVAILABLE its acceptance is uncertain.
         """
         if self._is_draining:
             raise RefusedError(Reason.SHUTTING_DOWN, _LEFT, retry_after_s=1.0)
@@ -135,13 +135,13 @@ class JobManager:
             idempotency_key=idempotency_key or None,
             retention_us=self._retention.kept_us(retention_s),
             created_us=self._store.now_us(),
-            replica=self._carrying.replica,
+            replica=self._runner.replica,
         )
-        answer = await self._carrying.accept(record, place, task, self._limits.jobs_per_owner)
+        answer = await self._runner.accept(record, place, task, self._limits.jobs_per_owner)
         if answer is None:
             raise self._retention.too_many()
         accepted, existed = answer
-        return self._carrying.current(_same_task(accepted, task) if existed else accepted), existed
+        return self._runner.current(_same_task(accepted, task) if existed else accepted), existed
 
     def require_room(self, caller: Caller) -> None:
         """Do nothing if a new job of a caller would be accepted, as far as this server knows.
@@ -161,7 +161,7 @@ class JobManager:
             RefusedError: The key was used for another task.
         """
         there = await self._store.find_by_key(caller.name, idempotency_key)
-        return None if there is None else self._carrying.current(_same_task(there, task))
+        return None if there is None else self._runner.current(_same_task(there, task))
 
     async def get(self, job_id: str, caller: Caller) -> JobRecord:
         """A job of the caller.
@@ -169,12 +169,12 @@ class JobManager:
         Raises:
             RefusedError: There is none, or the database is away.
         """
-        return self._carrying.current(await self._find(job_id, caller))
+        return self._runner.current(await self._find(job_id, caller))
 
     def waiting_before(self, record: JobRecord) -> int:
-        """Return the number of tasks that wait before a job on its server; 0 if that is another one."""
-        carried = self._carrying.get(record.id)
-        return 0 if carried is None or carried.place is None else self._scheduler.before(carried.place)
+        """Return the number of tasks ahead of a job in the queue of this server; 0 if another server has the job."""
+        job = self._runner.get(record.id)
+        return 0 if job is None or job.place is None else self._scheduler.before(job.place)
 
     async def watch(self, job_id: str, caller: Caller, after_revision: int) -> AsyncIterator[JobRecord]:
         """Yield a job whenever it has changed, up to its end.
@@ -189,11 +189,11 @@ class JobManager:
         """
         seen = after_revision
         with self._watchers.watch(job_id) as watch:
-            carried = self._carrying.get(job_id)
+            job = self._runner.get(job_id)
             record: JobRecord | None
-            if carried is not None and carried.is_kept and _may_see(caller, carried.record):
-                # Thousands may come at once, after a lost connection: of these the database is not asked.
-                record = carried.record
+            if job is not None and job.is_stored and _may_see(caller, job.record):
+                # Thousands may come at once after a lost connection: they cause no database queries.
+                record = job.record
             else:
                 record = await self.get(job_id, caller)
             while True:
@@ -206,7 +206,7 @@ class JobManager:
                         return
                 if self._has_left:
                     raise RefusedError(Reason.SHUTTING_DOWN, _LEFT, retry_after_s=1.0)
-                record = await watch.news()
+                record = await watch.next_record()
                 if record is None and watch.is_gone:
                     raise _no_such_job()
 
@@ -220,7 +220,7 @@ class JobManager:
         ended = await self._store.cancel(job_id)
         if ended is None:
             raise _no_such_job()
-        self._carrying.ended(ended)
+        self._runner.ended(ended)
         return ended
 
     async def list_jobs(self, chosen: JobFilter, after: tuple[int, str] | None, limit: int) -> list[JobRecord]:
@@ -229,7 +229,7 @@ class JobManager:
         Raises:
             RefusedError: The database is away.
         """
-        return [self._carrying.current(record) for record in await self._store.list_jobs(chosen, after, limit)]
+        return [self._runner.current(record) for record in await self._store.list_jobs(chosen, after, limit)]
 
     async def result(self, job_id: str, caller: Caller) -> tuple[JobRecord, AsyncIterator[bytes]]:
         """A job that has succeeded, and the messages of its result, read as they are taken.
@@ -256,38 +256,39 @@ class JobManager:
         return record, self._messages(record.result_key, number)
 
     async def drain(self, seconds: float) -> None:
-        """Come to an end: jobs that do not end in time are left to whoever comes next.
+        """Shut down: jobs that do not end in time are resumed by another server or after the next start.
 
-        Nothing is accepted any more, what waits is left to others at once, and watchers are told to ask there at last.
+        No more jobs are accepted, waiting jobs are released to other servers at once, and watchers are cut off at the
+        end.
 
         Args:
-            seconds: For what runs.
+            seconds: Time for running jobs to end, in seconds.
         """
         self._is_draining = True
-        self._lookout.stop_adopting()
-        ours = self._carrying.ids
-        await self._carrying.leave_waiting()
-        await self._carrying.wait_for_running(seconds)
-        for keeper in self._keepers:
-            keeper.cancel()
-        await asyncio.gather(*self._keepers, return_exceptions=True)
-        self._keepers = []
-        ours |= self._carrying.ids
-        await self._carrying.stop_all()
+        self._lease_monitor.stop_adopting()
+        ours = self._runner.ids
+        await self._runner.release_waiting()
+        await self._runner.wait_for_running(seconds)
+        for task in self._background:
+            task.cancel()
+        await asyncio.gather(*self._background, return_exceptions=True)
+        self._background = []
+        ours |= self._runner.ids
+        await self._runner.stop_all()
         try:
-            await self._store.put_back(ours, self._carrying.replica, None)
-            await self._store.leave(self._carrying.replica)
+            await self._store.put_back(ours, self._runner.replica, None)
+            await self._store.leave(self._runner.replica)
         except StoreUnavailableError:
-            _log.error("the database is away: jobs that have not ended are carried on after the next start")
+            _log.error("the database is unavailable: jobs that have not ended will be resumed after the next start")
         self._has_left = True
         self._watchers.wake()
 
-    async def look(self) -> None:
-        """Look at once what others have done in the database."""
-        await self._lookout.look()
+    async def poll(self) -> None:
+        """Poll the database once."""
+        await self._lease_monitor.poll()
 
     async def sweep(self) -> None:
-        """Delete at once what need not be kept any more."""
+        """Delete expired jobs and excess results once."""
         await self._retention.sweep()
 
     async def _find(self, job_id: str, caller: Caller) -> JobRecord:

@@ -69,7 +69,7 @@ class Results:
             while self._unwritten:
                 await self._write_some()
 
-    def at_hand(self, key: str) -> Result | None:
+    def in_memory(self, key: str) -> Result | None:
         """A result that is in memory."""
         found = self._memory.get(key)
         if found is not None:
@@ -80,7 +80,7 @@ class Results:
 
     async def find(self, key: str) -> Result | None:
         """A result that is known; None also if the database cannot be asked."""
-        found = self.at_hand(key)
+        found = self.in_memory(key)
         if found is not None:
             return found
         unwritten = self._unwritten.get(key)

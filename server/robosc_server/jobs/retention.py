@@ -63,7 +63,7 @@ class Retention:
         """A job has a result more."""
         self._needed_bytes += sum(map(len, result.messages))
 
-    async def sweep_often(self) -> None:
+    async def sweep_forever(self) -> None:
         """Sweep now and then, and when there is no room, for ever."""
         while True:
             self._is_wanted.clear()

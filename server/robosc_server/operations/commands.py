@@ -8,7 +8,6 @@ from typing import Any
 
 from robosc.cli.running import Parser, guarded
 from robosc_api.security import Scope, SecurityError, add_token_arguments, written_token
-from robosc_server.operations.example import example_file
 from robosc_server.operations.settings import (
     Settings,
     SettingsError,
@@ -19,6 +18,7 @@ from robosc_server.operations.settings import (
     shown,
     source_of,
 )
+from robosc_server.operations.settings_reference import example_file
 
 _CHECK_EPILOG = """\
 exit status:
@@ -92,7 +92,7 @@ def print_example(argv: Sequence[str]) -> int:
 def check_config(argv: Sequence[str]) -> int:
     """Print whether a server could start with such settings; the exit status."""
     # The database's library takes longer to import than other commands take in all.
-    from robosc_server.operations.check import Grade, check_settings
+    from robosc_server.operations.config_check import Grade, check_settings
 
     parser = Parser(
         prog="robosc-server check-config",

@@ -15,8 +15,8 @@ from robosc_api.layers import Layer, behaviour_of, with_behaviour
 from robosc_api.security import CALLER
 from robosc_api.streams import writing
 from robosc_server.clock import monotonic
-from robosc_server.failures import RefusedError, abort, code_of, fault_words
-from robosc_server.operations.logs import tell_fault
+from robosc_server.failures import RefusedError, abort, code_of, fault_message
+from robosc_server.operations.logs import log_fault
 from robosc_server.operations.metrics import MethodMetrics, Metrics
 from robosc_server.operations.request_ids import HEADER, REQUEST_ID, request_id_of
 from robosc_server.operations.tracing import NO_TRACING, Tracing
@@ -111,7 +111,7 @@ class CallInterceptor(Layer):
                 raise
             except Exception as error:
                 code = grpc.StatusCode.INTERNAL
-                await abort(context, fault_of(error))
+                await abort(context, internal_error(error))
             finally:
                 metrics.under_way -= 1
                 self._ended(method, metrics, context, code, monotonic() - begun_s)
@@ -181,10 +181,10 @@ def _refuse(method: str) -> None:
         raise RefusedError(Reason.SHUTTING_DOWN, "the server ends; another one may answer", _REFUSED_RETRY_S)
 
 
-def fault_of(fault: BaseException | str) -> RefusedError:
+def internal_error(fault: BaseException | str) -> RefusedError:
     """Return the error that a caller gets for a fault of ours, which the log has from now on.
 
     Args:
         fault: The fault, or a traceback of it from another process.
     """
-    return RefusedError(Reason.INTERNAL_FAULT, fault_words(tell_fault(fault)))
+    return RefusedError(Reason.INTERNAL_FAULT, fault_message(log_fault(fault)))

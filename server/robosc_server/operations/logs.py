@@ -21,7 +21,7 @@ import structlog
 
 from robosc_server.operations.request_ids import REQUEST_ID
 from robosc_server.operations.settings import LogFormat, LogLevel
-from robosc_server.operations.worker_words import bounded, safe_words
+from robosc_server.operations.worker_output import bounded, loggable_fields
 
 _LEVELS = {
     LogLevel.DEBUG: logging.DEBUG,
@@ -37,7 +37,7 @@ _PLAIN = re.compile(r"[A-Za-z0-9._:/+@,%'()\[\]-]+\Z")
 type _Line = MutableMapping[str, Any]
 
 
-def set_up_logs(log_format: LogFormat, log_level: LogLevel, stream: TextIO | None = None) -> None:
+def configure_logging(log_format: LogFormat, log_level: LogLevel, stream: TextIO | None = None) -> None:
     """Send what is logged here, and through the standard library by others, to one place in one form.
 
     Args:
@@ -76,7 +76,7 @@ def set_up_logs(log_format: LogFormat, log_level: LogLevel, stream: TextIO | Non
         logging.getLogger(name).setLevel(max(level, logging.WARNING))
 
 
-def tell_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT") -> str:
+def log_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT") -> str:
     """Log a fault of ours; returns its id, which is all that a caller is told of it.
 
     Args:
@@ -87,7 +87,7 @@ def tell_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT") -> st
     identity = secrets.token_hex(4)
     log = structlog.get_logger()
     if isinstance(fault, str):
-        known, words = safe_words(fault), bounded(fault)
+        known, words = loggable_fields(fault), bounded(fault)
     else:
         known = {"error": type(fault).__qualname__, "places": _places(fault.__traceback__)}
         words = "".join(traceback.format_exception(fault))

@@ -465,7 +465,7 @@ def group_of(name: str) -> str:
     return str(extra["group"])
 
 
-def words_of(name: str) -> str:
+def description_of(name: str) -> str:
     """Return the description of a setting."""
     return Settings.model_fields[name].description or ""
 
@@ -498,7 +498,7 @@ def add_settings_arguments(parser: argparse.ArgumentParser) -> None:
         group = groups.setdefault(group_of(name), None) or parser.add_argument_group(group_of(name))
         groups[group_of(name)] = group
         extra: Any = field.json_schema_extra
-        words = f"{words_of(name)} (default: {default_text(name)})".replace("%", "%%")
+        words = f"{description_of(name)} (default: {default_text(name)})".replace("%", "%%")
         if field.annotation is bool:
             group.add_argument(
                 flag_of(name), dest=name, action=argparse.BooleanOptionalAction, default=argparse.SUPPRESS, help=words

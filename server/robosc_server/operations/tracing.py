@@ -81,10 +81,10 @@ def open_tracing(endpoint: str | None, version: str) -> Tracing:
     provider = TracerProvider(resource=Resource.create({"service.name": "robosc-server", "service.version": version}))
     exporter = OTLPSpanExporter(endpoint=endpoint, insecure=endpoint.startswith("http://"))
     provider.add_span_processor(BatchSpanProcessor(exporter))
-    return SentTracing(provider)
+    return OtlpTracing(provider)
 
 
-class SentTracing(Tracing):
+class OtlpTracing(Tracing):
     """Makes spans.
 
     Args:

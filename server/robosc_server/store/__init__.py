@@ -1,7 +1,7 @@
 """Storage of what is kept: jobs and results, in a database."""
 
 from robosc_server.store.errors import StoreError, StoreUnavailableError
-from robosc_server.store.opening import open_store
+from robosc_server.store.factory import open_store
 from robosc_server.store.records import JobFilter, JobRecord, JobState
 from robosc_server.store.store import Store
 

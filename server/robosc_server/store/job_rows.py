@@ -10,7 +10,7 @@ from typing import Any
 
 from sqlalchemy import Connection, Row, and_, bindparam, delete, func, insert, or_, select, tuple_, update
 
-from robosc_server.store.fairness import given_back
+from robosc_server.store.eviction import choose_evicted
 from robosc_server.store.records import ACTIVE, STEP, JobFilter, JobRecord, JobState
 from robosc_server.store.result_rows import insert_result
 from robosc_server.store.schema import JOBS, REPLICAS, REQUESTS, RESULTS
@@ -363,7 +363,7 @@ def forget(connection: Connection, held: dict[str, int], excess: int, limit: int
         for row in connection.execute(query.order_by(JOBS.c.ended_us, JOBS.c.id).limit(limit)):
             yield row.id, 0 if row.is_referred_to else row.size
 
-    chosen, left = given_back(held, oldest, excess, limit)
+    chosen, left = choose_evicted(held, oldest, excess, limit)
     if chosen:
         connection.execute(delete(JOBS).where(JOBS.c.id.in_(chosen)))
     return len(chosen), left

@@ -6,7 +6,7 @@ from typing import Any
 from sqlalchemy import Connection, bindparam, delete, func, insert, select, update
 from sqlalchemy.dialects import postgresql, sqlite
 
-from robosc_server.store.fairness import given_back
+from robosc_server.store.eviction import choose_evicted
 from robosc_server.store.records import blocks_of
 from robosc_server.store.schema import BLOCKS, JOBS, RESULTS
 from robosc_server.tasks.task import Result, TaskKind
@@ -86,7 +86,7 @@ def trim(connection: Connection, held: dict[str, int], excess: int, limit: int) 
         for row in connection.execute(query.with_for_update(skip_locked=True, of=RESULTS)):
             yield row.key, row.size
 
-    chosen, left = given_back(held, oldest, excess, limit)
+    chosen, left = choose_evicted(held, oldest, excess, limit)
     if chosen:
         connection.execute(delete(RESULTS).where(RESULTS.c.key.in_(chosen)))
     return len(chosen), left

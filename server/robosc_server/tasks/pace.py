@@ -8,7 +8,7 @@ from robosc_server.tasks.task import Report
 PAUSE_S = 0.1
 
 
-class PacedReports:
+class ThrottledReports:
     """Filter of reports: passes on the first of each stage, and others if none was for a while.
 
     Small work reports little.

@@ -138,7 +138,7 @@ def accepted(kind: TaskKind, request: bytes, limits: RequestLimits) -> Task:
     return Task(kind, request, hashlib.sha256(meaning.encode("utf-8")).hexdigest(), look.main_file)
 
 
-class RecentRequests:
+class RequestCache:
     """Acceptance of requests that knows earlier ones again, byte by byte: a client that asks twice is common.
 
     Args:

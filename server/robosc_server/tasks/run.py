@@ -22,9 +22,9 @@ from robosc.synthesis import UnknownEngineError
 from robosc.synthesis.engines import keep_ready, resolve_engine
 from robosc.targets import GeneratedFiles, TargetRefusal, UnknownTargetError, generate_or_refuse, require_generatable
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_server.tasks.attempt import Attempt, OnReport
-from robosc_server.tasks.convert import given, pieces, told
-from robosc_server.tasks.pace import PacedReports
+from robosc_server.tasks.convert import chunks, from_proto, to_proto
+from robosc_server.tasks.pace import ThrottledReports
+from robosc_server.tasks.synthesis_attempt import Attempt, OnReport
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
 from robosc_server.tasks.verify import NoPropertyError, verification
 
@@ -59,14 +59,14 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
         on_report: Callback that receives reports of the progress now and then.
     """
     try:
-        return Result(_bounded(_WORK[kind](request, limits, PacedReports(on_report)), limits.result_bytes))
+        return Result(_bounded(_WORK[kind](request, limits, ThrottledReports(on_report)), limits.result_bytes))
     except NodeLimitError as error:
         return Failure(Reason.NODE_LIMIT, str(error))
     except MemoryError:
         return Failure(Reason.MEMORY_LIMIT, f"the work needs more than {limits.memory_bytes} bytes of memory")
     except _ResultTooLargeError:
         return Failure(Reason.RESULT_TOO_LARGE, f"the result has more than {limits.result_bytes} bytes")
-    except (UnknownTargetError, UnknownEngineError, given.OptionError, NoPropertyError) as error:
+    except (UnknownTargetError, UnknownEngineError, from_proto.OptionError, NoPropertyError) as error:
         return Failure(Reason.MALFORMED_REQUEST, str(error))
     except Exception as error:  # The worker's border: whatever it was, the server logs it and lives on.
         return Failure(Reason.INTERNAL_FAULT, "a fault of the server", _places(error))
@@ -114,9 +114,9 @@ def _bounded(messages: Iterable[Any], maximum_bytes: int) -> tuple[bytes, ...]:
 
 def _check(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.CheckResponse]:
     request = pb.CheckRequest.FromString(content)
-    bundle = given.bundle(request.bundle)
+    bundle = from_proto.bundle(request.bundle)
     on_report(Report("check", bundle.main.name))
-    yield pb.CheckResponse(diagnostics=told.findings(check(bundle).diagnostics))
+    yield pb.CheckResponse(diagnostics=to_proto.findings(check(bundle).diagnostics))
 
 
 def _synthesize(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.SynthesizeResponse]:
@@ -126,11 +126,11 @@ def _synthesize(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iter
     with attempt:
         made = attempt.make(request, limits.nodes, on_report, allow_livelock=request.options.allow_livelock)
         if made.statistics is not None:
-            result.statistics.CopyFrom(told.statistics(made.statistics))
+            result.statistics.CopyFrom(to_proto.statistics(made.statistics))
         if made.supervisor is not None:
             content = encode(made.supervisor)
             result.supervisor, result.supervisor_digest = content, hashlib.sha256(content).digest()
-            result.summary.CopyFrom(told.summary(made.supervisor))
+            result.summary.CopyFrom(to_proto.summary(made.supervisor))
     result.MergeFrom(pb.SynthesisResult(**attempt.ending()))
     yield pb.SynthesizeResponse(result=result)
 
@@ -138,7 +138,7 @@ def _synthesize(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iter
 def _generate(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.GenerateResponse]:
     request = pb.GenerateRequest.FromString(content)
     require_generatable(request.target)
-    choices = given.generation(request.generation)
+    choices = from_proto.generation(request.generation)
     attempt = Attempt()
     files: GeneratedFiles | None = None
     with attempt:
@@ -149,11 +149,11 @@ def _generate(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterat
             attempt.refusal = found
         else:
             files = found
-    listing = [] if files is None else pieces.listing(files)
-    digest = pieces.digest_of(listing) if listing else b""
+    listing = [] if files is None else chunks.listing(files)
+    digest = chunks.digest_of(listing) if listing else b""
     yield pb.GenerateResponse(result=pb.GenerationResult(files=listing, digest=digest, **attempt.ending()))
     if files is not None:
-        yield from (pb.GenerateResponse(chunk=chunk) for chunk in pieces.file_chunks(files))
+        yield from (pb.GenerateResponse(chunk=chunk) for chunk in chunks.file_chunks(files))
 
 
 def _explore(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.ExploreResponse]:
@@ -177,7 +177,7 @@ def _explore(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterato
             states=states, transitions=transitions, size=len(text), digest=digest, **attempt.ending()
         )
     )
-    yield from (pb.ExploreResponse(chunk=chunk) for chunk in pieces.pieces(text))
+    yield from (pb.ExploreResponse(chunk=chunk) for chunk in chunks.content_chunks(text))
 
 
 def _graph(supervisor: Supervisor, maximum_states: int) -> Graph:
@@ -214,7 +214,7 @@ def _format(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator
     try:
         yield pb.FormatResponse(text=format_text(request.file.text, request.file.name))
     except LanguageError as error:
-        yield pb.FormatResponse(diagnostics=told.findings(error.diagnostics))
+        yield pb.FormatResponse(diagnostics=to_proto.findings(error.diagnostics))
 
 
 _WORK: dict[TaskKind, Callable[[bytes, TaskLimits, OnReport], Iterator[Any]]] = {

@@ -16,8 +16,8 @@ from robosc.supervisor import Supervisor, decode
 from robosc.synthesis.engines import resolve_engine
 from robosc.verification import Limits
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_server.tasks.attempt import Attempt, OnReport
-from robosc_server.tasks.convert import given, told
+from robosc_server.tasks.convert import from_proto, to_proto
+from robosc_server.tasks.synthesis_attempt import Attempt, OnReport
 from robosc_server.tasks.task import Report
 
 DEFAULT_STATES = 1_000_000
@@ -57,16 +57,16 @@ def verification(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnRep
 
 def _given(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) -> pb.VerificationResult:
     """Verify the given supervisor; if it is right, and only if asked for, verify its robot's properties."""
-    engine = resolve_engine(given.engine_name(request.options))
+    engine = resolve_engine(from_proto.engine_name(request.options))
     try:
         supervisor = decode(request.supervisor)
     except InvalidSupervisorError as error:
         return _result(pb.VERIFICATION_STATUS_FAILED, malformed_json(error), reason=str(error))
     found = verify_supervisor_file(
         supervisor,
-        given.bundle(request.bundle),
+        from_proto.bundle(request.bundle),
         Limits.of(request.maximum_states or DEFAULT_STATES),
-        deployment=given.deployment(request.options),
+        deployment=from_proto.deployment(request.options),
         engine=engine,
         on_progress=_on_step(on_report),
     )
@@ -87,7 +87,7 @@ def _no_robot(found: FileVerification) -> str:
 def _made(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) -> pb.VerificationResult:
     """Properties of the robot under the supervisor that is made for it."""
     # Errors of properties are reported before the synthesis, which may take long.
-    model = check(given.bundle(request.bundle)).model
+    model = check(from_proto.bundle(request.bundle)).model
     errors = None if model is None else _property_errors(request, model)
     if errors is not None:
         return errors
@@ -116,7 +116,7 @@ def _properties(request: pb.VerifyRequest, model: Model) -> tuple[Property, ...]
         NoPropertyError: There is none.
     """
     texts = [SourceFile(f"property {number}", text) for number, text in enumerate(request.properties, start=1)]
-    listings = [given.source_file(file) for file in request.property_files]
+    listings = [from_proto.source_file(file) for file in request.property_files]
     properties = properties_of(model, texts, listings)
     if not properties:
         raise NoPropertyError(f"there is no property in {' and '.join(file.name for file in listings)}")
@@ -134,7 +134,7 @@ def _verdicts(
         system,
         supervisor.added,
         _properties(request, supervisor.model),
-        engine=given.engine(request.options, maximum_nodes),
+        engine=from_proto.engine(request.options, maximum_nodes),
         on_progress=_on_step(on_report),
     )
     holds = all(verdict.holds for verdict in verdicts)
@@ -150,5 +150,5 @@ def _result(
     status: Any, document: Mapping[str, object], *, reason: str = "", diagnostics: tuple[Any, ...] = ()
 ) -> pb.VerificationResult:
     return pb.VerificationResult(
-        status=status, report=json_text(document), reason=reason, diagnostics=told.findings(diagnostics)
+        status=status, report=json_text(document), reason=reason, diagnostics=to_proto.findings(diagnostics)
     )

@@ -6,10 +6,10 @@ from typing import Protocol
 from robosc_server.tasks.task import Outcome, Report, Task, TaskLimits
 
 type OnReport = Callable[[Report], Awaitable[None]]
-type OnSpent = Callable[[float], None]
+type OnCpuTime = Callable[[float], None]
 
 
-def uncounted(cpu_s: float) -> None:
+def ignore_cpu_time(cpu_s: float) -> None:
     """Note for nobody what a process has taken."""
 
 
@@ -28,10 +28,12 @@ class Workers(Protocol):
     def capacity(self) -> int:
         """Number of tasks that they can be busy with at once; may change."""
 
-    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:
+    async def run(
+        self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime = ignore_cpu_time
+    ) -> Outcome:
         """The outcome of a task, begun at once: the caller sees to it that no more than `capacity` are under way.
 
-        However it ends, `on_spent` is told how many seconds of a processor's time each process has taken that was at
+        However it ends, `on_cpu_time` is told how many seconds of a processor's time each process has taken that was at
         it, as soon as that is known: about when the process is gone, which may be after this has returned. Of one that
         was lost with those who knew, it is told the time by the clock.
 

@@ -1,4 +1,4 @@
-"""A worker: a fork of the template that waits for one task, does it, answers and ends."""
+"""A worker: a fork of the fork server that waits for one task, does it, answers and ends."""
 
 import faulthandler
 import gc
@@ -29,12 +29,14 @@ _COLLECT_EVERY = 20_000
 OUT_OF_MEMORY = "the work took more memory than a task may have"
 
 
-def work(connection: socket.socket, last_words: int, function: TaskFunction, sandbox: Sandbox, used_bytes: int) -> None:
+def run_worker(
+    connection: socket.socket, crash_output: int, function: TaskFunction, sandbox: Sandbox, used_bytes: int
+) -> None:
     """Wait for a task, do it, send its outcome; confined before anything of a stranger's is read.
 
     Args:
         connection: Connection to the server; where it ends before a task came, nobody needs this process.
-        last_words: Descriptor to which the interpreter writes where it was when it crashed.
+        crash_output: Descriptor to which the interpreter writes where it was when it crashed.
         function: Function that does the task.
         sandbox: Sandbox that confines this process.
         used_bytes: Bytes of address space that this process has.
@@ -42,10 +44,10 @@ def work(connection: socket.socket, last_words: int, function: TaskFunction, san
     Raises:
         SandboxError: It cannot be confined.
     """
-    faulthandler.enable(last_words)
-    confinement.go_first()
+    faulthandler.enable(crash_output)
+    confinement.prefer_oom_kill()
     # What another process holds open tells nobody of its end, and gives who holds it something to reach.
-    close_others({connection.fileno(), last_words} | sandbox.descriptors)
+    close_others({connection.fileno(), crash_output} | sandbox.descriptors)
     sandbox.enter()
     try:
         task, limits = task_of(_receive(connection), _receive(connection))
@@ -68,9 +70,9 @@ def _answer(
     except MemoryError:
         outcome = Failure(Reason.MEMORY_LIMIT, OUT_OF_MEMORY)
     except BaseException:  # The worker's border: whatever it was, the server logs it and lives on.
-        confinement.make_room()
+        confinement.raise_memory_limit()
         outcome = Failure(Reason.INTERNAL_FAULT, "the server is at fault", traceback.format_exc())
-    confinement.make_room()
+    confinement.raise_memory_limit()
     _send(connection, outcome, limits)
 
 
@@ -106,7 +108,7 @@ def _receive_exactly(connection: socket.socket, length: int) -> bytes:
     return bytes(content)
 
 
-def silence() -> None:
+def redirect_to_devnull() -> None:
     """Have standard input, output and error lead nowhere: libraries that print disturb nobody, and tell nothing."""
     nowhere = os.open(os.devnull, os.O_RDWR)
     for descriptor in range(3):

@@ -11,12 +11,12 @@ from robosc_server.tasks.task import TaskLimits
 from robosc_server.workers import kernel
 
 _FILES_LIMIT = 64
-_LEAST_ROOM_BYTES = 64 * 2**20
-_FAREWELL_BYTES = 64 * 2**20
-_FAREWELL_S = 2
+_MINIMUM_FREE_BYTES = 64 * 2**20
+_FAILURE_REPORT_BYTES = 64 * 2**20
+_FAILURE_REPORT_S = 2
 
 
-def die_with(parent: int) -> None:
+def exit_with_parent(parent: int) -> None:
     """Have the kernel kill this process when its parent dies; where that one is dead already, end at once."""
     with suppress(OSError):
         kernel.prctl(kernel.SET_PARENT_DEATH_SIGNAL, int(signal.SIGKILL))
@@ -24,7 +24,7 @@ def die_with(parent: int) -> None:
         os._exit(1)
 
 
-def go_first() -> None:
+def prefer_oom_kill() -> None:
     """Be the first to go where the machine's memory ends."""
     with suppress(OSError):
         # The file is the superuser's as long as nobody may look into this process.
@@ -50,23 +50,23 @@ def confine(limits: TaskLimits, used_bytes: int) -> None:
     is too little for any task. Processor time counts from here on, in whole seconds. No byte can be written to a
     file.
     """
-    memory_bytes = max(limits.memory_bytes, used_bytes + _LEAST_ROOM_BYTES)
-    _set(resource.RLIMIT_AS, memory_bytes, memory_bytes + _FAREWELL_BYTES)
+    memory_bytes = max(limits.memory_bytes, used_bytes + _MINIMUM_FREE_BYTES)
+    _set(resource.RLIMIT_AS, memory_bytes, memory_bytes + _FAILURE_REPORT_BYTES)
     used = resource.getrusage(resource.RUSAGE_SELF)
     cpu_s = max(1, math.ceil(limits.cpu_seconds)) + round(used.ru_utime + used.ru_stime)
-    _set(resource.RLIMIT_CPU, cpu_s, cpu_s + _FAREWELL_S)
+    _set(resource.RLIMIT_CPU, cpu_s, cpu_s + _FAILURE_REPORT_S)
     _set(resource.RLIMIT_FSIZE, 0, 0)
     _set(resource.RLIMIT_NOFILE, _FILES_LIMIT, _FILES_LIMIT)
 
 
-def make_room() -> None:
+def raise_memory_limit() -> None:
     """Let go of the memory limit by as much as it takes to say farewell."""
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
     with suppress(OSError, ValueError):
         resource.setrlimit(resource.RLIMIT_AS, (hard, hard))
 
 
-def no_core() -> None:
+def disable_core_dumps() -> None:
     """Leave no image of the memory, in which a model would stand, behind on a disk."""
     _set(resource.RLIMIT_CORE, 0, 0)
 

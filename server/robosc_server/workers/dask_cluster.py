@@ -14,8 +14,8 @@ from typing import Any, Self
 from robosc import __version__
 from robosc_server.clock import monotonic
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Task, TaskLimits
-from robosc_server.workers import OnReport, OnSpent, WorkerLostError, WorkersError, uncounted
-from robosc_server.workers.dask_spending import Spending
+from robosc_server.workers import OnCpuTime, OnReport, WorkerLostError, WorkersError, ignore_cpu_time
+from robosc_server.workers.dask_cpu_time import CpuTimeAccount
 from robosc_server.workers.frames import FrameError
 from robosc_server.workers.local import TASK_FUNCTION
 
@@ -113,7 +113,7 @@ class DaskWorkers:
         self._threads: dict[str, int] = {}
         self._refused: dict[str, str] = {}
         self._watched: dict[str, _Watched] = {}
-        self._spending: dict[str, Spending] = {}
+        self._spending: dict[str, CpuTimeAccount] = {}
         self._keeper: asyncio.Task[None] | None = None
         self._has_looked = asyncio.Event()
         self._is_over = asyncio.Event()
@@ -145,7 +145,9 @@ class DaskWorkers:
         """Threads of all workers of the cluster that can be used; 0 while it is away."""
         return sum(self._threads.values())
 
-    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:
+    async def run(
+        self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime = ignore_cpu_time
+    ) -> Outcome:
         """Return the outcome of a task; see `Workers.run`.
 
         A worker of the cluster that is lost has its task done by another one, once. Reports come at most ten times a
@@ -158,7 +160,7 @@ class DaskWorkers:
         """
         watched = _Watched()
         for _ in range(_STARTS):
-            outcome = await self._run_once(task, limits, on_report, on_spent, watched)
+            outcome = await self._run_once(task, limits, on_report, on_cpu_time, watched)
             if outcome is not None:
                 return outcome
             if watched.begun >= _ATTEMPTS:
@@ -167,7 +169,7 @@ class DaskWorkers:
         raise WorkersError(f"the Dask cluster at {self._address} loses its workers before they begin a task")
 
     async def _run_once(
-        self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent, watched: _Watched
+        self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime, watched: _Watched
     ) -> Outcome | None:
         """The outcome of a task; None: workers were lost, and it has to be begun anew."""
         from robosc_server.workers.dask_task import run_on_cluster
@@ -177,7 +179,7 @@ class DaskWorkers:
             raise WorkersError(self.fault or f"the Dask cluster at {self._address} has no worker")
         name = f"robosc-{task.kind}-{uuid.uuid4().hex}"
         self._watched[name] = watched
-        self._spending[name] = Spending(on_spent, monotonic)
+        self._spending[name] = CpuTimeAccount(on_cpu_time, monotonic)
         named = sorted(self._threads) if self._refused else None
         future = client.submit(
             run_on_cluster,

@@ -131,7 +131,7 @@ def outcome_of(content: bytes, limits: TaskLimits) -> Outcome:
     reader = AnswerReader(limits)
     view = memoryview(content)
     while len(view) >= HEADER.size:
-        announced = reader.announced(bytes(view[: HEADER.size]))
+        announced = reader.read_header(bytes(view[: HEADER.size]))
         if isinstance(announced, Failure):
             return announced
         tag, length = announced

@@ -34,7 +34,7 @@ _FAILURE_BYTES = 2**20
 _TEXT_LIMIT = 4_000
 _DETAILS_LIMIT = 60_000
 
-_TOLD_BY_WORKERS = frozenset(
+_WORKER_REASONS = frozenset(
     {
         Reason.MALFORMED_REQUEST,
         Reason.REQUEST_TOO_LARGE,
@@ -131,7 +131,7 @@ class AnswerReader:
         self._messages: list[bytes] = []
         self._bytes = 0
 
-    def announced(self, header: bytes) -> tuple[Tag, int] | Failure:
+    def read_header(self, header: bytes) -> tuple[Tag, int] | Failure:
         """Tag and length of the payload that comes next, or why the answer must not be read on.
 
         Raises:
@@ -189,7 +189,7 @@ def _failure(values: dict[str, Any]) -> Failure:
         reason = Reason(_text(values, "reason", _TEXT_LIMIT))
     except ValueError:
         raise FrameError("a failure of no known reason") from None
-    if reason not in _TOLD_BY_WORKERS:
+    if reason not in _WORKER_REASONS:
         raise FrameError(f"a failure whose reason {reason} is not for workers to tell")
     return Failure(reason, _text(values, "message", _TEXT_LIMIT), _text(values, "details", _DETAILS_LIMIT))
 

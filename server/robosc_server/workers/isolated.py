@@ -7,7 +7,7 @@ from concurrent.futures import Future
 from typing import Any
 
 from robosc_server.tasks.task import Outcome, Report, Task, TaskLimits
-from robosc_server.workers import OnSpent, uncounted
+from robosc_server.workers import OnCpuTime, ignore_cpu_time
 from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
 
 _ASK_S = 0.02
@@ -72,7 +72,7 @@ def run_isolated(
     on_report: Callable[[Report], None],
     should_stop: Callable[[], bool],
     task_function: str = TASK_FUNCTION,
-    on_spent: OnSpent = uncounted,
+    on_cpu_time: OnCpuTime = ignore_cpu_time,
     *,
     must_be_confined: bool = False,
 ) -> Outcome:
@@ -84,7 +84,7 @@ def run_isolated(
         on_report: Callback that receives each report, in another thread; must not wait.
         should_stop: Function that is asked every 20 ms, in this thread; once true, the process is killed.
         task_function: Function that does tasks, `package.module:name`.
-        on_spent: Callback that receives the processor time of each process that was busy with it, in another thread,
+        on_cpu_time: Callback that receives the processor time of each process that was busy with it, in another thread,
             maybe after the outcome; see `Workers.run`.
         must_be_confined: True if it is not to be done where a part of the confinement is not available.
 
@@ -98,7 +98,7 @@ def run_isolated(
     async def tell(report: Report) -> None:
         on_report(report)
 
-    work = background.start(background.workers.run(task, limits, tell, on_spent))
+    work = background.start(background.workers.run(task, limits, tell, on_cpu_time))
     ended = threading.Event()
     work.add_done_callback(lambda _: ended.set())
     while not ended.wait(_ASK_S):

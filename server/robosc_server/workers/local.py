@@ -6,10 +6,10 @@ from typing import Self
 
 from robosc_server.clock import monotonic
 from robosc_server.tasks.task import Failure, Outcome, Reason, Task, TaskLimits
-from robosc_server.workers import OnReport, OnSpent, WorkerLostError, uncounted
-from robosc_server.workers.endings import OUT_OF_TIME
-from robosc_server.workers.process import TemplateLostError, WorkerProcess
-from robosc_server.workers.supply import Supply
+from robosc_server.workers import OnCpuTime, OnReport, WorkerLostError, ignore_cpu_time
+from robosc_server.workers.exit_reasons import OUT_OF_TIME
+from robosc_server.workers.pool import WorkerPool
+from robosc_server.workers.process import ForkServerLostError, WorkerProcess
 
 TASK_FUNCTION = "robosc_server.tasks.run:run_task"
 """Does tasks; `package.module:name`."""
@@ -38,54 +38,56 @@ class LocalWorkers:
             must_be_confined: True if there are to be none where a part of their confinement is not available.
         """
         self._size = size
-        self._supply = Supply(task_function, size if spare is None else spare, must_be_confined=must_be_confined)
+        self._pool = WorkerPool(task_function, size if spare is None else spare, must_be_confined=must_be_confined)
 
     async def __aenter__(self) -> Self:
-        await self._supply.__aenter__()
+        await self._pool.__aenter__()
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        await self._supply.__aexit__(None)
+        await self._pool.__aexit__(None)
 
     @property
     def capacity(self) -> int:
         """Number of tasks that can be under way; 0 while no process can be had."""
-        return 0 if self._supply.is_hopeless else self._size
+        return 0 if self._pool.is_failing else self._size
 
     @property
     def pids(self) -> frozenset[int]:
         """Numbers of all worker processes, ready and at work."""
-        return self._supply.pids
+        return self._pool.pids
 
     @property
     def fault(self) -> str:
         """Reason why no process can be had now, in one sentence; empty where there are some."""
-        return self._supply.fault
+        return self._pool.fault
 
     @property
     def missing(self) -> tuple[str, ...]:
         """Parts of the workers' confinement that this machine does not have, one sentence for each."""
-        return self._supply.missing or ()
+        return self._pool.missing or ()
 
     @property
     def restarts(self) -> int:
         """Number of times that the process that starts workers ended and was started again."""
-        return self._supply.restarts
+        return self._pool.restarts
 
-    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:
+    async def run(
+        self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime = ignore_cpu_time
+    ) -> Outcome:
         """The outcome of a task; see `Workers.run`.
 
         Raises:
             WorkersError: No process can be had.
-            WorkerLostError: The template ended under it, each time.
+            WorkerLostError: The fork server ended under it, each time.
         """
         for _ in range(_ATTEMPTS):
-            with contextlib.suppress(TemplateLostError):
-                return await self._run_once(task, limits, on_report, on_spent)
+            with contextlib.suppress(ForkServerLostError):
+                return await self._run_once(task, limits, on_report, on_cpu_time)
         raise WorkerLostError("the process that starts workers ended twice under one task")
 
-    async def _run_once(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent) -> Outcome:
-        worker = await self._supply.take()
+    async def _run_once(self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime) -> Outcome:
+        worker = await self._pool.acquire()
         begun_s = monotonic()
         limit = asyncio.timeout(limits.seconds)
         is_answered = False
@@ -99,14 +101,14 @@ class LocalWorkers:
                 raise
             return Failure(Reason.TIME_LIMIT, OUT_OF_TIME)
         finally:
-            burial = self._supply.bury(worker)
-            burial.add_done_callback(lambda _: on_spent(_cpu_s(worker, monotonic() - begun_s)))
+            termination = self._pool.terminate(worker)
+            termination.add_done_callback(lambda _: on_cpu_time(_cpu_s(worker, monotonic() - begun_s)))
             if not is_answered:  # Whoever gives a task up can count on its end.
-                await asyncio.wait([burial], timeout=_GONE_S)
+                await asyncio.wait([termination], timeout=_GONE_S)
 
 
 def _cpu_s(worker: WorkerProcess, clock_s: float) -> float:
     """Seconds of a processor's time that a process took that is gone; by the clock, if the kernel's word was lost."""
-    known = worker.ending.done() and not worker.ending.cancelled()
-    ending = worker.ending.result() if known else None
-    return clock_s if ending is None else ending.cpu_s
+    known = worker.exit.done() and not worker.exit.cancelled()
+    end = worker.exit.result() if known else None
+    return clock_s if end is None else end.cpu_s

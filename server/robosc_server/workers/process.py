@@ -9,17 +9,17 @@ import socket
 
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Task, TaskLimits
 from robosc_server.workers import OnReport
-from robosc_server.workers.endings import Ending, KillsBefore, failure_of, kills_for_memory
+from robosc_server.workers.exit_reasons import ProcessExit, RecentOomKills, failure_of, oom_kills
 from robosc_server.workers.frames import HEADER, AnswerReader, FrameError, task_frames
 
 _BUFFER_BYTES = 2**16
-_ENDING_S = 5.0
-_LAST_WORDS_BYTES = 2**14
+_EXIT_S = 5.0
+_CRASH_OUTPUT_BYTES = 2**14
 
-_kills_before = KillsBefore()
+_kills_before = RecentOomKills()
 
 
-class TemplateLostError(Exception):
+class ForkServerLostError(Exception):
     """The process that a worker was forked from has ended, and the worker with it."""
 
 
@@ -29,16 +29,16 @@ class WorkerProcess:
     Attributes:
         pid: Its number.
         task: Task that it is busy with, or was.
-        ending: End of the process, as soon as that is known; None: the template that could have reported it is gone.
+        end: End of the process, as soon as that is known; None: the fork server that could have reported it is gone.
     """
 
-    def __init__(self, pid: int, connection: socket.socket, descriptor: int, last_words: int) -> None:
+    def __init__(self, pid: int, connection: socket.socket, descriptor: int, crash_output: int) -> None:
         self.pid = pid
         self.task: Task | None = None
-        self.ending: asyncio.Future[Ending | None] = asyncio.get_running_loop().create_future()
+        self.exit: asyncio.Future[ProcessExit | None] = asyncio.get_running_loop().create_future()
         self._connection = connection
         self._descriptor = descriptor
-        self._last_words = last_words
+        self._crash_output = crash_output
         self._is_gone = asyncio.get_running_loop().create_future()
         self._writer: asyncio.StreamWriter | None = None
         asyncio.get_running_loop().add_reader(descriptor, self._note_gone)
@@ -70,13 +70,13 @@ class WorkerProcess:
             self._writer.transport.abort()
         self._connection.close()
         os.close(self._descriptor)
-        os.close(self._last_words)
+        os.close(self._crash_output)
 
     async def run(self, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
         """The outcome of a task; the process is of no use afterwards.
 
         Raises:
-            TemplateLostError: It ended with its template, which is not the task's fault.
+            ForkServerLostError: It ended with its fork server, which is not the task's fault.
         """
         kills = _kills_before()
         self.task = task
@@ -93,7 +93,7 @@ class WorkerProcess:
     async def _answer(self, reader: asyncio.StreamReader, limits: TaskLimits, on_report: OnReport) -> Outcome:
         answer = AnswerReader(limits)
         while True:
-            announced = answer.announced(await reader.readexactly(HEADER.size))
+            announced = answer.read_header(await reader.readexactly(HEADER.size))
             if isinstance(announced, Failure):
                 return announced
             tag, length = announced
@@ -108,16 +108,16 @@ class WorkerProcess:
         """Return the reason why the connection ended before an answer was whole."""
         self.kill()  # It closed its end, but may live: then it was told nothing of a limit by the kernel.
         try:
-            async with asyncio.timeout(_ENDING_S):
-                ending = await asyncio.shield(self.ending)
+            async with asyncio.timeout(_EXIT_S):
+                end = await asyncio.shield(self.exit)
         except TimeoutError:
             return Failure(Reason.WORKER_DIED, "the worker process ended, and nothing is known of how")
-        if ending is None:
-            raise TemplateLostError
-        return failure_of(ending, limits, self._read_last_words(), kills_for_memory() > kills)
+        if end is None:
+            raise ForkServerLostError
+        return failure_of(end, limits, self._read_crash_output(), oom_kills() > kills)
 
-    def _read_last_words(self) -> str:
+    def _read_crash_output(self) -> str:
         try:
-            return os.read(self._last_words, _LAST_WORDS_BYTES).decode("utf-8", "replace")
+            return os.read(self._crash_output, _CRASH_OUTPUT_BYTES).decode("utf-8", "replace")
         except OSError:  # None were written.
             return ""

@@ -43,7 +43,7 @@ async def _seconds(work: Callable[[], Awaitable[object]]) -> float:
 
 
 async def _cold_s(task: Task, task_function: str) -> float:
-    """With a template that is started for it, ended included."""
+    """With a fork server that is started for it, ended included."""
     begin = time.perf_counter()
     async with LocalWorkers(1, task_function) as workers:
         assert isinstance(await workers.run(task, TaskLimits(), _ignore), Result)
@@ -65,7 +65,7 @@ async def _row(name: str, task: Task, task_function: str) -> list[str]:
         in_process, ready = [], []
         for _ in range(ROUNDS):
             in_process.append(await _seconds(here))
-            # The template forks the next process meanwhile, as it does for a server that is not at its limit.
+            # The fork server forks the next process meanwhile, as it does for a server that is not at its limit.
             await asyncio.sleep(PAUSE_S)
             ready.append(await _seconds(there))
             await asyncio.sleep(PAUSE_S)

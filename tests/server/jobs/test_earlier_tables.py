@@ -6,7 +6,7 @@ from pathlib import Path
 from sqlalchemy import inspect
 
 from robosc_server.store import Store, open_store
-from robosc_server.store.looking import look_at_sqlite
+from robosc_server.store.inspection import inspect_sqlite
 from support.first_tables import TABLES, check
 
 
@@ -30,7 +30,7 @@ def test_tables_of_the_first_version_in_sqlite(tmp_path: Path) -> None:
     connection.close()
     # Who only looks changes nothing.
     before = (tmp_path / "old" / "jobs.sqlite").read_bytes()
-    look_at_sqlite(tmp_path / "old" / "jobs.sqlite")
+    inspect_sqlite(tmp_path / "old" / "jobs.sqlite")
     assert (tmp_path / "old" / "jobs.sqlite").read_bytes() == before
     for _ in range(2):  # The second time there is nothing left to do.
         old, new = open_store(tmp_path / "old"), open_store(tmp_path / "new")

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from robosc_server.failures import RefusedError
-from robosc_server.jobs import Caller, JobLimits, QueueLimits, carrying
+from robosc_server.jobs import Caller, JobLimits, QueueLimits, runner
 from robosc_server.store import JobFilter, JobRecord, JobState, StoreUnavailableError
 from robosc_server.store.records import STEP
 from robosc_server.tasks.task import Failure, Reason, Report, Result, TaskKind
@@ -60,7 +60,7 @@ def test_what_was_worked_out_before_is_answered_from_the_store(tmp_path: Path) -
             assert (second.state, second.is_from_store, second.attempts) == (JobState.SUCCEEDED, True, 0)
             assert await messages_of_job(made.manager, second.id) == messages_for(TaskKind.CHECK, "hello", 0)
             assert made.workers.begun == ["hello"]
-            assert (made.scheduler.running, made.scheduler.waiting, made.manager.carried) == (0, 0, 0)
+            assert (made.scheduler.running, made.scheduler.waiting, made.manager.active_jobs) == (0, 0, 0)
         # And by a server that has nothing in memory.
         async with parts(tmp_path) as made:
             third, _ = await made.manager.submit(task_of("hello"), ME)
@@ -354,7 +354,7 @@ def test_draining_lets_jobs_end_that_run(tmp_path: Path) -> None:
 
 
 def test_workers_that_are_away_cost_a_job_no_attempt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robosc_server.jobs.carrying._RETRY_S", 0.01)
+    monkeypatch.setattr("robosc_server.jobs.runner._RETRY_S", 0.01)
 
     async def test() -> None:
         gate = tmp_path / "gate"
@@ -394,7 +394,7 @@ class Allowance:
 def test_jobs_wait_beside_the_line_while_their_owner_has_spent_too_much(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("robosc_server.jobs.carrying._QUOTA_S", 0.01)
+    monkeypatch.setattr("robosc_server.jobs.runner._QUOTA_S", 0.01)
 
     async def test() -> None:
         accounts = Allowance()
@@ -452,7 +452,7 @@ def test_cancelled_work_counts_for_its_owner(tmp_path: Path) -> None:
 
 
 def test_a_job_that_loses_its_worker_again_and_again_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robosc_server.jobs.carrying._RETRY_S", 0.01)
+    monkeypatch.setattr("robosc_server.jobs.runner._RETRY_S", 0.01)
 
     async def test() -> None:
         async with parts(tmp_path, Choices(capacity=1)) as made:
@@ -470,7 +470,7 @@ def test_a_job_that_loses_its_worker_again_and_again_fails(tmp_path: Path, monke
             done = await ended(made.manager, job.id)
             assert done.failure is not None
             assert (done.state, done.failure.reason) == (JobState.FAILED, Reason.WORKER_DIED)
-            assert done.failure.message == "the job's worker was lost 3 times while it did the task"
+            assert done.failure.message == "the worker process was lost 3 times during this job"
             assert 2 <= len((tmp_path / "begun").read_text().splitlines()) - begun <= 3
             assert (made.scheduler.running, made.scheduler.waiting) == (0, 0)
 
@@ -478,7 +478,7 @@ def test_a_job_that_loses_its_worker_again_and_again_fails(tmp_path: Path, monke
 
 
 def test_losses_count_also_when_servers_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robosc_server.jobs.carrying._RETRY_S", 0.01)
+    monkeypatch.setattr("robosc_server.jobs.runner._RETRY_S", 0.01)
 
     async def has_lost_once(made: Parts, job_id: str) -> bool:
         return (await made.manager.get(job_id, ME)).losses == 1
@@ -538,7 +538,7 @@ def test_an_acceptance_whose_answer_was_lost_is_found_and_done(tmp_path: Path, m
 def test_a_beginning_that_may_have_been_kept_is_tried_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_happened: bool
 ) -> None:
-    monkeypatch.setattr("robosc_server.jobs.carrying._RETRY_S", 0.01)
+    monkeypatch.setattr("robosc_server.jobs.runner._RETRY_S", 0.01)
 
     async def test() -> None:
         async with parts(tmp_path) as made:
@@ -562,7 +562,7 @@ def test_a_beginning_that_may_have_been_kept_is_tried_again(
 
 def test_a_thousand_watchers_wait_without_a_question_to_the_database(tmp_path: Path) -> None:
     async def test() -> None:
-        async with parts(tmp_path, Choices(limits=JobLimits(look_s=0.005, sweep_s=3600.0))) as made:
+        async with parts(tmp_path, Choices(limits=JobLimits(poll_s=0.005, sweep_s=3600.0))) as made:
             gate = tmp_path / "gate"
             job, _ = await made.manager.submit(task_of(f"until {gate}"), ME)
             await until(lambda: is_in(made.manager, job.id, JobState.RUNNING))
@@ -578,7 +578,7 @@ def test_a_thousand_watchers_wait_without_a_question_to_the_database(tmp_path: P
 
             database._run = counted  # type: ignore[assignment, method-assign]
             for _ in range(20):
-                await made.manager.look()
+                await made.manager.poll()
             assert asked == []
             gate.touch()
             assert {record.state for record in await asyncio.gather(*watching)} == {JobState.SUCCEEDED}
@@ -607,7 +607,7 @@ def test_a_job_whose_result_cannot_be_kept_ends_all_the_same(tmp_path: Path, mon
             assert record.state is JobState.FAILED
             assert record.failure is not None
             assert record.failure.reason is Reason.INTERNAL_FAULT
-            assert record.failure.message.startswith("the result cannot be kept; internal error ")
+            assert record.failure.message.startswith("the result cannot be stored; internal error ")
             assert (made.scheduler.running, made.scheduler.waiting) == (0, 0)
 
     in_loop(test)
@@ -616,7 +616,7 @@ def test_a_job_whose_result_cannot_be_kept_ends_all_the_same(tmp_path: Path, mon
 def test_jobs_that_wait_for_workers_count_like_those_in_the_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(carrying, "_LONGEST_RETRY_S", 1.0)
+    monkeypatch.setattr(runner, "_LONGEST_RETRY_S", 1.0)
 
     async def test() -> None:
         queue = QueueLimits(waiting=6, waiting_per_caller=4)

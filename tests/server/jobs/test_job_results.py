@@ -31,14 +31,14 @@ def test_what_is_kept_is_written_beside_as_it_was_made_and_sent_as_it_is_finishe
             assert await results.find("k") is None
             assert results.keep("k", _KIND, made, "me") == sent
             assert results.unwritten("k") == made
-            assert results.at_hand("k") == await results.find("k") == sent
+            assert results.in_memory("k") == await results.find("k") == sent
             await until(lambda: is_written(store, "k"))
             assert await store.find_result("k") == (_KIND, made)
             assert (results.hits, results.misses) == (2, 1)
         async with Results(store, 10_000, finish) as results:
-            assert results.at_hand("k") is None
+            assert results.in_memory("k") is None
             assert await results.find("k") == sent
-            assert results.at_hand("k") == sent
+            assert results.in_memory("k") == sent
         store.close()
 
     in_loop(test)
@@ -50,12 +50,12 @@ def test_memory_is_bounded_and_what_was_asked_for_last_stays(tmp_path: Path) -> 
         results = Results(store, 5_000)
         for key in "abc":
             results.remember(key, _KIND, Result((bytes(1000),)))
-        assert results.at_hand("a") is not None
+        assert results.in_memory("a") is not None
         results.remember("d", _KIND, Result((bytes(1000),)))
-        assert [key for key in "abcd" if results.at_hand(key)] == ["a", "c", "d"]
+        assert [key for key in "abcd" if results.in_memory(key)] == ["a", "c", "d"]
         results.remember("large", _KIND, Result((bytes(5_000),)))
-        assert results.at_hand("large") is None
-        assert [key for key in "abcd" if results.at_hand(key)] == ["a", "c", "d"]
+        assert results.in_memory("large") is None
+        assert [key for key in "abcd" if results.in_memory(key)] == ["a", "c", "d"]
         store.close()
 
     in_loop(test)
@@ -140,7 +140,7 @@ def test_what_waits_to_be_written_is_bounded_and_what_is_beyond_stays_in_memory_
             for _ in range(2):  # The second time it is known.
                 results.keep(key, _KIND, Result((bytes(1000),)), "me")
         assert [results.unwritten(key) is not None for key in "abcd"] == [True, True, False, False]
-        assert all(results.at_hand(key) for key in "abcd")
+        assert all(results.in_memory(key) for key in "abcd")
         async with results:
             await until(lambda: is_written(store, "b"))
         # What was written makes room.

@@ -326,7 +326,7 @@ def test_a_fault_of_ours_is_told_without_its_text(tmp_path: Path, monkeypatch: p
 
 def test_watchers_that_go_away_leave_nothing_behind(tmp_path: Path) -> None:
     async def test() -> None:
-        limits = JobLimits(look_s=0.02, sweep_s=3600.0)
+        limits = JobLimits(poll_s=0.02, sweep_s=3600.0)
         async with service(tmp_path, Choices(limits=limits)) as (made, stub):
             job = (await stub.SubmitJob(submission(_NEVER))).job
             watching = [stub.WatchJob(pb.WatchJobRequest(id=job.id)) for _ in range(20)]

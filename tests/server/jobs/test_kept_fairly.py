@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from robosc_server.failures import RefusedError
 from robosc_server.jobs import Caller, JobLimits, retention
 from robosc_server.store import JobState, open_store
-from robosc_server.store.fairness import given_back
+from robosc_server.store.eviction import choose_evicted
 from robosc_server.tasks.task import Reason, Result
 from support.effort import examples
 from support.job_parts import ME, Choices, Times, ended, in_loop, is_in, parts, sweep_by_hand
@@ -49,7 +49,7 @@ def test_whoever_holds_most_gives_first(
 ) -> None:
     fixed = {owner: more.get(owner, 0) for owner in things}
     held = {owner: fixed[owner] + sum(sizes) for owner, sizes in things.items()}
-    gone, left = given_back(
+    gone, left = choose_evicted(
         held, lambda owner: ((f"{owner}{n}", size) for n, size in enumerate(things[owner])), excess, limit
     )
     expected = twin_of_given_back(fixed, things, excess, limit)

@@ -17,7 +17,7 @@ from robosc_server.operations.interceptor import CallInterceptor
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.request_ids import REQUEST_ID
 from robosc_server.operations.settings import LogLevel
-from robosc_server.operations.tracing import SentTracing
+from robosc_server.operations.tracing import OtlpTracing
 from robosc_server.tasks.task import Reason
 from support.small_server import SERVICE, Ended, call, logged, small_server
 from support.waiting import PATIENCE_S, limited, until
@@ -292,7 +292,7 @@ def test_what_a_guard_refuses_is_logged_with_a_reason_and_whom_it_lets_in_by_nam
 def test_a_call_is_a_span_that_continues_its_callers_trace_and_holds_no_message() -> None:
     exporter, provider = InMemorySpanExporter(), TracerProvider()
     provider.add_span_processor(SimpleSpanProcessor(exporter))
-    tracing = SentTracing(provider)
+    tracing = OtlpTracing(provider)
     trace, parent = "0af7651916cd43dd8448eb211c80319c", "b7ad6b7169203331"
 
     async def inside(request: bytes, context: Any) -> bytes:

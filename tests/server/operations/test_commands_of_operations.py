@@ -18,10 +18,10 @@ from sqlalchemy import create_engine, text
 from robosc_api.security import Quota, Scope, make_token
 from robosc_api.security.tokens import parse_tokens
 from robosc_server.operations.commands import run_command
-from robosc_server.operations.example import example_file
 from robosc_server.operations.settings import Settings, settings_from, variable_of
+from robosc_server.operations.settings_reference import example_file
 from robosc_server.store import StoreError, open_store
-from robosc_server.store.opening import DATABASE_FILE
+from robosc_server.store.factory import DATABASE_FILE
 from robosc_server.store.schema import VERSION
 from support.certificates import Authority
 from support.held_store import held_store

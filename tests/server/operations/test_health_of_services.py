@@ -12,7 +12,7 @@ from robosc_server.operations.drain import drain
 from robosc_server.operations.health import Health
 from robosc_server.operations.interceptor import CallInterceptor
 from robosc_server.operations.metrics import Metrics
-from robosc_server.outgoing import Outgoing
+from robosc_server.result_sender import ResultSender
 from support.held_time import HeldLoop, on_held_time
 from support.small_server import SERVICE, call, logged, small_server
 from support.waiting import PATIENCE_S, limited, until
@@ -160,11 +160,11 @@ def test_a_large_answer_that_was_sent_is_waited_for() -> None:
     size = 3_000_000
 
     async def test(loop: HeldLoop) -> None:
-        outgoing, calls, health = Outgoing(size, size), CallInterceptor(Metrics("1")), Health({})
+        sender, calls, health = ResultSender(size, size), CallInterceptor(Metrics("1")), Health({})
 
         async def large(request: bytes, context: Any) -> bytes:
             answer = bytes(size)
-            outgoing.hold(context, (answer,))
+            sender.hold(context, (answer,))
             return answer
 
         ports: list[int] = []
@@ -178,9 +178,9 @@ def test_a_large_answer_that_was_sent_is_waited_for() -> None:
             async with grpc.aio.insecure_channel(f"127.0.0.1:{ports[0]}", options) as slow:
                 method: Any = slow.unary_stream(f"/{SERVICE}/Unary")
                 reader = method(b"")
-                await until(lambda: outgoing.unread_bytes > 0 and not calls.under_way())
+                await until(lambda: sender.unread_bytes > 0 and not calls.under_way())
                 ending = asyncio.create_task(
-                    drain(server, health, calls, PATIENCE_S, unread_bytes=lambda: outgoing.unread_bytes)
+                    drain(server, health, calls, PATIENCE_S, unread_bytes=lambda: sender.unread_bytes)
                 )
                 # Longer than small answers are given.
                 await loop.passed(5.0)

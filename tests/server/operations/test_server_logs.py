@@ -10,12 +10,12 @@ import structlog
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc_server.failures import for_callers
-from robosc_server.operations.logs import tell_fault
+from robosc_server.failures import public_failure
+from robosc_server.operations.logs import log_fault
 from robosc_server.operations.request_ids import REQUEST_ID
 from robosc_server.operations.settings import LogFormat, LogLevel
 from robosc_server.tasks.task import Failure, Reason
-from robosc_server.workers.endings import Ending, facts_of
+from robosc_server.workers.exit_reasons import ProcessExit, exit_description
 from support.small_server import logged
 
 MARKER = "a_word_of_the_model"
@@ -87,8 +87,8 @@ def test_an_exception_is_told_without_its_words_above_debug(form: LogFormat) -> 
         with logged(level, form) as log:
             logging.getLogger("others").error("failed", exc_info=raised())
             structlog.get_logger().error("failed", exc_info=raised())
-            tell_fault(raised())
-            tell_fault(_TRACEBACK)
+            log_fault(raised())
+            log_fault(_TRACEBACK)
         return log.text
 
     quiet = told(LogLevel.INFO)
@@ -110,9 +110,9 @@ def test_what_the_system_says_is_told() -> None:
 
 def test_how_a_worker_died_is_logged_and_an_exception_in_it_is_not() -> None:
     with logged(LogLevel.INFO) as log:
-        facts = facts_of(Ending(-11, 1.5, 2**20))
-        died = for_callers(Failure(Reason.WORKER_DIED, "it died", f"{facts}\nFatal Python error\n{MARKER}"))
-        fault = for_callers(Failure(Reason.INTERNAL_FAULT, "a fault", f"Traceback\nKeyError: {MARKER}"))
+        facts = exit_description(ProcessExit(-11, 1.5, 2**20))
+        died = public_failure(Failure(Reason.WORKER_DIED, "it died", f"{facts}\nFatal Python error\n{MARKER}"))
+        fault = public_failure(Failure(Reason.INTERNAL_FAULT, "a fault", f"Traceback\nKeyError: {MARKER}"))
     ending = "was ended by SIGSEGV after 1.50 s of a processor's time, with at most 1048576 bytes resident"
     assert log.lines("fault")[0]["ending"] == ending
     assert MARKER not in log.text
@@ -139,7 +139,7 @@ def test_how_a_worker_died_is_logged_and_an_exception_in_it_is_not() -> None:
 @pytest.mark.parametrize("reason", [Reason.WORKER_DIED, Reason.INTERNAL_FAULT])
 def test_workers_can_say_what_they_like_and_nothing_of_it_is_told_above_debug(words: str, reason: Reason) -> None:
     with logged(LogLevel.INFO) as log:
-        for_callers(Failure(reason, MARKER, words))
+        public_failure(Failure(reason, MARKER, words))
     (line,) = log.lines()
     assert MARKER not in json.dumps(line)
     assert line["reason"] == reason
@@ -149,8 +149,8 @@ def test_workers_can_say_what_they_like_and_nothing_of_it_is_told_above_debug(wo
 def test_what_workers_say_at_debug_is_one_short_line_without_control(form: LogFormat) -> None:
     lying = f"KeyError: x\n2026-01-01T00:00:00.000Z error   forged\r\x1b[2J\x85\u2028\x9b2J\u202e{MARKER}"
     with logged(LogLevel.DEBUG, form) as log:
-        for_callers(Failure(Reason.WORKER_DIED, "it died", lying))
-        for_callers(Failure(Reason.WORKER_DIED, "it died", "\n" * 60_000 + " " * 60_000 + "x" * 60_000 + MARKER))
+        public_failure(Failure(Reason.WORKER_DIED, "it died", lying))
+        public_failure(Failure(Reason.WORKER_DIED, "it died", "\n" * 60_000 + " " * 60_000 + "x" * 60_000 + MARKER))
     assert len(log.text.splitlines()) == 4
     assert all(line.isprintable() for line in log.text.splitlines())
     assert log.text.count(MARKER) == 2

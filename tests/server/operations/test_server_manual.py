@@ -5,9 +5,9 @@ from pathlib import Path
 
 from prometheus_client.parser import text_string_to_metric_families
 
-from robosc_server.operations.example import settings_table
 from robosc_server.operations.metrics import Metrics
-from robosc_server.operations.settings import Settings, default_text, flag_of, variable_of, words_of
+from robosc_server.operations.settings import Settings, default_text, description_of, flag_of, variable_of
+from robosc_server.operations.settings_reference import settings_table
 
 PAGE = (Path(__file__).parents[3] / "docs" / "server.md").read_text("utf-8")
 
@@ -17,7 +17,9 @@ def test_every_setting_stands_in_the_manual_as_it_is_defined() -> None:
     table, _, _ = rest.partition("\n<!-- end of settings -->")
     assert table == settings_table()
     for name in Settings.model_fields:
-        row = f"| `{flag_of(name)}` | `{name}` | `{variable_of(name)}` | {words_of(name)} | {default_text(name)} |"
+        row = (
+            f"| `{flag_of(name)}` | `{name}` | `{variable_of(name)}` | {description_of(name)} | {default_text(name)} |"
+        )
         assert table.count(row) == 1
 
 
@@ -36,4 +38,4 @@ def test_every_metric_stands_in_the_manual() -> None:
 
 def test_no_row_of_a_table_is_broken() -> None:
     for name in Settings.model_fields:
-        assert "|" not in words_of(name) + default_text(name)
+        assert "|" not in description_of(name) + default_text(name)

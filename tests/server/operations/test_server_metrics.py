@@ -9,8 +9,8 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from robosc_api.security import SecurityError
+from robosc_server.operations.instrumented_workers import InstrumentedWorkers
 from robosc_server.operations.metrics import Metrics, MetricsEndpoint, metric_names
-from robosc_server.operations.observed import ObservedWorkers
 from robosc_server.tasks.task import Failure, Outcome, Reason, Result, Task, TaskKind, TaskLimits
 from support.waiting import PATIENCE_S, limited
 
@@ -150,7 +150,7 @@ def test_tasks_are_counted_by_how_they_ended() -> None:
     class Scripted:
         capacity = 1
 
-        async def run(self, task: Task, limits: TaskLimits, on_report: object, on_spent: object = None) -> Outcome:
+        async def run(self, task: Task, limits: TaskLimits, on_report: object, on_cpu_time: object = None) -> Outcome:
             assert observed.running == 1
             match task.request:
                 case b"result":
@@ -162,7 +162,7 @@ def test_tasks_are_counted_by_how_they_ended() -> None:
                     raise AssertionError
 
     metrics = Metrics("1")
-    observed = ObservedWorkers(Scripted(), metrics)
+    observed = InstrumentedWorkers(Scripted(), metrics)
 
     async def drop(report: object) -> None:
         pass

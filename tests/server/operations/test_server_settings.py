@@ -11,12 +11,12 @@ from robosc_server.operations.settings import (
     Settings,
     SettingsError,
     default_text,
+    description_of,
     flag_of,
     load_settings,
     read_file,
     shown,
     variable_of,
-    words_of,
 )
 from robosc_server.tasks.task import TaskLimits
 
@@ -164,7 +164,7 @@ def test_every_setting_is_in_the_help(capsys: pytest.CaptureFixture[str]) -> Non
     for name in Settings.model_fields:
         assert f" {flag_of(name)}" in text
         # Lines are folded at hyphens, too.
-        wanted = f"{words_of(name)} (default: {default_text(name)})"
+        wanted = f"{description_of(name)} (default: {default_text(name)})"
         assert wanted.replace(" ", "").replace("-", "") in text.replace(" ", "").replace("-", "")
         assert variable_of(name) == ENVIRONMENT_PREFIX + name.upper()
 

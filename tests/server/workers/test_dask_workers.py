@@ -14,11 +14,11 @@ from robosc import __version__
 from robosc_server.tasks.task import Failure, Outcome, Reason, Result, TaskLimits
 from robosc_server.workers import WorkersError, dask_task
 from robosc_server.workers.dask_cluster import DaskWorkers
-from robosc_server.workers.dask_spending import Spending
+from robosc_server.workers.dask_cpu_time import CpuTimeAccount
 from robosc_server.workers.dask_task import answer, outcome_of
+from robosc_server.workers.factory import open_workers
 from robosc_server.workers.frames import FrameError, too_large
 from robosc_server.workers.local import LocalWorkers
-from robosc_server.workers.opening import open_workers
 from support.fake_tasks import TASK_FUNCTION
 
 LIMITS = TaskLimits(seconds=60, cpu_seconds=20, memory_bytes=512 * 2**20, result_bytes=10**6)
@@ -42,7 +42,7 @@ def test_a_package_that_cannot_be_loaded_is_told_in_one_sentence(
 
 
 def test_nobody_loads_dask_who_does_not_ask_for_it() -> None:
-    program = "import sys, robosc_server.workers.opening; print({'distributed', 'dask', 'grpc'} & sys.modules.keys())"
+    program = "import sys, robosc_server.workers.factory; print({'distributed', 'dask', 'grpc'} & sys.modules.keys())"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     told = subprocess.run([sys.executable, "-c", program], env=environment, check=True, capture_output=True, text=True)
     assert told.stdout.strip() == "set()"
@@ -69,7 +69,7 @@ def test_what_lost_workers_took_counts_by_the_clock() -> None:
 
     spent: list[float] = []
     now_s = 10.0
-    spending = Spending(spent.append, lambda: now_s)
+    spending = CpuTimeAccount(spent.append, lambda: now_s)
     spending.hear({"is": "reports", "task": "t", "reports": []})
     spending.hear(begun("a"))
     # Another one begins: the first one was lost, and is not believed any more.

@@ -16,7 +16,7 @@ import pytest
 from robosc_server.tasks.task import Failure, Reason, Report, Result, TaskKind
 from robosc_server.workers import WorkerLostError, WorkersError
 from robosc_server.workers.local import LocalWorkers
-from robosc_server.workers.supply import Supply
+from robosc_server.workers.pool import WorkerPool
 from support.background import BackgroundLoop, has_ended, is_stopped, parent_of
 from support.descriptors import open_descriptors
 from support.fake_tasks import TASK_FUNCTION, said
@@ -160,7 +160,7 @@ class TestDeaths:
         assert [said(running.run(f"echo {number}")) for number in range(8)] == [str(number) for number in range(8)]
         assert lost == [3, 3, 3]
 
-    def test_a_task_whose_template_dies_is_begun_again_once(
+    def test_a_task_whose_fork_server_dies_is_begun_again_once(
         self, running: Running, caplog: pytest.LogCaptureFixture
     ) -> None:
         restarts = running.local.restarts
@@ -186,7 +186,7 @@ class TestDeaths:
             future.result(60)
         assert said(running.run("echo again")) == "again"
 
-    def test_a_template_that_cannot_load_is_told_in_one_sentence(self) -> None:
+    def test_a_fork_server_that_cannot_load_is_told_in_one_sentence(self) -> None:
         told = r"^cannot load no\.such:thing: ModuleNotFoundError: No module named"
         workers = LocalWorkers(1, "no.such:thing")
         with BackgroundLoop() as loop, pytest.raises(WorkersError, match=told):
@@ -197,7 +197,7 @@ class TestDeaths:
         clock = HeldLoop()
 
         def becomes(capacity: int) -> bool:
-            # A template that fails is started again after pauses.
+            # A fork server that fails is started again after pauses.
             clock.advance(0.2)
             return workers.capacity == capacity
 
@@ -207,12 +207,12 @@ class TestDeaths:
             running = Running(loop, workers)
             try:
                 assert workers.capacity == 1
-                workers._supply._task_function = "no.such:thing"
+                workers._pool._task_function = "no.such:thing"
                 os.kill(parent_of(next(iter(workers.pids))), signal.SIGKILL)
                 assert eventually(lambda: becomes(0))
                 with pytest.raises(WorkersError, match="cannot load"):
                     running.run("echo")
-                workers._supply._task_function = TASK_FUNCTION
+                workers._pool._task_function = TASK_FUNCTION
                 assert eventually(lambda: becomes(1))
                 assert said(running.run("echo again")) == "again"
             finally:
@@ -224,9 +224,9 @@ class TestDeaths:
             loop.run(workers.__aenter__())
             running = Running(loop, workers)
             future, pid = running.begun("stuck")
-            template = parent_of(pid)
+            fork_server = parent_of(pid)
             loop.run(workers.__aexit__())
-            assert eventually(lambda: has_ended(pid) and has_ended(template))
+            assert eventually(lambda: has_ended(pid) and has_ended(fork_server))
             with pytest.raises(WorkersError, match="have ended"):
                 future.result(60)
             with pytest.raises(WorkersError, match="have ended"):
@@ -253,9 +253,9 @@ class TestNothingIsLeft:
         with subprocess.Popen([sys.executable, program], stdout=subprocess.PIPE, text=True, env=environment) as server:
             assert server.stdout is not None
             pids = [int(server.stdout.readline()) for _ in range(2)]
-            template = parent_of(pids[0])
-            children = Path(f"/proc/{template}/task/{template}/children")
-            pids += [template, *map(int, children.read_text().split())]
+            fork_server = parent_of(pids[0])
+            children = Path(f"/proc/{fork_server}/task/{fork_server}/children")
+            pids += [fork_server, *map(int, children.read_text().split())]
             server.kill()
         assert len(set(pids)) >= 3
         assert eventually(lambda: all(map(has_ended, pids)))
@@ -263,7 +263,7 @@ class TestNothingIsLeft:
     def test_nothing_is_left_after_many_tasks(self, running: Running) -> None:
         def is_at_rest() -> bool:
             # Also of the last one, whose descriptors are closed when it is gone.
-            return len(running.local.pids) == 2 and not running.local._supply._burials
+            return len(running.local.pids) == 2 and not running.local._pool._terminations
 
         running.run("echo")
         assert eventually(is_at_rest)
@@ -275,13 +275,13 @@ class TestNothingIsLeft:
 
     def test_workers_end_also_where_a_burial_ends_that_very_moment(self) -> None:
         async def run() -> None:
-            supply = Supply(TASK_FUNCTION, 1, must_be_confined=False)
-            burial = supply._begin(asyncio.sleep(0))
-            while not burial.done():
+            supply = WorkerPool(TASK_FUNCTION, 1, must_be_confined=False)
+            termination = supply._begin(asyncio.sleep(0))
+            while not termination.done():
                 await asyncio.sleep(0)
             # It is done, and what follows from that is at its turn only when this here waits.
-            assert supply._burials == {burial}
+            assert supply._terminations == {termination}
             await supply.__aexit__()
-            assert not supply._burials
+            assert not supply._terminations
 
         asyncio.run(run())

@@ -30,7 +30,7 @@ def test_processes_find_everything_loaded() -> None:
     program = (
         "import sys\n"
         "from robosc_server.tasks.task import TaskKind, TaskLimits\n"
-        "from robosc_server.workers.template import _load\n"
+        "from robosc_server.workers.fork_server import _load\n"
         "from support.hostile_models import buttons\n"
         "from support.requests import small_request\n"
         "function = _load('robosc_server.tasks.run:run_task')\n"

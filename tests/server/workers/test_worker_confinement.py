@@ -117,9 +117,9 @@ class TestHostileCode:
 
     @pytest.mark.parametrize("what", ["signal", "trace", "memory", "limit", "interrupt"])
     def test_it_does_nothing_to_others(self, fake: Any, sibling: int, what: str) -> None:
-        template = parent_of(sibling)
+        fork_server = parent_of(sibling)
         # The server is this process: it must not be an answer of the kernel's by chance that it lives on.
-        for pid in (sibling, template, parent_of(template)):
+        for pid in (sibling, fork_server, parent_of(fork_server)):
             assert tried(fake, f"{what} {pid}") == "EPERM"
             assert is_running(pid)
 
@@ -140,20 +140,20 @@ class TestReportsAreBounded:
         reader = AnswerReader(TaskLimits(), lambda: now_s)
         header = frames.HEADER.pack(Tag.REPORT.value, 2)
         for _ in range(frames.REPORTS_BURST):
-            reader.announced(header)
+            reader.read_header(header)
         with pytest.raises(FrameError, match="1001 reports"):
-            reader.announced(header)
+            reader.read_header(header)
         now_s += 2.0
         for _ in range(2 * frames.REPORTS_PER_SECOND - 1):
-            reader.announced(header)
+            reader.read_header(header)
         with pytest.raises(FrameError, match="1101 reports"):
-            reader.announced(header)
+            reader.read_header(header)
 
     def test_by_their_size(self) -> None:
         longest = frames.report_frame(Report("\U0001f916" * 5000, "\U0001f916" * 5000))
-        AnswerReader(TaskLimits()).announced(longest[: frames.HEADER.size])
+        AnswerReader(TaskLimits()).read_header(longest[: frames.HEADER.size])
         with pytest.raises(FrameError, match="a report of 131073 bytes"):
-            AnswerReader(TaskLimits()).announced(frames.HEADER.pack(Tag.REPORT.value, 2**17 + 1))
+            AnswerReader(TaskLimits()).read_header(frames.HEADER.pack(Tag.REPORT.value, 2**17 + 1))
 
 
 def requests() -> list[tuple[TaskKind, Any]]:

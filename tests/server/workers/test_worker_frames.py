@@ -29,7 +29,7 @@ def read(content: bytes, limits: TaskLimits = LIMITS) -> tuple[list[Report], Out
     reports: list[Report] = []
     place = 0
     while len(content) >= place + HEADER.size:
-        announced = reader.announced(content[place : place + HEADER.size])
+        announced = reader.read_header(content[place : place + HEADER.size])
         if isinstance(announced, Failure):
             return reports, announced
         tag, length = announced

@@ -1,6 +1,6 @@
-"""Desk that gives an accepted task its result: one that is kept, or the one that a worker makes."""
+"""TaskDispatcher that gives an accepted task its result: one that is kept, or the one that a worker makes."""
 
-from robosc_server.failures import RefusedError, for_callers
+from robosc_server.failures import RefusedError, public_failure
 from robosc_server.jobs import Results, Scheduler
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.quotas import Quotas
@@ -8,8 +8,8 @@ from robosc_server.tasks.task import Failure, Result, Task, TaskLimits
 from robosc_server.workers import OnReport
 
 
-class Desk:
-    """Desk for the tasks of calls, which end with their call.
+class TaskDispatcher:
+    """TaskDispatcher for the tasks of calls, which end with their call.
 
     Args:
         results: Kept results.
@@ -28,9 +28,9 @@ class Desk:
         self._limits = limits
         self._metrics = metrics
 
-    def kept(self, key: str) -> Result | None:
+    def cached(self, key: str) -> Result | None:
         """The result of an equal task, if it is in memory."""
-        result = self._results.at_hand(key)
+        result = self._results.in_memory(key)
         if result is not None:
             self._metrics.cache_hit("memory")
         return result
@@ -52,7 +52,7 @@ class Desk:
 
         def made_meanwhile() -> Result | None:
             nonlocal found
-            found = self._results.at_hand(task.key)
+            found = self._results.in_memory(task.key)
             return found
 
         outcome = await self._scheduler.run(task, caller, self._limits, on_report, made_meanwhile)
@@ -60,6 +60,6 @@ class Desk:
             self._metrics.cache_hit("memory")
             return found
         if isinstance(outcome, Failure):
-            told = for_callers(outcome)
+            told = public_failure(outcome)
             raise RefusedError(told.reason, told.message)
         return self._results.keep(task.key, task.kind, outcome, caller)

@@ -15,28 +15,28 @@ class Watch:
         is_gone: True if the job is there no more.
     """
 
-    __slots__ = ("_news", "_record", "is_gone", "revision")
+    __slots__ = ("_has_news", "_record", "is_gone", "revision")
 
     def __init__(self) -> None:
         self.revision = 0
         self.is_gone = False
         self._record: JobRecord | None = None
-        self._news = asyncio.Event()
+        self._has_news = asyncio.Event()
 
-    def tell(self, record: JobRecord) -> None:
+    def notify(self, record: JobRecord) -> None:
         """Give it a job as it is now."""
         if self._record is None or record.revision > self._record.revision:
             self._record = record
-            self._news.set()
+            self._has_news.set()
 
     def wake(self) -> None:
         """Have it look up, though nothing has changed."""
-        self._news.set()
+        self._has_news.set()
 
-    async def news(self) -> JobRecord | None:
+    async def next_record(self) -> JobRecord | None:
         """Return the newest record received since the last call, once there is one; None: it was woken."""
-        await self._news.wait()
-        self._news.clear()
+        await self._has_news.wait()
+        self._has_news.clear()
         record, self._record = self._record, None
         return record
 
@@ -60,12 +60,12 @@ class Watchers:
             if not watches:
                 del self._by_job[job_id]
 
-    def tell(self, record: JobRecord) -> None:
+    def notify(self, record: JobRecord) -> None:
         """Tell all watchers of a job how it is now."""
         for watch in self._by_job.get(record.id, ()):
-            watch.tell(record)
+            watch.notify(record)
 
-    def tell_gone(self, job_id: str) -> None:
+    def notify_gone(self, job_id: str) -> None:
         """Tell all watchers of a job that it is there no more."""
         for watch in self._by_job.get(job_id, ()):
             watch.is_gone = True

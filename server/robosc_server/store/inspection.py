@@ -12,7 +12,7 @@ from robosc_server.store.schema import version_of
 _BUSY_S = 1.0
 
 
-def look_at_sqlite(file: Path) -> None:
+def inspect_sqlite(file: Path) -> None:
     """Look at a file that is there; a server may have it open.
 
     Raises:
@@ -26,7 +26,7 @@ def look_at_sqlite(file: Path) -> None:
     _look(create_engine(url, poolclass=NullPool, connect_args={"timeout": _BUSY_S}))
 
 
-def look_at_postgresql(url: URL, connect_s: float) -> str:
+def inspect_postgresql(url: URL, connect_s: float) -> str:
     """Look at a database by asking its server, and return its version.
 
     Args:

@@ -16,7 +16,7 @@ from support.waiting import PATIENCE_S
 _HANGING = """
 import asyncio, sys, time
 import robosc_server.application as application
-import robosc_server.operations.ending as ending
+import robosc_server.operations.shutdown as shutdown
 from robosc_server.main import main
 
 async def waiting(*_):
@@ -25,8 +25,8 @@ async def waiting(*_):
 async def working(*_):
     time.sleep(3600)
 
-begin = ending.Ending.__init__
-ending.Ending.__init__ = lambda self, drain_s: begin(self, drain_s, LIMIT)
+begin = shutdown.ShutdownSignals.__init__
+shutdown.ShutdownSignals.__init__ = lambda self, drain_s: begin(self, drain_s, LIMIT)
 application.drain = HOW
 main(["--port", "0", "--worker-processes", "1", "--state-dir", sys.argv[1], "--drain-seconds", "0"])
 """

@@ -18,11 +18,11 @@ _log = logging.getLogger(__name__)
 END_S = 20.0
 """Time for the end beyond that of calls under way, in seconds: mostly for a database that does not answer."""
 
-_TOLD_BEFORE_S = 0.5
+_LOGGED_BEFORE_S = 0.5
 _BY_SIGNAL = 128
 
 
-class Ending:
+class ShutdownSignals:
     """Handler of the signals to end; to be used in the main thread.
 
     Args:
@@ -32,7 +32,7 @@ class Ending:
 
     def __init__(self, drain_s: float, end_s: float = END_S) -> None:
         self._limit_s = drain_s + end_s
-        self._is_wanted = asyncio.Event()
+        self._is_requested = asyncio.Event()
         self._interrupts = 0
         # Without a standard error, nobody is told of what hangs; it ends all the same.
         self._stderr = sys.__stderr__ or os.open(os.devnull, os.O_WRONLY)
@@ -41,21 +41,21 @@ class Ending:
         """Heed signals from now on, on the event loop that runs."""
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
-            loop.add_signal_handler(number, self._told, number)
+            loop.add_signal_handler(number, self._on_signal, number)
 
-    async def wanted(self) -> None:
+    async def requested(self) -> None:
         """Return when the server is to end: by itself from then on, but not for longer than its limit."""
-        await self._is_wanted.wait()
+        await self._is_requested.wait()
 
-    def over(self) -> None:
+    def finished(self) -> None:
         """It has ended."""
         faulthandler.cancel_dump_traceback_later()
 
-    def _told(self, number: int) -> None:
-        if not self._is_wanted.is_set():
-            self._is_wanted.set()
+    def _on_signal(self, number: int) -> None:
+        if not self._is_requested.is_set():
+            self._is_requested.set()
             loop = asyncio.get_running_loop()
-            loop.call_later(max(0.0, self._limit_s - _TOLD_BEFORE_S), _tell_tasks)
+            loop.call_later(max(0.0, self._limit_s - _LOGGED_BEFORE_S), _log_pending_tasks)
             # A thread of its own that needs nothing of the interpreter: whatever hangs, it ends the process.
             faulthandler.dump_traceback_later(self._limit_s, exit=True, file=self._stderr)
         self._interrupts += number == signal.SIGINT
@@ -65,7 +65,7 @@ class Ending:
             os._exit(_BY_SIGNAL + number)
 
 
-def _tell_tasks() -> None:
+def _log_pending_tasks() -> None:
     """Log where everything waits that has not ended, by places in the code alone."""
     for task in asyncio.all_tasks():
         _log.error("the server does not end: %s waits at %s", task.get_name(), " < ".join(_places(task.get_coro())))

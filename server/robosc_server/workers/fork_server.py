@@ -33,7 +33,7 @@ MUST_BE_CONFINED = "required"
 _FORK_PAUSE_MS = 200
 
 
-class _Template:
+class _ForkServer:
     """Forks workers when it is told to, and reaps them."""
 
     def __init__(self, line: socket.socket, function: TaskFunction, sandbox: Sandbox) -> None:
@@ -69,13 +69,13 @@ class _Template:
             ours, theirs = socket.socketpair()
             stack.enter_context(ours)
             stack.enter_context(theirs)
-            words, last_words = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
+            words, crash_output = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
             stack.callback(os.close, words)
-            stack.callback(os.close, last_words)
-            template = os.getpid()
+            stack.callback(os.close, crash_output)
+            fork_server = os.getpid()
             pid = os.fork()
             if pid == 0:
-                self._become_worker(template, theirs, last_words)
+                self._become_worker(fork_server, theirs, crash_output)
             try:
                 descriptor = os.pidfd_open(pid)
             except OSError:
@@ -86,14 +86,14 @@ class _Template:
             self._poll.register(descriptor, select.POLLIN)
             self._tell({"is": "worker", "pid": pid}, [ours.fileno(), descriptor, words])
 
-    def _become_worker(self, template: int, connection: socket.socket, last_words: int) -> None:
+    def _become_worker(self, fork_server: int, connection: socket.socket, crash_output: int) -> None:
         """Do one task in the child, and end whatever happens."""
         try:
-            confinement.die_with(template)
-            child.work(connection, last_words, self._function, self._sandbox, self._used_bytes)
+            confinement.exit_with_parent(fork_server)
+            child.run_worker(connection, crash_output, self._function, self._sandbox, self._used_bytes)
         except BaseException:
             with contextlib.suppress(BaseException):
-                os.write(last_words, traceback.format_exc().encode())
+                os.write(crash_output, traceback.format_exc().encode())
             os._exit(1)
         finally:
             os._exit(0)
@@ -142,10 +142,10 @@ def main() -> None:
     """Import, freeze, serve."""
     line = socket.socket(fileno=int(sys.argv[1]))
     line.set_inheritable(False)
-    confinement.die_with(int(sys.argv[3]))
+    confinement.exit_with_parent(int(sys.argv[3]))
     # What it forks has these from it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    confinement.no_core()
+    confinement.disable_core_dumps()
     kernel.keep_memory_private()
     sys.dont_write_bytecode = True
     try:
@@ -165,9 +165,9 @@ def main() -> None:
     gc.disable()
     sys.stdout.flush()
     sys.stderr.flush()
-    child.silence()
+    child.redirect_to_devnull()
     with contextlib.suppress(ConnectionError):
-        _Template(line, function, sandbox).run()
+        _ForkServer(line, function, sandbox).run()
 
 
 def _give_up(line: socket.socket, message: str) -> NoReturn:

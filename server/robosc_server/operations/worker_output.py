@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from robosc_server.workers.endings import FACTS
+from robosc_server.workers.exit_reasons import EXIT_DESCRIPTION
 
 _PLACES = 12
 _LINES = 500
@@ -23,7 +23,7 @@ _PLACE = re.compile(r' {2}File "(?:[^"]*/)?((?:robosc|robosc_api|robosc_server)/
 _KIND = re.compile(r"([A-Za-z_][A-Za-z0-9_.]{0,100})(?::.*)?")
 
 
-def safe_words(words: str) -> dict[str, object]:
+def loggable_fields(words: str) -> dict[str, object]:
     """Return the parts of a worker's words that hold nothing of a model, as fields of a line of the log.
 
     Args:
@@ -31,7 +31,7 @@ def safe_words(words: str) -> dict[str, object]:
     """
     lines = [line[:_LINE_CHARACTERS] for line in words.split("\n")]
     told: dict[str, object] = {}
-    if FACTS.fullmatch(lines[0]):
+    if EXIT_DESCRIPTION.fullmatch(lines[0]):
         told["ending"] = lines[0]
     lines = lines[-_LINES:]
     kinds = [match[1] for line in lines if (match := _KIND.fullmatch(line)) and _is_exception(match[1])]

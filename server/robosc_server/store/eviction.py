@@ -4,7 +4,7 @@ import heapq
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 
-def given_back(
+def choose_evicted(
     held: Mapping[str, int], oldest: Callable[[str], Iterable[tuple[str, int]]], excess: int, limit: int
 ) -> tuple[list[str], dict[str, int]]:
     """Choose the things that go, one by one: each time the oldest of the owner who holds most at that moment.

@@ -5,7 +5,7 @@ import signal
 import pytest
 
 from robosc_server.tasks.task import Reason, TaskLimits
-from robosc_server.workers.endings import Ending, KillsBefore, failure_of, kills_for_memory
+from robosc_server.workers.exit_reasons import ProcessExit, RecentOomKills, failure_of, oom_kills
 
 MIB = 2**20
 LIMITS = TaskLimits(cpu_seconds=10, memory_bytes=1000 * MIB)
@@ -46,19 +46,19 @@ LIMITS = TaskLimits(cpu_seconds=10, memory_bytes=1000 * MIB)
 def test_each_ending_is_told_by_its_cause(
     exit_code: int, cpu_s: float, peak_mib: int, was_memory_short: bool, reason: Reason, message: str
 ) -> None:
-    failure = failure_of(Ending(exit_code, cpu_s, peak_mib * MIB), LIMITS, "Fatal error\n", was_memory_short)
+    failure = failure_of(ProcessExit(exit_code, cpu_s, peak_mib * MIB), LIMITS, "Fatal error\n", was_memory_short)
     assert (failure.reason, failure.message) == (reason, message)
     assert failure.details.endswith(f"at most {peak_mib * MIB} bytes resident\nFatal error")
 
 
 def test_kills_for_want_of_memory_are_counted_by_the_kernel() -> None:
-    assert kills_for_memory() >= 0
+    assert oom_kills() >= 0
 
 
 def test_kills_before_now_are_asked_for_once_a_second() -> None:
     now_s = [100.0]
     counts = iter([3, 5])
-    before = KillsBefore(lambda: next(counts), lambda: now_s[0])
+    before = RecentOomKills(lambda: next(counts), lambda: now_s[0])
     told = []
     for at_s in (100.0, 100.5, 100.999, 101.0, 101.5):
         now_s[0] = at_s

@@ -1,4 +1,4 @@
-"""Workers that stand ready: a template process that forks them, started again where it ends, and their burial."""
+"""Pool of idle worker processes: a fork server process creates them, and is restarted whenever it exits."""
 
 import asyncio
 import contextlib
@@ -14,30 +14,30 @@ from typing import Any, Self
 from robosc_server.clock import monotonic
 from robosc_server.tasks.task import Task
 from robosc_server.workers import WorkersError
-from robosc_server.workers.endings import Ending
+from robosc_server.workers.exit_reasons import ProcessExit
+from robosc_server.workers.fork_server import MUST_BE_CONFINED, PACKET_BYTES
 from robosc_server.workers.process import WorkerProcess
-from robosc_server.workers.template import MUST_BE_CONFINED, PACKET_BYTES
 
 _LOG = logging.getLogger(__name__)
 
 START_S = 60.0
-"""Time that a template may take until its first worker stands ready, in seconds, also on an overloaded machine."""
+"""Time that a fork server may take until its first worker stands ready, in seconds, also on an overloaded machine."""
 
 _PAUSES_S = (0.0, 0.0, 0.2, 1.0, 5.0)
-_HOPELESS = 3
+_FAILING = 3
 _DESCRIPTORS = 3
-_DEAD_SPARE_PAUSE_S = 0.2
+_REPLACEMENT_PAUSE_S = 0.2
 _KEY_DIGITS = 16
-_HANDED_ON = frozenset({"PATH", "HOME", "LANG", "LANGUAGE", "TZ", "TMPDIR", "LD_LIBRARY_PATH"})
-_HANDED_ON_PREFIXES = ("LC_", "PYTHON")
+_INHERITED = frozenset({"PATH", "HOME", "LANG", "LANGUAGE", "TZ", "TMPDIR", "LD_LIBRARY_PATH"})
+_INHERITED_PREFIXES = ("LC_", "PYTHON")
 """Variables of the environment that workers have, too."""
 
 
-class Supply:
-    """Supply of workers that stand ready; an asynchronous context.
+class WorkerPool:
+    """WorkerPool of workers that stand ready; an asynchronous context.
 
     Attributes:
-        restarts: Number of templates that ended without being told to.
+        restarts: Number of fork servers that ended without being told to.
         fault: Reason why no process can be had now, in one sentence; empty where there are some.
         missing: Parts of the workers' confinement that this machine does not have, one sentence for each; None: that
             is not known yet.
@@ -54,24 +54,24 @@ class Supply:
         self._task_function = task_function
         self._spare = spare
         self._ready: deque[WorkerProcess] = deque()
-        self._known: dict[int, WorkerProcess] = {}  # by pid, of the template that lives
-        self._line: socket.socket | None = None
+        self._known: dict[int, WorkerProcess] = {}  # by pid, of the fork server that lives
+        self._channel: socket.socket | None = None
         self.fault = ""
-        self._failures = 0  # Templates that ended, one after the other, without a worker.
-        self._lost: list[Task] = []  # Tasks that were under way when the last template ended.
+        self._failures = 0  # Fork servers that ended, one after the other, without a worker.
+        self._lost: list[Task] = []  # Tasks that were under way when the last fork server ended.
         self._is_closed = False
         self._changed = asyncio.Event()
-        self._keeper: asyncio.Task[None] | None = None
-        self._burials: set[asyncio.Task[None]] = set()
+        self._restarter: asyncio.Task[None] | None = None
+        self._terminations: set[asyncio.Task[None]] = set()
 
     async def __aenter__(self) -> Self:
-        self._keeper = asyncio.create_task(self._keep())
+        self._restarter = asyncio.create_task(self._keep_fork_server())
         try:
             async with asyncio.timeout(START_S):
                 while not self._ready:
                     if self.fault:
                         raise WorkersError(self.fault)
-                    await self._change()
+                    await self._state_change()
         except TimeoutError:
             await self._close()
             raise WorkersError(f"no worker process stood ready within {START_S:.0f} s") from None
@@ -85,41 +85,41 @@ class Supply:
 
     async def _close(self) -> None:
         self._is_closed = True
-        if self._keeper is not None:
-            self._keeper.cancel()
-            await asyncio.gather(self._keeper, return_exceptions=True)
+        if self._restarter is not None:
+            self._restarter.cancel()
+            await asyncio.gather(self._restarter, return_exceptions=True)
         self._changed.set()
-        while self._burials:
+        while self._terminations:
             # Not `gather`: it returns at once where all of them are done, so that those that were done this moment
             # never get to leave the set, and the loop to nothing else.
-            await asyncio.wait(self._burials)
+            await asyncio.wait(self._terminations)
 
     @property
-    def is_hopeless(self) -> bool:
-        """True if one template after the other ended without a worker; it is tried again now and then."""
-        return self._failures >= _HOPELESS
+    def is_failing(self) -> bool:
+        """True if one fork server after the other ended without a worker; it is tried again now and then."""
+        return self._failures >= _FAILING
 
-    async def take(self) -> WorkerProcess:
-        """A worker for one task; `bury` it afterwards.
+    async def acquire(self) -> WorkerProcess:
+        """A worker for one task; `terminate` it afterwards.
 
         Raises:
             WorkersError: None can be had.
         """
         end = monotonic() + START_S
-        while (worker := self._living()) is None:
+        while (worker := self._next_live_worker()) is None:
             if self._is_closed:
                 raise WorkersError("the server's workers have ended")
-            if self.is_hopeless:
+            if self.is_failing:
                 raise WorkersError(self.fault)
             try:
                 async with asyncio.timeout(end - monotonic()):
-                    await self._change()
+                    await self._state_change()
             except TimeoutError:
                 raise WorkersError(self.fault or f"no worker process stood ready within {START_S:.0f} s") from None
-        self._ask_for(1)
+        self._request_forks(1)
         return worker
 
-    def _living(self) -> WorkerProcess | None:
+    def _next_live_worker(self) -> WorkerProcess | None:
         """The next worker that stands ready; one that has died is told of soon."""
         while self._ready:
             worker = self._ready.popleft()
@@ -131,54 +131,54 @@ class Supply:
     def _replace(self, worker: WorkerProcess) -> None:
         """Bury a worker that died without a task, and have another one; if that goes on, a few times a second."""
         _LOG.warning("a waiting worker process ended")
-        self.bury(worker)
-        asyncio.get_running_loop().call_later(_DEAD_SPARE_PAUSE_S, self._ask_for, 1)
+        self.terminate(worker)
+        asyncio.get_running_loop().call_later(_REPLACEMENT_PAUSE_S, self._request_forks, 1)
 
-    def bury(self, worker: WorkerProcess) -> asyncio.Task[None]:
+    def terminate(self, worker: WorkerProcess) -> asyncio.Task[None]:
         """End a worker now; what is returned ends when its process is gone."""
         worker.kill()
-        return self._begin(self._bury(worker))
+        return self._begin(self._await_exit(worker))
 
     @property
     def pids(self) -> frozenset[int]:
         """Numbers of all processes of workers, ready and at work."""
         return frozenset(self._known)
 
-    async def _bury(self, worker: WorkerProcess) -> None:
+    async def _await_exit(self, worker: WorkerProcess) -> None:
         await worker.gone()
-        # The template tells how it ended; after that, its number may be another's.
-        await asyncio.shield(worker.ending)
+        # The fork server tells how it ended; after that, its number may be another's.
+        await asyncio.shield(worker.exit)
         worker.close()
 
     def _begin(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         task = asyncio.create_task(work)
-        self._burials.add(task)
-        task.add_done_callback(self._burials.discard)
+        self._terminations.add(task)
+        task.add_done_callback(self._terminations.discard)
         return task
 
-    async def _change(self) -> None:
+    async def _state_change(self) -> None:
         self._changed.clear()
         await self._changed.wait()
 
-    def _ask_for(self, count: int) -> None:
-        """Tell the template to fork; where it is gone, the next one is told."""
-        if self._line is not None:
+    def _request_forks(self, count: int) -> None:
+        """Tell the fork server to fork; where it is gone, the next one is told."""
+        if self._channel is not None:
             with contextlib.suppress(OSError):
-                self._line.send(str(count).encode())
+                self._channel.send(str(count).encode())
 
-    async def _keep(self) -> None:
-        """Have a template, always."""
+    async def _keep_fork_server(self) -> None:
+        """Have a fork server, always."""
         while True:
-            status = await self._run_template()
+            status = await self._run_fork_server()
             self.restarts += 1
             self._failures += 1
             self.fault = self.fault or f"the process that starts workers ended with status {status}"
-            _LOG.error("%s; it is started again%s", self.fault, _suspects(self._lost))
+            _LOG.error("%s; it is started again%s", self.fault, _tasks_under_way(self._lost))
             self._changed.set()
             await asyncio.sleep(_PAUSES_S[min(self._failures, len(_PAUSES_S) - 1)])
 
-    async def _run_template(self) -> int | None:
-        """Start a template and take what it makes, until it ends; its status."""
+    async def _run_fork_server(self) -> int | None:
+        """Start a fork server and take what it makes, until it ends; its status."""
         loop = asyncio.get_running_loop()
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ours.setblocking(False)
@@ -186,7 +186,7 @@ class Supply:
         try:
             with theirs:
                 process = await asyncio.create_subprocess_exec(
-                    *(sys.executable, "-P", "-m", "robosc_server.workers.template"),
+                    *(sys.executable, "-P", "-m", "robosc_server.workers.fork_server"),
                     *(str(theirs.fileno()), self._task_function, str(os.getpid()), self._confinement),
                     stdin=asyncio.subprocess.DEVNULL,
                     stdout=asyncio.subprocess.DEVNULL,
@@ -195,9 +195,9 @@ class Supply:
                     # A terminal's signals reach the server alone.
                     start_new_session=True,
                 )
-            self._line = ours
-            loop.add_reader(ours, self._hear, ours)
-            self._ask_for(self._spare)
+            self._channel = ours
+            loop.add_reader(ours, self._receive, ours)
+            self._request_forks(self._spare)
             return await process.wait()
         except OSError as error:
             self.fault = f"cannot start the process that starts workers: {error.strerror}"
@@ -205,41 +205,41 @@ class Supply:
         finally:
             if process is not None and process.returncode is None:
                 process.kill()
-            self._line = None
-            self._hear_all(ours)
+            self._channel = None
+            self._receive_all(ours)
             loop.remove_reader(ours)
             ours.close()
-            # The kernel ends workers with their template; that they are gone is waited for.
+            # The kernel ends workers with their fork server; that they are gone is waited for.
             for worker in self._ready:
-                self.bury(worker)
+                self.terminate(worker)
             self._ready.clear()
             self._lost = [worker.task for worker in self._known.values() if worker.task is not None]
             for worker in self._known.values():
                 worker.kill()
-                worker.ending.set_result(None)
+                worker.exit.set_result(None)
             self._known.clear()
             if process is not None:
                 await process.wait()
 
-    def _hear_all(self, line: socket.socket) -> None:
-        """Take everything that a template reported before it ended."""
+    def _receive_all(self, channel: socket.socket) -> None:
+        """Take everything that a fork server reported before it ended."""
         with contextlib.suppress(OSError):
-            while self._hear(line):
+            while self._receive(channel):
                 pass
 
-    def _hear(self, line: socket.socket) -> bool:
-        """Take one packet of the template's; whether there was one."""
+    def _receive(self, channel: socket.socket) -> bool:
+        """Take one packet of the fork server's; whether there was one."""
         try:
-            packet, descriptors, _, _ = socket.recv_fds(line, PACKET_BYTES, _DESCRIPTORS, socket.MSG_CMSG_CLOEXEC)
+            packet, descriptors, _, _ = socket.recv_fds(channel, PACKET_BYTES, _DESCRIPTORS, socket.MSG_CMSG_CLOEXEC)
         except BlockingIOError:
             return False
         except OSError:
             packet, descriptors = b"", []
         if not packet:
-            asyncio.get_running_loop().remove_reader(line)  # It ends: its status tells that.
+            asyncio.get_running_loop().remove_reader(channel)  # It ends: its status tells that.
             return False
-        told = json.loads(packet)
-        match told["is"]:
+        packet_values = json.loads(packet)
+        match packet_values["is"]:
             case "worker" if len(descriptors) < _DESCRIPTORS:
                 # The system had none to spare. A worker whose line nobody holds ends by itself; another one is asked
                 # for when there may be room.
@@ -247,20 +247,23 @@ class Supply:
                     os.close(number)
                 self.fault = "this process may have no more files open"
                 _LOG.error("%s; no worker can be had", self.fault)
-                asyncio.get_running_loop().call_later(_DEAD_SPARE_PAUSE_S, self._ask_for, 1)
+                asyncio.get_running_loop().call_later(_REPLACEMENT_PAUSE_S, self._request_forks, 1)
             case "worker":
-                connection, descriptor, last_words = descriptors
-                worker = WorkerProcess(told["pid"], socket.socket(fileno=connection), descriptor, last_words)
+                connection, descriptor, crash_output = descriptors
+                worker = WorkerProcess(packet_values["pid"], socket.socket(fileno=connection), descriptor, crash_output)
                 self._known[worker.pid] = worker
                 self._ready.append(worker)
                 self.fault, self._failures = "", 0
             case "confined":
-                self._note_confinement(tuple(told["missing"]))
+                self._note_confinement(tuple(packet_values["missing"]))
             case "ended":
-                self._note_end(told["pid"], Ending(told["exit_code"], told["cpu_s"], told["peak_bytes"]))
+                self._note_exit(
+                    packet_values["pid"],
+                    ProcessExit(packet_values["exit_code"], packet_values["cpu_s"], packet_values["peak_bytes"]),
+                )
             case "fault":
-                if told["message"] != self.fault:
-                    self.fault = told["message"]
+                if packet_values["message"] != self.fault:
+                    self.fault = packet_values["message"]
                     _LOG.error("%s", self.fault)
         self._changed.set()
         return True
@@ -274,18 +277,18 @@ class Supply:
         if not missing:
             _LOG.info("workers are confined")
 
-    def _note_end(self, pid: int, ending: Ending) -> None:
+    def _note_exit(self, pid: int, end: ProcessExit) -> None:
         worker = self._known.pop(pid, None)
-        if worker is None:  # It never got here: see `_hear`.
+        if worker is None:  # It never got here: see `_receive`.
             return
-        worker.ending.set_result(ending)
+        worker.exit.set_result(end)
         if worker in self._ready:
             self._ready.remove(worker)
             self._replace(worker)
 
 
-def _suspects(tasks: list[Task]) -> str:
-    """The tasks that may have to do with the end of a template: by their keys, since names are of the model."""
+def _tasks_under_way(tasks: list[Task]) -> str:
+    """The tasks that may have to do with the end of a fork server: by their keys, since names are of the model."""
     if not tasks:
         return ""
     return "; tasks under way: " + ", ".join(f"{task.kind} {task.key[:_KEY_DIGITS]}" for task in tasks)
@@ -300,7 +303,7 @@ def _environment() -> dict[str, str]:
     environment = {
         name: value
         for name, value in os.environ.copy().items()
-        if name in _HANDED_ON or name.startswith(_HANDED_ON_PREFIXES)
+        if name in _INHERITED or name.startswith(_INHERITED_PREFIXES)
     }
     environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
     return environment

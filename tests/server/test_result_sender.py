@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from robosc_server.failures import RefusedError
-from robosc_server.outgoing import SMALL_BYTES, Outgoing
+from robosc_server.result_sender import SMALL_BYTES, ResultSender
 from robosc_server.tasks.task import Reason
 
 SIZE = SMALL_BYTES + 1
@@ -52,42 +52,42 @@ async def chunks(count: int) -> AsyncIterator[bytes]:
 def test_who_reads_gets_any_number_of_messages() -> None:
     async def test() -> None:
         # Two may be unread; a hundred are sent to each of two calls.
-        outgoing = Outgoing(5 * SIZE, 100 * SIZE)
+        sender = ResultSender(5 * SIZE, 100 * SIZE)
         calls = [Call(), Call()]
-        sending = [asyncio.create_task(outgoing.send_each(call, chunks(100))) for call in calls]
+        sending = [asyncio.create_task(sender.send_each(call, chunks(100))) for call in calls]
         for _ in range(100):
             for call in calls:
                 call.read()
             await asyncio.sleep(0)
             await asyncio.sleep(0)
-            assert outgoing.unread_bytes <= 4 * SIZE
+            assert sender.unread_bytes <= 4 * SIZE
         await asyncio.wait_for(asyncio.gather(*sending), 60)
         assert [call.written for call in calls] == [100, 100]
         # The last one of each may still be on its way.
-        assert outgoing.unread_bytes == 2 * SIZE
+        assert sender.unread_bytes == 2 * SIZE
         for call in calls:
             call.end()
-        assert outgoing.unread_bytes == 0
+        assert sender.unread_bytes == 0
 
     asyncio.run(test())
 
 
 def test_who_reads_nothing_is_sent_nothing_more() -> None:
     async def test() -> None:
-        outgoing = Outgoing(2 * SIZE, 100 * SIZE)
+        sender = ResultSender(2 * SIZE, 100 * SIZE)
         deaf = [Call(), Call()]
         for call in deaf:
-            outgoing.hold(call, (bytes(SIZE),))
+            sender.hold(call, (bytes(SIZE),))
         with pytest.raises(RefusedError) as refused:
-            outgoing.hold(Call(), (bytes(SIZE),))
+            sender.hold(Call(), (bytes(SIZE),))
         assert refused.value.reason is Reason.SERVER_BUSY
         # Others have room, and small results are not counted.
-        outgoing.hold(Call("192.0.2.2"), (bytes(SIZE),))
-        outgoing.hold(Call(), (bytes(SMALL_BYTES),))
+        sender.hold(Call("192.0.2.2"), (bytes(SIZE),))
+        sender.hold(Call(), (bytes(SMALL_BYTES),))
         deaf[0].end()
-        is_read = outgoing.hold(Call(), (bytes(SIZE),))
+        is_read = sender.hold(Call(), (bytes(SIZE),))
         is_read()
         is_read()
-        assert outgoing.unread_bytes == 2 * SIZE
+        assert sender.unread_bytes == 2 * SIZE
 
     asyncio.run(test())

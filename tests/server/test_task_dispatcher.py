@@ -1,4 +1,4 @@
-"""Tests of the desk from which tasks of calls get their results: what is counted, and what is not done twice."""
+"""Tests of the dispatcher from which tasks of calls get their results: what is counted, and what is not done twice."""
 
 import asyncio
 from pathlib import Path
@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from robosc_api.security import Entry, Quota, Scope
-from robosc_server.desk import Desk
 from robosc_server.failures import RefusedError
 from robosc_server.jobs import QueueLimits
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.quotas import Quotas
+from robosc_server.task_dispatcher import TaskDispatcher
 from robosc_server.tasks.task import Reason, Report, Result, TaskLimits
 from support.job_parts import Choices, Parts, parts
 from support.job_workers import task_of
@@ -25,10 +25,10 @@ class OneToken:
         return Entry(name, frozenset({Scope.SYNTHESIZE}), "", Quota(per_minute=3))
 
 
-def desk_of(made: Parts) -> Desk:
+def dispatcher_of(made: Parts) -> TaskDispatcher:
     tokens: Any = OneToken()
     quotas = Quotas(tokens, lambda: 0.0)
-    return Desk(made.results, made.scheduler, quotas, TaskLimits(), Metrics("of a test"))
+    return TaskDispatcher(made.results, made.scheduler, quotas, TaskLimits(), Metrics("of a test"))
 
 
 async def drop(report: Report) -> None:
@@ -38,8 +38,8 @@ async def drop(report: Report) -> None:
 def test_equal_calls_that_wait_are_answered_by_the_first(tmp_path: Path) -> None:
     async def test() -> None:
         async with parts(tmp_path, Choices(capacity=1)) as made:
-            desk, task = desk_of(made), task_of(f"until {tmp_path / 'go'}\nthe same")
-            calls = [asyncio.create_task(desk.result(task, "me", drop)) for _ in range(3)]
+            dispatcher, task = dispatcher_of(made), task_of(f"until {tmp_path / 'go'}\nthe same")
+            calls = [asyncio.create_task(dispatcher.result(task, "me", drop)) for _ in range(3)]
             await until(lambda: made.scheduler.waiting == 2)
             (tmp_path / "go").touch()
             results = await asyncio.gather(*calls)
@@ -55,10 +55,10 @@ def test_what_is_refused_since_there_is_too_much_to_do_is_not_counted(tmp_path: 
     async def test() -> None:
         choices = Choices(capacity=1, queue=QueueLimits(waiting=1, waiting_per_caller=1))
         async with parts(tmp_path, choices) as made:
-            desk = desk_of(made)
+            dispatcher = dispatcher_of(made)
 
             def call(number: int) -> asyncio.Task[Result]:
-                return asyncio.create_task(desk.result(task_of(f"until {tmp_path / 'go'}\n{number}"), "me", drop))
+                return asyncio.create_task(dispatcher.result(task_of(f"until {tmp_path / 'go'}\n{number}"), "me", drop))
 
             under_way = [call(0), call(1)]
             await until(lambda: made.scheduler.waiting == 1)

@@ -38,8 +38,8 @@ from robosc_server.operations.metrics import check_metrics_address
 from robosc_server.operations.settings import Confinement, Settings, shown
 from robosc_server.signing import SigningError, read_signing_key
 from robosc_server.store.errors import StoreError
-from robosc_server.store.looking import look_at_postgresql, look_at_sqlite
-from robosc_server.store.opening import DATABASE_FILE, is_in_use
+from robosc_server.store.factory import DATABASE_FILE, is_in_use
+from robosc_server.store.inspection import inspect_postgresql, inspect_sqlite
 
 _CONNECT_S = 5.0
 _TRY_S = 20.0
@@ -194,7 +194,7 @@ def _postgresql(text: str) -> tuple[Grade, str]:
     try:
         url = make_url(text)
         name = url.render_as_string(hide_password=True)
-        version = look_at_postgresql(url, _CONNECT_S)
+        version = inspect_postgresql(url, _CONNECT_S)
     except (ArgumentError, ValueError):
         return Grade.ERROR, "database_url: postgresql://USER:PASSWORD@HOST:PORT/NAME is needed"
     except (ImportError, NoSuchModuleError):
@@ -216,7 +216,7 @@ def _sqlite(file: Path) -> tuple[Grade, str]:
             return Grade.ERROR, f"{there} cannot be written: {problem}"
         is_there = file.exists()
         if is_there:
-            look_at_sqlite(file)
+            inspect_sqlite(file)
         if is_in_use(file):
             return Grade.WARNING, f"{file} is in use now by another robosc-server"
     except (OSError, StoreError) as error:

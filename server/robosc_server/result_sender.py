@@ -18,7 +18,7 @@ SMALL_BYTES = 64 * 1024
 _RETRY_S = 5.0
 
 
-class Outgoing:
+class ResultSender:
     """Sends results, and counts those that are not read yet.
 
     Args:

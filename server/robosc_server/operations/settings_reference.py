@@ -6,7 +6,15 @@ from typing import Any
 
 from pydantic_core import PydanticUndefined
 
-from robosc_server.operations.settings import Settings, default_text, flag_of, group_of, shown, variable_of, words_of
+from robosc_server.operations.settings import (
+    Settings,
+    default_text,
+    description_of,
+    flag_of,
+    group_of,
+    shown,
+    variable_of,
+)
 
 _WIDTH = 100
 
@@ -36,7 +44,7 @@ def example_file() -> str:
         if group_of(name) != group:
             group = group_of(name)
             lines += ["", f"## {group}"]
-        words = f"{words_of(name)} (default: {default_text(name)})"
+        words = f"{description_of(name)} (default: {default_text(name)})"
         lines += ["", *textwrap.wrap(words, _WIDTH, initial_indent="# ", subsequent_indent="# ")]
         lines.append(f"#{name} = {_literal(name)}")
     return "\n".join(lines) + "\n"
@@ -65,7 +73,7 @@ def settings_table() -> str:
         rows = ["| flag | file | environment | what it is | default |", "|---|---|---|---|---|"]
         for name in Settings.model_fields:
             if group_of(name) == group:
-                cells = (f"`{flag_of(name)}`", f"`{name}`", f"`{variable_of(name)}`", words_of(name))
+                cells = (f"`{flag_of(name)}`", f"`{name}`", f"`{variable_of(name)}`", description_of(name))
                 rows.append(
                     f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} | {default_text(name)} |"
                 )

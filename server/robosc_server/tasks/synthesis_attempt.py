@@ -10,7 +10,7 @@ from robosc.explanation import to_text
 from robosc.model.structure import Deployment
 from robosc.targets import TargetRefusal
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_server.tasks.convert import given, told
+from robosc_server.tasks.convert import from_proto, to_proto
 from robosc_server.tasks.task import Report
 
 OnReport = Callable[[Report], None]
@@ -59,10 +59,10 @@ class Attempt:
         """Make the supervisor that a request is about."""
         options = request.options
         self.made = make_supervisor(
-            given.bundle(request.bundle),
-            deployment=given.deployment(options) or Deployment.CONTROLLER,
-            engine=given.engine(options, maximum_nodes),
-            verify_limit=given.verified_states(options),
+            from_proto.bundle(request.bundle),
+            deployment=from_proto.deployment(options) or Deployment.CONTROLLER,
+            engine=from_proto.engine(options, maximum_nodes),
+            verify_limit=from_proto.verified_states(options),
             allow_livelock=allow_livelock,
             on_progress=lambda step: on_report(Report(step.stage, step.message)),
         )
@@ -74,10 +74,10 @@ class Attempt:
         diagnostics = self.refusal.diagnostics if self.refusal else made.diagnostics if made else ()
         if error is not None or made is None:
             status, reason = pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL, str(error)
-            return {"status": status, "diagnostics": told.findings(diagnostics), "reason": reason}
+            return {"status": status, "diagnostics": to_proto.findings(diagnostics), "reason": reason}
         return {
-            "status": told.STATUSES[OutcomeStatus.MODEL_ERRORS if self.refusal else made.status],
-            "diagnostics": told.findings(diagnostics),
+            "status": to_proto.STATUSES[OutcomeStatus.MODEL_ERRORS if self.refusal else made.status],
+            "diagnostics": to_proto.findings(diagnostics),
             "reason": made.reason,
             "explanation": to_text(made.explanation) if made.explanation else "",
         }

@@ -21,7 +21,7 @@ _NEVER_RESIDENT_BYTES = 96 * 2**20  # Of the address space: mostly parts of libr
 
 
 @dataclass(frozen=True, slots=True)
-class Ending:
+class ProcessExit:
     """End of a worker's process.
 
     Attributes:
@@ -35,43 +35,43 @@ class Ending:
     peak_bytes: int
 
 
-FACTS = re.compile(
+EXIT_DESCRIPTION = re.compile(
     r"(ended with status \d{1,3} and no answer|was ended by (SIG[A-Z0-9]{2,8}|signal \d{1,3})) "
     r"after \d{1,9}\.\d\d s of a processor's time, with at most \d{1,15} bytes resident"
 )
-"""Pattern of the text that `facts_of` returns: nobody can say anything of a model in this form."""
+"""Pattern of the text that `exit_description` returns: nobody can say anything of a model in this form."""
 
 
-def facts_of(ending: Ending) -> str:
+def exit_description(end: ProcessExit) -> str:
     """Return a description of a process's end, in one line."""
     return (
-        f"{_told(ending.exit_code)} after {ending.cpu_s:.2f} s of a processor's time, "
-        f"with at most {ending.peak_bytes} bytes resident"
+        f"{_status_text(end.exit_code)} after {end.cpu_s:.2f} s of a processor's time, "
+        f"with at most {end.peak_bytes} bytes resident"
     )
 
 
-def failure_of(ending: Ending, limits: TaskLimits, last_words: str, was_memory_short: bool) -> Failure:
+def failure_of(end: ProcessExit, limits: TaskLimits, crash_output: str, was_memory_short: bool) -> Failure:
     """Return the failure of a task whose worker ended without an answer, and was not killed by the server.
 
     Args:
-        ending: End of the worker's process.
+        end: End of the worker's process.
         limits: Limits of the task.
-        last_words: Text that the interpreter wrote when it crashed.
+        crash_output: Text that the interpreter wrote when it crashed.
         was_memory_short: True if the kernel killed some process for want of memory meanwhile.
     """
-    details = f"{facts_of(ending)}\n{last_words}".rstrip()
-    out_of_processor = ending.cpu_s >= limits.cpu_seconds
-    if ending.exit_code == -signal.SIGXCPU or (ending.exit_code == -signal.SIGKILL and out_of_processor):
+    details = f"{exit_description(end)}\n{crash_output}".rstrip()
+    out_of_processor = end.cpu_s >= limits.cpu_seconds
+    if end.exit_code == -signal.SIGXCPU or (end.exit_code == -signal.SIGKILL and out_of_processor):
         return Failure(Reason.CPU_LIMIT, OUT_OF_PROCESSOR, details)
-    if ending.exit_code == -signal.SIGKILL and was_memory_short:
+    if end.exit_code == -signal.SIGKILL and was_memory_short:
         return Failure(Reason.MEMORY_LIMIT, "the machine ran out of memory, and ended the work", details)
-    if ending.exit_code and ending.peak_bytes + _NEVER_RESIDENT_BYTES >= _NEAR_THE_LIMIT * limits.memory_bytes:
+    if end.exit_code and end.peak_bytes + _NEVER_RESIDENT_BYTES >= _NEAR_THE_LIMIT * limits.memory_bytes:
         # Libraries in C end the process where memory is refused to them: CUDD by exit(1), others by abort().
         return Failure(Reason.MEMORY_LIMIT, OUT_OF_MEMORY, details)
-    return Failure(Reason.WORKER_DIED, f"the worker process {_told(ending.exit_code)}", details)
+    return Failure(Reason.WORKER_DIED, f"the worker process {_status_text(end.exit_code)}", details)
 
 
-def kills_for_memory() -> int:
+def oom_kills() -> int:
     """Return the number of processes that this machine's kernel has killed for want of memory; 0 if unknown."""
     with suppress(OSError, ValueError):
         for line in Path("/proc/vmstat").read_text().splitlines():
@@ -80,7 +80,7 @@ def kills_for_memory() -> int:
     return 0
 
 
-class KillsBefore:
+class RecentOomKills:
     """Number of processes killed for want of memory before now; asked of the kernel at most once a second.
 
     Asking takes a tenth of a millisecond, and the answer is of use only where a worker is killed: one that was killed
@@ -91,7 +91,7 @@ class KillsBefore:
         clock: Seconds that never go back.
     """
 
-    def __init__(self, count: Callable[[], int] = kills_for_memory, clock: Callable[[], float] = monotonic) -> None:
+    def __init__(self, count: Callable[[], int] = oom_kills, clock: Callable[[], float] = monotonic) -> None:
         self._count, self._clock = count, clock
         self._known = 0
         self._until_s = -math.inf
@@ -103,7 +103,7 @@ class KillsBefore:
         return self._known
 
 
-def _told(exit_code: int) -> str:
+def _status_text(exit_code: int) -> str:
     if exit_code >= 0:
         return f"ended with status {exit_code} and no answer"
     with suppress(ValueError):

@@ -1,4 +1,4 @@
-"""Long results in pieces: generated files and graphs as lists, digests and chunks."""
+"""Chunks of long results: generated files and graphs as lists, digests and chunks."""
 
 import hashlib
 from collections.abc import Iterable, Iterator
@@ -7,7 +7,7 @@ from robosc.targets import GeneratedFiles
 from robosc_api.v1 import synthesis_pb2 as pb
 
 CHUNK_BYTES = 64 * 1024
-"""The longest piece."""
+"""Maximum size of a chunk, in bytes."""
 
 
 def listing(files: GeneratedFiles) -> list[pb.GeneratedFile]:
@@ -30,14 +30,14 @@ def digest_of(files: Iterable[pb.GeneratedFile]) -> bytes:
 
 
 def file_chunks(files: GeneratedFiles) -> Iterator[pb.FileChunk]:
-    """The content of all files in pieces, file by file."""
+    """The content of all files in chunks, file by file."""
     for number, text in enumerate(files.values()):
         content = text.encode("utf-8")
         for offset in range(0, len(content), CHUNK_BYTES):
             yield pb.FileChunk(file=number, offset=offset, data=content[offset : offset + CHUNK_BYTES])
 
 
-def pieces(content: bytes) -> Iterator[bytes]:
-    """A content in pieces."""
+def content_chunks(content: bytes) -> Iterator[bytes]:
+    """Some content, in chunks."""
     for offset in range(0, len(content), CHUNK_BYTES):
         yield content[offset : offset + CHUNK_BYTES]

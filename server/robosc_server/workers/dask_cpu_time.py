@@ -4,22 +4,22 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from robosc_server.workers import OnSpent
+from robosc_server.workers import OnCpuTime
 
 
-class Spending:
+class CpuTimeAccount:
     """The processor's time of one task, whose workers may be lost.
 
     A worker tells when it begins, and what its process has taken when that is gone. One that is lost tells nothing any
     more: then the time by the clock counts, until another one begins or nobody waits for the task.
 
     Args:
-        on_spent: Is told seconds.
+        on_cpu_time: Is told seconds.
         clock: Seconds of a monotonic clock.
     """
 
-    def __init__(self, on_spent: OnSpent, clock: Callable[[], float]) -> None:
-        self._on_spent = on_spent
+    def __init__(self, on_cpu_time: OnCpuTime, clock: Callable[[], float]) -> None:
+        self._on_spent = on_cpu_time
         self._clock = clock
         self._worker = ""
         self._begun_s: float | None = None

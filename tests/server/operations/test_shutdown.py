@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from robosc_server.operations.ending import Ending
+from robosc_server.operations.shutdown import ShutdownSignals
 from support.held_time import HeldLoop, on_held_time
 from support.waiting import PATIENCE_S, until
 
@@ -34,11 +34,11 @@ def forced(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     return found
 
 
-def told(test: Callable[[HeldLoop, Ending], Coroutine[Any, Any, None]]) -> None:
+def told(test: Callable[[HeldLoop, ShutdownSignals], Coroutine[Any, Any, None]]) -> None:
     async def run(loop: HeldLoop) -> None:
-        ending = Ending(30.0)
-        ending.listen()
-        await test(loop, ending)
+        shutdown = ShutdownSignals(30.0)
+        shutdown.listen()
+        await test(loop, shutdown)
 
     on_held_time(run)
 
@@ -50,17 +50,17 @@ def test_an_end_that_hangs_is_told_and_will_be_forced(
     async def hanging() -> None:
         await asyncio.Event().wait()
 
-    async def test(loop: HeldLoop, ending: Ending) -> None:
+    async def test(loop: HeldLoop, shutdown: ShutdownSignals) -> None:
         task = asyncio.create_task(hanging(), name="what hangs")
         os.kill(os.getpid(), number)
-        await ending.wanted()
+        await shutdown.requested()
         assert forced == {"after_s": 50.0, "exits": True}
         await loop.passed(49.4)
         assert "does not end" not in caplog.text
         await loop.passed(0.2)
-        assert "the server does not end: what hangs waits at test_server_ending.py:" in caplog.text
+        assert "the server does not end: what hangs waits at test_shutdown.py:" in caplog.text
         task.cancel()
-        ending.over()
+        shutdown.finished()
         assert not forced
 
     with caplog.at_level(logging.ERROR):
@@ -68,15 +68,15 @@ def test_an_end_that_hangs_is_told_and_will_be_forced(
 
 
 def test_a_second_interrupt_ends_it_at_once(forced: dict[str, Any], caplog: pytest.LogCaptureFixture) -> None:
-    async def test(loop: HeldLoop, ending: Ending) -> None:
+    async def test(loop: HeldLoop, shutdown: ShutdownSignals) -> None:
         # Another request to end gracefully changes nothing, also one that comes while it ends.
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGTERM):
             os.kill(os.getpid(), number)
-        await ending.wanted()
+        await shutdown.requested()
         assert "status" not in forced
         os.kill(os.getpid(), signal.SIGINT)
         await until(lambda: "status" in forced)
-        assert (forced["status"], ending._interrupts) == (128 + signal.SIGINT, 2)
+        assert (forced["status"], shutdown._interrupts) == (128 + signal.SIGINT, 2)
 
     told(test)
     assert "ended at once, by a second interrupt" in caplog.text
@@ -84,13 +84,13 @@ def test_a_second_interrupt_ends_it_at_once(forced: dict[str, Any], caplog: pyte
 
 _HANGING = """
 import asyncio, os, signal, time
-from robosc_server.operations.ending import Ending
+from robosc_server.operations.shutdown import ShutdownSignals
 
 async def main():
-    ending = Ending(0.0, end_s=0.01)
-    ending.listen()
+    shutdown = ShutdownSignals(0.0, end_s=0.01)
+    shutdown.listen()
     os.kill(os.getpid(), signal.SIGTERM)
-    await ending.wanted()
+    await shutdown.requested()
     time.sleep(3600)
 
 asyncio.run(main())

@@ -7,10 +7,10 @@ from robosc_server.clock import monotonic
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.tracing import NO_TRACING, Tracing
 from robosc_server.tasks.task import Failure, Outcome, Task, TaskLimits
-from robosc_server.workers import OnReport, OnSpent, Workers, uncounted
+from robosc_server.workers import OnCpuTime, OnReport, Workers, ignore_cpu_time
 
 
-class ObservedWorkers:
+class InstrumentedWorkers:
     """Some workers, watched.
 
     Args:
@@ -47,14 +47,16 @@ class ObservedWorkers:
         """Number of tasks that they are busy with."""
         return self._running
 
-    async def run(self, task: Task, limits: TaskLimits, on_report: OnReport, on_spent: OnSpent = uncounted) -> Outcome:
+    async def run(
+        self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime = ignore_cpu_time
+    ) -> Outcome:
         """The outcome of a task, as `Workers.run`."""
         outcome: Outcome | None = None
         begun_s = monotonic()
         self._running += 1
         try:
             with self._tracing.span("worker run", {"task.kind": task.kind.value}) as span:
-                outcome = await self._workers.run(task, limits, on_report, on_spent)
+                outcome = await self._workers.run(task, limits, on_report, on_cpu_time)
                 span.set_attribute("task.outcome", outcome.reason if isinstance(outcome, Failure) else "RESULT")
             return outcome
         finally:

@@ -23,7 +23,7 @@ from robosc_server.jobs import (
     JobManager,
     JobService,
     QueueLimits,
-    Results,
+    ResultCache,
     Scheduler,
     add_job_service,
 )
@@ -42,7 +42,7 @@ from robosc_server.store import StoreError, StoreUnavailableError, open_store
 from robosc_server.synthesis_service import METHODS, SERVICE_NAME, SynthesisService
 from robosc_server.task_dispatcher import TaskDispatcher
 from robosc_server.tasks.describe import server_limits, targets_response, version_response
-from robosc_server.tasks.requests import QUICK_BYTES, RequestLimits, accepted
+from robosc_server.tasks.requests import QUICK_BYTES, RequestLimits, accept_request
 from robosc_server.tasks.task import Result, TaskKind
 from robosc_server.workers import Workers, WorkersError
 from robosc_server.workers.factory import open_workers
@@ -157,7 +157,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         QueueLimits(settings.waiting_tasks, settings.waiting_tasks_per_caller, _RESERVED_TASKS),
         accounts=quotas,
     )
-    results = await stack.enter_async_context(Results(store, settings.memory_cache_bytes, finish))
+    results = await stack.enter_async_context(ResultCache(store, settings.memory_cache_bytes, finish))
     manager = await stack.enter_async_context(
         JobManager(
             store,
@@ -183,9 +183,9 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     )
     jobs = JobService(
         manager,
-        lambda kind, request: accepted(kind, request, request_limits),
+        lambda kind, request: accept_request(kind, request, request_limits),
         admit=quotas.admit,
-        send=sender.send_each,
+        send=sender.send_stream,
         limits=request_limits,
     )
 
@@ -194,7 +194,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     health = Health({SERVICE_NAME: ("workers",), JOB_SERVICE_NAME: ("store", "workers")})
     health_pb2_grpc.add_HealthServicer_to_server(health, server)
     reflection.enable_server_reflection((*services, health_names.SERVICE_NAME, reflection.SERVICE_NAME), server)
-    metrics.follow(
+    metrics.set_sources(
         waiting=lambda: scheduler.waiting,
         running=lambda: scheduler.running,
         jobs=lambda: {str(state): count for state, count in manager.counts.items()},
@@ -202,7 +202,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         restarts=lambda: getattr(workers, "restarts", 0),  # Those of a cluster are its own.
     )
     await stack.enter_async_context(
-        health.following(
+        health.probing(
             {
                 "store": partial(_is_true, lambda: store.is_available),
                 "workers": partial(_is_true, lambda: workers.capacity > 0),

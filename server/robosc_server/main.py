@@ -38,7 +38,7 @@ def _serve(settings: Settings) -> int:
     async def serve_until_signal() -> None:
         shutdown.listen()
         async with running_server(settings) as address:
-            _tell(address)
+            _announce(address)
             await shutdown.requested()
 
     try:
@@ -51,7 +51,7 @@ def _serve(settings: Settings) -> int:
     return 0
 
 
-def _tell(address: str) -> None:
+def _announce(address: str) -> None:
     """Print where the server listens; that nobody takes that is no reason to serve nobody."""
     try:
         sys.stdout.write(f"robosc-server listening on {address}\n")

@@ -36,7 +36,7 @@ class ResultSender:
         """Bytes of the results that are on their way."""
         return self._unread.total()
 
-    async def send_each(self, context: Any, messages: AsyncIterable[bytes]) -> None:
+    async def send_stream(self, context: Any, messages: AsyncIterable[bytes]) -> None:
         """Send the messages of a result as fast as they are read.
 
         Args:
@@ -48,13 +48,13 @@ class ResultSender:
         """
         read: Callable[[], None] = _nothing
         async for message in messages:
-            is_read = self.hold(context, (message,))
+            is_read = self.reserve(context, (message,))
             await context.write(message)
             # gRPC takes one when there is room for it, which those before it have left.
             read()
             read = is_read
 
-    def hold(self, context: Any, messages: tuple[bytes, ...]) -> Callable[[], None]:
+    def reserve(self, context: Any, messages: tuple[bytes, ...]) -> Callable[[], None]:
         """Count a result until its call is over; it may have to wait before it can be sent.
 
         Args:

@@ -23,7 +23,7 @@ _SERVICE = pb.DESCRIPTOR.services_by_name["SynthesisService"]
 SERVICE_NAME = _SERVICE.full_name
 METHODS = tuple(method.name for method in _SERVICE.methods)
 
-PATIENCE_S = 0.05
+PROGRESS_PERIOD_S = 0.05
 """Time that work may take before its caller is informed of it, and between two such messages, in seconds."""
 
 type Context = grpc.aio.ServicerContext[Any, Any]
@@ -81,31 +81,31 @@ class SynthesisService:
             # handler together with the status, at once, and lets it write other messages before.
             methods[name] = grpc.unary_unary_rpc_method_handler(self._stream(kind))
         for name, (message, answer) in self._fixed.items():
-            methods[name] = grpc.unary_unary_rpc_method_handler(_answering(message, answer))
+            methods[name] = grpc.unary_unary_rpc_method_handler(_fixed_answer(message, answer))
         return grpc.method_handlers_generic_handler(SERVICE_NAME, methods)
 
     def _unary(self, kind: TaskKind) -> Any:
         async def answer(request: bytes, context: Context) -> bytes:
-            task = self._requests.accepted(kind, request)
+            task = self._requests.accept(kind, request)
             result = self._provider.cached(task.key)
             if result is None:
                 result = await self._provider.result(task, caller_of(context), _drop)
-            self._sender.hold(context, result.messages)
+            self._sender.reserve(context, result.messages)
             return result.messages[0]
 
         return answer
 
     def _stream(self, kind: TaskKind) -> Any:
         async def answer(request: bytes, context: Context) -> bytes:
-            task = self._requests.accepted(kind, request)
+            task = self._requests.accept(kind, request)
             result = self._provider.cached(task.key)
             if result is None:
-                async with _Progress(context) as progress:
-                    result = await self._provider.result(task, caller_of(context), progress.tell)
+                async with _ProgressWriter(context) as progress:
+                    result = await self._provider.result(task, caller_of(context), progress.report)
                     # Now: a caller that does not read its reports has the result wait.
-                    self._sender.hold(context, result.messages)
+                    self._sender.reserve(context, result.messages)
             else:
-                self._sender.hold(context, result.messages)
+                self._sender.reserve(context, result.messages)
             *first, last = result.messages
             for message in first:
                 await context.write(message)
@@ -114,7 +114,7 @@ class SynthesisService:
         return answer
 
 
-def _answering(request_type: Any, answer: bytes) -> Any:
+def _fixed_answer(request_type: Any, answer: bytes) -> Any:
     async def fixed(request: bytes, context: Context) -> bytes:
         require_short(request, QUICK_BYTES)
         try:
@@ -126,7 +126,7 @@ def _answering(request_type: Any, answer: bytes) -> Any:
     return fixed
 
 
-class _Progress:
+class _ProgressWriter:
     """Tells a caller where the work is, if it takes a while: what is newest, and not too often.
 
     Each message costs server and client as much as a small call; who reads slowly misses some, and holds no worker up.
@@ -135,16 +135,16 @@ class _Progress:
     def __init__(self, context: Context) -> None:
         self._context = context
         self._newest: Report | None = None
-        self._may_tell = False
+        self._may_write = False
         self._writer: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> Self:
-        self._pause = asyncio.get_running_loop().call_later(PATIENCE_S, self._resume)
+        self._pause = asyncio.get_running_loop().call_later(PROGRESS_PERIOD_S, self._resume)
         return self
 
     async def __aexit__(self, kind: type[BaseException] | None, *details: object) -> None:
         self._pause.cancel()
-        self._may_tell = False
+        self._may_write = False
         if self._writer is None:
             return
         if kind is not None and issubclass(kind, asyncio.CancelledError):
@@ -155,26 +155,26 @@ class _Progress:
         await self._writer
         self._pause.cancel()
 
-    async def tell(self, report: Report) -> None:
+    async def report(self, report: Report) -> None:
         """Tell it soon, unless there is something newer by then."""
         self._newest = report
-        if self._may_tell:
+        if self._may_write:
             self._begin()
 
     def _resume(self) -> None:
-        self._may_tell = True
+        self._may_write = True
         if self._newest is not None:
             self._begin()
 
     def _begin(self) -> None:
-        self._may_tell = False
+        self._may_write = False
         self._writer = asyncio.create_task(self._write())
 
     async def _write(self) -> None:
         report, self._newest = self._newest, None
         if report is not None:
             await self._context.write(progress_message(report))
-        self._pause = asyncio.get_running_loop().call_later(PATIENCE_S, self._resume)
+        self._pause = asyncio.get_running_loop().call_later(PROGRESS_PERIOD_S, self._resume)
 
 
 def progress_message(report: Report) -> bytes:

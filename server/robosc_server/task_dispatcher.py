@@ -1,7 +1,7 @@
 """TaskDispatcher that gives an accepted task its result: one that is kept, or the one that a worker makes."""
 
 from robosc_server.failures import RefusedError, public_failure
-from robosc_server.jobs import Results, Scheduler
+from robosc_server.jobs import ResultCache, Scheduler
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.quotas import Quotas
 from robosc_server.tasks.task import Failure, Result, Task, TaskLimits
@@ -20,7 +20,7 @@ class TaskDispatcher:
     """
 
     def __init__(
-        self, results: Results, scheduler: Scheduler, quotas: Quotas, limits: TaskLimits, metrics: Metrics
+        self, results: ResultCache, scheduler: Scheduler, quotas: Quotas, limits: TaskLimits, metrics: Metrics
     ) -> None:
         self._results = results
         self._scheduler = scheduler

@@ -54,7 +54,7 @@ def test_who_reads_gets_any_number_of_messages() -> None:
         # Two may be unread; a hundred are sent to each of two calls.
         sender = ResultSender(5 * SIZE, 100 * SIZE)
         calls = [Call(), Call()]
-        sending = [asyncio.create_task(sender.send_each(call, chunks(100))) for call in calls]
+        sending = [asyncio.create_task(sender.send_stream(call, chunks(100))) for call in calls]
         for _ in range(100):
             for call in calls:
                 call.read()
@@ -77,15 +77,15 @@ def test_who_reads_nothing_is_sent_nothing_more() -> None:
         sender = ResultSender(2 * SIZE, 100 * SIZE)
         deaf = [Call(), Call()]
         for call in deaf:
-            sender.hold(call, (bytes(SIZE),))
+            sender.reserve(call, (bytes(SIZE),))
         with pytest.raises(RefusedError) as refused:
-            sender.hold(Call(), (bytes(SIZE),))
+            sender.reserve(Call(), (bytes(SIZE),))
         assert refused.value.reason is Reason.SERVER_BUSY
         # Others have room, and small results are not counted.
-        sender.hold(Call("192.0.2.2"), (bytes(SIZE),))
-        sender.hold(Call(), (bytes(SMALL_BYTES),))
+        sender.reserve(Call("192.0.2.2"), (bytes(SIZE),))
+        sender.reserve(Call(), (bytes(SMALL_BYTES),))
         deaf[0].end()
-        is_read = sender.hold(Call(), (bytes(SIZE),))
+        is_read = sender.reserve(Call(), (bytes(SIZE),))
         is_read()
         is_read()
         assert sender.unread_bytes == 2 * SIZE

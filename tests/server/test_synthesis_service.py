@@ -27,8 +27,8 @@ from robosc_client import Client
 from robosc_server import application
 from robosc_server.application import StartError
 from robosc_server.main import main
-from robosc_server.synthesis_service import PATIENCE_S as PAUSE_S
-from robosc_server.synthesis_service import _Progress, progress_message
+from robosc_server.synthesis_service import PROGRESS_PERIOD_S as PAUSE_S
+from robosc_server.synthesis_service import _ProgressWriter, progress_message
 from robosc_server.tasks.task import Report
 from support.background import is_running, is_stopped
 from support.fake_tasks import TASK_FUNCTION as FAKE
@@ -182,22 +182,22 @@ class TestWork:
 
         async def test(loop: HeldLoop) -> None:
             context: Any = Context()
-            async with _Progress(context) as progress:
+            async with _ProgressWriter(context) as progress:
                 for number in range(100):
-                    await progress.tell(report(number))
+                    await progress.report(report(number))
                 await loop.passed(PAUSE_S / 2)
                 assert told == []
                 await loop.passed(PAUSE_S / 2)
                 assert told == [progress_message(report(99))]
-                await progress.tell(report(100))
-                await progress.tell(report(101))
+                await progress.report(report(100))
+                await progress.report(report(101))
                 await loop.passed(PAUSE_S / 2)
                 assert len(told) == 1
                 await loop.passed(PAUSE_S / 2)
                 assert told[1:] == [progress_message(report(101))]
                 # After a while without a word, the next one is told at once.
                 await loop.passed(10.0)
-                await progress.tell(report(102))
+                await progress.report(report(102))
                 await loop.passed(0.0)
                 assert told[2:] == [progress_message(report(102))]
 
@@ -206,7 +206,7 @@ class TestWork:
     def test_what_is_done_at_once_tells_nothing_of_its_progress(
         self, fake: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("robosc_server.synthesis_service.PATIENCE_S", PATIENCE_S)
+        monkeypatch.setattr("robosc_server.synthesis_service.PROGRESS_PERIOD_S", PATIENCE_S)
         request = pb.SynthesizeRequest(bundle=bundle("reports 20\necho silence"))
         (response,) = STUB(fake).Synthesize(request, timeout=PATIENCE_S)
         assert response.result.reason == "silence"

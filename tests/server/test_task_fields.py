@@ -11,7 +11,7 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.failures import RefusedError
 from robosc_server.jobs.convert import submission
 from robosc_server.tasks.fields import Nested, has_few_fields, nested_of
-from robosc_server.tasks.requests import RequestLimits, accepted
+from robosc_server.tasks.requests import RequestLimits, accept_request
 from robosc_server.tasks.task import Reason, TaskKind
 
 LIMITS = RequestLimits()
@@ -99,7 +99,7 @@ def test_as_much_as_there_may_be_is_accepted() -> None:
     )
     request.bundle.searched.extend(["w" * 9] * limit)
     request.options.engine = "auto"
-    assert accepted(TaskKind.VERIFY, request.SerializeToString(), LIMITS)
+    assert accept_request(TaskKind.VERIFY, request.SerializeToString(), LIMITS)
 
 
 EMPTY_FILES = delimited(1, delimited(2, b"") * 500_000)
@@ -122,7 +122,7 @@ def test_what_would_take_long_to_parse_is_not_parsed(what: str, submits: bool) -
         if submits:
             submission(delimited(1, delimited(1, request)), LIMITS)
         else:
-            accepted(TaskKind.CHECK, request, LIMITS)
+            accept_request(TaskKind.CHECK, request, LIMITS)
     assert caught.value.reason is Reason.REQUEST_TOO_LARGE
 
 

@@ -15,7 +15,7 @@ import robosc_server.tasks.requests as requests_module
 from robosc.verification import DEFAULT_STATES
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.failures import RefusedError
-from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestCache, RequestLimits, accepted
+from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestCache, RequestLimits, accept_request
 from robosc_server.tasks.task import Reason, Task, TaskKind
 from support.effort import examples
 from support.models import EXAMPLES
@@ -25,13 +25,13 @@ LIMITS = RequestLimits()
 
 
 def key_of(kind: TaskKind, request: Any, limits: RequestLimits = LIMITS) -> str:
-    return accepted(kind, request.SerializeToString(), limits).key
+    return accept_request(kind, request.SerializeToString(), limits).key
 
 
 def refusal(kind: TaskKind, request: Any, limits: RequestLimits = LIMITS) -> RefusedError:
     content = request if isinstance(request, bytes) else request.SerializeToString()
     with pytest.raises(RefusedError) as caught:
-        accepted(kind, content, limits)
+        accept_request(kind, content, limits)
     return caught.value
 
 
@@ -52,7 +52,7 @@ class TestAcceptance:
     @pytest.mark.parametrize("kind", TaskKind)
     def test_the_least_of_each_kind(self, kind: TaskKind) -> None:
         content = small_request(kind, "robot R {}").SerializeToString()
-        task = accepted(kind, content, LIMITS)
+        task = accept_request(kind, content, LIMITS)
         assert (task.kind, task.request, task.main_file) == (kind, content, "robot.rscd")
         assert re.fullmatch("[0-9a-f]{64}", task.key)
 
@@ -131,7 +131,7 @@ class TestAcceptance:
         posix, windows = PurePosixPath(name), PureWindowsPath(name)
         is_right = bool(name) and name.isprintable() and not (posix.is_absolute() or windows.drive or windows.root)
         try:
-            accepted(TaskKind.CHECK, small_request(TaskKind.CHECK, name=name).SerializeToString(), LIMITS)
+            accept_request(TaskKind.CHECK, small_request(TaskKind.CHECK, name=name).SerializeToString(), LIMITS)
             was_accepted = True
         except RefusedError:
             was_accepted = False
@@ -141,7 +141,7 @@ class TestAcceptance:
 class TestSizes:
     def test_names_and_texts_up_to_the_last_byte(self) -> None:
         limits = RequestLimits(bundle_bytes=100)
-        accepted(TaskKind.CHECK, small_request(TaskKind.CHECK, "x" * 90).SerializeToString(), limits)
+        accept_request(TaskKind.CHECK, small_request(TaskKind.CHECK, "x" * 90).SerializeToString(), limits)
         found = refusal(TaskKind.CHECK, small_request(TaskKind.CHECK, "x" * 91), limits)
         assert found.reason is Reason.REQUEST_TOO_LARGE
         assert found.message == "the names and texts have 101 bytes, this server takes at most 100"
@@ -162,14 +162,14 @@ class TestSizes:
         request = small_request(kind)
         request.MergeFrom(MESSAGES[kind](**change))
         assert refusal(kind, request, RequestLimits(bundle_bytes=100)).reason is Reason.REQUEST_TOO_LARGE
-        accepted(kind, request.SerializeToString(), RequestLimits(bundle_bytes=200))
+        accept_request(kind, request.SerializeToString(), RequestLimits(bundle_bytes=200))
 
     def test_files_up_to_the_last(self) -> None:
         limits = RequestLimits(bundle_files=4)
         request = small_request(TaskKind.CHECK)
         request.bundle.libraries.extend(pb.SourceFile(name=f"l{number}") for number in range(2))
         request.bundle.interfaces.extend(pb.SourceFile(name=f"i{number}") for number in range(1))
-        accepted(TaskKind.CHECK, request.SerializeToString(), limits)
+        accept_request(TaskKind.CHECK, request.SerializeToString(), limits)
         request.bundle.interfaces.add(name="i2")
         found = refusal(TaskKind.CHECK, request, limits)
         assert (found.reason, "5 files" in found.message) == (Reason.REQUEST_TOO_LARGE, True)
@@ -183,7 +183,7 @@ class TestSizes:
     def test_a_thousand_files_of_the_longest_names_fit(self) -> None:
         request = small_request(TaskKind.CHECK)
         request.bundle.libraries.extend(pb.SourceFile(name=f"{number:0255}", text="x" * 700) for number in range(999))
-        accepted(TaskKind.CHECK, request.SerializeToString(), LIMITS)
+        accept_request(TaskKind.CHECK, request.SerializeToString(), LIMITS)
 
     @pytest.mark.parametrize(
         "content",
@@ -232,12 +232,15 @@ class TestHostileBytes:
     def test_unknown_fields_change_nothing(self) -> None:
         known = small_request(TaskKind.SYNTHESIZE, "robot R {}").SerializeToString()
         unknown = field(15, b"x" * 1000) + b"\x78\x01" + b"\x7b\x7c"
-        task = accepted(TaskKind.SYNTHESIZE, known + unknown, LIMITS)
-        assert task.key == accepted(TaskKind.SYNTHESIZE, known, LIMITS).key
+        task = accept_request(TaskKind.SYNTHESIZE, known + unknown, LIMITS)
+        assert task.key == accept_request(TaskKind.SYNTHESIZE, known, LIMITS).key
 
     def test_of_fields_that_come_twice_the_last_counts(self) -> None:
         first, second = (small_request(TaskKind.CHECK, text).SerializeToString() for text in ("first", "second"))
-        assert accepted(TaskKind.CHECK, first + second, LIMITS).key == accepted(TaskKind.CHECK, second, LIMITS).key
+        assert (
+            accept_request(TaskKind.CHECK, first + second, LIMITS).key
+            == accept_request(TaskKind.CHECK, second, LIMITS).key
+        )
         # Parts that may be many are put together, and two files of one name are none.
         library = pb.CheckRequest(bundle=pb.Bundle(libraries=[pb.SourceFile(name="a")])).SerializeToString()
         assert "two files" in refusal(TaskKind.CHECK, first + library + library).message
@@ -252,7 +255,7 @@ class TestHostileBytes:
         place = chance.randrange(len(broken))
         for content in (noise, bytes(broken), bytes(broken[:place]) + noise + bytes(broken[place:])):
             try:
-                task = accepted(kind, content, LIMITS)
+                task = accept_request(kind, content, LIMITS)
             except RefusedError as error:
                 assert error.reason in (Reason.MALFORMED_REQUEST, Reason.REQUEST_TOO_LARGE)
                 assert error.message.isprintable()
@@ -469,7 +472,7 @@ class TestKeys:
     def test_another_version_gives_another_key(self, monkeypatch: pytest.MonkeyPatch) -> None:
         request = small_request(TaskKind.CHECK)
         before = key_of(TaskKind.CHECK, request)
-        monkeypatch.setattr(requests_module, "_makers", lambda: ("another", "plug-in 1.0"))
+        monkeypatch.setattr(requests_module, "_producer_versions", lambda: ("another", "plug-in 1.0"))
         assert key_of(TaskKind.CHECK, request) != before
 
     def test_what_the_server_allows_decides_where_nothing_is_asked_for(self) -> None:
@@ -489,55 +492,57 @@ class TestKeys:
 
     def test_of_the_line_follower(self) -> None:
         bundle = bundle_at(EXAMPLES / "line_follower" / "line_follower.rscd")
-        task = accepted(TaskKind.SYNTHESIZE, pb.SynthesizeRequest(bundle=bundle).SerializeToString(), LIMITS)
+        task = accept_request(TaskKind.SYNTHESIZE, pb.SynthesizeRequest(bundle=bundle).SerializeToString(), LIMITS)
         assert task.main_file == "line_follower.rscd"
 
 
 class TestRecentRequests:
     def test_says_the_same_as_a_look_at_each(self) -> None:
-        recent = RequestCache(LIMITS)
+        cache = RequestCache(LIMITS)
         contents = [small_request(kind).SerializeToString() for kind in MESSAGES] + [b"", b"\xff", b"no message"]
         for _ in range(2):
             for kind in MESSAGES:
                 for content in contents:
-                    assert told(recent.accepted, kind, content) == told(partial(accepted, limits=LIMITS), kind, content)
+                    assert told(cache.accept, kind, content) == told(
+                        partial(accept_request, limits=LIMITS), kind, content
+                    )
 
     def test_one_that_came_before_is_not_looked_at_again(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        recent = RequestCache(LIMITS)
+        cache = RequestCache(LIMITS)
         content = small_request(TaskKind.CHECK).SerializeToString()
-        task = recent.accepted(TaskKind.CHECK, content)
-        monkeypatch.setattr(requests_module, "accepted", None)
-        assert recent.accepted(TaskKind.CHECK, bytes(bytearray(content))) is task
+        task = cache.accept(TaskKind.CHECK, content)
+        monkeypatch.setattr(requests_module, "accept_request", None)
+        assert cache.accept(TaskKind.CHECK, bytes(bytearray(content))) is task
 
     def test_is_bounded_and_forgets_what_was_asked_for_longest_ago(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        recent = RequestCache(LIMITS)
+        cache = RequestCache(LIMITS)
         requests = [
             pb.CheckRequest(bundle=pb.Bundle(main=pb.SourceFile(name="m", text=f"{number:060000}"))).SerializeToString()
             for number in range(100)
         ]
         first, *others = requests
-        tasks = [recent.accepted(TaskKind.CHECK, first)]
+        tasks = [cache.accept(TaskKind.CHECK, first)]
         for request in others:
-            tasks.append(recent.accepted(TaskKind.CHECK, request))
-            assert recent.accepted(TaskKind.CHECK, first) is tasks[0]
-        assert sum(map(len, recent_contents(recent))) <= 4 * 2**20
-        assert recent.accepted(TaskKind.CHECK, requests[1]) is not tasks[1]
-        assert recent.accepted(TaskKind.CHECK, requests[-1]) is tasks[-1]
+            tasks.append(cache.accept(TaskKind.CHECK, request))
+            assert cache.accept(TaskKind.CHECK, first) is tasks[0]
+        assert sum(map(len, cached_contents(cache))) <= 4 * 2**20
+        assert cache.accept(TaskKind.CHECK, requests[1]) is not tasks[1]
+        assert cache.accept(TaskKind.CHECK, requests[-1]) is tasks[-1]
 
     def test_many_small_ones_are_bounded_too(self) -> None:
-        recent = RequestCache(LIMITS)
+        cache = RequestCache(LIMITS)
         for number in range(10_000):
             file = pb.SourceFile(name="m", text=str(number))
-            recent.accepted(TaskKind.CHECK, pb.CheckRequest(bundle=pb.Bundle(main=file)).SerializeToString())
+            cache.accept(TaskKind.CHECK, pb.CheckRequest(bundle=pb.Bundle(main=file)).SerializeToString())
         # Each takes some four hundred bytes beside its own.
-        assert len(recent_contents(recent)) < 8500
+        assert len(cached_contents(cache)) < 8500
 
     def test_a_long_one_is_looked_at_each_time(self) -> None:
-        recent = RequestCache(LIMITS)
+        cache = RequestCache(LIMITS)
         bundle = pb.Bundle(main=pb.SourceFile(name="m", text="x" * 70_000))
         content = pb.CheckRequest(bundle=bundle).SerializeToString()
-        assert recent.accepted(TaskKind.CHECK, content) is not recent.accepted(TaskKind.CHECK, content)
-        assert not recent_contents(recent)
+        assert cache.accept(TaskKind.CHECK, content) is not cache.accept(TaskKind.CHECK, content)
+        assert not cached_contents(cache)
 
 
 def told(accept: Callable[[TaskKind, bytes], Task], kind: TaskKind, content: bytes) -> object:
@@ -548,6 +553,6 @@ def told(accept: Callable[[TaskKind, bytes], Task], kind: TaskKind, content: byt
         return error.reason, error.message
 
 
-def recent_contents(recent: RequestCache) -> list[bytes]:
+def cached_contents(recent: RequestCache) -> list[bytes]:
     """The requests that are remembered."""
     return [content for _, content in recent._tasks]

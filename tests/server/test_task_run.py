@@ -19,9 +19,8 @@ from robosc.targets import available_targets
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.convert.chunks import CHUNK_BYTES
 from robosc_server.tasks.describe import server_limits, targets_response, version_response
-from robosc_server.tasks.pace import PAUSE_S, ThrottledReports
-from robosc_server.tasks.requests import RequestLimits, accepted
-from robosc_server.tasks.run import run_task
+from robosc_server.tasks.requests import RequestLimits, accept_request
+from robosc_server.tasks.run import PAUSE_S, ThrottledReports, run_task
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
 from support.models import EMPTY, EXAMPLES
 from support.requests import MESSAGES, RESPONSES, bundle_at, small_request
@@ -41,7 +40,7 @@ KEPT_TEXT = """robot R { component C {
 
 def outcome(kind: TaskKind, request: Any, limits: TaskLimits = LIMITS) -> Outcome:
     """Return the outcome of an accepted request."""
-    task = accepted(kind, request.SerializeToString(), RequestLimits())
+    task = accept_request(kind, request.SerializeToString(), RequestLimits())
     return run_task(kind, task.request, limits, lambda report: None)
 
 

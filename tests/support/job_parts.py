@@ -17,7 +17,7 @@ from robosc_server.jobs import (
     JobManager,
     JobService,
     QueueLimits,
-    Results,
+    ResultCache,
     Scheduler,
     add_job_service,
     caller_of,
@@ -56,7 +56,7 @@ class Parts:
     store: Store
     workers: ScriptedWorkers
     scheduler: Scheduler
-    results: Results
+    results: ResultCache
     manager: JobManager
 
 
@@ -81,7 +81,7 @@ async def parts(folder: Path, choices: Choices | None = None) -> AsyncIterator[P
     try:
         workers = ScriptedWorkers(chosen.capacity)
         scheduler = Scheduler(workers, chosen.queue, accounts=chosen.accounts)
-        async with Results(store, chosen.memory_bytes) as results:
+        async with ResultCache(store, chosen.memory_bytes) as results:
             manager = JobManager(store, scheduler, results, TaskLimits(), chosen.limits, chosen.times.monotonic)
             async with manager:
                 yield Parts(store, workers, scheduler, results, manager)

@@ -5,7 +5,7 @@ from concurrent.futures import Future
 
 import pytest
 
-from robosc_server.tasks.requests import RequestLimits, accepted
+from robosc_server.tasks.requests import RequestLimits, accept_request
 from robosc_server.tasks.task import Failure, Outcome, Reason, Task, TaskKind, TaskLimits
 from robosc_server.workers.local import LocalWorkers
 from support.background import BackgroundLoop
@@ -45,7 +45,7 @@ def real() -> Iterator[RealRunning]:
 
 def task_of(request: object, kind: TaskKind) -> Task:
     assert isinstance(request, MESSAGES[kind])
-    return accepted(kind, request.SerializeToString(), RequestLimits())
+    return accept_request(kind, request.SerializeToString(), RequestLimits())
 
 
 def synthesis(text: str) -> Task:

@@ -28,7 +28,7 @@ def test_two_servers_that_sweep_at_once_give_back_no_more_than_one(
     database_url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The second one has seen how much there is before the first one sweeps."""
-    monkeypatch.setattr("robosc_server.store.store._THINNED_AT_ONCE", 2)
+    monkeypatch.setattr("robosc_server.store.store._EVICTED_AT_ONCE", 2)
     times = Times()
     results = [Kept(f"{number:02}", "ab"[number % 2], 10, float(number)) for number in range(12)]
     first, second = (open_store(Path("/nowhere"), database_url, times.wall) for _ in range(2))
@@ -51,7 +51,7 @@ def test_two_servers_that_sweep_at_once_give_back_no_more_than_one(
 
         # While one has the lock the other leaves the work to it.
         with first._database._engine.connect() as connection, connection.begin():
-            connection.execute(select(func.pg_advisory_xact_lock(store_module._SWEEPING)))
+            connection.execute(select(func.pg_advisory_xact_lock(store_module._SWEEP_LOCK)))
             await second.sweep(0)
         assert [await first.find_result(result.key) is not None for result in left] == [True] * 7
         await second.sweep(0)

@@ -8,8 +8,8 @@ import pytest
 
 from robosc_server.failures import RefusedError
 from robosc_server.operations.interceptor import CallInterceptor
+from robosc_server.operations.logs import REQUEST_ID
 from robosc_server.operations.metrics import Metrics
-from robosc_server.operations.request_ids import REQUEST_ID
 from robosc_server.operations.settings import LogLevel
 from robosc_server.tasks.task import Reason
 from support.small_server import SERVICE, logged

@@ -1,12 +1,11 @@
 """Jobs: tasks that go on without their caller."""
 
-from robosc_server.jobs.callers import Caller, caller_of
 from robosc_server.jobs.convert import JOB_METHODS, JOB_SERVICE_NAME
-from robosc_server.jobs.limits import JobLimits
-from robosc_server.jobs.manager import JobManager
-from robosc_server.jobs.results import Results
+from robosc_server.jobs.manager import Caller, JobManager
+from robosc_server.jobs.result_cache import ResultCache
+from robosc_server.jobs.retention import JobLimits
 from robosc_server.jobs.scheduler import QueueLimits, Scheduler
-from robosc_server.jobs.service import JobService, add_job_service
+from robosc_server.jobs.service import JobService, add_job_service, caller_of
 
 __all__ = [
     "JOB_METHODS",
@@ -16,7 +15,7 @@ __all__ = [
     "JobManager",
     "JobService",
     "QueueLimits",
-    "Results",
+    "ResultCache",
     "Scheduler",
     "add_job_service",
     "caller_of",

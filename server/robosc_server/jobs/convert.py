@@ -41,7 +41,7 @@ _LENGTH_DELIMITED = 2
 _SUBMISSION = nested_of(pb.SubmitJobRequest)
 
 
-def refusal(message: str) -> RefusedError:
+def malformed(message: str) -> RefusedError:
     """A request that is wrong."""
     return RefusedError(Reason.MALFORMED_REQUEST, message)
 
@@ -58,7 +58,7 @@ def submission(content: bytes, limits: RequestLimits) -> pb.SubmitJobRequest:
         return pb.SubmitJobRequest.FromString(content)
     except DecodeError:
         # The parser's own words may quote the message.
-        raise refusal(NOT_A_MESSAGE) from None
+        raise malformed(NOT_A_MESSAGE) from None
 
 
 def kind_and_request(task: pb.Task) -> tuple[TaskKind, bytes]:
@@ -69,7 +69,7 @@ def kind_and_request(task: pb.Task) -> tuple[TaskKind, bytes]:
     """
     name = task.WhichOneof("request")
     if name is None:
-        raise refusal("a job needs a task")
+        raise malformed("a job needs a task")
     return TaskKind(name), getattr(task, name).SerializeToString()
 
 
@@ -80,7 +80,7 @@ def checked_idempotency_key(text: str) -> str:
         RefusedError: It is none.
     """
     if len(text) > MAXIMUM_IDEMPOTENCY_KEY or not all(" " <= character <= "~" for character in text):
-        raise refusal(f"an idempotency key has 1 to {MAXIMUM_IDEMPOTENCY_KEY} printable ASCII characters")
+        raise malformed(f"an idempotency key has 1 to {MAXIMUM_IDEMPOTENCY_KEY} printable ASCII characters")
     return text
 
 
@@ -91,7 +91,7 @@ def checked_label(text: str) -> str:
         RefusedError: It is none.
     """
     if len(text) > MAXIMUM_LABEL or not text.isprintable():
-        raise refusal(f"a label has at most {MAXIMUM_LABEL} printable characters")
+        raise malformed(f"a label has at most {MAXIMUM_LABEL} printable characters")
     return text
 
 
@@ -105,7 +105,7 @@ def retention_s_of(request: pb.SubmitJobRequest) -> float | None:
         return None
     retention_s = request.retention.seconds + request.retention.nanos / 1e9
     if retention_s < 0 or not 0 <= request.retention.nanos < 1_000_000_000:
-        raise refusal("a retention is a time that is not negative")
+        raise malformed("a retention is a time that is not negative")
     return retention_s
 
 
@@ -116,9 +116,9 @@ def filter_of(request: pb.ListJobsRequest, caller: str) -> JobFilter:
         RefusedError: There are no such states or kinds.
     """
     if any(number not in _STATE_OF for number in request.states):
-        raise refusal("there is no such state of a job")
+        raise malformed("there is no such state of a job")
     if request.kind and request.kind not in _KIND_OF:
-        raise refusal("there is no such kind of task")
+        raise malformed("there is no such kind of task")
     states = frozenset(_STATE_OF[number] for number in request.states)
     return JobFilter(None if request.all_owners else caller, states, _KIND_OF.get(request.kind))
 
@@ -133,7 +133,7 @@ def page_token(last: JobRecord, chosen: JobFilter) -> str:
     return urlsafe_b64encode(_TOKEN.pack(last.created_us, bytes.fromhex(last.id), _digest(chosen))).decode()
 
 
-def place_of(token: str, chosen: JobFilter) -> tuple[int, str] | None:
+def page_position(token: str, chosen: JobFilter) -> tuple[int, str] | None:
     """Time of creation and id of the job that a page follows; None: it is the first.
 
     Raises:
@@ -146,9 +146,9 @@ def place_of(token: str, chosen: JobFilter) -> tuple[int, str] | None:
             raise ValueError
         created_us, job_id, digest = _TOKEN.unpack(urlsafe_b64decode(token.encode("ascii")))
     except (ValueError, struct.error) as error:
-        raise refusal("this is no page token of this server") from error
+        raise malformed("this is no page token of this server") from error
     if digest != _digest(chosen) or created_us >= 2**63:
-        raise refusal("this page token is for another list: the other fields must be those of the page before")
+        raise malformed("this page token is for another list: the other fields must be those of the page before")
     return created_us, job_id.hex()
 
 

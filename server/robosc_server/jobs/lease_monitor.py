@@ -10,7 +10,7 @@ import logging
 import math
 from collections.abc import Callable
 
-from robosc_server.jobs.limits import JobLimits
+from robosc_server.jobs.retention import JobLimits
 from robosc_server.jobs.runner import JobRunner
 from robosc_server.jobs.watchers import Watchers
 from robosc_server.store import Store, StoreUnavailableError
@@ -137,7 +137,7 @@ class LeaseMonitor:
             if job.record.progress is not None and job.record.revision > job.stored_revision
         }
         if told:
-            await self._store.note_progress(self._runner.replica, told)
+            await self._store.write_progress(self._runner.replica, told)
             for job_id, (revision, _) in told.items():
                 job = self._runner.get(job_id)
                 if job is not None:

@@ -10,16 +10,15 @@ expired jobs and results.
 import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
 
 from robosc_server.clock import monotonic
 from robosc_server.failures import RefusedError
-from robosc_server.jobs.callers import Caller
 from robosc_server.jobs.lease_monitor import LeaseMonitor
-from robosc_server.jobs.limits import JobLimits
-from robosc_server.jobs.results import Results
-from robosc_server.jobs.retention import Retention
+from robosc_server.jobs.result_cache import ResultCache
+from robosc_server.jobs.retention import JobLimits, Retention
 from robosc_server.jobs.runner import JobRunner, new_id
 from robosc_server.jobs.scheduler import Scheduler
 from robosc_server.jobs.watchers import Watchers
@@ -31,6 +30,19 @@ from robosc_server.tasks.task import Reason, Task, TaskKind, TaskLimits
 _log = logging.getLogger(__name__)
 
 _LEFT = "the server is shutting down; call another server, or try again later"
+
+
+@dataclass(frozen=True, slots=True)
+class Caller:
+    """Caller of the server.
+
+    Attributes:
+        name: Name that tells callers apart.
+        is_admin: True if the jobs of others count as this caller's, too.
+    """
+
+    name: str
+    is_admin: bool = False
 
 
 class JobManager:
@@ -52,7 +64,7 @@ class JobManager:
         self,
         store: Store,
         scheduler: Scheduler,
-        results: Results,
+        results: ResultCache,
         task_limits: TaskLimits,
         limits: JobLimits,
         clock: Callable[[], float] = monotonic,
@@ -174,7 +186,7 @@ class JobManager:
     def waiting_before(self, record: JobRecord) -> int:
         """Return the number of tasks ahead of a job in the queue of this server; 0 if another server has the job."""
         job = self._runner.get(record.id)
-        return 0 if job is None or job.place is None else self._scheduler.before(job.place)
+        return 0 if job is None or job.place is None else self._scheduler.tasks_ahead(job.place)
 
     async def watch(self, job_id: str, caller: Caller, after_revision: int) -> AsyncIterator[JobRecord]:
         """Yield a job whenever it has changed, up to its end.
@@ -276,7 +288,7 @@ class JobManager:
         ours |= self._runner.ids
         await self._runner.stop_all()
         try:
-            await self._store.put_back(ours, self._runner.replica, None)
+            await self._store.requeue(ours, self._runner.replica, None)
             await self._store.leave(self._runner.replica)
         except StoreUnavailableError:
             _log.error("the database is unavailable: jobs that have not ended will be resumed after the next start")

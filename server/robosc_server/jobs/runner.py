@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from robosc_server.failures import RefusedError, fault_message, public_failure
-from robosc_server.jobs.results import Results
+from robosc_server.jobs.result_cache import ResultCache
 from robosc_server.jobs.retention import Retention
 from robosc_server.jobs.scheduler import Place, Scheduler
 from robosc_server.jobs.watchers import Watchers
@@ -83,7 +83,7 @@ class JobRunner:
         self,
         store: Store,
         scheduler: Scheduler,
-        results: Results,
+        results: ResultCache,
         task_limits: TaskLimits,
         retention: Retention,
         watchers: Watchers,
@@ -152,7 +152,7 @@ class JobRunner:
         """Run queued jobs that this server does not run yet; none after `release_waiting`."""
         for record in () if self._is_closed else records:
             if record.id not in self._active and record.state is JobState.QUEUED:
-                job = ActiveJob(record, self._scheduler.enter_anyway(record.owner))
+                job = ActiveJob(record, self._scheduler.enter_unbounded(record.owner))
                 self._active[record.id] = job
                 self._start(job, record)
 
@@ -181,8 +181,8 @@ class JobRunner:
         await self.stop(waiting)
         with contextlib.suppress(StoreUnavailableError):  # Retried at the end of the shutdown.
             # Some may have started at this moment.
-            await self._store.put_back({job.record.id for job in waiting}, self.replica, None)
-            await self._store.give_up_waiting(self.replica)
+            await self._store.requeue({job.record.id for job in waiting}, self.replica, None)
+            await self._store.release_queued(self.replica)
 
     async def wait_for_running(self, seconds: float) -> None:
         """Wait for running jobs to end, at most so many seconds."""
@@ -215,7 +215,7 @@ class JobRunner:
             self._watchers.notify(accepted)
             if self._is_closed:
                 with contextlib.suppress(StoreUnavailableError):
-                    await self._store.give_up_waiting(self.replica)
+                    await self._store.release_queued(self.replica)
         else:
             self._start(job, accepted)
         return accepted, existed
@@ -246,7 +246,7 @@ class JobRunner:
         """Return the outcome of a job; None: it has ended, or belongs to another server."""
         pause_s = _RETRY_S
         while True:
-            place = job.place = job.place or self._scheduler.enter_anyway(job.record.owner)
+            place = job.place = job.place or self._scheduler.enter_unbounded(job.record.owner)
             await place.turn()
             if (wait_s := self._quota_wait_s(job)) > 0:
                 # It waits outside the queue, where it blocks no other task.
@@ -303,16 +303,16 @@ class JobRunner:
             is_lost: True if its worker was lost while it ran; that is counted.
         """
         job.place = None
-        with self._scheduler.aside(place):
-            is_noted = await self._put_back(job, is_lost=is_lost)
+        with self._scheduler.waiting_outside(place):
+            is_noted = await self._requeue_stored(job, is_lost=is_lost)
             await asyncio.sleep(pause_s)
-            while not (is_noted or await self._put_back(job, is_lost=is_lost)):
+            while not (is_noted or await self._requeue_stored(job, is_lost=is_lost)):
                 await asyncio.sleep(pause_s)
 
-    async def _put_back(self, job: ActiveJob, *, is_lost: bool) -> bool:
+    async def _requeue_stored(self, job: ActiveJob, *, is_lost: bool) -> bool:
         """Mark a job as queued in the database; return False if the database is unavailable."""
         try:
-            back = await self._store.put_back([job.record.id], self.replica, self.replica, is_lost=is_lost)
+            back = await self._store.requeue([job.record.id], self.replica, self.replica, is_lost=is_lost)
         except StoreUnavailableError:
             return False
         for record in back:

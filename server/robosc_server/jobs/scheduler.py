@@ -19,7 +19,7 @@ from robosc_server.failures import RefusedError
 from robosc_server.tasks.task import Failure, Outcome, Reason, Task, TaskLimits
 from robosc_server.workers import OnReport, WorkerLostError, Workers, WorkersError
 
-_LOOK_S = 1.0
+_POLL_S = 1.0
 """While tasks wait: how often it is looked whether there are more workers."""
 
 _FIRST_GUESS_S = 1.0
@@ -111,10 +111,10 @@ class Scheduler:
         self._waiting = 0
         self._running = 0
         self._running_of: Counter[str] = Counter()
-        self._aside: Counter[str] = Counter()
+        self._waiting_outside: Counter[str] = Counter()
         self._mean_s: float | None = None
         self._is_closed = False
-        self._look: asyncio.TimerHandle | None = None
+        self._poll_timer: asyncio.TimerHandle | None = None
         self._order: dict[Place, int] | None = None
 
     @property
@@ -198,7 +198,7 @@ class Scheduler:
             RefusedError: There is too much to do, or the server ends.
         """
         self.require_room(caller)
-        return self.enter_anyway(caller)
+        return self.enter_unbounded(caller)
 
     def require_room(self, caller: str) -> None:
         """Do nothing if `enter` would give a place.
@@ -208,11 +208,11 @@ class Scheduler:
         """
         if self._is_closed:
             raise RefusedError(Reason.SHUTTING_DOWN, "the server ends; ask another one, or later", retry_after_s=1.0)
-        waiting = self._waiting + self._aside.total()
+        waiting = self._waiting + self._waiting_outside.total()
         is_free = not waiting and self._running < self._workers.capacity
         name = network_of(caller)
         if not is_free and not self._is_reserved_for(name):
-            own = len(self._ring.get(name, ())) + self._aside[name]
+            own = len(self._ring.get(name, ())) + self._waiting_outside[name]
             if own and own >= self._waiting_of(caller):
                 after_s = self._retry_after_s(own * max(1, len(self._ring)))
                 raise RefusedError(Reason.SERVER_BUSY, "too many requests of yours wait already", after_s)
@@ -229,12 +229,12 @@ class Scheduler:
         own = None if self._accounts is None else self._accounts.waiting(caller)
         return self._limits.waiting_per_caller if own is None else own
 
-    def enter_anyway(self, caller: str) -> Place:
+    def enter_unbounded(self, caller: str) -> Place:
         """A place for a task that was accepted before: no bound holds."""
         place = Place(caller)
         self._ring.setdefault(place.line, deque()).append(place)
         self._waiting += 1
-        self._give_turns()
+        self._start_waiting()
         return place
 
     def leave(self, place: Place) -> None:
@@ -246,7 +246,7 @@ class Scheduler:
             self._running -= 1
             self._running_of[place.line] -= 1
             self._running_of += Counter()  # Without those that are none.
-            self._give_turns()
+            self._start_waiting()
             return
         line = self._ring.get(place.line)
         if line is not None and place in line:
@@ -257,26 +257,26 @@ class Scheduler:
                 del self._ring[place.line]
 
     @contextmanager
-    def aside(self, place: Place) -> Iterator[None]:
+    def waiting_outside(self, place: Place) -> Iterator[None]:
         """Give a place back and wait beside the line for something else, which counts like waiting in it."""
         self.leave(place)
-        self._aside[place.line] += 1
+        self._waiting_outside[place.line] += 1
         try:
             yield
         finally:
-            self._aside[place.line] -= 1
-            self._aside += Counter()
+            self._waiting_outside[place.line] -= 1
+            self._waiting_outside += Counter()
 
-    def before(self, place: Place) -> int:
+    def tasks_ahead(self, place: Place) -> int:
         """Return the number of tasks that would begin before a waiting one, if nothing else came.
 
         It is 0 for one that does not wait.
         """
         if self._order is None:
-            self._order = self._order_now()
+            self._order = self._current_order()
         return self._order.get(place, 0)
 
-    def _order_now(self) -> dict[Place, int]:
+    def _current_order(self) -> dict[Place, int]:
         lines = [iter(line) for line in self._ring.values()]
         order: dict[Place, int] = {}
         while lines:
@@ -289,17 +289,17 @@ class Scheduler:
             lines = kept
         return order
 
-    def _give_turns(self) -> None:
+    def _start_waiting(self) -> None:
         self._order = None
         while self._waiting and self._running < self._workers.capacity:
-            self._begin(next(iter(self._ring)))
+            self._start(next(iter(self._ring)))
         while (name := next(filter(self._is_reserved_for, self._ring), None)) is not None:
-            self._begin(name)
-        if self._waiting and self._look is None:
+            self._start(name)
+        if self._waiting and self._poll_timer is None:
             # Workers of a cluster come and go without telling.
-            self._look = asyncio.get_running_loop().call_later(_LOOK_S, self._look_again)
+            self._poll_timer = asyncio.get_running_loop().call_later(_POLL_S, self._poll_capacity)
 
-    def _begin(self, name: str) -> None:
+    def _start(self, name: str) -> None:
         """Give the next task of a line its turn; others in it wait for theirs at the end of the ring."""
         line = self._ring.pop(name)
         place = line.popleft()
@@ -311,9 +311,9 @@ class Scheduler:
         place._begun_s = self._clock()
         place._turn.set_result(None)
 
-    def _look_again(self) -> None:
-        self._look = None
-        self._give_turns()
+    def _poll_capacity(self) -> None:
+        self._poll_timer = None
+        self._start_waiting()
 
     def _retry_after_s(self, before: int) -> float:
         """About when so many tasks have begun, by how long tasks took lately."""

@@ -7,11 +7,11 @@ from typing import Any
 import grpc
 import grpc.aio
 
+from robosc_api import security
 from robosc_api.v1 import jobs_pb2 as pb
 from robosc_server.failures import RefusedError
 from robosc_server.jobs import convert
-from robosc_server.jobs.callers import Caller, caller_of
-from robosc_server.jobs.manager import JobManager
+from robosc_server.jobs.manager import Caller, JobManager
 from robosc_server.store import JobRecord
 from robosc_server.tasks.requests import RequestLimits
 from robosc_server.tasks.task import Reason, Task, TaskKind
@@ -23,7 +23,14 @@ _LIMITS = RequestLimits()
 type Context = grpc.aio.ServicerContext[Any, Any]
 
 
-def _anybody(caller: str) -> None:
+def caller_of(context: Any) -> Caller:
+    """Return the caller of the call under way."""
+    # A certificate may name anybody, in any characters; a database takes no NUL.
+    name = "".join(character if character.isprintable() else "?" for character in security.caller_of(context))
+    return Caller(name, security.is_admin())
+
+
+def _unlimited(caller: str) -> None:
     """Let each caller ask for as much as it likes."""
 
 
@@ -49,7 +56,7 @@ class JobService(convert.JobServiceServicer):
         manager: JobManager,
         accept: Callable[[TaskKind, bytes], Task],
         identify: Callable[[Context], Caller] = caller_of,
-        admit: Callable[[str], None] = _anybody,
+        admit: Callable[[str], None] = _unlimited,
         send: Callable[[Context, AsyncIterable[bytes]], Awaitable[None]] = _write,
         limits: RequestLimits = _LIMITS,
     ) -> None:
@@ -115,7 +122,7 @@ class JobService(convert.JobServiceServicer):
         chosen = convert.filter_of(request, caller.name)
         size = convert.page_size_of(request)
         # One more than asked for tells whether there are more.
-        found = await self._manager.list_jobs(chosen, convert.place_of(request.page_token, chosen), size + 1)
+        found = await self._manager.list_jobs(chosen, convert.page_position(request.page_token, chosen), size + 1)
         token = convert.page_token(found[size - 1], chosen) if len(found) > size else ""
         answer = pb.ListJobsResponse(next_page_token=token)
         for place in range(0, min(size, len(found)), _JOBS_AT_ONCE):
@@ -137,10 +144,10 @@ class JobService(convert.JobServiceServicer):
 
 def add_job_service(service: JobService, server: grpc.aio.Server) -> None:
     """Have a server offer it; results go out as the bytes that they are kept as, and submissions come in as bytes."""
-    convert.add_servicer(service, _BytesToo(server))  # type: ignore[no-untyped-call]  # generated
+    convert.add_servicer(service, _SerializedAdapter(server))  # type: ignore[no-untyped-call]  # generated
 
 
-class _BytesToo:
+class _SerializedAdapter:
     """Adapter that passes handlers on to a server, with a serializer that takes serialized messages, too.
 
     Args:

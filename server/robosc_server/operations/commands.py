@@ -14,8 +14,8 @@ from robosc_server.operations.settings import (
     add_settings_arguments,
     config_file_of,
     default_text,
+    format_value,
     settings_of,
-    shown,
     source_of,
 )
 from robosc_server.operations.settings_reference import example_file
@@ -141,18 +141,18 @@ def _settings_document(settings: Settings, arguments: argparse.Namespace) -> dic
         value = getattr(settings, name)
         is_set = name in settings.model_fields_set
         document[name] = {
-            "value": _plain(name, value),
+            "value": _json_value(name, value),
             "source": source_of(name, vars(arguments), config) if is_set else "default",
             "default": default_text(name),
         }
     return document
 
 
-def _plain(name: str, value: Any) -> Any:
+def _json_value(name: str, value: Any) -> Any:
     if value is None or isinstance(value, bool | int | float):
         return value
     # It may hold a password.
-    return "set, not shown" if name == "database_url" else shown(name, value)
+    return "set, not shown" if name == "database_url" else format_value(name, value)
 
 
 def _print_json(document: dict[str, Any]) -> None:

@@ -35,7 +35,7 @@ from robosc_api.security import (
 from robosc_api.security.addresses import split
 from robosc_api.security.listening import read
 from robosc_server.operations.metrics import check_metrics_address
-from robosc_server.operations.settings import Confinement, Settings, shown
+from robosc_server.operations.settings import Confinement, Settings, format_value
 from robosc_server.signing import SigningError, read_signing_key
 from robosc_server.store.errors import StoreError
 from robosc_server.store.factory import DATABASE_FILE, is_in_use
@@ -250,10 +250,11 @@ def _workers(settings: Settings) -> Iterator[tuple[Grade, str]]:
     wanted = settings.worker_processes * settings.task_memory_bytes
     there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if wanted > there:
+        size = format_value("task_memory_bytes", settings.task_memory_bytes)
         yield (
             Grade.WARNING,
-            f"{settings.worker_processes} processes of {shown('task_memory_bytes', settings.task_memory_bytes)} may "
-            "together want more memory than this machine has",
+            f"{settings.worker_processes} worker processes with {size} each may exceed the memory of this machine: "
+            "lower worker_processes or task_memory_bytes",
         )
     else:
         yield Grade.OK, f"{settings.worker_processes} local processes"

@@ -10,9 +10,9 @@ from robosc_server.clock import monotonic
 from robosc_server.operations.health import Health
 from robosc_server.operations.interceptor import CallInterceptor
 
-_LOOK_S = 0.05
+_POLL_S = 0.05
 
-_LAST_WORDS_S = 0.2
+_FLUSH_S = 0.2
 """Time that small answers have to get on the wire after they were handed to gRPC, in seconds."""
 
 
@@ -62,7 +62,7 @@ async def drain(
     calls.refuse_new()
     log.info("draining", calls=calls.under_way(idle_methods))
     while (calls.under_way(idle_methods) or unread_bytes()) and monotonic() - begun_s < seconds:
-        await asyncio.sleep(_LOOK_S)
+        await asyncio.sleep(_POLL_S)
     left = calls.under_way(idle_methods)
-    await stop(server, _LAST_WORDS_S)
+    await stop(server, _FLUSH_S)
     log.info("drained", seconds=round(monotonic() - begun_s, 3), cancelled=left)

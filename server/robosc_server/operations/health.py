@@ -62,36 +62,38 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
             else:
                 log.warning("condition does not hold", condition=name)
             self._conditions[name] = holds
-            self._tell()
+            self._notify()
 
     def drain(self) -> None:
         """From now on nothing is well: whoever hands calls to servers chooses another one."""
         self._is_draining = True
-        self._tell()
+        self._notify()
 
     @asynccontextmanager
-    async def following(self, probes: Mapping[str, Probe], every_s: float = 2.0) -> AsyncIterator[None]:
+    async def probing(self, probes: Mapping[str, Probe], every_s: float = 2.0) -> AsyncIterator[None]:
         """Ask again and again whether conditions hold; each was asked once before the context begins.
 
         Args:
             probes: By condition, who knows; one that raises or takes long says no.
             every_s: Seconds between the end of a question and the next.
         """
-        await asyncio.gather(*(self._ask(name, probe) for name, probe in probes.items()))
+        await asyncio.gather(*(self._probe(name, probe) for name, probe in probes.items()))
         async with asyncio.TaskGroup() as group:
-            tasks = [group.create_task(self._follow(name, probe, every_s)) for name, probe in probes.items()]
+            tasks = [
+                group.create_task(self._probe_periodically(name, probe, every_s)) for name, probe in probes.items()
+            ]
             try:
                 yield
             finally:
                 for task in tasks:
                     task.cancel()
 
-    async def _follow(self, name: str, probe: Probe, every_s: float) -> None:
+    async def _probe_periodically(self, name: str, probe: Probe, every_s: float) -> None:
         while True:
             await asyncio.sleep(every_s)
-            await self._ask(name, probe)
+            await self._probe(name, probe)
 
-    async def _ask(self, name: str, probe: Probe) -> None:
+    async def _probe(self, name: str, probe: Probe) -> None:
         try:
             async with asyncio.timeout(_PROBE_LIMIT_S):
                 holds = await probe()
@@ -100,7 +102,7 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
             holds = False
         self.set_condition(name, holds)
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         self._changed.set()
         self._changed = asyncio.Event()
 

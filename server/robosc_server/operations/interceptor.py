@@ -16,9 +16,8 @@ from robosc_api.security import CALLER
 from robosc_api.streams import writing
 from robosc_server.clock import monotonic
 from robosc_server.failures import RefusedError, abort, code_of, fault_message
-from robosc_server.operations.logs import log_fault
+from robosc_server.operations.logs import REQUEST_ID, REQUEST_ID_HEADER, log_fault, request_id_of
 from robosc_server.operations.metrics import MethodMetrics, Metrics
-from robosc_server.operations.request_ids import HEADER, REQUEST_ID, request_id_of
 from robosc_server.operations.tracing import NO_TRACING, Tracing
 from robosc_server.tasks.task import Reason
 
@@ -90,7 +89,7 @@ class CallInterceptor(Layer):
             metrics.under_way += 1
             code = grpc.StatusCode.OK
             try:
-                context.set_trailing_metadata(((HEADER, REQUEST_ID.get()),))
+                context.set_trailing_metadata(((REQUEST_ID_HEADER, REQUEST_ID.get()),))
                 if self._is_refusing:
                     _refuse(method)
                 answer = await inner(request, context)

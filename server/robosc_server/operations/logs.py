@@ -13,15 +13,15 @@ import sys
 import time
 import traceback
 from collections.abc import MutableMapping
+from contextvars import ContextVar
 from types import TracebackType
 from typing import Any, TextIO
 
 import msgspec
 import structlog
 
-from robosc_server.operations.request_ids import REQUEST_ID
 from robosc_server.operations.settings import LogFormat, LogLevel
-from robosc_server.operations.worker_output import bounded, loggable_fields
+from robosc_server.operations.worker_output import last_part, loggable_fields
 
 _LEVELS = {
     LogLevel.DEBUG: logging.DEBUG,
@@ -30,11 +30,31 @@ _LEVELS = {
     LogLevel.ERROR: logging.ERROR,
 }
 # They tell at the level info what helps their developers alone.
-_TALKATIVE = ("asyncio", "distributed", "opentelemetry", "sqlalchemy")
+_VERBOSE_LIBRARIES = ("asyncio", "distributed", "opentelemetry", "sqlalchemy")
 _FRAMES = 12
 _PLAIN = re.compile(r"[A-Za-z0-9._:/+@,%'()\[\]-]+\Z")
 
 type _Line = MutableMapping[str, Any]
+
+
+REQUEST_ID_HEADER = "x-request-id"
+"""Metadata that a caller may send, and that comes back behind the answer."""
+
+REQUEST_ID: ContextVar[str] = ContextVar("request_id", default="")
+"""Identifier of the call under way; empty: no call."""
+
+_REQUEST_ID_FORM = re.compile(r"[A-Za-z0-9._:/+=@-]{1,128}\Z")
+
+
+def request_id_of(metadata: Any) -> str:
+    """The id in a call's metadata, or a new one: there is none, it is odd, or there are several."""
+    found = None
+    for key, value in metadata or ():
+        if key == REQUEST_ID_HEADER:
+            if found is not None or not _REQUEST_ID_FORM.match(value):
+                return secrets.token_hex(8)
+            found = value
+    return found or secrets.token_hex(8)
 
 
 def configure_logging(log_format: LogFormat, log_level: LogLevel, stream: TextIO | None = None) -> None:
@@ -48,7 +68,7 @@ def configure_logging(log_format: LogFormat, log_level: LogLevel, stream: TextIO
     target = sys.stderr if stream is None else stream
     level = _LEVELS[log_level]
     renderer = _json if log_format is LogFormat.JSON else _text
-    exceptions = _exception_in_full if log_level is LogLevel.DEBUG else _exception_without_words
+    exceptions = _exception_in_full if log_level is LogLevel.DEBUG else _exception_without_message
     common = [_time_and_request, exceptions]
     structlog.configure(
         processors=[structlog.processors.add_log_level, *common, renderer],
@@ -72,7 +92,7 @@ def configure_logging(log_format: LogFormat, log_level: LogLevel, stream: TextIO
             root.removeHandler(old)
     root.addHandler(handler)
     root.setLevel(level)
-    for name in _TALKATIVE:
+    for name in _VERBOSE_LIBRARIES:
         logging.getLogger(name).setLevel(max(level, logging.WARNING))
 
 
@@ -87,7 +107,7 @@ def log_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT") -> str
     identity = secrets.token_hex(4)
     log = structlog.get_logger()
     if isinstance(fault, str):
-        known, words = loggable_fields(fault), bounded(fault)
+        known, words = loggable_fields(fault), last_part(fault)
     else:
         known = {"error": type(fault).__qualname__, "places": _places(fault.__traceback__)}
         words = "".join(traceback.format_exception(fault))
@@ -132,7 +152,7 @@ def _error_of(line: _Line) -> BaseException | None:
     return given if isinstance(given, BaseException) else None
 
 
-def _exception_without_words(logger: Any, name: str, line: _Line) -> _Line:
+def _exception_without_message(logger: Any, name: str, line: _Line) -> _Line:
     error = _error_of(line)
     if error is not None:
         line["error"] = type(error).__qualname__

@@ -111,18 +111,18 @@ class Metrics:
         Gauge("robosc_server_calls_under_way", "Calls that have begun and not ended.", registry=registry).set_function(
             lambda: self.calls_under_way
         )
-        self._waiting: Callable[[], int] = _nothing
-        self._running: Callable[[], int] = _nothing
+        self._waiting: Callable[[], int] = _zero
+        self._running: Callable[[], int] = _zero
         self._jobs: Callable[[], Mapping[str, int]] = dict
         self._conditions: Callable[[], Mapping[str, bool]] = dict
-        self._restarts: Callable[[], int] = _nothing
+        self._restarts: Callable[[], int] = _zero
         Gauge("robosc_server_tasks_waiting", "Tasks that wait for a worker.", registry=registry).set_function(
             lambda: self._waiting()
         )
         Gauge("robosc_server_tasks_running", "Tasks that workers are at.", registry=registry).set_function(
             lambda: self._running()
         )
-        registry.register(_Asked(self))
+        registry.register(_LabelledCollector(self))
         self._methods: dict[str, MethodMetrics] = {}
 
     def method(self, name: str) -> MethodMetrics:
@@ -171,7 +171,7 @@ class Metrics:
         """Count a request whose result was not there."""
         self._lookups.labels("none").inc()
 
-    def follow(
+    def set_sources(
         self,
         *,
         waiting: Callable[[], int] | None = None,
@@ -195,7 +195,7 @@ class Metrics:
         self._conditions = conditions or self._conditions
         self._restarts = restarts or self._restarts
 
-    def followed(self) -> Iterable[Metric]:
+    def labelled_metrics(self) -> Iterable[Metric]:
         """Return the metrics whose values are asked for, and that have labels."""
         jobs = GaugeMetricFamily("robosc_server_jobs", "Jobs that are kept, by state.", labels=("state",))
         for state, number in sorted(self._jobs().items()):
@@ -216,16 +216,16 @@ class Metrics:
         return generate_latest(self._registry)
 
 
-def _nothing() -> int:
+def _zero() -> int:
     return 0
 
 
-class _Asked:
+class _LabelledCollector:
     def __init__(self, metrics: Metrics) -> None:
         self._metrics = metrics
 
     def collect(self) -> Iterable[Metric]:
-        return self._metrics.followed()
+        return self._metrics.labelled_metrics()
 
 
 class MetricsEndpoint:

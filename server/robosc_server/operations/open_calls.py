@@ -11,7 +11,7 @@ from robosc_server.failures import RefusedError
 from robosc_server.tasks.task import Reason
 
 HEALTH_CALLS = 1000
-"""Health checks that are open at once, from this machine and from elsewhere: they need no token, and so have places of
+"""Health checks that are open at once, from this machine and from elsewhere: they need no token, and so have slots of
 their own."""
 
 HEALTH_CALLS_PER_CALLER = 50
@@ -54,39 +54,39 @@ class OpenCalls(Layer):
     ) -> None:
         super().__init__()
         self._identify = identify
-        self._places, self._health_places = _Places(limits), _Places(health)
+        self._slots, self._health_slots = _CallSlots(limits), _CallSlots(health)
         # Of whoever looks after this machine, whom nobody from elsewhere can crowd out.
-        self._own_health_places = _Places(health)
+        self._own_health_slots = _CallSlots(health)
 
     @property
     def count(self) -> int:
         """Calls that are open, health checks aside."""
-        return self._places.taken
+        return self._slots.taken
 
     def around(self, inner: Any, method: str) -> Any:
         """A handler behind a look at how many calls there are."""
         behaviour = behaviour_of(inner)
-        identify, places = self._identify, self._places
+        identify, slots = self._identify, self._slots
 
         # They give what the handler gives, and are none: one more coroutine would cost every call some time.
         def counted(request: Any, context: Any) -> Any:
-            places.take(network_of(identify(context)), context)
+            slots.take(network_of(identify(context)), context)
             return behaviour(request, context)
 
         def counted_apart(request: Any, context: Any) -> Any:
             is_own = is_loopback_peer(context.peer())
-            places = self._own_health_places if is_own else self._health_places
-            places.take(network_of(identify(context)), context)
+            slots = self._own_health_slots if is_own else self._health_slots
+            slots.take(network_of(identify(context)), context)
             return behaviour(request, context)
 
         return with_behaviour(inner, counted_apart if method.startswith(_HEALTH) else counted)
 
 
-class _Places:
+class _CallSlots:
     """Places for the calls of some methods.
 
     Attributes:
-        taken: Number of places that are taken.
+        taken: Number of slots that are taken.
     """
 
     def __init__(self, limits: CallLimits) -> None:
@@ -111,7 +111,7 @@ class _Places:
             message = f"a caller may have {limit} calls open at once, watches included"
             raise RefusedError(Reason.QUOTA_EXCEEDED, message, _RETRY_S)
         if self.taken >= self._limits.calls:
-            raise RefusedError(Reason.SERVER_BUSY, "as many calls are open as this server has places for", _RETRY_S)
+            raise RefusedError(Reason.SERVER_BUSY, "as many calls are open as this server has slots for", _RETRY_S)
         self._by_caller[caller] = count + 1
         self.taken += 1
         # When the call is over for gRPC, too: whoever reads no answer holds it when the handler has long ended.

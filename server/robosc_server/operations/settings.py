@@ -136,14 +136,14 @@ def _state_folder() -> Path:
 
 def _setting(default: Any, words: str, group: str, **more: Any) -> Any:
     """A field: its default (or what makes it, with the words for that), what the manual says, its group there."""
-    extra = {"group": group, "default": more.pop("told", None), "metavar": more.pop("metavar", None)}
+    extra = {"group": group, "default": more.pop("default_words", None), "metavar": more.pop("metavar", None)}
     if callable(default):
         return Field(default_factory=default, description=words, json_schema_extra=extra, **more)
     return Field(default=default, description=words, json_schema_extra=extra, **more)
 
 
 _LISTENING, _SECURITY, _LIMITS, _QUEUE = "listening", "security", "limits of one task", "queue"
-_KEEPING, _WORKING, _WATCHING = "jobs and results", "workers", "operations"
+_STORAGE, _WORKERS, _OPERATIONS = "jobs and results", "workers", "operations"
 
 
 class Settings(BaseModel):
@@ -163,7 +163,7 @@ class Settings(BaseModel):
     )
 
     tls_certificate: Path | None = _setting(
-        None, "certificate chain (PEM): listen with TLS", _SECURITY, metavar="FILE", told="no TLS"
+        None, "certificate chain (PEM): listen with TLS", _SECURITY, metavar="FILE", default_words="no TLS"
     )
     tls_key: Path | None = _setting(None, "its private key (PEM)", _SECURITY, metavar="FILE")
     client_ca: Path | None = _setting(
@@ -171,14 +171,14 @@ class Settings(BaseModel):
         "callers need a certificate that one of these (PEM) has signed",
         _SECURITY,
         metavar="FILE",
-        told="callers need no certificate",
+        default_words="callers need no certificate",
     )
     tokens: Path | None = _setting(
         None,
         "callers need a token of this file (see `robosc-server token`)",
         _SECURITY,
         metavar="FILE",
-        told="callers need no token",
+        default_words="callers need no token",
     )
     insecure_beyond_loopback: bool = _setting(
         False, "listen without TLS where other machines reach it, on a network that you trust", _SECURITY
@@ -188,7 +188,7 @@ class Settings(BaseModel):
         "Ed25519 private key (PEM) that supervisors are signed with",
         _SECURITY,
         metavar="FILE",
-        told="supervisors are not signed",
+        default_words="supervisors are not signed",
     )
 
     bundle_bytes: _Bytes = _setting(2**20, "largest model with its libraries: all names and texts", _LIMITS)
@@ -217,70 +217,74 @@ class Settings(BaseModel):
     workers: Annotated[str, AfterValidator(_workers)] = _setting(
         "local",
         "who works: `local` processes, or a Dask cluster, `dask://HOST:PORT` or `dask+tls://HOST:PORT`",
-        _WORKING,
+        _WORKERS,
         metavar="WHERE",
     )
     worker_processes: Annotated[_Count, Field(le=1024)] = _setting(
         _processors,
         "local tasks worked on at once, each in its own process",
-        _WORKING,
-        told="the number of processors",
+        _WORKERS,
+        default_words="the number of processors",
     )
 
     confinement: Confinement = _setting(
         Confinement.BEST_EFFORT,
         "required: no task is done where the kernel cannot keep its process from files, network and other processes;"
         " best-effort: what is missing is told, and tasks are done",
-        _WORKING,
+        _WORKERS,
     )
 
     state_dir: Path = _setting(
         _state_folder,
         "folder for jobs and results, unless there is a database_url",
-        _KEEPING,
+        _STORAGE,
         metavar="FOLDER",
-        told="$XDG_STATE_HOME/robosc-server, or ~/.local/state/robosc-server",
+        default_words="$XDG_STATE_HOME/robosc-server, or ~/.local/state/robosc-server",
     )
     database_url: Annotated[str, AfterValidator(_database)] | None = _setting(
         None,
         "database for jobs and results: postgresql://USER:PASSWORD@HOST:PORT/NAME, which several servers may share, or"
         " sqlite:///FILE",
-        _KEEPING,
+        _STORAGE,
         metavar="URL",
-        told="SQLite in state_dir",
+        default_words="SQLite in state_dir",
         repr=False,
     )
     retention_seconds: _Seconds = _setting(
-        7 * 86400.0, "seconds that a job and its result are kept after its end", _KEEPING
+        7 * 86400.0, "seconds that a job and its result are kept after its end", _STORAGE
     )
     jobs_per_caller: _Count = _setting(
-        10_000, "jobs of one caller that are kept; beyond, those that ended first are forgotten", _KEEPING
+        10_000, "jobs of one caller that are kept; beyond, those that ended first are forgotten", _STORAGE
     )
     results_bytes: _Bytes = _setting(
         2 * 2**30,
         "results kept, in the database; beyond, whoever has most gives first, of what was unused longest",
-        _KEEPING,
+        _STORAGE,
     )
     memory_cache_bytes: Annotated[int, BeforeValidator(_bytes), BeforeValidator(_whole), Field(ge=0, le=2**50)] = (
-        _setting(64 * 2**20, "results kept in memory as well; 0: none", _KEEPING)
+        _setting(64 * 2**20, "results kept in memory as well; 0: none", _STORAGE)
     )
 
-    log_format: LogFormat = _setting(LogFormat.TEXT, "how lines of the log look: text or json", _WATCHING)
+    log_format: LogFormat = _setting(LogFormat.TEXT, "how lines of the log look: text or json", _OPERATIONS)
     log_level: LogLevel = _setting(
-        LogLevel.INFO, "debug, info, warning or error; nothing of a model is logged above debug", _WATCHING
+        LogLevel.INFO, "debug, info, warning or error; nothing of a model is logged above debug", _OPERATIONS
     )
     metrics_address: Annotated[str, AfterValidator(_host_and_port)] | None = _setting(
-        None, "where Prometheus finds metrics, over HTTP at /metrics", _WATCHING, metavar="HOST:PORT", told="nowhere"
+        None,
+        "where Prometheus finds metrics, over HTTP at /metrics",
+        _OPERATIONS,
+        metavar="HOST:PORT",
+        default_words="nowhere",
     )
     metrics_beyond_loopback: bool = _setting(
-        False, "metrics may be where other machines reach them; they are in the clear and for everybody", _WATCHING
+        False, "metrics may be where other machines reach them; they are in the clear and for everybody", _OPERATIONS
     )
     tracing_endpoint: Annotated[str, AfterValidator(_endpoint)] | None = _setting(
         None,
         "receiver of traces, with OTLP over gRPC, such as http://127.0.0.1:4317",
-        _WATCHING,
+        _OPERATIONS,
         metavar="URL",
-        told="nowhere",
+        default_words="nowhere",
     )
 
     @property
@@ -323,7 +327,7 @@ class SettingsError(Exception):
         self.problems = tuple(problems)
 
 
-class _Given(BaseSettings, Settings):
+class _SourcedSettings(BaseSettings, Settings):
     """The same from all sources."""
 
     model_config = SettingsConfigDict(
@@ -362,16 +366,16 @@ def settings_from(flags: Mapping[str, Any], config: Path | None) -> Settings:
     """
     content = {} if config is None else read_file(config)
 
-    class Given(_Given):
+    class SourcedSettings(_SourcedSettings):
         from_file = content
 
     try:
-        given = Given(**flags)
+        given = SourcedSettings(**flags)
     except ValidationError as error:
         problems = []
         for problem in error.errors(include_url=False, include_context=False):
             place = source_of(str(problem["loc"][0]), flags, config)
-            problems.append(f"{place}: {_sentence(problem['type'], problem['msg'])}")
+            problems.append(f"{place}: {_problem_text(problem['type'], problem['msg'])}")
         raise SettingsError(problems) from None
     return Settings.model_construct(given.model_fields_set, **dict(given))
 
@@ -387,7 +391,7 @@ def source_of(name: str, flags: Mapping[str, Any], config: Path | None) -> str:
     return f"{config}: {name}"
 
 
-_SENTENCES = {
+_PROBLEM_TEXTS = {
     "extra_forbidden": "there is no such setting; `robosc-server example-config` prints all",
     "int_parsing": "a whole number is needed",
     "int_type": "a whole number is needed",
@@ -400,8 +404,8 @@ _SENTENCES = {
 }
 
 
-def _sentence(kind: str, message: str) -> str:
-    return _SENTENCES.get(kind) or message.replace("Input should be", "it should be")
+def _problem_text(kind: str, message: str) -> str:
+    return _PROBLEM_TEXTS.get(kind) or message.replace("Input should be", "it should be")
 
 
 def read_file(path: Path) -> dict[str, Any]:
@@ -445,10 +449,10 @@ def default_text(name: str) -> str:
         return str(extra["default"])
     if field.default is None or field.default is PydanticUndefined:
         return "none"
-    return str(field.default).lower() if isinstance(field.default, bool) else shown(name, field.default)
+    return str(field.default).lower() if isinstance(field.default, bool) else format_value(name, field.default)
 
 
-def shown(name: str, value: Any) -> str:
+def format_value(name: str, value: Any) -> str:
     """A value as the manual and a file have it: bytes with a unit, seconds without needless digits."""
     if isinstance(value, bool):
         return str(value).lower()

@@ -11,8 +11,8 @@ from robosc_server.operations.settings import (
     default_text,
     description_of,
     flag_of,
+    format_value,
     group_of,
-    shown,
     variable_of,
 )
 
@@ -53,7 +53,7 @@ def example_file() -> str:
 def _literal(name: str) -> str:
     default = Settings.model_fields[name].default
     value: Any = _EXAMPLES.get(name) if default is None or default is PydanticUndefined else default
-    text = shown(name, value)
+    text = format_value(name, value)
     is_number = (isinstance(value, bool | int | float) and text.lower() in ("true", "false")) or _is_number(text)
     return text if is_number else json.dumps(text)
 

@@ -30,21 +30,21 @@ def loggable_fields(words: str) -> dict[str, object]:
         words: Words of a worker, such as a traceback, or the facts of `workers.endings`.
     """
     lines = [line[:_LINE_CHARACTERS] for line in words.split("\n")]
-    told: dict[str, object] = {}
+    fields: dict[str, object] = {}
     if EXIT_DESCRIPTION.fullmatch(lines[0]):
-        told["ending"] = lines[0]
+        fields["ending"] = lines[0]
     lines = lines[-_LINES:]
     kinds = [match[1] for line in lines if (match := _KIND.fullmatch(line)) and _is_exception(match[1])]
     if kinds:
-        told["error"] = kinds[-1]
+        fields["error"] = kinds[-1]
     found = [match for line in lines if (match := _PLACE.match(line))][-_PLACES:]
     places = [f"{match[1]}:{match[2]}" for match in found if _is_ours(match[1])]
     if places:
-        told["places"] = places
-    return told
+        fields["places"] = places
+    return fields
 
 
-def bounded(words: str) -> str:
+def last_part(words: str) -> str:
     """The end of a worker's words, where a traceback has the fault; for the level debug."""
     return words if len(words) <= _WORDS else f"[...]{words[-_WORDS:]}"
 

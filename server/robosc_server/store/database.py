@@ -31,14 +31,14 @@ _PENDING = 2048
 _TRIES = 3
 """Number of tries of a change that meets another one of the same rows."""
 
-_STEPS = 100_000
+_PROGRESS_STEPS = 100_000
 """Steps of SQLite's machine, some milliseconds, after which a statement asks if its transaction was given up."""
 
 _PAUSE_S = 0.5
 """After a connection has failed: for how long nothing is tried."""
 
-_FAULTS_OF_OURS = (IntegrityError, ProgrammingError, DataError)
-_COLLISIONS = frozenset({"40001", "40P01"})  # serialization_failure, deadlock_detected
+_PROGRAMMING_ERRORS = (IntegrityError, ProgrammingError, DataError)
+_CONFLICTS = frozenset({"40001", "40P01"})  # serialization_failure, deadlock_detected
 
 
 class _Transaction[T]:
@@ -67,7 +67,7 @@ class _Transaction[T]:
             try:
                 return self._run_once()
             except DBAPIError as error:
-                if self._is_abandoned or not tries_left or not _is_collision(error):
+                if self._is_abandoned or not tries_left or not _is_conflict(error):
                     raise
         raise AssertionError("unreachable: the last try returns or raises")
 
@@ -76,7 +76,7 @@ class _Transaction[T]:
         with self._lock:
             self._is_abandoned = True
             if self._driver_connection is not None:
-                _cut_off(self._driver_connection)
+                _abort_connection(self._driver_connection)
 
     def _run_once(self) -> T:
         if self._is_abandoned:
@@ -87,7 +87,7 @@ class _Transaction[T]:
             is_sqlite = isinstance(driver_connection, sqlite3.Connection)
             if is_sqlite:
                 # An interrupt between two statements is lost: the next one is to end as well.
-                driver_connection.set_progress_handler(lambda: self._is_abandoned, _STEPS)
+                driver_connection.set_progress_handler(lambda: self._is_abandoned, _PROGRESS_STEPS)
             with self._lock:
                 self._driver_connection = driver_connection
             try:
@@ -100,7 +100,7 @@ class _Transaction[T]:
                     driver_connection.set_progress_handler(None, 0)
 
 
-def _cut_off(driver_connection: Any) -> None:
+def _abort_connection(driver_connection: Any) -> None:
     if isinstance(driver_connection, sqlite3.Connection):
         driver_connection.interrupt()
         return
@@ -112,8 +112,8 @@ def _cut_off(driver_connection: Any) -> None:
             duplicate.close()
 
 
-def _is_collision(error: DBAPIError) -> bool:
-    return isinstance(error, IntegrityError) or getattr(error.orig, "sqlstate", None) in _COLLISIONS
+def _is_conflict(error: DBAPIError) -> bool:
+    return isinstance(error, IntegrityError) or getattr(error.orig, "sqlstate", None) in _CONFLICTS
 
 
 class Database:
@@ -194,17 +194,17 @@ class Database:
         try:
             # Who waits may be cancelled; the transaction goes on then.
             result = await asyncio.wait_for(asyncio.shield(future), self._answer_s)
-        except _FAULTS_OF_OURS:
+        except _PROGRAMMING_ERRORS:
             raise
         except (DBAPIError, PoolTimeoutError, TimeoutError) as error:
             if isinstance(error, TimeoutError):
-                future.add_done_callback(_drop)
+                future.add_done_callback(_consume_outcome)
                 future.cancel()
                 transaction.abandon()
             self._note_failure(error, is_write=is_write)
             raise StoreUnavailableError from error
         except asyncio.CancelledError:
-            future.add_done_callback(_drop)
+            future.add_done_callback(_consume_outcome)
             raise
         self._note_success(is_write=is_write)
         return result
@@ -230,7 +230,7 @@ class Database:
             _log.warning("the database can be used again")
 
 
-def _drop(future: asyncio.Future[Any]) -> None:
+def _consume_outcome(future: asyncio.Future[Any]) -> None:
     """Take notice of how something ended that nobody waits for."""
     if not future.cancelled():
         future.exception()

@@ -209,7 +209,7 @@ def begin(connection: Connection, job_id: str, replica: str, now_us: int) -> tup
     return begun, bytes(connection.scalar(_REQUEST, {"of": job_id}) or b"")
 
 
-def put_back(
+def requeue(
     connection: Connection, ids: Collection[str], replica: str, next_replica: str | None, *, is_lost: bool
 ) -> list[JobRecord]:
     """Have running jobs wait again that were interrupted; the attempt does not count.
@@ -231,7 +231,7 @@ def put_back(
     return found
 
 
-def give_up_waiting(connection: Connection, replica: str) -> None:
+def release_queued(connection: Connection, replica: str) -> None:
     """Leave the jobs of a server that wait to whoever finds them first."""
     connection.execute(
         update(JOBS).where(JOBS.c.replica == replica, JOBS.c.state == JobState.QUEUED).values(replica=None)
@@ -263,7 +263,7 @@ def cancel(connection: Connection, job_id: str, now_us: int) -> JobRecord | None
     return _end(connection, record, JobState.CANCELLED, now_us)
 
 
-def note_progress(connection: Connection, replica: str, progress: dict[str, tuple[int, Report]]) -> None:
+def write_progress(connection: Connection, replica: str, progress: dict[str, tuple[int, Report]]) -> None:
     """Keep what workers have told, with the revisions that it has brought jobs to."""
     for job_id, (revision, report) in progress.items():
         connection.execute(

@@ -35,12 +35,12 @@ def beats_of_others(connection: Connection, replica: str) -> dict[str, int]:
     return {row.id: row.beats for row in rows}
 
 
-def leave_dead(connection: Connection, dead: Mapping[str, int]) -> None:
+def remove_dead(connection: Connection, dead: Mapping[str, int]) -> None:
     """Tell that servers are gone that have not counted on from the numbers given; their jobs are nobody's then."""
     for name, beats in dead.items():
         connection.execute(delete(REPLICAS).where(REPLICAS.c.id == name, REPLICAS.c.beats == beats))
 
 
-def leave_others(connection: Connection, ours: str) -> None:
+def remove_others(connection: Connection, ours: str) -> None:
     """Tell that there is no other server; all jobs but ours are nobody's then."""
     connection.execute(delete(REPLICAS).where(REPLICAS.c.id != ours))

@@ -19,9 +19,9 @@ from robosc_server.tasks.task import Failure, Report, Result, TaskKind
 
 _SWEPT_AT_ONCE = 200
 _TAKEN_AT_ONCE = 200
-_THINNED_AT_ONCE = 50
+_EVICTED_AT_ONCE = 50
 _FREE_PAGES = 2000
-_SWEEPING = 0x526F626F5343
+_SWEEP_LOCK = 0x526F626F5343
 """The advisory lock of PostgreSQL that one of several servers has while it makes room: any number that is ours."""
 
 
@@ -112,19 +112,19 @@ class Store:
         now_us = self.now_us()
         return await self._database.write(lambda connection: job_rows.begin(connection, job_id, replica, now_us))
 
-    async def put_back(
+    async def requeue(
         self, ids: Collection[str], replica: str, next_replica: str | None, *, is_lost: bool = False
     ) -> list[JobRecord]:
-        """Have running jobs wait again; see `job_rows.put_back`. In small transactions."""
+        """Have running jobs wait again; see `job_rows.requeue`. In small transactions."""
         found: list[JobRecord] = []
         for some in batched(sorted(ids), _TAKEN_AT_ONCE):
-            work = partial(job_rows.put_back, ids=some, replica=replica, next_replica=next_replica, is_lost=is_lost)
+            work = partial(job_rows.requeue, ids=some, replica=replica, next_replica=next_replica, is_lost=is_lost)
             found += await self._database.write(work)
         return found
 
-    async def give_up_waiting(self, replica: str) -> None:
+    async def release_queued(self, replica: str) -> None:
         """Leave the jobs of a server that wait to whoever finds them first."""
-        await self._database.write(lambda connection: job_rows.give_up_waiting(connection, replica))
+        await self._database.write(lambda connection: job_rows.release_queued(connection, replica))
 
     async def end(self, job_id: str, replica: str, outcome: Result | Failure) -> JobRecord | None:
         """End a job; None: it has ended, or is another server's."""
@@ -142,13 +142,13 @@ class Store:
         now_us = self.now_us()
         return await self._database.write(lambda connection: job_rows.cancel(connection, job_id, now_us))
 
-    async def note_progress(self, replica: str, progress: Mapping[str, tuple[int, Report]]) -> None:
-        """Keep what workers have told; see `job_rows.note_progress`."""
+    async def write_progress(self, replica: str, progress: Mapping[str, tuple[int, Report]]) -> None:
+        """Keep what workers have told; see `job_rows.write_progress`."""
         told = {
             job_id: (revision, Report(job_rows.clean(report.stage), job_rows.clean(report.message)))
             for job_id, (revision, report) in progress.items()
         }
-        await self._database.write(lambda connection: job_rows.note_progress(connection, replica, told))
+        await self._database.write(lambda connection: job_rows.write_progress(connection, replica, told))
 
     async def active_of(self, replica: str) -> list[JobRecord]:
         """The jobs of a server that have not ended, the oldest first."""
@@ -164,7 +164,7 @@ class Store:
         def work(connection: Connection) -> None:
             replica_rows.enter(connection, replica)
             if not self.is_shared:
-                replica_rows.leave_others(connection, replica)
+                replica_rows.remove_others(connection, replica)
 
         await self._database.write(work)
         if not self.is_shared:
@@ -174,7 +174,7 @@ class Store:
         """Tell that a server is gone; its jobs that wait are left to others."""
 
         def work(connection: Connection) -> None:
-            job_rows.give_up_waiting(connection, replica)
+            job_rows.release_queued(connection, replica)
             replica_rows.leave(connection, replica)
 
         await self._database.write(work)
@@ -196,7 +196,7 @@ class Store:
             The jobs that have changed.
         """
         if dead:
-            await self._database.write(lambda connection: replica_rows.leave_dead(connection, dead))
+            await self._database.write(lambda connection: replica_rows.remove_dead(connection, dead))
         return await self._take_orphans(replica)
 
     async def keep_results(self, results: Sequence[tuple[str, TaskKind, Result, str]]) -> None:
@@ -253,10 +253,10 @@ class Store:
         while swept := await self._database.write(partial(job_rows.sweep, now_us=now_us, limit=_SWEPT_AT_ONCE)):
             total += swept
         if await self.size_of_needed() >= results_bytes:
-            total += await self._thin(job_rows.results_by_owner, job_rows.forget, results_bytes * 9 // 10)
-        await self._thin(result_rows.sizes_by_owner, result_rows.trim, results_bytes)
+            total += await self._evict_down_to(job_rows.results_by_owner, job_rows.forget, results_bytes * 9 // 10)
+        await self._evict_down_to(result_rows.sizes_by_owner, result_rows.trim, results_bytes)
         if not self.is_shared:
-            await self._database.write(_give_pages_back)
+            await self._database.write(_vacuum)
         return total
 
     async def _take_orphans(self, replica: str) -> list[JobRecord]:
@@ -269,7 +269,7 @@ class Store:
             taken += some
         return taken
 
-    async def _thin(
+    async def _evict_down_to(
         self,
         sizes: Callable[[Connection], dict[str, int]],
         give: Callable[[Connection, dict[str, int], int, int], tuple[int, dict[str, int]]],
@@ -278,14 +278,14 @@ class Store:
         """Have owners give something back until all together hold no more than a bound; how many things that were."""
         held, total = await self._database.read(sizes), 0
         while sum(held.values()) > bound:
-            number, held = await self._database.write(partial(_given, sizes, give, held, bound))
+            number, held = await self._database.write(partial(_evict_some, sizes, give, held, bound))
             if not number:
                 break
             total += number
         return total
 
 
-def _given(
+def _evict_some(
     sizes: Callable[[Connection], dict[str, int]],
     give: Callable[[Connection, dict[str, int], int, int], tuple[int, dict[str, int]]],
     held: dict[str, int],
@@ -294,18 +294,18 @@ def _given(
 ) -> tuple[int, dict[str, int]]:
     """Some of what is too much goes; where other servers do the same, one at a time, and by what is held by then."""
     if connection.dialect.name == "postgresql":
-        if not connection.scalar(select(func.pg_try_advisory_xact_lock(_SWEEPING))):
+        if not connection.scalar(select(func.pg_try_advisory_xact_lock(_SWEEP_LOCK))):
             return 0, held
         held = sizes(connection)
     excess = sum(held.values()) - bound
-    return give(connection, held, excess, _THINNED_AT_ONCE) if excess > 0 else (0, held)
+    return give(connection, held, excess, _EVICTED_AT_ONCE) if excess > 0 else (0, held)
 
 
 def _beat(replica: str, connection: Connection) -> bool:
     return replica_rows.beat(connection, replica)
 
 
-def _give_pages_back(connection: Connection) -> None:
+def _vacuum(connection: Connection) -> None:
     cursor = connection.connection.cursor()
     # A page goes back with each row, also where the driver knows of no columns.
     cursor.execute(f"PRAGMA incremental_vacuum({_FREE_PAGES})")

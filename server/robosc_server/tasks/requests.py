@@ -1,4 +1,4 @@
-"""Requests as they come in: looked at, refused or accepted, and given the key that says what they mean.
+"""Requests as they come in: looked at, refused or accept_request, and given the key that says what they mean.
 
 This stands before everything else, in the server's own process, and looks at bytes of strangers: their number is
 limited before they are parsed, the parser refuses nesting (beyond 100 levels, unknown fields included) and texts that
@@ -112,7 +112,7 @@ def require_parsable(content: bytes, nested: Nested, limits: RequestLimits) -> N
         raise _too_large(f"the request has more than {limits.fields} files, names, texts and the like")
 
 
-def accepted(kind: TaskKind, request: bytes, limits: RequestLimits) -> Task:
+def accept_request(kind: TaskKind, request: bytes, limits: RequestLimits) -> Task:
     """Return the task that a request asks for.
 
     Args:
@@ -124,18 +124,18 @@ def accepted(kind: TaskKind, request: bytes, limits: RequestLimits) -> Task:
         RefusedError: It is no message, has invalid names, lacks something or has too much.
     """
     require_short(request, limits.request_bytes)
-    parse, look_at, nested = _KINDS[kind]
+    parse, read, nested = _KINDS[kind]
     require_parsable(request, nested, limits)
     try:
         message = parse(request)
     except DecodeError:
         # The parser's own words may quote the message.
         raise RefusedError(Reason.MALFORMED_REQUEST, NOT_A_MESSAGE) from None
-    look = _Look(limits)
+    reader = _RequestReader(limits)
     # Python's notation of nested values is read back as those values only: other values have another notation.
-    meaning = repr((_makers(), kind.value, look_at(message, look)))
-    look.require_small()
-    return Task(kind, request, hashlib.sha256(meaning.encode("utf-8")).hexdigest(), look.main_file)
+    meaning = repr((_producer_versions(), kind.value, read(message, reader)))
+    reader.require_small()
+    return Task(kind, request, hashlib.sha256(meaning.encode("utf-8")).hexdigest(), reader.main_file)
 
 
 class RequestCache:
@@ -150,8 +150,8 @@ class RequestCache:
         self._tasks: OrderedDict[tuple[TaskKind, bytes], Task] = OrderedDict()
         self._bytes = 0
 
-    def accepted(self, kind: TaskKind, request: bytes) -> Task:
-        """The task that a request asks for; see `accepted`.
+    def accept(self, kind: TaskKind, request: bytes) -> Task:
+        """The task that a request asks for; see `accept_request`.
 
         Raises:
             RefusedError: It cannot be one.
@@ -160,7 +160,7 @@ class RequestCache:
         if known is not None:
             self._tasks.move_to_end((kind, request))
             return known
-        task = accepted(kind, request, self._limits)
+        task = accept_request(kind, request, self._limits)
         if len(request) <= _REMEMBERED_BYTES:
             self._tasks[kind, request] = task
             self._bytes += len(request) + _ENTRY_BYTES
@@ -171,7 +171,7 @@ class RequestCache:
 
 
 @cache
-def _makers() -> tuple[str, ...]:
+def _producer_versions() -> tuple[str, ...]:
     """Return everything that makes results, by version.
 
     It is this distribution, the diagrams, and those distributions whose targets and engines it uses.
@@ -183,7 +183,7 @@ def _makers() -> tuple[str, ...]:
     return (__version__, diagrams, *sorted(others))
 
 
-class _Look:
+class _RequestReader:
     """Looks at the parts of one request, and counts their bytes.
 
     Attributes:
@@ -304,15 +304,15 @@ def _require_relative(name: str) -> None:
         raise _malformed(f"a file's name must be relative, not '{visible(name[:80])}'")
 
 
-def _check(message: Any, look: _Look) -> object:
-    return look.bundle(message.bundle)
+def _check(message: Any, reader: _RequestReader) -> object:
+    return reader.bundle(message.bundle)
 
 
-def _synthesize(message: Any, look: _Look) -> object:
-    return look.bundle(message.bundle), look.options(message.options)
+def _synthesize(message: Any, reader: _RequestReader) -> object:
+    return reader.bundle(message.bundle), reader.options(message.options)
 
 
-def _generate(message: Any, look: _Look) -> object:
+def _generate(message: Any, reader: _RequestReader) -> object:
     if not message.target:
         raise _malformed("the request names no target")
     choices = message.generation
@@ -320,26 +320,26 @@ def _generate(message: Any, look: _Look) -> object:
     if choices.HasField("supervised"):
         named = choices.supervised
         supervised = [
-            look.name(text, "a name of the supervised controller")
+            reader.name(text, "a name of the supervised controller")
             for text in (named.package, named.executable, named.launch_file)
         ]
     return (
-        _synthesize(message, look),
-        look.name(message.target, "the target's name"),
-        look.name(choices.package, "the package's name"),
+        _synthesize(message, reader),
+        reader.name(message.target, "the target's name"),
+        reader.name(choices.package, "the package's name"),
         choices.publish_state,
         choices.log_events,
         supervised,
     )
 
 
-def _explore(message: Any, look: _Look) -> object:
-    deployment, engine, _, *rest = look.options(message.options)
+def _explore(message: Any, reader: _RequestReader) -> object:
+    deployment, engine, _, *rest = reader.options(message.options)
     # Silent steps are allowed, whatever the options say of them.
-    return look.bundle(message.bundle), deployment, engine, rest, message.maximum_states or _DEFAULT_GRAPH_STATES
+    return reader.bundle(message.bundle), deployment, engine, rest, message.maximum_states or _DEFAULT_GRAPH_STATES
 
 
-def _verify(message: Any, look: _Look) -> object:
+def _verify(message: Any, reader: _RequestReader) -> object:
     is_given = bool(message.supervisor)
     if not is_given and (message.maximum_states or message.strict):
         raise _malformed("maximum_states and strict say how to check a supervisor: the request has none")
@@ -347,32 +347,32 @@ def _verify(message: Any, look: _Look) -> object:
         raise _malformed("the request has neither a supervisor nor properties")
     if message.maximum_states > _MAXIMUM_VERIFIED_STATES:
         raise _malformed(f"maximum_states is more than {_MAXIMUM_VERIFIED_STATES}")
-    look.require_few(len(message.properties), "properties")
-    look.require_few(len(message.property_files), "files of properties")
+    reader.require_few(len(message.properties), "properties")
+    reader.require_few(len(message.property_files), "files of properties")
     # A supervisor that is given may be for any deployment.
     unsaid = pb.DEPLOYMENT_UNSPECIFIED if is_given else pb.DEPLOYMENT_CONTROLLER
-    deployment, engine, _, *rest, made_states = look.options(message.options, deployment=unsaid)
+    deployment, engine, _, *rest, made_states = reader.options(message.options, deployment=unsaid)
     return (
-        look.bundle(message.bundle),
+        reader.bundle(message.bundle),
         # Where one is given, none is made.
         (deployment, engine, rest, None if is_given else made_states),
-        look.content(message.supervisor) if is_given else None,
-        [look.text(text) for text in message.properties],
-        [look.file(file) for file in message.property_files],
+        reader.content(message.supervisor) if is_given else None,
+        [reader.text(text) for text in message.properties],
+        [reader.file(file) for file in message.property_files],
         message.maximum_states or _DEFAULT_VERIFIED_STATES,
         message.strict,
     )
 
 
-def _format(message: Any, look: _Look) -> object:
+def _format(message: Any, reader: _RequestReader) -> object:
     if not message.HasField("file"):
         raise _malformed("the request has no file")
-    found = look.file(message.file)
-    look.main_file = found[0]
+    found = reader.file(message.file)
+    reader.main_file = found[0]
     return found
 
 
-_REQUESTS: dict[TaskKind, tuple[Any, Callable[[Any, _Look], object]]] = {
+_REQUESTS: dict[TaskKind, tuple[Any, Callable[[Any, _RequestReader], object]]] = {
     TaskKind.CHECK: (pb.CheckRequest, _check),
     TaskKind.SYNTHESIZE: (pb.SynthesizeRequest, _synthesize),
     TaskKind.GENERATE: (pb.GenerateRequest, _generate),
@@ -380,8 +380,8 @@ _REQUESTS: dict[TaskKind, tuple[Any, Callable[[Any, _Look], object]]] = {
     TaskKind.VERIFY: (pb.VerifyRequest, _verify),
     TaskKind.FORMAT: (pb.FormatRequest, _format),
 }
-_KINDS: dict[TaskKind, tuple[Callable[[bytes], Any], Callable[[Any, _Look], object], Nested]] = {
-    kind: (message.FromString, look_at, nested_of(message)) for kind, (message, look_at) in _REQUESTS.items()
+_KINDS: dict[TaskKind, tuple[Callable[[bytes], Any], Callable[[Any, _RequestReader], object], Nested]] = {
+    kind: (message.FromString, read, nested_of(message)) for kind, (message, read) in _REQUESTS.items()
 }
 
 

@@ -22,9 +22,9 @@ from robosc.synthesis import UnknownEngineError
 from robosc.synthesis.engines import keep_ready, resolve_engine
 from robosc.targets import GeneratedFiles, TargetRefusal, UnknownTargetError, generate_or_refuse, require_generatable
 from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_server.clock import monotonic
 from robosc_server.tasks.convert import chunks, from_proto, to_proto
-from robosc_server.tasks.pace import ThrottledReports
-from robosc_server.tasks.synthesis_attempt import Attempt, OnReport
+from robosc_server.tasks.synthesis_attempt import OnReport, SynthesisAttempt
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
 from robosc_server.tasks.verify import NoPropertyError, verification
 
@@ -47,6 +47,33 @@ robot Rehearsal {
 
 class _ResultTooLargeError(Exception):
     """A result beyond its limit."""
+
+
+PAUSE_S = 0.1
+
+
+class ThrottledReports:
+    """Filter of reports: passes on the first of each stage, and others if none was for a while.
+
+    Small work reports little.
+
+    Args:
+        on_report: Receiver of the reports.
+        clock: Seconds that never go back.
+    """
+
+    def __init__(self, on_report: Callable[[Report], None], clock: Callable[[], float] = monotonic) -> None:
+        self._on_report = on_report
+        self._clock = clock
+        self._stage = ""
+        self._told_s = 0.0
+
+    def __call__(self, report: Report) -> None:
+        """Pass a report on, or drop it."""
+        now_s = self._clock()
+        if report.stage != self._stage or now_s - self._told_s >= PAUSE_S:
+            self._stage, self._told_s = report.stage, now_s
+            self._on_report(report)
 
 
 def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnReport) -> Outcome:
@@ -121,7 +148,7 @@ def _check(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[
 
 def _synthesize(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.SynthesizeResponse]:
     request = pb.SynthesizeRequest.FromString(content)
-    attempt = Attempt()
+    attempt = SynthesisAttempt()
     result = pb.SynthesisResult()
     with attempt:
         made = attempt.make(request, limits.nodes, on_report, allow_livelock=request.options.allow_livelock)
@@ -131,7 +158,7 @@ def _synthesize(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iter
             content = encode(made.supervisor)
             result.supervisor, result.supervisor_digest = content, hashlib.sha256(content).digest()
             result.summary.CopyFrom(to_proto.summary(made.supervisor))
-    result.MergeFrom(pb.SynthesisResult(**attempt.ending()))
+    result.MergeFrom(pb.SynthesisResult(**attempt.result_fields()))
     yield pb.SynthesizeResponse(result=result)
 
 
@@ -139,7 +166,7 @@ def _generate(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterat
     request = pb.GenerateRequest.FromString(content)
     require_generatable(request.target)
     choices = from_proto.generation(request.generation)
-    attempt = Attempt()
+    attempt = SynthesisAttempt()
     files: GeneratedFiles | None = None
     with attempt:
         made = attempt.make(request, limits.nodes, on_report, allow_livelock=request.options.allow_livelock)
@@ -151,14 +178,14 @@ def _generate(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterat
             files = found
     listing = [] if files is None else chunks.listing(files)
     digest = chunks.digest_of(listing) if listing else b""
-    yield pb.GenerateResponse(result=pb.GenerationResult(files=listing, digest=digest, **attempt.ending()))
+    yield pb.GenerateResponse(result=pb.GenerationResult(files=listing, digest=digest, **attempt.result_fields()))
     if files is not None:
         yield from (pb.GenerateResponse(chunk=chunk) for chunk in chunks.file_chunks(files))
 
 
 def _explore(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.ExploreResponse]:
     request = pb.ExploreRequest.FromString(content)
-    attempt = Attempt()
+    attempt = SynthesisAttempt()
     graph: Graph | None = None
     with attempt:
         # The graph is of everything allowed, whatever an executor would choose.
@@ -167,14 +194,14 @@ def _explore(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterato
             on_report(Report("exploration", f"{made.supervisor.certificate.states} states"))
             graph = _graph(made.supervisor, request.maximum_states or DEFAULT_LIMIT)
     if graph is None:
-        yield pb.ExploreResponse(result=pb.ExplorationResult(**attempt.ending()))
+        yield pb.ExploreResponse(result=pb.ExplorationResult(**attempt.result_fields()))
         return
     text = _bounded_text(json_pieces(graph_json(graph)), limits.result_bytes)
     digest = hashlib.sha256(text).digest()
     states, transitions = len(graph.states), len(graph.transitions)
     yield pb.ExploreResponse(
         result=pb.ExplorationResult(
-            states=states, transitions=transitions, size=len(text), digest=digest, **attempt.ending()
+            states=states, transitions=transitions, size=len(text), digest=digest, **attempt.result_fields()
         )
     )
     yield from (pb.ExploreResponse(chunk=chunk) for chunk in chunks.content_chunks(text))

@@ -28,7 +28,7 @@ class Request(Protocol):
         """Options for making the supervisor."""
 
 
-class Attempt:
+class SynthesisAttempt:
     """Context around all that may find out that a model cannot be handled: that error is kept, and ends the block.
 
     Attributes:
@@ -68,7 +68,7 @@ class Attempt:
         )
         return self.made
 
-    def ending(self) -> dict[str, Any]:
+    def result_fields(self) -> dict[str, Any]:
         """The fields that every result has: `status`, `diagnostics`, `reason` and `explanation`."""
         made, error = self.made, self.error
         diagnostics = self.refusal.diagnostics if self.refusal else made.diagnostics if made else ()

@@ -17,7 +17,7 @@ from robosc.synthesis.engines import resolve_engine
 from robosc.verification import Limits
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.convert import from_proto, to_proto
-from robosc_server.tasks.synthesis_attempt import Attempt, OnReport
+from robosc_server.tasks.synthesis_attempt import OnReport, SynthesisAttempt
 from robosc_server.tasks.task import Report
 
 DEFAULT_STATES = 1_000_000
@@ -91,7 +91,7 @@ def _made(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) ->
     errors = None if model is None else _property_errors(request, model)
     if errors is not None:
         return errors
-    made = Attempt().make(request, maximum_nodes, on_report, allow_livelock=True)
+    made = SynthesisAttempt().make(request, maximum_nodes, on_report, allow_livelock=True)
     if made.supervisor is not None:
         return _verdicts(request, made.supervisor, maximum_nodes, on_report)
     document = {"status": str(made.status), "reason": made.reason, **diagnostics_json(made.diagnostics)}

@@ -19,7 +19,7 @@ from robosc_server.workers.frames import (
     task_of,
     too_large,
 )
-from robosc_server.workers.sandbox import Sandbox, close_others
+from robosc_server.workers.sandbox import Sandbox, close_other_descriptors
 
 type TaskFunction = Callable[[TaskKind, bytes, TaskLimits, Callable[[Report], None]], Outcome]
 
@@ -47,7 +47,7 @@ def run_worker(
     faulthandler.enable(crash_output)
     confinement.prefer_oom_kill()
     # What another process holds open tells nobody of its end, and gives who holds it something to reach.
-    close_others({connection.fileno(), crash_output} | sandbox.descriptors)
+    close_other_descriptors({connection.fileno(), crash_output} | sandbox.descriptors)
     sandbox.enter()
     try:
         task, limits = task_of(_receive(connection), _receive(connection))

@@ -24,7 +24,7 @@ _LOG = logging.getLogger(__name__)
 CONNECT_S = 5.0
 """Time that one attempt to reach the scheduler may take, in seconds."""
 
-LOOK_S = 0.5
+POLL_S = 0.5
 """Period at which the cluster is asked for its workers, in seconds."""
 
 _TLS = "tls://"
@@ -37,14 +37,14 @@ _STARTS = 3
 _GRACE_S = 30.0
 _CANCEL_S = 1.0
 _END_S = 5.0
-_END_LOOK_S = 0.01
-_SPENT_S = 10.0
-_EXAMINE_S = 3.0
+_CLOSE_POLL_S = 0.01
+_CPU_REPORT_S = 10.0
+_CHECK_S = 3.0
 _KEPT_REPORTS = 64
 _LOST = "two workers of the cluster were lost while they did this task"
 
 
-class _Watched:
+class _TaskEvents:
     """Reports of a cluster on one task under way."""
 
     def __init__(self) -> None:
@@ -53,7 +53,7 @@ class _Watched:
         self._reports: deque[Report] = deque(maxlen=_KEPT_REPORTS)
         self._news = asyncio.Event()
 
-    def tell(self, event: dict[str, Any]) -> None:
+    def add(self, event: dict[str, Any]) -> None:
         """Take an event of the cluster's."""
         if event["is"] == "begun":
             self.begun += 1
@@ -62,7 +62,7 @@ class _Watched:
             self._reports.extend(Report(str(stage), str(message)) for stage, message in event["reports"])
         self._news.set()
 
-    async def pass_on(self, on_report: OnReport) -> Failure:
+    async def forward_reports(self, on_report: OnReport) -> Failure:
         """Pass reports on, the last of them where the receiver is slow; returns once too many workers were lost."""
         while self.begun <= _ATTEMPTS:
             await self._news.wait()
@@ -112,33 +112,33 @@ class DaskWorkers:
         self._client: Any = None
         self._threads: dict[str, int] = {}
         self._refused: dict[str, str] = {}
-        self._watched: dict[str, _Watched] = {}
-        self._spending: dict[str, CpuTimeAccount] = {}
-        self._keeper: asyncio.Task[None] | None = None
-        self._has_looked = asyncio.Event()
-        self._is_over = asyncio.Event()
+        self._events: dict[str, _TaskEvents] = {}
+        self._cpu_accounts: dict[str, CpuTimeAccount] = {}
+        self._connection_task: asyncio.Task[None] | None = None
+        self._first_poll_done = asyncio.Event()
+        self._is_closing = asyncio.Event()
         self.fault = f"the Dask scheduler at {address} was not reached yet"
 
     async def __aenter__(self) -> Self:
-        self._keeper = asyncio.create_task(self._keep())
-        await self._has_looked.wait()
+        self._connection_task = asyncio.create_task(self._keep_connected())
+        await self._first_poll_done.wait()
         if self.fault:
             _LOG.error("%s; it is tried again", self.fault)
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        if self._keeper is not None:
-            self._keeper.cancel()
-            await asyncio.gather(self._keeper, return_exceptions=True)
+        if self._connection_task is not None:
+            self._connection_task.cancel()
+            await asyncio.gather(self._connection_task, return_exceptions=True)
         self.fault = "the server's workers have ended"
         # Whoever waits for a task is told, as long as there is a loop to tell it in.
-        self._is_over.set()
+        self._is_closing.set()
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(_END_S):
-                while self._watched:
-                    await asyncio.sleep(_END_LOOK_S)
-        for name in tuple(self._spending):
-            self._settle(name)
+                while self._events:
+                    await asyncio.sleep(_CLOSE_POLL_S)
+        for name in tuple(self._cpu_accounts):
+            self._close_account(name)
 
     @property
     def capacity(self) -> int:
@@ -158,18 +158,18 @@ class DaskWorkers:
                 loses them before they begin.
             WorkerLostError: The starter of processes on a worker ended under it, more than once.
         """
-        watched = _Watched()
+        events = _TaskEvents()
         for _ in range(_STARTS):
-            outcome = await self._run_once(task, limits, on_report, on_cpu_time, watched)
+            outcome = await self._run_once(task, limits, on_report, on_cpu_time, events)
             if outcome is not None:
                 return outcome
-            if watched.begun >= _ATTEMPTS:
+            if events.begun >= _ATTEMPTS:
                 return Failure(Reason.WORKER_DIED, _LOST)
         # It has done nothing that workers could have been lost for.
         raise WorkersError(f"the Dask cluster at {self._address} loses its workers before they begin a task")
 
     async def _run_once(
-        self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime, watched: _Watched
+        self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime, events: _TaskEvents
     ) -> Outcome | None:
         """The outcome of a task; None: workers were lost, and it has to be begun anew."""
         from robosc_server.workers.dask_task import run_on_cluster
@@ -178,9 +178,9 @@ class DaskWorkers:
         if client is None or not self._threads:
             raise WorkersError(self.fault or f"the Dask cluster at {self._address} has no worker")
         name = f"robosc-{task.kind}-{uuid.uuid4().hex}"
-        self._watched[name] = watched
-        self._spending[name] = CpuTimeAccount(on_cpu_time, monotonic)
-        named = sorted(self._threads) if self._refused else None
+        self._events[name] = events
+        self._cpu_accounts[name] = CpuTimeAccount(on_cpu_time, monotonic)
+        allowed = sorted(self._threads) if self._refused else None
         future = client.submit(
             run_on_cluster,
             __version__,
@@ -193,22 +193,22 @@ class DaskWorkers:
             (limits.seconds, limits.cpu_seconds, limits.memory_bytes, limits.nodes, limits.result_bytes),
             key=name,
             pure=False,
-            workers=named,
+            workers=allowed,
         )
         works = (
             asyncio.create_task(self._answer(future, limits)),
-            asyncio.create_task(watched.pass_on(on_report)),
-            asyncio.create_task(self._guard(client, watched, limits, named)),
+            asyncio.create_task(events.forward_reports(on_report)),
+            asyncio.create_task(self._watch_for_loss(client, events, limits, allowed)),
         )
         try:
             done, _ = await asyncio.wait(works, return_when=asyncio.FIRST_COMPLETED)
             # The answer first, if it is there.
             return next(work for work in works if work in done).result()
         finally:
-            del self._watched[name]
-            self._spending[name].stop()
+            del self._events[name]
+            self._cpu_accounts[name].stop()
             # What the last process took is told when it is gone, a moment after this.
-            asyncio.get_running_loop().call_later(_SPENT_S, self._settle, name)
+            asyncio.get_running_loop().call_later(_CPU_REPORT_S, self._close_account, name)
             for work in works:
                 work.cancel()
             with contextlib.suppress(Exception):
@@ -242,16 +242,16 @@ class DaskWorkers:
             raise kind(content[1:1000].decode("utf-8", "replace"))
         raise WorkersError(f"the Dask cluster at {self._address} answered what is no answer of RoboSC")
 
-    async def _guard(
-        self, client: Any, watched: _Watched, limits: TaskLimits, named: list[str] | None
+    async def _watch_for_loss(
+        self, client: Any, events: _TaskEvents, limits: TaskLimits, allowed: list[str] | None
     ) -> Failure | None:
         """End a wait for something that will not come.
 
         Args:
             client: Client of the cluster that has the task.
-            watched: Reports of the cluster on the task.
+            events: Reports of the cluster on the task.
             limits: Limits of the task.
-            named: The workers that alone may do it; None: any.
+            allowed: The workers that alone may do it; None: any.
 
         Returns:
             Failure of the task; None: those workers are gone and others are there, but the scheduler would go on
@@ -260,41 +260,41 @@ class DaskWorkers:
         Raises:
             WorkersError: The cluster is lost, or has had no worker for a while.
         """
-        worked_at = monotonic()
+        last_worker_at = monotonic()
         while True:
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(LOOK_S):
-                    await self._is_over.wait()
+                async with asyncio.timeout(POLL_S):
+                    await self._is_closing.wait()
             now = monotonic()
             if self._client is not client:
                 raise WorkersError(f"the Dask scheduler at {self._address} was lost")
             if self._threads:
-                worked_at = now
-                if named is not None and self._threads.keys().isdisjoint(named):
+                last_worker_at = now
+                if allowed is not None and self._threads.keys().isdisjoint(allowed):
                     return None
-            if now - worked_at > _GRACE_S:
+            if now - last_worker_at > _GRACE_S:
                 raise WorkersError(self.fault or f"the Dask cluster at {self._address} has no worker")
-            if watched.begun and now - watched.begun_at > limits.seconds + _GRACE_S:
+            if events.begun and now - events.begun_at > limits.seconds + _GRACE_S:
                 return Failure(Reason.TIME_LIMIT, "the work took longer than a task may take")
 
-    async def _keep(self) -> None:
+    async def _keep_connected(self) -> None:
         """Have a client of the cluster, whenever that is there."""
         while True:
             client = None
             try:
                 client = await self._connect()
-                await self._look_after(client)
+                await self._monitor(client)
             except Exception as error:  # Of the network, of Dask, of another version of it: told, and tried again.
                 why = await self._tls_fault() or _sentence(error)
                 self._note_fault(f"the Dask scheduler at {self._address} cannot be reached: {why}")
             finally:
                 self._client, self._threads, self._refused = None, {}, {}
-                self._has_looked.set()
+                self._first_poll_done.set()
                 if client is not None:
                     with contextlib.suppress(Exception):
                         async with asyncio.timeout(CONNECT_S):
                             await client.close()
-            await asyncio.sleep(LOOK_S)
+            await asyncio.sleep(POLL_S)
 
     async def _connect(self) -> Any:
         # Certificates for tls:// are Dask's own settings; the files are read anew.
@@ -311,17 +311,17 @@ class DaskWorkers:
         host, _, port = self._address.removeprefix(_TLS).rpartition(":")
         return await tls_fault(host.strip("[]"), int(port), CONNECT_S)
 
-    async def _look_after(self, client: Any) -> None:
+    async def _monitor(self, client: Any) -> None:
         """Know the cluster's workers, until it is lost."""
         connection = client.scheduler_comm
-        client.subscribe_topic(_topic(client), self._hear)
+        client.subscribe_topic(_topic(client), self._on_event)
         known: dict[str, str] = {}
         while True:
             if client.status != "running" or client.scheduler_comm is not connection:
                 raise ConnectionError("the connection was lost")
             async with asyncio.timeout(CONNECT_S):
                 threads = dict(await client.nthreads())
-            new = [self._examine(client, address) for address in threads.keys() - known.keys()]
+            new = [self._check_worker(client, address) for address in threads.keys() - known.keys()]
             examined = dict(await asyncio.gather(*new))
             known = {address: why for address, why in (known | examined).items() if why is not None}
             for address in examined.keys() & known.keys():
@@ -335,15 +335,15 @@ class DaskWorkers:
             else:
                 reasons = [*self._refused.values(), f"the Dask cluster at {self._address} has no worker"]
                 self._note_fault(reasons[0])
-            self._has_looked.set()
-            await asyncio.sleep(LOOK_S)
+            self._first_poll_done.set()
+            await asyncio.sleep(POLL_S)
 
-    async def _examine(self, client: Any, address: str) -> tuple[str, str | None]:
+    async def _check_worker(self, client: Any, address: str) -> tuple[str, str | None]:
         """A worker's address, and why it cannot be used: empty if it can, None if it does not answer."""
         from robosc_server.workers.dask_task import mismatch, ready_version
 
         try:
-            async with asyncio.timeout(_EXAMINE_S):
+            async with asyncio.timeout(_CHECK_S):
                 version = await client.run(
                     ready_version, self._task_function, self._must_be_confined, workers=[address]
                 )
@@ -355,22 +355,22 @@ class DaskWorkers:
             address, str(version.get(address)), __version__
         )
 
-    def _settle(self, name: str) -> None:
+    def _close_account(self, name: str) -> None:
         """Account for what is known of a task that has ended, and wait for no more."""
-        spending = self._spending.pop(name, None)
-        if spending is not None:
-            spending.settle()
+        account = self._cpu_accounts.pop(name, None)
+        if account is not None:
+            account.close()
 
-    async def _hear(self, event: tuple[float, Any]) -> None:
-        spending = self._spending.get(event[1]["task"])
-        if spending is not None:
-            spending.hear(event[1])
-        watched = self._watched.get(event[1]["task"])
-        if watched is not None:
-            watched.tell(event[1])
+    async def _on_event(self, event: tuple[float, Any]) -> None:
+        account = self._cpu_accounts.get(event[1]["task"])
+        if account is not None:
+            account.record_event(event[1])
+        events = self._events.get(event[1]["task"])
+        if events is not None:
+            events.add(event[1])
 
     def _note_fault(self, fault: str) -> None:
-        if fault != self.fault and self._has_looked.is_set():
+        if fault != self.fault and self._first_poll_done.is_set():
             if fault:
                 _LOG.error("%s; it is tried again", fault)
             else:

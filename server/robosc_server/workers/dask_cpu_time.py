@@ -25,11 +25,11 @@ class CpuTimeAccount:
         self._begun_s: float | None = None
         self._stopped_s: float | None = None
 
-    def hear(self, event: dict[str, Any]) -> None:
+    def record_event(self, event: dict[str, Any]) -> None:
         """Take an event of the cluster's: `begun` or `spent`; others are nothing."""
         match event["is"]:
             case "begun":
-                self.settle()
+                self.close()
                 self._worker, self._begun_s = event["worker"], self._clock()
             case "spent" if self._begun_s is not None and event["worker"] == self._worker:
                 cpu_s = event["cpu_s"]
@@ -41,7 +41,7 @@ class CpuTimeAccount:
         """Nobody waits for the task any more, which has ended or is about to."""
         self._stopped_s = self._clock()
 
-    def settle(self) -> None:
+    def close(self) -> None:
         """Wait no more for what a worker that has begun may tell."""
         if self._begun_s is not None:
             end_s = self._clock() if self._stopped_s is None else max(self._stopped_s, self._begun_s)

@@ -23,7 +23,7 @@ LOST = b"L"
 
 BEGUN = "begun"
 REPORTS = "reports"
-SPENT = "spent"
+CPU_TIME = "spent"
 
 _TELL_EVERY_ASKS = 5  # A tenth of a second.
 _KEPT_REPORTS = 16
@@ -82,8 +82,8 @@ def run_on_cluster(
         state = worker.state.tasks.get(name)
         return state is None or state.state not in _UNDER_WAY
 
-    def tell_spent(cpu_s: float) -> None:
-        worker.log_event(topic, {"is": SPENT, "task": name, "worker": worker.address, "cpu_s": cpu_s})
+    def report_cpu_time(cpu_s: float) -> None:
+        worker.log_event(topic, {"is": CPU_TIME, "task": name, "worker": worker.address, "cpu_s": cpu_s})
 
     worker.log_event(topic, {"is": BEGUN, "task": name, "worker": worker.address})
     task = Task(TaskKind(kind), request, *identity)
@@ -94,7 +94,7 @@ def run_on_cluster(
             kept.append,
             is_unwanted,
             task_function,
-            tell_spent,
+            report_cpu_time,
             must_be_confined=must_be_confined,
         )
         return ANSWER + answer(outcome)

@@ -13,7 +13,7 @@ from robosc_server.workers import kernel
 
 # The same numbers on every machine.
 _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446
-_TELL_VERSION = 1
+_QUERY_VERSION = 1
 _PATH_BENEATH = 1
 
 _READ_FILE, _READ_FOLDER = 1 << 2, 1 << 3
@@ -31,7 +31,7 @@ class FileRules:
     """
 
     def __init__(self, places: Iterable[Path]) -> None:
-        version = kernel.system_call(_CREATE_RULESET, None, 0, _TELL_VERSION)
+        version = kernel.system_call(_CREATE_RULESET, None, 0, _QUERY_VERSION)
         accesses = max(mask for since, mask in _FILE_ACCESSES.items() if since <= version)
         network = _NETWORK_ACCESSES if version >= _NETWORK_FROM else 0
         scopes = _SCOPES if version >= _SCOPES_FROM else 0

@@ -26,8 +26,10 @@ MESSAGES_LIMIT = 100_000
 
 REPORTS_BURST = 1000
 REPORTS_PER_SECOND = 50
-"""Reports of one task: as many at once, and then so many in a second. Tasks tell ten in a second (see `pace`), and one
-for each of their few stages; each costs the server time."""
+"""Progress reports of one task: a burst, and then so many in a second.
+
+Tasks send ten in a second (see `tasks.run.ThrottledReports`) and one for each of their stages.
+"""
 
 _REPORT_BYTES = 2**17
 _FAILURE_BYTES = 2**20

@@ -18,7 +18,7 @@ class StoppedError(Exception):
     """The task's process was killed, because the caller said so."""
 
 
-class _Background:
+class _BackgroundWorkers:
     """Workers in an event loop of their own, as long as this process lives."""
 
     def __init__(self, task_function: str, *, must_be_confined: bool) -> None:
@@ -42,7 +42,7 @@ class _Background:
 
 
 _LOCK = threading.Lock()
-_BACKGROUNDS: dict[tuple[str, bool], _Background] = {}
+_BACKGROUNDS: dict[tuple[str, bool], _BackgroundWorkers] = {}
 
 
 def prepare(task_function: str = TASK_FUNCTION, *, must_be_confined: bool = False) -> None:
@@ -58,11 +58,11 @@ def prepare(task_function: str = TASK_FUNCTION, *, must_be_confined: bool = Fals
     _background(task_function, must_be_confined).prepare()
 
 
-def _background(task_function: str, must_be_confined: bool) -> _Background:
+def _background(task_function: str, must_be_confined: bool) -> _BackgroundWorkers:
     kind = (task_function, must_be_confined)
     with _LOCK:
         if kind not in _BACKGROUNDS:
-            _BACKGROUNDS[kind] = _Background(task_function, must_be_confined=must_be_confined)
+            _BACKGROUNDS[kind] = _BackgroundWorkers(task_function, must_be_confined=must_be_confined)
         return _BACKGROUNDS[kind]
 
 

@@ -17,7 +17,7 @@ from robosc_server.workers.system_calls import prepare_filter, restrict_system_c
 
 _STANDARD_ERROR = 2
 _HIGHEST_DESCRIPTOR = 2**31 - 1
-_TOLD_BYTES = 1000
+_ANSWER_BYTES = 1000
 _KILLED = "who tries it is ended"
 
 
@@ -45,7 +45,7 @@ class Sandbox:
             "files can be read (no Landlock)": self._restrict_files,
             "calls of the kernel are not filtered (no seccomp)": restrict_system_calls,
         }
-        self._faults = {words: fault for words, restrict in self._parts.items() if (fault := _tried(restrict))}
+        self._faults = {words: fault for words, restrict in self._parts.items() if (fault := _failure_of(restrict))}
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -76,12 +76,12 @@ class Sandbox:
         self._rules.restrict()
 
 
-def _tried(restrict: Callable[[], None]) -> str:
+def _failure_of(restrict: Callable[[], None]) -> str:
     """Return the reason why a process cannot be confined by something; empty if it can.
 
     It is found out by a fork that ends at once.
     """
-    told, telling = os.pipe2(os.O_CLOEXEC)
+    read_end, write_end = os.pipe2(os.O_CLOEXEC)
     pid = os.fork()
     if pid == 0:
         try:
@@ -90,16 +90,16 @@ def _tried(restrict: Callable[[], None]) -> str:
         except BaseException as error:  # A fork must not go on as if it were the process that it was forked from.
             answer = getattr(error, "strerror", None) or str(error)
         with contextlib.suppress(BaseException):
-            os.write(telling, answer.encode()[:_TOLD_BYTES])
+            os.write(write_end, answer.encode()[:_ANSWER_BYTES])
         os._exit(0)
-    os.close(telling)
+    os.close(write_end)
     os.waitpid(pid, 0)
-    answer = os.read(told, _TOLD_BYTES).decode("utf-8", "replace")
-    os.close(told)
+    answer = os.read(read_end, _ANSWER_BYTES).decode("utf-8", "replace")
+    os.close(read_end)
     return "" if answer == "done" else answer or _KILLED
 
 
-def close_others(kept: Set[int]) -> None:
+def close_other_descriptors(kept: Set[int]) -> None:
     """Close every descriptor but those, and standard input, output and error."""
     first = _STANDARD_ERROR + 1
     for number in sorted(number for number in kept if number >= first):

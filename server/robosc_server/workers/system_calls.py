@@ -35,7 +35,7 @@ _NOT_FOR_READING = 0o3 | 0o100 | 0o1000 | 0o10000000
 _DESCRIPTOR_COMMANDS = (0, 1, 2, 3, 1030)
 
 
-_NOBODY = 0x7FFFFFFE
+_PLACEHOLDER_PID = 0x7FFFFFFE
 """No process has this number: the kernel's are below 2^22. Nothing else in a filter is like it."""
 
 
@@ -217,20 +217,20 @@ def _if_any_bit(bits: int, then: list[_Instruction]) -> Iterator[_Instruction]:
 
 
 @cache
-def _program_of_nobody(machine: str) -> bytes:
+def _placeholder_program(machine: str) -> bytes:
     """The filter of a process with an impossible number: forks put in their own, and need not make it anew."""
-    return filter_program(ARCHITECTURES[machine], _NOBODY)
+    return filter_program(ARCHITECTURES[machine], _PLACEHOLDER_PID)
 
 
 def prepare_filter() -> None:
     """Make what `restrict_system_calls` takes, so that forks of this process need not."""
     machine = os.uname().machine
     if machine in ARCHITECTURES:
-        _program_of_nobody(machine)
+        _placeholder_program(machine)
 
 
 def _own_program(machine: str) -> bytes:
-    return _program_of_nobody(machine).replace(_word(_NOBODY), _word(os.getpid()))
+    return _placeholder_program(machine).replace(_word(_PLACEHOLDER_PID), _word(os.getpid()))
 
 
 def _word(value: int) -> bytes:

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from figures import text_table
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_server.tasks.requests import RequestLimits, accepted
+from robosc_server.tasks.requests import RequestLimits, accept_request
 from robosc_server.tasks.run import rehearse, run_task
 from robosc_server.tasks.task import Report, Result, Task, TaskKind, TaskLimits
 from robosc_server.workers.local import LocalWorkers
@@ -96,7 +96,7 @@ async def _rows() -> list[list[str]]:
     rehearse()
     rows = [await _row("nothing", fake_task("echo"), TASK_FUNCTION)]
     for kind, request in requests.items():
-        task = accepted(kind, request.SerializeToString(), RequestLimits())
+        task = accept_request(kind, request.SerializeToString(), RequestLimits())
         rows.append(await _row(f"{kind} line_follower", task, "robosc_server.tasks.run:run_task"))
     return rows
 

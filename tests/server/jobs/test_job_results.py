@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robosc_server.jobs import Results
+from robosc_server.jobs import ResultCache
 from robosc_server.store import Store, StoreUnavailableError, open_store
 from robosc_server.tasks.task import Result, TaskKind
 from support.job_parts import Times, in_loop
@@ -27,7 +27,7 @@ def test_what_is_kept_is_written_beside_as_it_was_made_and_sent_as_it_is_finishe
     async def test() -> None:
         store = open_store(tmp_path)
         made, sent = Result((b"a", b"")), Result((b"a", b"", b"signed"))
-        async with Results(store, 10_000, finish) as results:
+        async with ResultCache(store, 10_000, finish) as results:
             assert await results.find("k") is None
             assert results.keep("k", _KIND, made, "me") == sent
             assert results.unwritten("k") == made
@@ -35,7 +35,7 @@ def test_what_is_kept_is_written_beside_as_it_was_made_and_sent_as_it_is_finishe
             await until(lambda: is_written(store, "k"))
             assert await store.find_result("k") == (_KIND, made)
             assert (results.hits, results.misses) == (2, 1)
-        async with Results(store, 10_000, finish) as results:
+        async with ResultCache(store, 10_000, finish) as results:
             assert results.in_memory("k") is None
             assert await results.find("k") == sent
             assert results.in_memory("k") == sent
@@ -47,7 +47,7 @@ def test_what_is_kept_is_written_beside_as_it_was_made_and_sent_as_it_is_finishe
 def test_memory_is_bounded_and_what_was_asked_for_last_stays(tmp_path: Path) -> None:
     async def test() -> None:
         store = open_store(tmp_path)
-        results = Results(store, 5_000)
+        results = ResultCache(store, 5_000)
         for key in "abc":
             results.remember(key, _KIND, Result((bytes(1000),)))
         assert results.in_memory("a") is not None
@@ -75,7 +75,7 @@ def test_without_the_database_it_goes_on_and_writes_when_it_is_back(
             error.retry_after_s = 0.01
             raise error
 
-        async with Results(store, 0) as results:
+        async with ResultCache(store, 0) as results:
             monkeypatch.setattr(store, "keep_results", away)
             monkeypatch.setattr(store, "find_result", away)
             results.keep("k", _KIND, Result((b"a",)), "me")
@@ -93,7 +93,7 @@ def test_without_the_database_it_goes_on_and_writes_when_it_is_back(
 def test_what_was_kept_shortly_before_the_end_is_there_after_it(tmp_path: Path) -> None:
     async def test() -> None:
         store = open_store(tmp_path)
-        async with Results(store, 0) as results:
+        async with ResultCache(store, 0) as results:
             for number in range(20):
                 results.keep(str(number), _KIND, Result((bytes(number),)), "me")
         for number in range(20):
@@ -116,7 +116,7 @@ def test_one_that_cannot_be_written_takes_no_other_with_it(tmp_path: Path, monke
             await keep(results)
 
         monkeypatch.setattr(store, "keep_results", choosy)
-        async with Results(store, 0) as results:
+        async with ResultCache(store, 0) as results:
             for key in ("a", "bad", "c", "d"):
                 results.keep(key, _KIND, Result((key.encode(),)), "me")
             await until(lambda: is_written(store, "d"))
@@ -131,11 +131,11 @@ def test_one_that_cannot_be_written_takes_no_other_with_it(tmp_path: Path, monke
 def test_what_waits_to_be_written_is_bounded_and_what_is_beyond_stays_in_memory_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("robosc_server.jobs.results._UNWRITTEN_BYTES", 3_500)
+    monkeypatch.setattr("robosc_server.jobs.result_cache._UNWRITTEN_BYTES", 3_500)
 
     async def test() -> None:
         store = open_store(tmp_path)
-        results = Results(store, 10**6)
+        results = ResultCache(store, 10**6)
         for key in "abcd":
             for _ in range(2):  # The second time it is known.
                 results.keep(key, _KIND, Result((bytes(1000),)), "me")
@@ -155,7 +155,7 @@ def test_what_waits_to_be_written_is_bounded_and_what_is_beyond_stays_in_memory_
 def test_what_is_asked_for_is_told_to_the_database_now_and_then(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("robosc_server.jobs.results._TOUCH_S", 0.01)
+    monkeypatch.setattr("robosc_server.jobs.result_cache._TOUCH_S", 0.01)
     times = Times()
 
     async def test() -> None:
@@ -171,7 +171,7 @@ def test_what_is_asked_for_is_told_to_the_database_now_and_then(
             touched.append(keys)
 
         monkeypatch.setattr(store, "touch", noted)
-        async with Results(store, 10**6) as results:
+        async with ResultCache(store, 10**6) as results:
             # Once from the database, and from memory.
             for _ in range(2):
                 assert await results.find("a") is not None

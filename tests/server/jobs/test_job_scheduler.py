@@ -119,7 +119,7 @@ def test_bounds_hold_and_tell_when_to_come_back() -> None:
             scheduler.enter("late")
         assert refused.value.reason is Reason.SERVER_BUSY
         # What was accepted before is not bounded.
-        adopted = scheduler.enter_anyway("greedy")
+        adopted = scheduler.enter_unbounded("greedy")
         clock.now_s = 4.0
         scheduler.leave(first)
         # Tasks take four seconds, then: five wait, one is done at a time.
@@ -142,7 +142,7 @@ def test_all_addresses_of_one_network_stand_in_one_line() -> None:
             scheduler.enter("2001:db8::4")
         others = [scheduler.enter(name) for name in ("2001:db8:0:1::1", "192.0.2.1", "192.0.2.2", "robot")]
         # One after the other: whoever has had a turn goes to the end.
-        assert [scheduler.before(place) for place in (waiting[0], *others, waiting[1])] == list(range(6))
+        assert [scheduler.tasks_ahead(place) for place in (waiting[0], *others, waiting[1])] == list(range(6))
         for place in (taken, *waiting, *others):
             scheduler.leave(place)
         assert (scheduler.running, scheduler.waiting) == (0, 0)
@@ -151,7 +151,7 @@ def test_all_addresses_of_one_network_stand_in_one_line() -> None:
 
 
 def test_more_workers_are_noticed_while_tasks_wait(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robosc_server.jobs.scheduler._LOOK_S", 0.01)
+    monkeypatch.setattr("robosc_server.jobs.scheduler._POLL_S", 0.01)
 
     async def test() -> None:
         workers = ScriptedWorkers(0)
@@ -202,7 +202,7 @@ def test_a_closed_line_takes_nothing_more() -> None:
         with pytest.raises(RefusedError) as refused:
             scheduler.enter("me")
         assert refused.value.reason is Reason.SHUTTING_DOWN
-        assert scheduler.before(waiting) == 0
+        assert scheduler.tasks_ahead(waiting) == 0
 
     run(test)
 
@@ -304,7 +304,7 @@ def test_whatever_happens_it_does_as_the_twin(
                     twin.leave(number)
             elif what == "capacity":
                 workers.capacity = twin.capacity = int(value)
-                scheduler._look_again()
+                scheduler._poll_capacity()
                 twin.serve()
             assert scheduler.waiting == len(twin.waiting)
             assert scheduler.running == len(twin.running)
@@ -312,6 +312,6 @@ def test_whatever_happens_it_does_as_the_twin(
             order = twin.before()
             for number, place in enumerate(places):
                 if place is not None:
-                    assert scheduler.before(place) == order.get(number, 0)
+                    assert scheduler.tasks_ahead(place) == order.get(number, 0)
 
     run(test)

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from robosc_api.v1 import jobs_pb2 as pb
 from robosc_server.failures import RefusedError
 from robosc_server.jobs import Caller, JobLimits, QueueLimits, caller_of
-from robosc_server.jobs.convert import page_token, place_of, result_response
+from robosc_server.jobs.convert import page_position, page_token, result_response
 from robosc_server.jobs.manager import JobManager
 from robosc_server.jobs.service import Context, JobService
 from robosc_server.store import JobFilter, JobRecord, JobState, StoreUnavailableError
@@ -245,7 +245,7 @@ def test_others_have_their_turn_while_a_long_list_is_made(size: int) -> None:
 def test_no_page_token_is_taken_that_was_not_given(token: str) -> None:
     if token:
         with pytest.raises(RefusedError) as refused:
-            place_of(token, _ALL)
+            page_position(token, _ALL)
         assert refused.value.reason is Reason.MALFORMED_REQUEST
 
 
@@ -275,7 +275,7 @@ def test_a_page_token_leads_back_to_its_place() -> None:
     record = JobRecord(
         "0123456789abcdef" * 2, "me", TaskKind.CHECK, JobState.FAILED, 1, "k", "f", "", None, 0, created_us=12345
     )
-    assert place_of(page_token(record, _ALL), _ALL) == (12345, record.id)
+    assert page_position(page_token(record, _ALL), _ALL) == (12345, record.id)
 
 
 def test_a_server_that_ends_tells_watchers_to_ask_again(tmp_path: Path) -> None:

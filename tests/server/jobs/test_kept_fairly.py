@@ -80,7 +80,7 @@ def test_what_is_swept_is_what_the_twin_sweeps(
     store = open_store(tmp_path_factory.mktemp("store"), wall_clock=times.wall)
     try:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("robosc_server.store.store._THINNED_AT_ONCE", at_once)
+            patch.setattr("robosc_server.store.store._EVICTED_AT_ONCE", at_once)
             asyncio.run(check_against_twin(store, times, some_results, some_jobs, bound))
     finally:
         store.close()

@@ -110,7 +110,7 @@ def test_a_cancelled_job_is_not_ended_again(tmp_path: Path) -> None:
         for late in (_RESULT, _FAILURE):
             assert await store.end("a", "ours", late) is None
         assert await store.begin("a", "ours") is None
-        assert await store.put_back(["a"], "ours", "ours") == []
+        assert await store.requeue(["a"], "ours", "ours") == []
         assert await found(store, "a") == cancelled
 
     with_store(tmp_path, test)
@@ -121,13 +121,13 @@ def test_only_running_jobs_of_ones_own_are_put_back(tmp_path: Path) -> None:
         for job_id in "ab":
             await accepted(store, job(job_id))
         await store.begin("a", "ours")
-        assert await store.put_back(["a", "b"], "theirs", "theirs") == []
-        (record,) = await store.put_back(["a", "b", "c"], "ours", "others")
+        assert await store.requeue(["a", "b"], "theirs", "theirs") == []
+        (record,) = await store.requeue(["a", "b", "c"], "ours", "others")
         assert (record.id, record.state, record.attempts, record.losses) == ("a", JobState.QUEUED, 0, 0)
         assert (record.replica, record.progress) == ("others", None)
         assert (await found(store, "b")).revision == 1
         await store.begin("a", "others")
-        (record,) = await store.put_back(["a"], "others", None, is_lost=True)
+        (record,) = await store.requeue(["a"], "others", None, is_lost=True)
         assert (record.attempts, record.losses, record.replica) == (0, 1, None)
 
     with_store(tmp_path, test)
@@ -141,14 +141,14 @@ def test_progress_is_noted_of_ones_own_running_jobs_and_never_backwards(tmp_path
         assert begun is not None
         revision = begun[0].revision
         told = {job_id: (revision + 2, Report("stage", "two\0")) for job_id in "ab"}
-        await store.note_progress("theirs", told)
+        await store.write_progress("theirs", told)
         assert (await found(store, "a")).progress is None
-        await store.note_progress("ours", told)
+        await store.write_progress("ours", told)
         record = await found(store, "a")
         assert (record.revision, record.progress) == (revision + 2, Report("stage", "two\N{REPLACEMENT CHARACTER}"))
         assert (await found(store, "b")).progress is None
         for earlier in (revision + 2, revision + 1):
-            await store.note_progress("ours", {"a": (earlier, Report("stage", "one"))})
+            await store.write_progress("ours", {"a": (earlier, Report("stage", "one"))})
         assert await found(store, "a") == record
         ended = await store.end("a", "ours", _FAILURE)
         assert ended is not None

@@ -14,8 +14,8 @@ from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanE
 from robosc_api.security import Guard, Rule, Scope, TokenFile, make_token
 from robosc_server.failures import RefusedError
 from robosc_server.operations.interceptor import CallInterceptor
+from robosc_server.operations.logs import REQUEST_ID
 from robosc_server.operations.metrics import Metrics
-from robosc_server.operations.request_ids import REQUEST_ID
 from robosc_server.operations.settings import LogLevel
 from robosc_server.operations.tracing import OtlpTracing
 from robosc_server.tasks.task import Reason

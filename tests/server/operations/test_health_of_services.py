@@ -102,7 +102,7 @@ def test_conditions_are_asked_for_again_and_again_and_who_raises_says_no() -> No
 
             return ask
 
-        async with health.following({name: probe(name) for name in is_there}, every_s=0.001):
+        async with health.probing({name: probe(name) for name in is_there}, every_s=0.001):
             assert health.is_serving("")
             is_there["store"] = ConnectionError("away")
             await until(lambda: not health.is_serving("robosc.Keeps"))
@@ -164,7 +164,7 @@ def test_a_large_answer_that_was_sent_is_waited_for() -> None:
 
         async def large(request: bytes, context: Any) -> bytes:
             answer = bytes(size)
-            sender.hold(context, (answer,))
+            sender.reserve(context, (answer,))
             return answer
 
         ports: list[int] = []

@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc_server.failures import public_failure
-from robosc_server.operations.logs import log_fault
-from robosc_server.operations.request_ids import REQUEST_ID
+from robosc_server.operations.logs import REQUEST_ID, log_fault
 from robosc_server.operations.settings import LogFormat, LogLevel
 from robosc_server.tasks.task import Failure, Reason
 from robosc_server.workers.exit_reasons import ProcessExit, exit_description

@@ -26,7 +26,7 @@ def test_every_setting_stands_in_the_manual_as_it_is_defined() -> None:
 def test_every_metric_stands_in_the_manual() -> None:
     told = set(re.findall(r"^\| `(robosc_server_[a-z_]+)` \|", PAGE, re.MULTILINE))
     metrics = Metrics("1")
-    metrics.follow(jobs=lambda: {"queued": 1}, conditions=lambda: {"store": True})
+    metrics.set_sources(jobs=lambda: {"queued": 1}, conditions=lambda: {"store": True})
     families = text_string_to_metric_families(metrics.text().decode())
     counted = {
         f"{family.name}_total" if family.type == "counter" else family.name

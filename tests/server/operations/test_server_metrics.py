@@ -46,7 +46,7 @@ async def sent(address: str, request: bytes) -> bytes:
 
 def test_prometheus_can_read_them() -> None:
     metrics = Metrics("1.2")
-    metrics.follow(
+    metrics.set_sources(
         waiting=lambda: 3,
         running=lambda: 2,
         jobs=lambda: {"queued": 5},

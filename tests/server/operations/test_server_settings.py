@@ -13,9 +13,9 @@ from robosc_server.operations.settings import (
     default_text,
     description_of,
     flag_of,
+    format_value,
     load_settings,
     read_file,
-    shown,
     variable_of,
 )
 from robosc_server.tasks.task import TaskLimits
@@ -173,5 +173,5 @@ def test_defaults_in_words() -> None:
     assert default_text("bundle_bytes") == "1MiB"
     assert default_text("insecure_beyond_loopback") == "false"
     assert default_text("tls_key") == "none"
-    assert shown("task_seconds", 0.5) == "0.5"
-    assert shown("result_bytes", 1000) == "1000"
+    assert format_value("task_seconds", 0.5) == "0.5"
+    assert format_value("result_bytes", 1000) == "1000"

@@ -69,27 +69,27 @@ def test_what_lost_workers_took_counts_by_the_clock() -> None:
 
     spent: list[float] = []
     now_s = 10.0
-    spending = CpuTimeAccount(spent.append, lambda: now_s)
-    spending.hear({"is": "reports", "task": "t", "reports": []})
-    spending.hear(begun("a"))
+    account = CpuTimeAccount(spent.append, lambda: now_s)
+    account.record_event({"is": "reports", "task": "t", "reports": []})
+    account.record_event(begun("a"))
     # Another one begins: the first one was lost, and is not believed any more.
     now_s = 13.0
-    spending.hear(begun("b"))
-    spending.hear(told("a", 1.0))
+    account.record_event(begun("b"))
+    account.record_event(told("a", 1.0))
     assert spent == [3.0]
     for nonsense in (-1.0, float("nan"), float("inf"), "7", None):
-        spending.hear(told("b", nonsense))
-    spending.hear(told("b", 0.25))
-    spending.hear(told("b", 0.25))
+        account.record_event(told("b", nonsense))
+    account.record_event(told("b", 0.25))
+    account.record_event(told("b", 0.25))
     assert spent == [3.0, 0.25]
     # It is given up, and what the last worker has to tell never comes.
     now_s = 20.0
-    spending.hear(begun("c"))
+    account.record_event(begun("c"))
     now_s = 21.5
-    spending.stop()
+    account.stop()
     now_s = 30.0
-    spending.settle()
-    spending.settle()
+    account.close()
+    account.close()
     assert spent == [3.0, 0.25, 1.5]
 
 

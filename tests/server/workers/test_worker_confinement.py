@@ -19,7 +19,7 @@ from robosc.targets import available_targets
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_api.v1 import synthesis_pb2_grpc
 from robosc_server import main as program
-from robosc_server.tasks.requests import RequestLimits, accepted
+from robosc_server.tasks.requests import RequestLimits, accept_request
 from robosc_server.tasks.run import run_task
 from robosc_server.tasks.task import Report, Result, TaskKind, TaskLimits
 from robosc_server.workers import frames
@@ -179,7 +179,7 @@ def test_every_task_is_done_as_without_confinement() -> None:
         loop.run(workers.__aenter__())
         assert workers.missing == ()
         for kind, request in requests():
-            task = accepted(kind, request.SerializeToString(), RequestLimits())
+            task = accept_request(kind, request.SerializeToString(), RequestLimits())
             outcome = loop.run(workers.run(task, TaskLimits(), note))
             assert isinstance(outcome, Result), (kind, outcome)
             assert outcome == run_task(kind, task.request, TaskLimits(), lambda report: None)

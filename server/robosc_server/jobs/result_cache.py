@@ -23,11 +23,11 @@ _GATHER_S = 0.1
 """Time that a result waits for others written with it, in seconds: a transaction costs as much as a small task."""
 
 
-def _as_it_is(kind: TaskKind, result: Result) -> Result:
+def _unchanged(kind: TaskKind, result: Result) -> Result:
     return result
 
 
-class Results:
+class ResultCache:
     """Results that were worked out before; without the database, those in memory remain.
 
     Inside the context, kept results are written to the database in the background; outside, they stay in memory.
@@ -39,7 +39,7 @@ class Results:
     """
 
     def __init__(
-        self, store: Store, memory_bytes: int, finish: Callable[[TaskKind, Result], Result] = _as_it_is
+        self, store: Store, memory_bytes: int, finish: Callable[[TaskKind, Result], Result] = _unchanged
     ) -> None:
         self._store, self._memory_bytes, self._finish = store, memory_bytes, finish
         self._memory: OrderedDict[str, Result] = OrderedDict()

@@ -11,45 +11,46 @@ import grpc.aio
 
 from robosc_api.security import Credentials, SecurityError, open_async_channel
 from robosc_client import operations
-from robosc_client.calls import LOST, Course, Listing, Operation, Watching
-from robosc_client.connection import CHANNEL_OPTIONS
+from robosc_client.calls import CHANNEL_OPTIONS, WATCH_INTERRUPTED, JobPages, JobWatch, Operation, RetriedCall
 from robosc_client.convert.failures import failure_of
 from robosc_client.convert.requests import JobStub, SynthesisStub
 from robosc_client.errors import CredentialsError, malformed
 from robosc_client.jobs import Job
-from robosc_client.methods import described
+from robosc_client.operations import client_method
 from robosc_client.retry import DEFAULT_RETRIES, RetryPolicy
 
 
-def _answered[**P, Result](
+def _unary_method[**P, Result](
     describe: Callable[P, Operation[Result]],
 ) -> "Callable[Concatenate[AsyncClient, P], Coroutine[Any, Any, Result]]":
     async def method(self: "AsyncClient", /, *arguments: P.args, **options: P.kwargs) -> Result:
         return await self._answer(describe(*arguments, **options))
 
-    return described(method, describe, "AsyncClient")
+    return client_method(method, describe, "AsyncClient")
 
 
-def _followed[**P](describe: Callable[P, Watching]) -> "Callable[Concatenate[AsyncClient, P], AsyncGenerator[Job]]":
+def _watch_method[**P](describe: Callable[P, JobWatch]) -> "Callable[Concatenate[AsyncClient, P], AsyncGenerator[Job]]":
     def method(self: "AsyncClient", /, *arguments: P.args, **options: P.kwargs) -> AsyncGenerator[Job]:
         return self._follow(describe(*arguments, **options))
 
-    return described(method, describe, "AsyncClient", AsyncGenerator[Job])
+    return client_method(method, describe, "AsyncClient", AsyncGenerator[Job])
 
 
-def _ended[**P](describe: Callable[P, Watching]) -> "Callable[Concatenate[AsyncClient, P], Coroutine[Any, Any, Job]]":
+def _wait_method[**P](
+    describe: Callable[P, JobWatch],
+) -> "Callable[Concatenate[AsyncClient, P], Coroutine[Any, Any, Job]]":
     async def method(self: "AsyncClient", /, *arguments: P.args, **options: P.kwargs) -> Job:
         async with aclosing(self._follow(describe(*arguments, **options))) as jobs:
             return await anext(job async for job in jobs if job.state.has_ended)
 
-    return described(method, describe, "AsyncClient", Job)
+    return client_method(method, describe, "AsyncClient", Job)
 
 
-def _listed[**P](describe: Callable[P, Listing]) -> "Callable[Concatenate[AsyncClient, P], AsyncGenerator[Job]]":
+def _list_method[**P](describe: Callable[P, JobPages]) -> "Callable[Concatenate[AsyncClient, P], AsyncGenerator[Job]]":
     def method(self: "AsyncClient", /, *arguments: P.args, **options: P.kwargs) -> AsyncGenerator[Job]:
         return self._list(describe(*arguments, **options))
 
-    return described(method, describe, "AsyncClient", AsyncGenerator[Job])
+    return client_method(method, describe, "AsyncClient", AsyncGenerator[Job])
 
 
 class AsyncClient:
@@ -105,58 +106,58 @@ class AsyncClient:
         """End the connection; requests under way are cancelled."""
         await self._channel.close()
 
-    check = _answered(operations.check)
-    synthesize = _answered(operations.synthesize)
-    generate = _answered(operations.generate)
-    explore = _answered(operations.explore)
-    verify = _answered(operations.verify)
-    format = _answered(operations.format_)
+    check = _unary_method(operations.check)
+    synthesize = _unary_method(operations.synthesize)
+    generate = _unary_method(operations.generate)
+    explore = _unary_method(operations.explore)
+    verify = _unary_method(operations.verify)
+    format = _unary_method(operations.format_)
 
-    list_targets = _answered(operations.list_targets)
-    get_version = _answered(operations.get_version)
+    list_targets = _unary_method(operations.list_targets)
+    get_version = _unary_method(operations.get_version)
 
-    submit = _answered(operations.submit)
-    get_job = _answered(operations.get_job)
-    watch = _followed(operations.watch)
-    wait = _ended(operations.wait)
-    cancel_job = _answered(operations.cancel_job)
-    list_jobs = _listed(operations.list_jobs)
-    job_result = _answered(operations.job_result)
+    submit = _unary_method(operations.submit)
+    get_job = _unary_method(operations.get_job)
+    watch = _watch_method(operations.watch)
+    wait = _wait_method(operations.wait)
+    cancel_job = _unary_method(operations.cancel_job)
+    list_jobs = _list_method(operations.list_jobs)
+    job_result = _unary_method(operations.job_result)
 
     async def _answer[Result](self, operation: Operation[Result]) -> Result:
         """Make a call, as often as it is worth it."""
-        course = Course(operation, self._retries, self._address)
+        call = RetriedCall(operation, self._retries, self._address)
         while True:
             try:
                 # Closed at once whatever happens, so that a caller who gives up ends the work, too.
-                async with aclosing(self._messages(operation, course.begin())) as messages:
+                async with aclosing(self._messages(operation, call.begin())) as messages:
                     async for message in messages:
-                        course.take(message)
-                return course.result()
+                        call.take(message)
+                return call.result()
             except grpc.RpcError as error:
-                delay_s = course.failed(error)
+                delay_s = call.failed(error)
             await self._sleep(delay_s)
 
-    async def _follow(self, watching: Watching) -> AsyncGenerator[Job]:
+    async def _follow(self, job_watch: JobWatch) -> AsyncGenerator[Job]:
         """A job until it has ended."""
-        attempts = watching.attempts(self._retries, self._address)
-        while not watching.is_over:
-            failure = LOST
+        attempts = job_watch.attempts(self._retries, self._address)
+        while not job_watch.is_over:
+            failure = WATCH_INTERRUPTED
             try:
-                async with aclosing(self._messages(watching.operation(), attempts.timeout_s())) as messages:
+                async with aclosing(self._messages(job_watch.operation(), attempts.timeout_s())) as messages:
                     async for message in messages:
                         attempts.succeeded()
-                        yield watching.take(message)
-                        if watching.is_over:
+                        yield job_watch.take(message)
+                        if job_watch.is_over:
                             return
             except grpc.RpcError as error:
                 failure = failure_of(error)
             await self._sleep(attempts.delay_after(failure, has_answered=False))
 
-    async def _list(self, listing: Listing) -> AsyncGenerator[Job]:
+    async def _list(self, pages: JobPages) -> AsyncGenerator[Job]:
         """Jobs, page by page."""
-        while not listing.is_over:
-            for job in listing.take(await self._answer(listing.operation())):
+        while not pages.is_over:
+            for job in pages.take(await self._answer(pages.operation())):
                 yield job
 
     async def _messages(self, operation: Operation[Any], timeout_s: float | None) -> AsyncGenerator[Any]:

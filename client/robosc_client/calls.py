@@ -1,7 +1,7 @@
-"""Calls on their way to a result, over as many attempts as it takes: the same for both clients.
+"""Calls with their retries, and the options of channels: the part that both clients share.
 
-No input or output is done here. A client makes the call that it is told of, gives every message that it receives, or
-the error, and waits as long as it is told to.
+Nothing is sent or received here. A client makes the call of an operation, passes on every message or the error, and
+waits for the delay that it is given.
 """
 
 from collections.abc import Callable
@@ -12,18 +12,39 @@ import grpc
 
 from robosc_api.v1 import jobs_pb2
 from robosc_client.convert import jobs
-from robosc_client.convert.assembly import Assembly, Whole
 from robosc_client.convert.failures import Failure, failure_of
 from robosc_client.convert.requests import list_request
+from robosc_client.convert.response_readers import MAXIMUM_BYTES, ResponseReader, UnaryReader
 from robosc_client.errors import malformed
 from robosc_client.jobs import Job, JobState, TaskKind
 from robosc_client.results import Progress
 from robosc_client.retry import Attempts, RetryPolicy
 
+KEEPALIVE_MS = 60_000
+"""A connection on which nothing comes is tried after so long: not more often than servers put up with."""
+
+CHANNEL_OPTIONS: tuple[tuple[str, int | str], ...] = (
+    # Behind one name there may be several servers: calls go to all of them by turns, and past one that is gone.
+    ("grpc.service_config", '{"loadBalancingConfig": [{"round_robin": {}}]}'),
+    # One message holds a whole supervisor; what surrounds it is little.
+    ("grpc.max_receive_message_length", MAXIMUM_BYTES + 2**20),
+    # The server knows its limit, and tells it.
+    ("grpc.max_send_message_length", -1),
+    # A proxy for web pages, set in the environment, is none for a service in the next room.
+    ("grpc.enable_http_proxy", 0),
+    # Whoever calls again wants a new connection soon, not when gRPC's own patience has passed.
+    ("grpc.initial_reconnect_backoff_ms", 100),
+    ("grpc.max_reconnect_backoff_ms", 5_000),
+    # A watch may wait for hours; a connection whose other end has gone without a word must not look like that.
+    ("grpc.keepalive_time_ms", KEEPALIVE_MS),
+    ("grpc.keepalive_timeout_ms", 10_000),
+    ("grpc.http2.max_pings_without_data", 0),
+)
+
 MAXIMUM_PAGE = 1000
 """Jobs that one answer lists."""
 
-LOST = Failure(grpc.StatusCode.UNAVAILABLE, "the watch ended before the job")
+WATCH_INTERRUPTED = Failure(grpc.StatusCode.UNAVAILABLE, "the watch ended before the job")
 """Failure of a watch that ends without an error before its job does."""
 
 _EMPTY_PAGES = 100
@@ -31,7 +52,7 @@ _EMPTY_PAGES = 100
 type OnProgress = Callable[[Progress], None]
 
 
-def ignored(progress: Progress) -> None:
+def ignore_progress(progress: Progress) -> None:
     """Nobody wants to know."""
 
 
@@ -42,7 +63,7 @@ class Operation[Result]:
     Attributes:
         method: Name of the method.
         request: The request message.
-        assembly: Function that makes the assembly of an answer; each attempt needs another.
+        reader: Function that makes the reader of a response; each attempt needs a new one.
         is_stream: True if the answer is a stream of messages.
         is_about_jobs: True if the method is of the service for jobs.
         deadline_s: Seconds for all attempts together; None: any number.
@@ -51,15 +72,15 @@ class Operation[Result]:
 
     method: str
     request: Any
-    assembly: Callable[[], Assembly[Result]]
+    reader: Callable[[], ResponseReader[Result]]
     is_stream: bool = False
     is_about_jobs: bool = False
     deadline_s: float | None = None
-    on_progress: OnProgress = ignored
+    on_progress: OnProgress = ignore_progress
 
 
-class Course[Result]:
-    """One operation on its way to its result."""
+class RetriedCall[Result]:
+    """One operation, called until it succeeds or its attempts are used up."""
 
     def __init__(self, operation: Operation[Result], policy: RetryPolicy, address: str) -> None:
         """Prepare the operation.
@@ -72,7 +93,7 @@ class Course[Result]:
         self._operation = operation
         self._attempts = Attempts(policy, address, operation.deadline_s)
         self._has_answered = False
-        self._assembly = operation.assembly()
+        self._reader = operation.reader()
 
     def begin(self) -> float | None:
         """An attempt is made: seconds that it may take; None: any number.
@@ -81,13 +102,13 @@ class Course[Result]:
             DeadlineError: There are none left.
         """
         self._has_answered = False
-        self._assembly = self._operation.assembly()
+        self._reader = self._operation.reader()
         return self._attempts.timeout_s()
 
     def take(self, message: Any) -> None:
         """The next message of the attempt; raises ServiceError for what no RoboSC server sends here."""
         self._has_answered = True
-        progress = self._assembly.take(message)
+        progress = self._reader.take(message)
         if progress is not None:
             self._operation.on_progress(progress)
 
@@ -96,7 +117,7 @@ class Course[Result]:
 
         Raises ServiceError where it is not whole.
         """
-        return self._assembly.result()
+        return self._reader.result()
 
     def failed(self, error: grpc.RpcError) -> float:
         """The attempt has failed: seconds until the next one.
@@ -107,7 +128,7 @@ class Course[Result]:
         return self._attempts.delay_after(failure_of(error), has_answered=self._has_answered)
 
 
-def about(job_id: str) -> Callable[[Any], Job]:
+def job_reader(job_id: str) -> Callable[[Any], Job]:
     """Reads the job in a message; it raises ServiceError for another job than this."""
 
     def convert(message: Any) -> Job:
@@ -119,7 +140,7 @@ def about(job_id: str) -> Callable[[Any], Job]:
     return convert
 
 
-class Listing:
+class JobPages:
     """Pages of jobs, as they are asked for."""
 
     def __init__(
@@ -156,7 +177,9 @@ class Listing:
         def convert(message: jobs_pb2.ListJobsResponse) -> tuple[tuple[Job, ...], str]:
             return jobs.page_of(message, self._page_size)
 
-        return Operation("ListJobs", request, lambda: Whole(convert), is_about_jobs=True, deadline_s=self._deadline_s)
+        return Operation(
+            "ListJobs", request, lambda: UnaryReader(convert), is_about_jobs=True, deadline_s=self._deadline_s
+        )
 
     def take(self, page: tuple[tuple[Job, ...], str]) -> tuple[Job, ...]:
         """The jobs of a page.
@@ -173,7 +196,7 @@ class Listing:
         return found
 
 
-class Watching:
+class JobWatch:
     """One job's changes, over as many connections as it takes.
 
     Attributes:
@@ -193,7 +216,7 @@ class Watching:
     def operation(self) -> Operation[Job]:
         """Asks for what comes after all that was seen; every message is one for `take`."""
         request = jobs_pb2.WatchJobRequest(id=self._job_id, after_revision=self._revision)
-        return Operation("WatchJob", request, lambda: Whole(self.take), is_stream=True, is_about_jobs=True)
+        return Operation("WatchJob", request, lambda: UnaryReader(self.take), is_stream=True, is_about_jobs=True)
 
     def take(self, message: jobs_pb2.WatchJobResponse) -> Job:
         """The job as it is now.
@@ -201,7 +224,7 @@ class Watching:
         Raises:
             ServiceError: It is another job, or nothing has changed.
         """
-        job = about(self._job_id)(message)
+        job = job_reader(self._job_id)(message)
         # A job that has ended is told of even if nothing has changed.
         if job.revision < self._revision or (job.revision == self._revision and not job.state.has_ended):
             raise malformed("a job's changes are not in their order")

@@ -11,45 +11,44 @@ import grpc
 
 from robosc_api.security import Credentials, SecurityError, open_channel
 from robosc_client import operations
-from robosc_client.calls import LOST, Course, Listing, Operation, Watching
-from robosc_client.connection import CHANNEL_OPTIONS
+from robosc_client.calls import CHANNEL_OPTIONS, WATCH_INTERRUPTED, JobPages, JobWatch, Operation, RetriedCall
 from robosc_client.convert.failures import failure_of
 from robosc_client.convert.requests import JobStub, SynthesisStub
 from robosc_client.errors import CredentialsError
 from robosc_client.jobs import Job
-from robosc_client.methods import described
+from robosc_client.operations import client_method
 from robosc_client.retry import DEFAULT_RETRIES, RetryPolicy
 
-_PARTING_S = 0.5
+_CLOSE_S = 0.5
 """Time that an interrupted program waits for the end of its connection, in seconds."""
 
 
-def _answered[**P, Result](describe: Callable[P, Operation[Result]]) -> "Callable[Concatenate[Client, P], Result]":
+def _unary_method[**P, Result](describe: Callable[P, Operation[Result]]) -> "Callable[Concatenate[Client, P], Result]":
     def method(self: "Client", /, *arguments: P.args, **options: P.kwargs) -> Result:
         return self._answer(describe(*arguments, **options))
 
-    return described(method, describe, "Client")
+    return client_method(method, describe, "Client")
 
 
-def _followed[**P](describe: Callable[P, Watching]) -> "Callable[Concatenate[Client, P], Iterator[Job]]":
+def _watch_method[**P](describe: Callable[P, JobWatch]) -> "Callable[Concatenate[Client, P], Iterator[Job]]":
     def method(self: "Client", /, *arguments: P.args, **options: P.kwargs) -> Iterator[Job]:
         return self._follow(describe(*arguments, **options))
 
-    return described(method, describe, "Client", Iterator[Job])
+    return client_method(method, describe, "Client", Iterator[Job])
 
 
-def _ended[**P](describe: Callable[P, Watching]) -> "Callable[Concatenate[Client, P], Job]":
+def _wait_method[**P](describe: Callable[P, JobWatch]) -> "Callable[Concatenate[Client, P], Job]":
     def method(self: "Client", /, *arguments: P.args, **options: P.kwargs) -> Job:
         return next(job for job in self._follow(describe(*arguments, **options)) if job.state.has_ended)
 
-    return described(method, describe, "Client", Job)
+    return client_method(method, describe, "Client", Job)
 
 
-def _listed[**P](describe: Callable[P, Listing]) -> "Callable[Concatenate[Client, P], Iterator[Job]]":
+def _list_method[**P](describe: Callable[P, JobPages]) -> "Callable[Concatenate[Client, P], Iterator[Job]]":
     def method(self: "Client", /, *arguments: P.args, **options: P.kwargs) -> Iterator[Job]:
         return self._list(describe(*arguments, **options))
 
-    return described(method, describe, "Client", Iterator[Job])
+    return client_method(method, describe, "Client", Iterator[Job])
 
 
 class Client:
@@ -106,64 +105,64 @@ class Client:
         # all calls before it waits.
         ending = threading.Thread(target=self._channel.close, daemon=True)
         ending.start()
-        ending.join(_PARTING_S)
+        ending.join(_CLOSE_S)
 
     def close(self) -> None:
         """End the connection; requests under way are cancelled."""
         self._channel.close()
 
-    check = _answered(operations.check)
-    synthesize = _answered(operations.synthesize)
-    generate = _answered(operations.generate)
-    explore = _answered(operations.explore)
-    verify = _answered(operations.verify)
-    format = _answered(operations.format_)
+    check = _unary_method(operations.check)
+    synthesize = _unary_method(operations.synthesize)
+    generate = _unary_method(operations.generate)
+    explore = _unary_method(operations.explore)
+    verify = _unary_method(operations.verify)
+    format = _unary_method(operations.format_)
 
-    list_targets = _answered(operations.list_targets)
-    get_version = _answered(operations.get_version)
+    list_targets = _unary_method(operations.list_targets)
+    get_version = _unary_method(operations.get_version)
 
-    submit = _answered(operations.submit)
-    get_job = _answered(operations.get_job)
-    watch = _followed(operations.watch)
-    wait = _ended(operations.wait)
-    cancel_job = _answered(operations.cancel_job)
-    list_jobs = _listed(operations.list_jobs)
-    job_result = _answered(operations.job_result)
+    submit = _unary_method(operations.submit)
+    get_job = _unary_method(operations.get_job)
+    watch = _watch_method(operations.watch)
+    wait = _wait_method(operations.wait)
+    cancel_job = _unary_method(operations.cancel_job)
+    list_jobs = _list_method(operations.list_jobs)
+    job_result = _unary_method(operations.job_result)
 
     def _answer[Result](self, operation: Operation[Result]) -> Result:
         """Make a call, as often as it is worth it."""
-        course = Course(operation, self._retries, self._address)
+        call = RetriedCall(operation, self._retries, self._address)
         while True:
             try:
                 # Closed at once whatever happens, so that a caller who gives up ends the work, too.
-                with closing(self._messages(operation, course.begin())) as messages:
+                with closing(self._messages(operation, call.begin())) as messages:
                     for message in messages:
-                        course.take(message)
-                return course.result()
+                        call.take(message)
+                return call.result()
             except grpc.RpcError as error:
-                delay_s = course.failed(error)
+                delay_s = call.failed(error)
             self._sleep(delay_s)
 
-    def _follow(self, watching: Watching) -> Iterator[Job]:
+    def _follow(self, job_watch: JobWatch) -> Iterator[Job]:
         """A job until it has ended."""
-        attempts = watching.attempts(self._retries, self._address)
-        while not watching.is_over:
-            failure = LOST
+        attempts = job_watch.attempts(self._retries, self._address)
+        while not job_watch.is_over:
+            failure = WATCH_INTERRUPTED
             try:
-                with closing(self._messages(watching.operation(), attempts.timeout_s())) as messages:
+                with closing(self._messages(job_watch.operation(), attempts.timeout_s())) as messages:
                     for message in messages:
                         attempts.succeeded()
-                        yield watching.take(message)
-                        if watching.is_over:
+                        yield job_watch.take(message)
+                        if job_watch.is_over:
                             return
             except grpc.RpcError as error:
                 failure = failure_of(error)
             self._sleep(attempts.delay_after(failure, has_answered=False))
 
-    def _list(self, listing: Listing) -> Iterator[Job]:
+    def _list(self, pages: JobPages) -> Iterator[Job]:
         """Jobs, page by page."""
-        while not listing.is_over:
-            yield from listing.take(self._answer(listing.operation()))
+        while not pages.is_over:
+            yield from pages.take(self._answer(pages.operation()))
 
     def _messages(self, operation: Operation[Any], timeout_s: float | None) -> Generator[Any]:
         """The messages of one attempt; the call ends with their reader."""

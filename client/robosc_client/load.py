@@ -16,12 +16,12 @@ import grpc
 import grpc.aio
 
 from robosc_api.security import Credentials, open_async_channel
-from robosc_client.connection import CHANNEL_OPTIONS
+from robosc_client.calls import CHANNEL_OPTIONS
 from robosc_client.convert.failures import failure_of
 
 MAXIMUM_CONCURRENCY = 10_000
 
-_SETTLING_S = 30.0
+_CONNECT_S = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,7 @@ async def _connected(channels: list[grpc.aio.Channel]) -> None:
     """Wait until there are connections; where there is no server, the calls tell so."""
     ready = asyncio.gather(*(channel.channel_ready() for channel in channels))
     try:
-        await asyncio.wait_for(ready, _SETTLING_S)
+        await asyncio.wait_for(ready, _CONNECT_S)
     except TimeoutError:
         return
 

@@ -4,10 +4,11 @@ These functions are the one description of the methods of both clients, which ta
 documentation over: `robosc_client.client` has them done for threads, `robosc_client.aio` for asyncio.
 """
 
+import inspect
 import os
 import secrets
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, get_args
 
 from robosc.pipeline.files import given_path, read_bounded
 from robosc.pipeline.findings import Findings
@@ -18,20 +19,20 @@ from robosc.supervisor.codec import MAXIMUM_BYTES, encode
 from robosc.targets import GenerateOptions, TargetInfo
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_client.calls import Listing, OnProgress, Operation, Watching, about, ignored
-from robosc_client.convert import answers, jobs
-from robosc_client.convert.assembly import (
-    Assembly,
-    ExplorationAssembly,
-    GenerationAssembly,
-    JobResultAssembly,
-    SynthesisAssembly,
-    VerificationAssembly,
-    Whole,
-    check_assembly,
-    format_assembly,
-)
+from robosc_client.calls import JobPages, JobWatch, OnProgress, Operation, ignore_progress, job_reader
+from robosc_client.convert import jobs, response_fields
 from robosc_client.convert.requests import request_of, submit_request
+from robosc_client.convert.response_readers import (
+    ExplorationReader,
+    GenerationReader,
+    JobResultReader,
+    ResponseReader,
+    SynthesisReader,
+    UnaryReader,
+    VerificationReader,
+    check_reader,
+    format_reader,
+)
 from robosc_client.jobs import Job, JobState, Submission, TaskKind
 from robosc_client.results import (
     Exploration,
@@ -64,7 +65,7 @@ type SupervisorLike = Supervisor | bytes | FileName
 def check(bundle: ModelLike, *, deadline_s: float | None = None) -> Operation[Findings]:
     """Every finding about a model or library, sorted by place."""
     model = loaded(bundle)
-    return Operation("Check", request_of(Check(model)), lambda: check_assembly(model), deadline_s=deadline_s)
+    return Operation("Check", request_of(Check(model)), lambda: check_reader(model), deadline_s=deadline_s)
 
 
 def synthesize(
@@ -72,10 +73,10 @@ def synthesize(
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     deadline_s: float | None = None,
-    on_progress: OnProgress = ignored,
+    on_progress: OnProgress = ignore_progress,
 ) -> Operation[Synthesis]:
     """Synthesize and certify a supervisor."""
-    return _work("Synthesize", Synthesize(loaded(bundle), options), SynthesisAssembly, deadline_s, on_progress)
+    return _streaming_task("Synthesize", Synthesize(loaded(bundle), options), SynthesisReader, deadline_s, on_progress)
 
 
 def generate(
@@ -85,7 +86,7 @@ def generate(
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     deadline_s: float | None = None,
-    on_progress: OnProgress = ignored,
+    on_progress: OnProgress = ignore_progress,
 ) -> Operation[Generation]:
     """Synthesize a supervisor and generate the files of a target around it.
 
@@ -98,7 +99,7 @@ def generate(
         on_progress: See the class.
     """
     task = Generate(loaded(bundle), target, generation, options)
-    return _work("Generate", task, lambda: GenerationAssembly(target), deadline_s, on_progress)
+    return _streaming_task("Generate", task, lambda: GenerationReader(target), deadline_s, on_progress)
 
 
 def explore(
@@ -107,11 +108,11 @@ def explore(
     *,
     maximum_states: int | None = None,
     deadline_s: float | None = None,
-    on_progress: OnProgress = ignored,
+    on_progress: OnProgress = ignore_progress,
 ) -> Operation[Exploration]:
     """Everything that the robot may do under its supervisor; beyond so many states it is given up."""
     task = Explore(loaded(bundle), options, maximum_states)
-    return _work("Explore", task, ExplorationAssembly, deadline_s, on_progress)
+    return _streaming_task("Explore", task, ExplorationReader, deadline_s, on_progress)
 
 
 def verify(
@@ -124,7 +125,7 @@ def verify(
     maximum_states: int | None = None,
     is_strict: bool = False,
     deadline_s: float | None = None,
-    on_progress: OnProgress = ignored,
+    on_progress: OnProgress = ignore_progress,
 ) -> Operation[Verification]:
     """Check a supervisor against its model, or verify properties of the robot under its supervisor.
 
@@ -155,7 +156,7 @@ def verify(
         )
     elif properties or property_files or supervisor is not None or options or maximum_states is not None or is_strict:
         raise TypeError("a task says by itself what is to be verified: give either a task or a model and the rest")
-    return _work("Verify", task, VerificationAssembly, deadline_s, on_progress)
+    return _streaming_task("Verify", task, VerificationReader, deadline_s, on_progress)
 
 
 def _content_of(supervisor: SupervisorLike) -> bytes:
@@ -174,17 +175,17 @@ def _content_of(supervisor: SupervisorLike) -> bytes:
 def format_(file: SourceFile, *, deadline_s: float | None = None) -> Operation[Formatted]:
     """Put a text into its canonical layout."""
     request = request_of(Format(file))
-    return Operation("Format", request, lambda: format_assembly(file.text), deadline_s=deadline_s)
+    return Operation("Format", request, lambda: format_reader(file.text), deadline_s=deadline_s)
 
 
-def _work[Result](
+def _streaming_task[Result](
     method: str,
     task: Task,
-    assembly: Callable[[], Assembly[Result]],
+    reader: Callable[[], ResponseReader[Result]],
     deadline_s: float | None,
     on_progress: OnProgress,
 ) -> Operation[Result]:
-    return Operation(method, request_of(task), assembly, is_stream=True, deadline_s=deadline_s, on_progress=on_progress)
+    return Operation(method, request_of(task), reader, is_stream=True, deadline_s=deadline_s, on_progress=on_progress)
 
 
 # About the server
@@ -193,13 +194,13 @@ def _work[Result](
 def list_targets(*, deadline_s: float | None = None) -> Operation[tuple[TargetInfo, ...]]:
     """Return the targets that can be generated, sorted by name."""
     request = pb.ListTargetsRequest()
-    return Operation("ListTargets", request, lambda: Whole(answers.targets_of), deadline_s=deadline_s)
+    return Operation("ListTargets", request, lambda: UnaryReader(response_fields.targets_of), deadline_s=deadline_s)
 
 
 def get_version(*, deadline_s: float | None = None) -> Operation[ServerInfo]:
     """Return information about the server, and its limits."""
     request = pb.GetVersionRequest()
-    return Operation("GetVersion", request, lambda: Whole(answers.server_info_of), deadline_s=deadline_s)
+    return Operation("GetVersion", request, lambda: UnaryReader(response_fields.server_info_of), deadline_s=deadline_s)
 
 
 # Jobs
@@ -225,15 +226,15 @@ def submit(
     # With a key, the call may be made again.
     key = secrets.token_hex(16) if idempotency_key is None else idempotency_key
     request = submit_request(task, key, label, retention_s)
-    return _about_jobs("SubmitJob", request, jobs.submission_of, deadline_s)
+    return _job_call("SubmitJob", request, jobs.submission_of, deadline_s)
 
 
 def get_job(job_id: str, *, deadline_s: float | None = None) -> Operation[Job]:
     """Return the current state of a job."""
-    return _about_jobs("GetJob", jobs_pb2.GetJobRequest(id=job_id), about(job_id), deadline_s)
+    return _job_call("GetJob", jobs_pb2.GetJobRequest(id=job_id), job_reader(job_id), deadline_s)
 
 
-def watch(job_id: str, *, after_revision: int = 0, deadline_s: float | None = None) -> Watching:
+def watch(job_id: str, *, after_revision: int = 0, deadline_s: float | None = None) -> JobWatch:
     """A job as it is now, and whenever it has changed until it has ended; over lost connections, too.
 
     Args:
@@ -241,17 +242,17 @@ def watch(job_id: str, *, after_revision: int = 0, deadline_s: float | None = No
         after_revision: Nothing is given before there is a greater one, or the job has ended.
         deadline_s: See the class.
     """
-    return Watching(job_id, after_revision, deadline_s)
+    return JobWatch(job_id, after_revision, deadline_s)
 
 
-def wait(job_id: str, *, deadline_s: float | None = None) -> Watching:
+def wait(job_id: str, *, deadline_s: float | None = None) -> JobWatch:
     """A job, once it has ended."""
-    return Watching(job_id, deadline_s=deadline_s)
+    return JobWatch(job_id, deadline_s=deadline_s)
 
 
 def cancel_job(job_id: str, *, deadline_s: float | None = None) -> Operation[Job]:
     """End a job; one that has ended stays as it is."""
-    return _about_jobs("CancelJob", jobs_pb2.CancelJobRequest(id=job_id), about(job_id), deadline_s)
+    return _job_call("CancelJob", jobs_pb2.CancelJobRequest(id=job_id), job_reader(job_id), deadline_s)
 
 
 def list_jobs(
@@ -261,7 +262,7 @@ def list_jobs(
     all_owners: bool = False,
     page_size: int = 100,
     deadline_s: float | None = None,
-) -> Listing:
+) -> JobPages:
     """List jobs, the youngest first, asked for page by page.
 
     Args:
@@ -271,7 +272,7 @@ def list_jobs(
         page_size: Jobs that are asked for at once.
         deadline_s: See the class; for each page.
     """
-    return Listing(states, kind, all_owners=all_owners, page_size=page_size, deadline_s=deadline_s)
+    return JobPages(states, kind, all_owners=all_owners, page_size=page_size, deadline_s=deadline_s)
 
 
 def job_result(job_id: str, *, kind: TaskKind | None = None, deadline_s: float | None = None) -> Operation[TaskResult]:
@@ -287,14 +288,41 @@ def job_result(job_id: str, *, kind: TaskKind | None = None, deadline_s: float |
     return Operation(
         "GetJobResult",
         request,
-        lambda: JobResultAssembly(kind),
+        lambda: JobResultReader(kind),
         is_stream=True,
         is_about_jobs=True,
         deadline_s=deadline_s,
     )
 
 
-def _about_jobs[Message, Result](
+def _job_call[Message, Result](
     method: str, request: Any, convert: Callable[[Message], Result], deadline_s: float | None
 ) -> Operation[Result]:
-    return Operation(method, request, lambda: Whole(convert), is_about_jobs=True, deadline_s=deadline_s)
+    return Operation(method, request, lambda: UnaryReader(convert), is_about_jobs=True, deadline_s=deadline_s)
+
+
+# From functions to methods
+
+
+def client_method[Method: Callable[..., Any]](
+    method: Method, description: Callable[..., Any], of: str, returns: Any = None
+) -> Method:
+    """Return a method that is called and documented as the function that describes it.
+
+    Args:
+        method: The method.
+        description: The function that describes it, but for `self`.
+        of: Name of the client's class.
+        returns: Type that the method returns; None: the result type of the operation that the function returns.
+    """
+    signature = inspect.signature(description)
+    own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY)
+    result = get_args(signature.return_annotation)[0] if returns is None else returns
+    documented: Any = method
+    documented.__name__ = description.__name__.removesuffix("_")
+    documented.__qualname__ = f"{of}.{documented.__name__}"
+    documented.__doc__ = description.__doc__
+    documented.__signature__ = signature.replace(
+        parameters=[own, *signature.parameters.values()], return_annotation=result
+    )
+    return method

@@ -13,7 +13,7 @@ from robosc.source import Bundle, SourceFile
 from robosc_api.security import SecurityError
 from robosc_client import Check, Synthesize, Task
 from robosc_client.commands.connection import add_connection_arguments, exit_statuses, number_up_to, seconds, target_of
-from robosc_client.commands.shown import Shown
+from robosc_client.commands.progress_line import ProgressLine
 from robosc_client.commands.tasks import add_synthesis_arguments, synthesis_options
 from robosc_client.convert.requests import request_of
 from robosc_client.load import MAXIMUM_CONCURRENCY, Load, Measured, measure
@@ -86,8 +86,8 @@ def _bench(arguments: argparse.Namespace) -> int:
     )
     address, credentials = target_of(arguments)
     try:
-        with Shown() as shown:
-            shown.show(f"{arguments.concurrency} callers at {address}")
+        with ProgressLine() as line:
+            line.show(f"{arguments.concurrency} callers at {address}")
             measured = asyncio.run(measure(address, credentials, load))
     except SecurityError as error:
         raise UsageError(str(error)) from error

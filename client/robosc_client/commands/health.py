@@ -5,8 +5,8 @@ import sys
 
 from robosc.cli.output import CommandError, ExitCode, print_json
 from robosc.source import visible
+from robosc_client.calls import CHANNEL_OPTIONS
 from robosc_client.commands.connection import add_connection_arguments, exit_statuses, target_of
-from robosc_client.connection import CHANNEL_OPTIONS
 from robosc_client.convert.failures import first_line
 from robosc_client.errors import CredentialsError
 

@@ -54,7 +54,7 @@ from robosc_client.commands.connection import (
     number_up_to,
     seconds,
 )
-from robosc_client.commands.shown import Shown
+from robosc_client.commands.progress_line import ProgressLine
 from robosc_client.commands.supervisor_file import write_supervisor
 from robosc_client.commands.tasks import (
     add_synthesis_arguments,
@@ -329,11 +329,11 @@ def _submit(arguments: argparse.Namespace, client: Client) -> int:
 
 def _watch(arguments: argparse.Namespace, client: Client) -> int:
     seen: Job | None = None
-    with Shown() as shown:
+    with ProgressLine() as line:
         for job in client.watch(arguments.job, deadline_s=arguments.deadline):
-            shown.show(_line(job), job.progress.stage if job.progress is not None else "")
+            line.show(_line(job), job.progress.stage if job.progress is not None else "")
             if not arguments.json and (seen is None or job.state is not seen.state):
-                shown.write(_line(job))
+                line.write(_line(job))
             seen = job
     if arguments.json and seen is not None:
         print_json({"job": job_json(seen)})
@@ -378,9 +378,9 @@ def _report_nothing(job: Job, found: Synthesis | Generation | Exploration | Veri
         if isinstance(found, Verification) and found.reason:
             sys.stderr.write(f"{job.main_file}: {visible(found.reason)}\n")
         return
-    from robosc_client.made import made_of
+    from robosc_client.outcomes import outcome_from_response
 
-    made = made_of(found)
+    made = outcome_from_response(found)
     print_diagnostics(made.diagnostics, None)
     report_reasons(made, Bundle(SourceFile(job.main_file, "")))
 
@@ -392,7 +392,7 @@ def _require_sound(arguments: argparse.Namespace, found: TaskResult, keys: "Coll
         CommandError: None of the keys has signed it, or it is no supervisor where one is wanted.
         ServiceError: The supervisor is no valid one, or for another deployment.
     """
-    from robosc_client.made import decoded, require_deployment
+    from robosc_client.outcomes import decoded, require_deployment
 
     supervisor = decoded(found.supervisor) if isinstance(found, Synthesis) and found.supervisor else None
     if supervisor is None or not isinstance(found, Synthesis):

@@ -47,7 +47,7 @@ from robosc.model.structure import Deployment
 from robosc.source import Bundle, SourceFile, visible
 from robosc_client import Client, SynthesisOptions, Verification, VerificationStatus, Verify
 from robosc_client.commands.connection import SERVICE, SIGNED_SERVICE, add_connection_arguments, exit_statuses
-from robosc_client.commands.shown import Shown
+from robosc_client.commands.progress_line import ProgressLine
 from robosc_client.commands.supervisor_file import write_supervisor
 from robosc_client.errors import malformed
 
@@ -161,19 +161,19 @@ def verify_task(arguments: argparse.Namespace, bundle: Bundle, supervisor: bytes
 
 
 def _check(arguments: argparse.Namespace, client: Client) -> int:
-    from robosc_client.made import made_of
+    from robosc_client.outcomes import outcome_from_response
 
     def make(bundle: Bundle) -> "SynthesisOutcome":
         options = replace(synthesis_options(arguments), allow_livelock=False)
-        with Shown() as shown:
-            found = client.synthesize(bundle, options, deadline_s=arguments.deadline, on_progress=shown.tell)
-        return made_of(found)
+        with ProgressLine() as line:
+            found = client.synthesize(bundle, options, deadline_s=arguments.deadline, on_progress=line.report)
+        return outcome_from_response(found)
 
     return check_here.run_with(arguments, lambda bundle: client.check(bundle, deadline_s=arguments.deadline), make)
 
 
 def _synth(arguments: argparse.Namespace, client: Client) -> int:
-    from robosc_client.made import made_of, require_made_for
+    from robosc_client.outcomes import outcome_from_response, require_made_for
 
     if arguments.output is not None and not arguments.output.name:
         raise UsageError("-o needs the name of a file")
@@ -181,9 +181,9 @@ def _synth(arguments: argparse.Namespace, client: Client) -> int:
     keys = trusted_keys(arguments)
     bundle = read_bundle(arguments)
     options = synthesis_options(arguments)
-    with Shown() as shown:
-        found = client.synthesize(bundle, options, deadline_s=arguments.deadline, on_progress=shown.tell)
-    made = made_of(found, found.supervisor)
+    with ProgressLine() as line:
+        found = client.synthesize(bundle, options, deadline_s=arguments.deadline, on_progress=line.report)
+    made = outcome_from_response(found, found.supervisor)
     if made.supervisor is not None:
         require_made_for(made.supervisor, bundle, options.deployment)
         if keys:
@@ -233,37 +233,37 @@ def require_signature(keys: "Collection[PublicKey]", supervisor: bytes, signatur
 
 
 def _generate(arguments: argparse.Namespace, client: Client) -> int:
-    from robosc_client.made import made_of
+    from robosc_client.outcomes import outcome_from_response
 
     generation = generate_options(arguments)
     bundle = read_bundle(arguments)
-    with Shown() as shown:
+    with ProgressLine() as line:
         found = client.generate(
             bundle,
             arguments.target,
             generation,
             synthesis_options(arguments),
             deadline_s=arguments.deadline,
-            on_progress=shown.tell,
+            on_progress=line.report,
         )
-    return report_generated(arguments, made_of(found), found.files, bundle)
+    return report_generated(arguments, outcome_from_response(found), found.files, bundle)
 
 
 def _explore(arguments: argparse.Namespace, client: Client) -> int:
     from robosc.exploration import graph_dot, graph_json, graph_text
-    from robosc_client.made import graph_of, made_of
+    from robosc_client.outcomes import graph_of, outcome_from_response
 
     bundle = read_bundle(arguments)
     options, limit = synthesis_options(arguments), sendable(arguments.limit, "--limit")
-    with Shown() as shown:
+    with ProgressLine() as line:
         found = client.explore(
             bundle,
             options,
             maximum_states=limit,
             deadline_s=arguments.deadline,
-            on_progress=shown.tell,
+            on_progress=line.report,
         )
-    made = made_of(found)
+    made = outcome_from_response(found)
     if found.graph is None:
         if arguments.json:
             print_json({"status": str(made.status), **synth.reasons_json(made), **diagnostics_json(made.diagnostics)})
@@ -307,7 +307,7 @@ def run_verify(
 def _verify_supervisor(arguments: argparse.Namespace, client: Client) -> int:
     from robosc.signatures import SignatureError
     from robosc.supervisor.codec import decode
-    from robosc_client.made import require_recheck
+    from robosc_client.outcomes import require_recheck
 
     if arguments.limit < 1:
         raise UsageError("--limit 0 cannot be asked of a server: it searches one state at least")
@@ -348,8 +348,8 @@ def _verified(arguments: argparse.Namespace, client: Client, task: Verify) -> Ve
     Raises:
         UnsupportedModelError: The model is correct, but cannot be handled.
     """
-    with Shown() as shown:
-        found = client.verify(task, deadline_s=arguments.deadline, on_progress=shown.tell)
+    with ProgressLine() as line:
+        found = client.verify(task, deadline_s=arguments.deadline, on_progress=line.report)
     if found.status is VerificationStatus.UNSUPPORTED_MODEL:
         raise UnsupportedModelError(found.reason)
     return found
@@ -358,7 +358,7 @@ def _verified(arguments: argparse.Namespace, client: Client, task: Verify) -> Ve
 def _report_verdicts(
     arguments: argparse.Namespace, found: Verification, bundle: Bundle, deployment: Deployment
 ) -> ExitCode:
-    from robosc_client.made import verdicts_of
+    from robosc_client.outcomes import verdicts_of
 
     if found.status in (VerificationStatus.PROPERTY_ERRORS, VerificationStatus.NO_SUPERVISOR):
         texts, listings = property_texts(arguments)

@@ -7,7 +7,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 from robosc.source import visible
 from robosc_api.v1 import jobs_pb2 as pb
-from robosc_client.convert.answers import MAXIMUM_SHOWN, progress_of, require_at_most
+from robosc_client.convert.response_fields import MAXIMUM_SHOWN, progress_of, require_at_most
 from robosc_client.errors import malformed
 from robosc_client.jobs import Job, JobFailure, JobState, Submission, TaskKind
 

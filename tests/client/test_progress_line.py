@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import rich.progress
 
-from robosc_client.commands.shown import Shown
+from robosc_client.commands.progress_line import ProgressLine
 from robosc_client.results import Progress
 
 
@@ -32,12 +32,12 @@ def bars(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 def test_the_bar_goes_on_with_the_stages(bars: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stderr", Terminal())
     told: list[tuple[float, float | None]] = []
-    with Shown() as shown:
+    with ProgressLine() as line:
         (task,) = bars[0].tasks
         # Nothing is known yet.
         assert task.total is None
         for stage in ("check", "synthesis", "synthesis", "verification", "controller", "generation"):
-            shown.tell(Progress(stage, "[bold]words"))
+            line.report(Progress(stage, "[bold]words"))
             told.append((task.completed, task.total))
             assert task.description == f"{stage}: [bold]words"
     assert told == [(0, 4), (1, 4), (1, 4), (2, 4), (3, 4), (4, 4)]
@@ -45,14 +45,14 @@ def test_the_bar_goes_on_with_the_stages(bars: list[Any], monkeypatch: pytest.Mo
 
 def test_what_has_no_known_stages_moves_to_and_fro(bars: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stderr", Terminal())
-    with Shown() as shown:
-        shown.show("64 callers")
-        shown.tell(Progress("waiting", "for a quota"))
+    with ProgressLine() as line:
+        line.show("64 callers")
+        line.report(Progress("waiting", "for a quota"))
         assert bars[0].tasks[0].total is None
 
 
 def test_there_is_none_without_a_terminal(bars: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stderr", io.StringIO())
-    with Shown() as shown:
-        shown.show("words")
+    with ProgressLine() as line:
+        line.show("words")
     assert bars == []

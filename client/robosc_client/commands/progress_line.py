@@ -1,4 +1,4 @@
-"""Display while work goes on: a line with a bar, on a terminal alone."""
+"""Progress of long work: a line with a bar on standard error, on a terminal only."""
 
 import sys
 from types import TracebackType
@@ -16,8 +16,8 @@ _STAGES = ("check", "synthesis", "verification", "controller")
 """Stages of making a supervisor, one after the other; the time that each takes depends on the model."""
 
 
-class Shown:
-    """A line on standard error that long work overwrites, and that is gone when the work has ended."""
+class ProgressLine:
+    """A line on standard error that shows the progress of long work, and is cleared at its end."""
 
     def __init__(self) -> None:
         self._bar: rich.progress.Progress | None = None
@@ -27,13 +27,15 @@ class Shown:
         if sys.stderr.isatty():
             from rich.console import Console
             from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
-            from rich.progress import Progress as Bar
+            from rich.progress import Progress as ProgressBar
 
             # What a server says is text, and no markup.
             words = TextColumn("{task.description}", markup=False)
             columns = (SpinnerColumn(), BarColumn(_BAR_WIDTH), words, TimeElapsedColumn())
             console = Console(stderr=True)
-            self._bar = Bar(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False)
+            self._bar = ProgressBar(
+                *columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False
+            )
             self._bar.start()
             self._line = self._bar.add_task("", total=None)
         return self
@@ -67,6 +69,6 @@ class Shown:
         if self._bar is not None:
             self._bar.start()
 
-    def tell(self, progress: Progress) -> None:
+    def report(self, progress: Progress) -> None:
         """Replace the line by where the work is."""
         self.show(f"{progress.stage}: {progress.message}", progress.stage)

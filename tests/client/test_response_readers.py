@@ -12,18 +12,18 @@ from hypothesis import strategies as st
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client import ServiceError, SynthesisStatus, VerificationStatus
-from robosc_client.calls import Listing
-from robosc_client.convert import assembly
-from robosc_client.convert.answers import server_info_of, targets_of
-from robosc_client.convert.assembly import (
-    ExplorationAssembly,
-    GenerationAssembly,
-    JobResultAssembly,
-    SynthesisAssembly,
-    VerificationAssembly,
-    Whole,
-    check_assembly,
-    format_assembly,
+from robosc_client.calls import JobPages
+from robosc_client.convert import response_readers
+from robosc_client.convert.response_fields import server_info_of, targets_of
+from robosc_client.convert.response_readers import (
+    ExplorationReader,
+    GenerationReader,
+    JobResultReader,
+    SynthesisReader,
+    UnaryReader,
+    VerificationReader,
+    check_reader,
+    format_reader,
 )
 from support.answers import (
     FILES,
@@ -40,24 +40,24 @@ from support.answers import (
 )
 
 
-def assembled(assembly_: Any, messages: Any) -> Any:
+def assembled(reader: Any, messages: Any) -> Any:
     for message in messages:
-        assembly_.take(message)
-    return assembly_.result()
+        reader.take(message)
+    return reader.result()
 
 
-def refused(assembly_: Any, messages: Any, words: str = "malformed") -> None:
+def refused(reader: Any, messages: Any, words: str = "malformed") -> None:
     with pytest.raises(ServiceError, match=words):
-        assembled(assembly_, messages)
+        assembled(reader, messages)
 
 
 class TestSynthesis:
     def test_result(self) -> None:
-        found = assembled(SynthesisAssembly(), [progress(), supervisor(b"x", signature=b"signed")])
+        found = assembled(SynthesisReader(), [progress(), supervisor(b"x", signature=b"signed")])
         assert (found.status, found.supervisor, found.signature) == (SynthesisStatus.SUPERVISOR, b"x", b"signed")
 
     def test_progress_is_harmless_on_a_terminal(self) -> None:
-        told = SynthesisAssembly().take(progress(stage="\x1b]0;title\x07" + "x" * 2000))
+        told = SynthesisReader().take(progress(stage="\x1b]0;title\x07" + "x" * 2000))
         assert told is not None
         assert told.stage.isprintable()
         assert len(told.stage) < 1100
@@ -89,42 +89,42 @@ class TestSynthesis:
         ],
     )
     def test_refused(self, messages: Any, words: str) -> None:
-        refused(SynthesisAssembly(), messages, words)
+        refused(SynthesisReader(), messages, words)
 
     def test_endless_progress(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(assembly, "MAXIMUM_PROGRESS", 1000)
-        refused(SynthesisAssembly(), (progress(number) for number in iter(int, 1)), "for ever")
+        monkeypatch.setattr(response_readers, "MAXIMUM_PROGRESS", 1000)
+        refused(SynthesisReader(), (progress(number) for number in iter(int, 1)), "for ever")
 
 
 @pytest.mark.parametrize(
-    ("assembly_", "message", "what"),
+    ("reader", "message", "what"),
     [
-        (check_assembly(), pb.CheckResponse(diagnostics=[pb.Diagnostic()] * 100_001), "findings"),
+        (check_reader(), pb.CheckResponse(diagnostics=[pb.Diagnostic()] * 100_001), "findings"),
         (
-            check_assembly(),
+            check_reader(),
             pb.CheckResponse(diagnostics=[pb.Diagnostic(related=[pb.RelatedPlace()] * 60_000)] * 2),
             "places",
         ),
-        (format_assembly(None), pb.FormatResponse(diagnostics=[pb.Diagnostic()] * 100_001), "findings"),
-        (SynthesisAssembly(), supervisor(summary=pb.Summary(added=[pb.AddedCondition()] * 100_001)), "events"),
-        (Whole(targets_of), pb.ListTargetsResponse(targets=[pb.Target()] * 1001), "targets"),
-        (Whole(server_info_of), pb.GetVersionResponse(engines=[""] * 1001), "engines"),
+        (format_reader(None), pb.FormatResponse(diagnostics=[pb.Diagnostic()] * 100_001), "findings"),
+        (SynthesisReader(), supervisor(summary=pb.Summary(added=[pb.AddedCondition()] * 100_001)), "events"),
+        (UnaryReader(targets_of), pb.ListTargetsResponse(targets=[pb.Target()] * 1001), "targets"),
+        (UnaryReader(server_info_of), pb.GetVersionResponse(engines=[""] * 1001), "engines"),
         (
-            Listing((), None, all_owners=False, page_size=2).operation().assembly(),
+            JobPages((), None, all_owners=False, page_size=2).operation().reader(),
             jobs_pb2.ListJobsResponse(jobs=[jobs_pb2.Job()] * 3),
             "more than 2 jobs",
         ),
     ],
 )
-def test_too_many_items(assembly_: Any, message: Any, what: str) -> None:
+def test_too_many_items(reader: Any, message: Any, what: str) -> None:
     """Are counted before one of them is looked at: each would be refused for itself, too."""
-    refused(assembly_, [message], what)
+    refused(reader, [message], what)
 
 
 class TestGeneration:
     @pytest.mark.parametrize("piece", [1000, 65536])
     def test_result(self, piece: int) -> None:
-        found = assembled(GenerationAssembly(), generation(piece=piece))
+        found = assembled(GenerationReader(), generation(piece=piece))
         assert {path: text.encode() for path, text in found.files.items()} == {
             path: data for path, (data, _) in FILES.items()
         }
@@ -133,22 +133,22 @@ class TestGeneration:
     def test_an_empty_file_may_have_an_empty_piece(self) -> None:
         head, first, *others = generation()
         empty = pb.GenerateResponse(chunk=pb.FileChunk(file=1))
-        assert assembled(GenerationAssembly(), [head, first, empty, *others]).files is not None
-        refused(GenerationAssembly(), [head, first, empty, empty], "order")
+        assert assembled(GenerationReader(), [head, first, empty, *others]).files is not None
+        refused(GenerationReader(), [head, first, empty, empty], "order")
 
     def test_no_files(self) -> None:
         result = pb.GenerationResult(status=pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL, reason="odd")
-        found = assembled(GenerationAssembly(), [pb.GenerateResponse(result=result)])
+        found = assembled(GenerationReader(), [pb.GenerateResponse(result=result)])
         assert (found.files, found.reason) == (None, "odd")
 
     def test_pieces_in_any_other_order_are_refused(self) -> None:
         head, *pieces = generation(piece=40_000)
         for place in range(len(pieces) - 1):
             changed = [*pieces[:place], pieces[place + 1], pieces[place], *pieces[place + 2 :]]
-            refused(GenerationAssembly(), [head, *changed], "order")
+            refused(GenerationReader(), [head, *changed], "order")
         for place in range(len(pieces)):
-            refused(GenerationAssembly(), [head, *pieces[:place], *pieces[place + 1 :]], "order|middle")
-            refused(GenerationAssembly(), [head, *pieces[: place + 1], *pieces[place:]], "order|too long|empty")
+            refused(GenerationReader(), [head, *pieces[:place], *pieces[place + 1 :]], "order|middle")
+            refused(GenerationReader(), [head, *pieces[: place + 1], *pieces[place:]], "order|too long|empty")
 
     @pytest.mark.parametrize(
         ("chunk", "words"),
@@ -162,27 +162,27 @@ class TestGeneration:
         ],
     )
     def test_wrong_pieces(self, chunk: Any, words: str) -> None:
-        refused(GenerationAssembly(), [generation()[0], pb.GenerateResponse(chunk=chunk)], words)
+        refused(GenerationReader(), [generation()[0], pb.GenerateResponse(chunk=chunk)], words)
 
     def test_more_than_was_declared(self) -> None:
         more = pb.GenerateResponse(chunk=pb.FileChunk(file=2, offset=100_000, data=b"x"))
-        refused(GenerationAssembly(), [*generation(), more], "too long")
+        refused(GenerationReader(), [*generation(), more], "too long")
 
     def test_pieces_before_the_result(self) -> None:
-        refused(GenerationAssembly(), chunks(FILES), "before")
+        refused(GenerationReader(), chunks(FILES), "before")
 
     @pytest.mark.parametrize("size", [2**26 + 1, 2**63])
     def test_sizes_are_looked_at_first(self, size: int) -> None:
         head = generation()[0]
         head.result.files[0].size = size
-        refused(GenerationAssembly(), [head], "bytes")
+        refused(GenerationReader(), [head], "bytes")
 
     def test_many_files(self) -> None:
         head = pb.GenerateResponse()
         head.result.status = pb.SYNTHESIS_STATUS_SUPERVISOR
         for number in range(10_001):
             head.result.files.add(path=f"{number:06}")
-        refused(GenerationAssembly(), [head], "10000 files")
+        refused(GenerationReader(), [head], "10000 files")
 
     def test_digests(self) -> None:
         for change in (
@@ -193,22 +193,22 @@ class TestGeneration:
         ):
             head, *pieces = copy.deepcopy(generation())
             change(head.result)
-            refused(GenerationAssembly(), [head, *pieces], "digest")
+            refused(GenerationReader(), [head, *pieces], "digest")
         head, *pieces = generation()
         other = generation({**FILES, "a/one.py": (b"print(2)\n", True)})[1]
-        refused(GenerationAssembly(), [head, other, *pieces[1:]], "digest of 'a/one.py'")
+        refused(GenerationReader(), [head, other, *pieces[1:]], "digest of 'a/one.py'")
 
     def test_no_text(self) -> None:
-        refused(GenerationAssembly(), generation({"a": (b"\xff", False)}), "UTF-8")
+        refused(GenerationReader(), generation({"a": (b"\xff", False)}), "UTF-8")
 
     def test_status_without_files(self) -> None:
-        refused(GenerationAssembly(), generation({}), "do not fit")
+        refused(GenerationReader(), generation({}), "do not fit")
 
     def test_not_sorted(self) -> None:
         head = generation()[0]
         files = [head.result.files[1], head.result.files[0]]
         result = pb.GenerationResult(status=pb.SYNTHESIS_STATUS_SUPERVISOR, files=files, digest=files_digest(files))
-        refused(GenerationAssembly(), [pb.GenerateResponse(result=result)], "sorted")
+        refused(GenerationReader(), [pb.GenerateResponse(result=result)], "sorted")
 
     @pytest.mark.parametrize(
         "path",
@@ -220,21 +220,21 @@ class TestGeneration:
         ],
     )  # fmt: skip
     def test_odd_paths(self, path: str) -> None:
-        refused(GenerationAssembly(), generation({path: (b"x", False)}))
+        refused(GenerationReader(), generation({path: (b"x", False)}))
 
     @pytest.mark.parametrize(
         "paths",
         [("README", "readme"), ("a", "a/b"), ("A", "a/b"), ("x/A/y", "x/a"), ("\u00e9", "e\u0301"), ("ß", "SS")],
     )
     def test_names_that_meet(self, paths: Any) -> None:
-        refused(GenerationAssembly(), generation(dict.fromkeys(paths, (b"x", False))))
+        refused(GenerationReader(), generation(dict.fromkeys(paths, (b"x", False))))
 
     @given(st.data())
     def test_nothing_is_collected_beyond_what_was_declared(self, data: st.DataObject) -> None:
         """Check for any pieces: no more bytes are held than the sizes allow, and a result is what was meant."""
         files = {"a": (b"12", False), "b": (b"", False), "c": (b"345", False)}
         head = generation(files)[0]
-        found = GenerationAssembly()
+        found = GenerationReader()
         found.take(head)
         piece = st.builds(
             pb.FileChunk,
@@ -259,7 +259,7 @@ class TestGeneration:
 
 class TestExploration:
     def test_result(self) -> None:
-        found = assembled(ExplorationAssembly(), exploration())
+        found = assembled(ExplorationReader(), exploration())
         assert found.graph is not None
         assert found.graph.states[1].components == {"C": "t"}
         assert found.graph.transitions == ((0, "go", 1), (1, "go", 0))
@@ -285,25 +285,25 @@ class TestExploration:
         ],
     )
     def test_refused(self, messages: Any, words: str) -> None:
-        refused(ExplorationAssembly(), messages, words)
+        refused(ExplorationReader(), messages, words)
 
 
 class TestOthers:
     def test_verification(self) -> None:
-        found = assembled(VerificationAssembly(), [verification()])
+        found = assembled(VerificationReader(), [verification()])
         assert (found.status, found.report) == (VerificationStatus.PASSED, {"status": "holds"})
         for wrong in ("[]", "{", "[" * 100_000, "null"):
-            refused(VerificationAssembly(), [verification(wrong)], "report")
-        refused(VerificationAssembly(), [verification(status=0)], "status")
+            refused(VerificationReader(), [verification(wrong)], "report")
+        refused(VerificationReader(), [verification(status=0)], "status")
 
     def test_check(self) -> None:
-        assert assembled(check_assembly(), [pb.CheckResponse()]) == ()
-        refused(check_assembly(), [], "none")
+        assert assembled(check_reader(), [pb.CheckResponse()]) == ()
+        refused(check_reader(), [], "none")
         odd: Any = 9
-        refused(check_assembly(), [pb.CheckResponse(diagnostics=[pb.Diagnostic(severity=odd)])], "severity")
+        refused(check_reader(), [pb.CheckResponse(diagnostics=[pb.Diagnostic(severity=odd)])], "severity")
 
     def test_format(self) -> None:
-        assert assembled(format_assembly("a  b"), [pb.FormatResponse(text="a\nb\n")]).text == "a\nb\n"
+        assert assembled(format_reader("a  b"), [pb.FormatResponse(text="a\nb\n")]).text == "a\nb\n"
         for before, after in (
             ("a b", "a c"),
             ("a b", "ab"),
@@ -311,20 +311,20 @@ class TestOthers:
             ("a // x", "a"),
             ("'a'", "' a'"),
         ):
-            refused(format_assembly(before), [pb.FormatResponse(text=after)], "more than its layout")
+            refused(format_reader(before), [pb.FormatResponse(text=after)], "more than its layout")
         broken = pb.FormatResponse(diagnostics=[pb.Diagnostic(severity=pb.SEVERITY_ERROR)])
-        assert assembled(format_assembly("a b"), [broken]).text is None
+        assert assembled(format_reader("a b"), [broken]).text is None
 
     def test_results_of_jobs(self) -> None:
-        found = assembled(JobResultAssembly(), enveloped("generate", generation()))
+        found = assembled(JobResultReader(), enveloped("generate", generation()))
         assert set(found.files) == set(FILES)
-        assert assembled(JobResultAssembly(), enveloped("check", [pb.CheckResponse()])) == ()
-        assert assembled(JobResultAssembly(), enveloped("format", [pb.FormatResponse(text="x")])).text == "x"
-        refused(JobResultAssembly(), [], "without a result")
-        refused(JobResultAssembly(), [jobs_pb2.GetJobResultResponse()], "nothing that")
-        refused(JobResultAssembly(), enveloped("synthesize", [progress()]), "tells of work")
+        assert assembled(JobResultReader(), enveloped("check", [pb.CheckResponse()])) == ()
+        assert assembled(JobResultReader(), enveloped("format", [pb.FormatResponse(text="x")])).text == "x"
+        refused(JobResultReader(), [], "without a result")
+        refused(JobResultReader(), [jobs_pb2.GetJobResultResponse()], "nothing that")
+        refused(JobResultReader(), enveloped("synthesize", [progress()]), "tells of work")
         two = [*enveloped("synthesize", [synthesis()]), *enveloped("check", [pb.CheckResponse()])]
-        refused(JobResultAssembly(), two, "two kinds")
+        refused(JobResultReader(), two, "two kinds")
 
 
 def test_the_digest_of_a_graph_is_of_its_bytes() -> None:

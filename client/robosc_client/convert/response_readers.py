@@ -1,7 +1,7 @@
-"""Results put together from the messages of a stream, as they come: no input or output is done here.
+"""Readers of responses: each reassembles one result from the messages of a call, without any input or output.
 
-Every size that a server declares is looked at before anything is collected, and no more is collected than it declared;
-chunks in another order, after the end, or too long, are refused, and so is a stream that never gets to its result.
+Every size that a server declares is checked before anything is collected, and no more is collected than it declared.
+Chunks in the wrong order, after the end, or too long are refused, and so is a stream that never reaches its result.
 """
 
 import hashlib
@@ -17,7 +17,7 @@ from robosc.source import Bundle
 from robosc.targets import GeneratedFiles
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_client.convert.answers import (
+from robosc_client.convert.response_fields import (
     diagnostics_of,
     explanation_of,
     progress_of,
@@ -54,8 +54,8 @@ MAXIMUM_PROGRESS = 1_000_000
 """Messages that tell where the work is: many days of them, from a server that is one."""
 
 
-class Assembly[Result](Protocol):
-    """Puts one result together."""
+class ResponseReader[Result](Protocol):
+    """Reader that reassembles one result."""
 
     def take(self, message: Any) -> Progress | None:
         """Take the next message; gives what it tells of the work.
@@ -72,8 +72,8 @@ class Assembly[Result](Protocol):
         """
 
 
-class Whole[Message, Result]:
-    """Assembly of the answer of a method that answers with one message."""
+class UnaryReader[Message, Result]:
+    """ResponseReader of the answer of a method that answers with one message."""
 
     def __init__(self, convert: Callable[[Message], Result]) -> None:
         self._convert = convert
@@ -92,7 +92,7 @@ class Whole[Message, Result]:
         return self._found[0]
 
 
-class _Stream:
+class _StreamReader:
     """Common part of every stream of the service: progress, then one result."""
 
     def __init__(self) -> None:
@@ -131,8 +131,8 @@ class _Stream:
             raise malformed("it ended without a result")
 
 
-class SynthesisAssembly(_Stream):
-    """Assembly of the answer to Synthesize."""
+class SynthesisReader(_StreamReader):
+    """ResponseReader of the answer to Synthesize."""
 
     _found: Synthesis
 
@@ -162,14 +162,14 @@ class SynthesisAssembly(_Stream):
         return self._found
 
 
-class GenerationAssembly(_Stream):
-    """Assembly of the answer to Generate: files, each from its beginning to its end."""
+class GenerationReader(_StreamReader):
+    """ResponseReader of the answer to Generate: files, each from its beginning to its end."""
 
     _head: pb.GenerationResult
     _status: SynthesisStatus
 
     def __init__(self, target: str = "") -> None:
-        """Prepare the assembly.
+        """Prepare the reader.
 
         Args:
             target: Target that was asked for; empty: it is not known.
@@ -261,8 +261,8 @@ def _files_digest(message: pb.GenerationResult) -> bytes:
     return listing.digest()
 
 
-class ExplorationAssembly(_Stream):
-    """Assembly of the answer to Explore: one document in pieces."""
+class ExplorationReader(_StreamReader):
+    """ResponseReader of the answer to Explore: one document in pieces."""
 
     _head: pb.ExplorationResult
     _status: SynthesisStatus
@@ -312,8 +312,8 @@ class ExplorationAssembly(_Stream):
         return graph
 
 
-class VerificationAssembly(_Stream):
-    """Assembly of the answer to Verify."""
+class VerificationReader(_StreamReader):
+    """ResponseReader of the answer to Verify."""
 
     _found: Verification
 
@@ -332,17 +332,17 @@ class VerificationAssembly(_Stream):
         return self._found
 
 
-def check_assembly(bundle: Bundle | None = None) -> Whole[pb.CheckResponse, Findings]:
-    """Return the assembly of the answer to Check.
+def check_reader(bundle: Bundle | None = None) -> UnaryReader[pb.CheckResponse, Findings]:
+    """Return the reader of the response to Check.
 
     Args:
         bundle: Texts that were sent; None: they are not at hand.
     """
-    return Whole(lambda message: diagnostics_of(message.diagnostics, bundle))
+    return UnaryReader(lambda message: diagnostics_of(message.diagnostics, bundle))
 
 
-def format_assembly(before: str | None) -> Whole[pb.FormatResponse, Formatted]:
-    """Return the assembly of the answer to Format.
+def format_reader(before: str | None) -> UnaryReader[pb.FormatResponse, Formatted]:
+    """Return the reader of the response to Format.
 
     Args:
         before: Text that was given: only its layout may differ afterwards; None: it is not at hand.
@@ -355,7 +355,7 @@ def format_assembly(before: str | None) -> Whole[pb.FormatResponse, Formatted]:
             raise malformed("the text differs in more than its layout")
         return Formatted(text, diagnostics)
 
-    return Whole(convert)
+    return UnaryReader(convert)
 
 
 def _differ_in_layout_alone(before: str, after: str) -> bool:
@@ -366,18 +366,18 @@ def _differ_in_layout_alone(before: str, after: str) -> bool:
     return tokenize(before).texts == tokenize(after).texts
 
 
-class JobResultAssembly:
-    """Assembly of the answer to GetJobResult: the messages of one of the others, each in an envelope."""
+class JobResultReader:
+    """ResponseReader of the answer to GetJobResult: the messages of one of the others, each in an envelope."""
 
     def __init__(self, expected: TaskKind | None = None) -> None:
-        """Prepare the assembly.
+        """Prepare the reader.
 
         Args:
             expected: Kind of the job's task; None: it is not known.
         """
         self._expected = expected
         self._kind: TaskKind | None = None
-        self._inner: Assembly[TaskResult]
+        self._inner: ResponseReader[TaskResult]
 
     def take(self, message: jobs_pb2.GetJobResultResponse) -> None:
         """Take the next message."""
@@ -388,7 +388,7 @@ class JobResultAssembly:
             self._kind = TaskKind(name)
             if self._expected not in (None, self._kind):
                 raise malformed(f"the result of a job that is to {self._expected} is that of {self._kind}")
-            self._inner = assembly_of(self._kind)
+            self._inner = reader_for(self._kind)
         if self._kind is not TaskKind(name):
             raise malformed("results of two kinds")
         if self._inner.take(getattr(message, name)) is not None:
@@ -401,18 +401,18 @@ class JobResultAssembly:
         return self._inner.result()
 
 
-def assembly_of(kind: TaskKind) -> Assembly[TaskResult]:
-    """A new assembly for the responses of a kind of task."""
+def reader_for(kind: TaskKind) -> ResponseReader[TaskResult]:
+    """A new reader for the responses of a kind of task."""
     match kind:
         case TaskKind.CHECK:
-            return check_assembly()
+            return check_reader()
         case TaskKind.SYNTHESIZE:
-            return SynthesisAssembly()
+            return SynthesisReader()
         case TaskKind.GENERATE:
-            return GenerationAssembly()
+            return GenerationReader()
         case TaskKind.EXPLORE:
-            return ExplorationAssembly()
+            return ExplorationReader()
         case TaskKind.VERIFY:
-            return VerificationAssembly()
+            return VerificationReader()
         case TaskKind.FORMAT:
-            return format_assembly(None)
+            return format_reader(None)

@@ -23,7 +23,7 @@ from robosc_client.errors import ServiceError, malformed
 from robosc_client.results import Exploration, Generation, StateGraph, Synthesis, SynthesisStatus
 
 
-def made_of(result: Synthesis | Generation | Exploration, content: bytes = b"") -> SynthesisOutcome:
+def outcome_from_response(result: Synthesis | Generation | Exploration, content: bytes = b"") -> SynthesisOutcome:
     """Return what the server made.
 
     Args:

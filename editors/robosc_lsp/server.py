@@ -39,9 +39,9 @@ from robosc_lsp.convert import (
     semantic_tokens,
     symbol,
 )
-from robosc_lsp.outcome import Outcome
+from robosc_lsp.messages import SynthesisResponse
 from robosc_lsp.project import Analysis, Project, place_of
-from robosc_lsp.synthesis import Turns, synthesized
+from robosc_lsp.synthesis_queue import SynthesisQueue, run_synthesis
 
 _LOG = logging.getLogger(__name__)
 
@@ -50,7 +50,7 @@ _SYNTHESIS_LIMIT_S = 60.0
 _LONGEST_PAUSE_S = 1.0
 _MOST_SYMBOLS = 500
 _LONGEST_NAME = 255
-_TRIED_S = 0.3
+_FIX_TIME_S = 0.3
 
 
 class _Protocol(LanguageServerProtocol):
@@ -97,16 +97,16 @@ class Server(LanguageServer):
         self._library_paths, self._interface_paths = tuple(library_paths), tuple(interface_paths)
         self._synthesis_s = synthesis_s
         self._versions: dict[str, int] = {}
-        self._outcomes: dict[str, tuple[str, Outcome]] = {}
-        self._look: asyncio.Task[None] | None = None
+        self._outcomes: dict[str, tuple[str, SynthesisResponse]] = {}
+        self._analysis_task: asyncio.Task[None] | None = None
         self._syntheses: dict[str, tuple[str, asyncio.Task[None]]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
-        self._look_s = 0.0
-        self._turns = Turns()
+        self._last_analysis_s = 0.0
+        self._queue = SynthesisQueue()
 
     # Texts
 
-    def begin(self, parameters: lsp.InitializeParams) -> None:
+    def initialize(self, parameters: lsp.InitializeParams) -> None:
         """The editor has told what it can and where it works."""
         uris = [folder.uri for folder in parameters.workspace_folders or ()]
         if not uris and parameters.root_uri:
@@ -117,7 +117,7 @@ class Server(LanguageServer):
         self.project.library_paths = self._library_paths
         self.project.interface_paths = (*self._interface_paths, *self.project.interface_paths)
 
-    def work_in(self, added: Sequence[str], removed: Sequence[str]) -> None:
+    def change_folders(self, added: Sequence[str], removed: Sequence[str]) -> None:
         """The editor works in other folders now."""
         gone = _paths(removed)
         self.project.folders = [path for path in self.project.folders if path not in gone] + _paths(added)
@@ -125,9 +125,9 @@ class Server(LanguageServer):
     def opened(self, document: lsp.TextDocumentItem) -> None:
         """A file is shown."""
         self._versions[document.uri] = document.version
-        self._turns.prefer(document.uri)
+        self._queue.prefer(document.uri)
         self.project.open(document.uri, document.text)
-        self.look_again()
+        self.schedule_analysis()
 
     def changed(
         self,
@@ -136,42 +136,42 @@ class Server(LanguageServer):
     ) -> None:
         """A file is edited: what is known of it is out of date."""
         self._versions[document.uri] = document.version
-        self._turns.prefer(document.uri)
+        self._queue.prefer(document.uri)
         self._stop(document.uri)
         self.project.edit(document.uri, changes)
-        self.look_again()
+        self.schedule_analysis()
 
     def closed(self, uri: str) -> None:
         """A file is shown no more."""
         self.project.close(uri)
         self._versions.pop(uri, None)
         self._outcomes.pop(uri, None)
-        self._turns.forget(uri)
+        self._queue.forget(uri)
         self._stop(uri)
         self.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, []))
-        self.look_again()
+        self.schedule_analysis()
 
-    def look_again(self) -> None:
+    def schedule_analysis(self) -> None:
         """Tell before long what is found in the open files."""
-        if self._look is None or self._look.done():
-            self._look = asyncio.get_running_loop().create_task(self._look_at_all())
+        if self._analysis_task is None or self._analysis_task.done():
+            self._analysis_task = asyncio.get_running_loop().create_task(self._analyse_all())
 
-    async def _look_at_all(self) -> None:
+    async def _analyse_all(self) -> None:
         # As long as the last look took: edits that come meanwhile are looked at together.
-        await asyncio.sleep(min(self._look_s, _LONGEST_PAUSE_S))
+        await asyncio.sleep(min(self._last_analysis_s, _LONGEST_PAUSE_S))
         begun_s = time.monotonic()
         for uri in self.project.open_uris:
             try:
                 analysis = self.project.analysis(uri)
                 if analysis is not None:
-                    self._tell(uri, analysis)
+                    self._publish(uri, analysis)
                     self._begin_synthesis(uri, analysis)
             except Exception:
                 # A fault of ours: the other files are to be looked at for all that.
                 _LOG.exception("%s could not be looked at", uri)
-        self._look_s = time.monotonic() - begun_s
+        self._last_analysis_s = time.monotonic() - begun_s
 
-    def _tell(self, uri: str, analysis: Analysis) -> None:
+    def _publish(self, uri: str, analysis: Analysis) -> None:
         items = diagnostics(analysis, self.project, self._findings(uri, analysis))
         self.text_document_publish_diagnostics(
             lsp.PublishDiagnosticsParams(uri, items, version=self._versions.get(uri))
@@ -182,7 +182,7 @@ class Server(LanguageServer):
 
     # Synthesis
 
-    def outcome(self, analysis: Analysis) -> Outcome | None:
+    def outcome(self, analysis: Analysis) -> SynthesisResponse | None:
         """Return the result of synthesis for this very text; None: there is none yet."""
         known = self._outcomes.get(analysis.uri)
         if known is None or analysis.bundle is None or known[0] != analysis.bundle.digest:
@@ -233,9 +233,9 @@ class Server(LanguageServer):
     async def _synthesize(self, uri: str, analysis: Analysis, bundle: Bundle) -> None:
         await asyncio.sleep(_SYNTHESIS_PAUSE_S)
         known = frozenset(item.code for item in analysis.inspected.checked.diagnostics)
-        async with self._turns.turn(uri):
-            self._outcomes[uri] = bundle.digest, await synthesized(bundle, known, self._synthesis_s)
-        self._tell(uri, analysis)
+        async with self._queue.slot(uri):
+            self._outcomes[uri] = bundle.digest, await run_synthesis(bundle, known, self._synthesis_s)
+        self._publish(uri, analysis)
         capabilities = self.client_capabilities.workspace
         lens = capabilities.code_lens if capabilities is not None else None
         if lens is not None and lens.refresh_support:
@@ -253,8 +253,8 @@ class Server(LanguageServer):
 
     async def finish(self) -> None:
         """End what goes on beside; its processes are gone then."""
-        if self._look is not None:
-            self._look.cancel()
+        if self._analysis_task is not None:
+            self._analysis_task.cancel()
         for uri in tuple(self._syntheses):
             self._stop(uri)
         if self._tasks:
@@ -310,7 +310,7 @@ class Server(LanguageServer):
         analysis, _, definition = found
         if wanted == definition.name:
             return lsp.WorkspaceEdit(changes={})
-        self._see_all_uses(analysis, definition)
+        self._require_visible_uses(analysis, definition)
         changes: dict[str, list[lsp.TextEdit]] = {}
         for place in self.everywhere(analysis, definition, declared=True):
             changes.setdefault(place.uri, []).append(lsp.TextEdit(place.range, spelled(wanted)))
@@ -322,7 +322,7 @@ class Server(LanguageServer):
                     raise JsonRpcInvalidParams(f"'{name}' means something else in {other.file} already")
         return lsp.WorkspaceEdit(changes=changes)
 
-    def _see_all_uses(self, analysis: Analysis, definition: Definition) -> None:
+    def _require_visible_uses(self, analysis: Analysis, definition: Definition) -> None:
         """See to it that no use of a definition stays unseen.
 
         Raises:
@@ -408,7 +408,7 @@ class Server(LanguageServer):
             return []
         findings = self._findings(uri, analysis)
         actions: list[lsp.CodeAction] = []
-        until_s = time.monotonic() + _TRIED_S
+        until_s = time.monotonic() + _FIX_TIME_S
         is_tried = False
         for item, shown in zip(findings, diagnostics(analysis, self.project, findings), strict=True):
             if item.location is None or item.location.file != analysis.file or not _touch(shown.range, where):
@@ -506,7 +506,7 @@ def make_server(
 
     @feature(lsp.INITIALIZE)
     def initialize(parameters: lsp.InitializeParams) -> None:
-        server.begin(parameters)
+        server.initialize(parameters)
 
     @feature(lsp.INITIALIZED)
     async def initialized(_: lsp.InitializedParams) -> None:
@@ -514,7 +514,7 @@ def make_server(
 
     @feature(lsp.WORKSPACE_DID_CHANGE_WORKSPACE_FOLDERS)
     def did_change_folders(parameters: lsp.DidChangeWorkspaceFoldersParams) -> None:
-        server.work_in(
+        server.change_folders(
             [folder.uri for folder in parameters.event.added], [folder.uri for folder in parameters.event.removed]
         )
 
@@ -537,12 +537,12 @@ def make_server(
     @feature(lsp.TEXT_DOCUMENT_DID_SAVE)
     def did_save(_: lsp.DidSaveTextDocumentParams) -> None:
         server.project.forget()
-        server.look_again()
+        server.schedule_analysis()
 
     @feature(lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES)
     def did_change_files(_: lsp.DidChangeWatchedFilesParams) -> None:
         server.project.forget()
-        server.look_again()
+        server.schedule_analysis()
 
     @feature(lsp.TEXT_DOCUMENT_HOVER)
     def hover(parameters: lsp.HoverParams) -> lsp.Hover | None:

@@ -18,25 +18,25 @@ from robosc.errors import NodeLimitError, RoboscError
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, SourceFile
 from robosc.synthesis.engines import EngineOptions
-from robosc_lsp.outcome import Asked, Finding, Outcome
+from robosc_lsp.messages import FindingMessage, SynthesisRequest, SynthesisResponse
 
 _MOST_NODES = 4_000_000
 """Node limit of decision diagrams, for which CUDD takes a gigabyte at most: a user who types has other work to do."""
 
 
-def outcome(asked: Asked) -> Outcome:
+def outcome(request: SynthesisRequest) -> SynthesisResponse:
     """Return the result of synthesis for a robot."""
-    bundle = Bundle(SourceFile(*asked.main), tuple(SourceFile(*file) for file in asked.libraries))
+    bundle = Bundle(SourceFile(*request.main), tuple(SourceFile(*file) for file in request.libraries))
     try:
         made = make_supervisor(
             bundle, deployment=Deployment.CONTROLLER, engine=EngineOptions(maximum_nodes=_MOST_NODES)
         )
     except NodeLimitError:
-        return Outcome("synthesis needs more memory than it may have beside an editor")
+        return SynthesisResponse("synthesis needs more memory than it may have beside an editor")
     except RoboscError as error:
-        return Outcome(reason=str(error))
+        return SynthesisResponse(reason=str(error))
     findings = tuple(
-        Finding(
+        FindingMessage(
             str(item.severity),
             item.code,
             item.message,
@@ -45,28 +45,28 @@ def outcome(asked: Asked) -> Outcome:
             tuple((place.message, place.location) for place in item.related),
         )
         for item in made.diagnostics
-        if item.code not in asked.known
+        if item.code not in request.known
     )
     if made.supervisor is None:
-        return Outcome(reason=made.reason, findings=findings)
+        return SynthesisResponse(reason=made.reason, findings=findings)
     system = to_automata(made.supervisor.model, made.supervisor.deployment)
     states = made.supervisor.certificate.states
-    return Outcome(states=int(states), added=added_texts(made.supervisor, system), findings=findings)
+    return SynthesisResponse(states=int(states), added=added_texts(made.supervisor, system), findings=findings)
 
 
 def _end_with(server: IO[bytes]) -> None:
-    """End this process when what it is asked from is gone."""
+    """End this process as soon as the language server closes its input."""
     server.read()
     os._exit(1)
 
 
 def main() -> NoReturn:
     """Answer one request."""
-    # Who types goes before.
+    # The editor has priority.
     os.nice(10)
-    asked = msgspec.json.decode(sys.stdin.buffer.readline(), type=Asked)
+    request = msgspec.json.decode(sys.stdin.buffer.readline(), type=SynthesisRequest)
     threading.Thread(target=_end_with, args=(sys.stdin.buffer,), daemon=True).start()
-    sys.stdout.buffer.write(msgspec.json.encode(outcome(asked)))
+    sys.stdout.buffer.write(msgspec.json.encode(outcome(request)))
     sys.stdout.buffer.flush()
     # Not by the interpreter's end: the thread holds a lock of the input.
     os._exit(0)

@@ -15,7 +15,7 @@ from lsprotocol import types as lsp
 
 from robosc import __version__
 from robosc_lsp import synthesizer
-from robosc_lsp.outcome import Asked
+from robosc_lsp.messages import SynthesisRequest
 from robosc_lsp.server import make_server
 from support.background import children_of, has_ended, is_running
 from support.editor import LIMIT_S, Editor, ProcessEditor
@@ -174,10 +174,10 @@ def test_a_synthesis_that_takes_too_long_is_given_up(tmp_path: Path) -> None:
 
 
 def test_a_synthesis_takes_no_more_memory_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = Asked(("small.rscd", bounded_products(4)), (), ())
-    assert synthesizer.outcome(asked).states
+    request = SynthesisRequest(("small.rscd", bounded_products(4)), (), ())
+    assert synthesizer.outcome(request).states
     monkeypatch.setattr(synthesizer, "_MOST_NODES", 10)
-    told = synthesizer.outcome(asked)
+    told = synthesizer.outcome(request)
     assert "memory" in told.unknown and not told.reason and told.states is None
 
 

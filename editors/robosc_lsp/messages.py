@@ -5,7 +5,7 @@ import msgspec
 from robosc.source import Location
 
 
-class Finding(msgspec.Struct, frozen=True):
+class FindingMessage(msgspec.Struct, frozen=True):
     """A finding of synthesis, as `robosc.errors.Diagnostic`."""
 
     severity: str
@@ -16,7 +16,7 @@ class Finding(msgspec.Struct, frozen=True):
     related: tuple[tuple[str, Location], ...] = ()
 
 
-class Outcome(msgspec.Struct, frozen=True):
+class SynthesisResponse(msgspec.Struct, frozen=True):
     """Result of synthesis for a robot.
 
     Attributes:
@@ -31,10 +31,10 @@ class Outcome(msgspec.Struct, frozen=True):
     states: int | None = None
     reason: str = ""
     added: dict[str, str] = {}
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[FindingMessage, ...] = ()
 
 
-class Asked(msgspec.Struct, frozen=True):
+class SynthesisRequest(msgspec.Struct, frozen=True):
     """A robot on its way to the process.
 
     Attributes:
@@ -48,4 +48,4 @@ class Asked(msgspec.Struct, frozen=True):
     known: tuple[str, ...]
 
 
-__all__ = ["Asked", "Finding", "Outcome"]
+__all__ = ["FindingMessage", "SynthesisRequest", "SynthesisResponse"]

@@ -1,4 +1,4 @@
-"""Synthesis beside the editor: in a process of its own, which is killed when its answer is not wanted any more.
+"""Background synthesis for the editor: in a separate process, which is killed when its answer is no longer needed.
 
 That process runs `robosc_lsp.synthesizer`; nothing here imports it, so that the server starts without what only
 synthesis needs, and synthesis without what only the server needs.
@@ -12,18 +12,18 @@ from collections.abc import AsyncIterator
 import msgspec
 
 from robosc.source import Bundle
-from robosc_lsp.outcome import Asked, Outcome
+from robosc_lsp.messages import SynthesisRequest, SynthesisResponse
 
 _PROGRAM = "robosc_lsp.synthesizer"
 
 
-class Turns:
-    """One synthesis at a time, that of the text edited last first."""
+class SynthesisQueue:
+    """Queue that runs one synthesis at a time; the text that was edited last goes first."""
 
     def __init__(self) -> None:
         self._edited: list[str] = []
         self._waiting: list[tuple[str, asyncio.Future[None]]] = []
-        self._is_taken = False
+        self._is_busy = False
 
     def prefer(self, uri: str) -> None:
         """A text has been edited."""
@@ -34,11 +34,11 @@ class Turns:
         self._edited = [other for other in self._edited if other != uri]
 
     @contextlib.asynccontextmanager
-    async def turn(self, uri: str) -> AsyncIterator[None]:
-        """Wait for the turn of a text, and have it."""
+    async def slot(self, uri: str) -> AsyncIterator[None]:
+        """Wait until the synthesis of a text may run; the slot is released at the end of the context."""
         mine = uri, asyncio.get_running_loop().create_future()
         self._waiting.append(mine)
-        self._give()
+        self._start_next()
         try:
             await mine[1]
             yield
@@ -46,23 +46,23 @@ class Turns:
             if mine in self._waiting:
                 self._waiting.remove(mine)
             else:
-                self._is_taken = False
-            self._give()
+                self._is_busy = False
+            self._start_next()
 
-    def _give(self) -> None:
+    def _start_next(self) -> None:
         # One that was cancelled has not left yet.
         waiting = [each for each in self._waiting if not each[1].done()]
-        if waiting and not self._is_taken:
-            chosen = min(waiting, key=lambda each: self._place_of(each[0]))
+        if waiting and not self._is_busy:
+            chosen = min(waiting, key=lambda each: self._priority_of(each[0]))
             self._waiting.remove(chosen)
-            self._is_taken = True
+            self._is_busy = True
             chosen[1].set_result(None)
 
-    def _place_of(self, uri: str) -> int:
+    def _priority_of(self, uri: str) -> int:
         return self._edited.index(uri) if uri in self._edited else len(self._edited)
 
 
-async def synthesized(bundle: Bundle, known: frozenset[str], limit_s: float) -> Outcome:
+async def run_synthesis(bundle: Bundle, known: frozenset[str], limit_s: float) -> SynthesisResponse:
     """Return the result of synthesis for a robot without errors; cancelling this ends its process.
 
     Args:
@@ -70,7 +70,7 @@ async def synthesized(bundle: Bundle, known: frozenset[str], limit_s: float) -> 
         known: Codes of findings that the checks have reported already.
         limit_s: Longest time; after it, nothing is known.
     """
-    asked = Asked(
+    request = SynthesisRequest(
         (bundle.main.name, bundle.main.text),
         tuple((file.name, file.text) for file in bundle.libraries),
         tuple(sorted(known)),
@@ -84,15 +84,15 @@ async def synthesized(bundle: Bundle, known: frozenset[str], limit_s: float) -> 
             stderr=asyncio.subprocess.DEVNULL,
         )
     except OSError as error:
-        return Outcome(f"synthesis cannot be started: {error.strerror}")
+        return SynthesisResponse(f"synthesis cannot be started: {error.strerror}")
     try:
         async with asyncio.timeout(limit_s):
-            answer = await _answer(process, msgspec.json.encode(asked) + b"\n")
-        return msgspec.json.decode(answer, type=Outcome)
+            answer = await _answer(process, msgspec.json.encode(request) + b"\n")
+        return msgspec.json.decode(answer, type=SynthesisResponse)
     except TimeoutError:
-        return Outcome(f"synthesis takes longer than {limit_s:g} s")
+        return SynthesisResponse(f"synthesis takes longer than {limit_s:g} s")
     except (OSError, msgspec.DecodeError):
-        return Outcome("synthesis failed")
+        return SynthesisResponse("synthesis failed")
     finally:
         if process.returncode is None:
             with contextlib.suppress(ProcessLookupError):

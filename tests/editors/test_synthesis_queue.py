@@ -2,7 +2,7 @@
 
 import asyncio
 
-from robosc_lsp.synthesis import Turns
+from robosc_lsp.synthesis_queue import SynthesisQueue
 
 
 async def settled() -> None:
@@ -12,21 +12,21 @@ async def settled() -> None:
 
 def test_one_at_a_time_and_the_text_edited_last_first() -> None:
     async def run() -> None:
-        turns, had = Turns(), list[str]()
+        queue, had = SynthesisQueue(), list[str]()
         ends = {name: asyncio.Event() for name in "abcd"}
 
         async def synthesize(name: str) -> None:
-            async with turns.turn(name):
+            async with queue.slot(name):
                 had.append(name)
                 await ends[name].wait()
 
         for name in "abcd":
-            turns.prefer(name)
+            queue.prefer(name)
         tasks = {name: asyncio.create_task(synthesize(name)) for name in "abcd"}
         await settled()
         assert had == ["a"]
-        turns.prefer("c")
-        turns.forget("d")
+        queue.prefer("c")
+        queue.forget("d")
         ends["a"].set()
         await settled()
         assert had == ["a", "c"]
@@ -47,17 +47,17 @@ def test_one_at_a_time_and_the_text_edited_last_first() -> None:
 
 def test_one_that_is_cancelled_as_it_is_its_turn_gives_it_on() -> None:
     async def run() -> None:
-        turns, had = Turns(), list[str]()
+        queue, had = SynthesisQueue(), list[str]()
 
         async def synthesize(name: str) -> None:
-            async with turns.turn(name):
+            async with queue.slot(name):
                 had.append(name)
 
-        first = turns.turn("a")
+        first = queue.slot("a")
         await first.__aenter__()
         tasks = [asyncio.create_task(synthesize(name)) for name in "bc"]
         await settled()
-        turns.prefer("b")
+        queue.prefer("b")
         await first.__aexit__(None, None, None)
         tasks[0].cancel()
         await asyncio.wait(tasks)

@@ -51,8 +51,8 @@ def _run(arguments: argparse.Namespace) -> int:
         for line in str(error).splitlines():
             sys.stderr.write(f"robosc-bridge: {line}\n")
         return WRONG_USE
-    is_well = condition.is_there if arguments.alive else condition.is_serving
-    (sys.stdout if is_well else sys.stderr).write(condition.words + "\n")
+    is_well = condition.is_alive if arguments.alive else condition.is_serving
+    (sys.stdout if is_well else sys.stderr).write(condition.message + "\n")
     return WELL if is_well else NOT_WELL
 
 
@@ -63,7 +63,9 @@ def _ask(remote: Remote, timeout_s: float, *, is_alive_enough: bool) -> Conditio
     key = _path(remote.tls_key)
     shown = (certificate, key) if remote.client_ca is not None and certificate is not None and key is not None else None
     ask = ask_alive if is_alive_enough else ask_health
-    return ask(local_address(remote.grpc_address), timeout_s=timeout_s, certificate=certificate, shown=shown)
+    return ask(
+        local_address(remote.grpc_address), timeout_s=timeout_s, certificate=certificate, client_certificate=shown
+    )
 
 
 def _path(text: str | None) -> Path | None:

@@ -1,4 +1,4 @@
-"""Asking a service how it is, by gRPC's health checks: for containers, units, probes and people."""
+"""Client of gRPC health checks, for containers, units, probes and people."""
 
 import socket
 from collections.abc import Sequence
@@ -29,16 +29,17 @@ class Condition:
     """Condition of a service.
 
     Attributes:
-        is_there: True if the program is at work: it answered, if with no, or ended a connection that it had taken, as
-            where a certificate does not suit. One that takes connections and says nothing hangs, and is not there.
-        is_serving: True if it said that it is well.
-        words: Its answer, or why there is none.
-        has_answered: True if there is an answer, well or not.
+        is_alive: True if the program is running: it answered, even with NOT_SERVING, or ended a connection that it had
+            accepted, for example because of a certificate. A program that accepts connections and never answers hangs,
+            and is not alive.
+        is_serving: True if it answered SERVING.
+        message: Its answer, or the reason why there is none.
+        has_answered: True if there is an answer, whatever it says.
     """
 
-    is_there: bool
+    is_alive: bool
     is_serving: bool
-    words: str
+    message: str
     has_answered: bool = False
 
 
@@ -58,16 +59,16 @@ def ask_health(
     *,
     timeout_s: float,
     certificate: Path | None = None,
-    shown: tuple[Path, Path] | None = None,
+    client_certificate: tuple[Path, Path] | None = None,
 ) -> Condition:
-    """Ask a service how it is.
+    """Query the health of a service on this machine.
 
     Args:
         address: `HOST:PORT`.
         service: Full name of one; empty: the program as a whole.
         timeout_s: Longest time for connection and answer, in seconds.
         certificate: The one (PEM) that the program itself listens with: none other is believed; None: without TLS.
-        shown: Certificate and key (PEM) that are shown to it; None: none.
+        client_certificate: Certificate and key (PEM) that are shown to it; None: none.
 
     Raises:
         SecurityError: A file cannot be used.
@@ -75,7 +76,11 @@ def ask_health(
     credentials = Credentials()
     options: tuple[tuple[str, str | int], ...] = (("grpc.enable_http_proxy", 0),)
     if certificate is not None:
-        credentials = Credentials(ca=certificate, certificate=shown and shown[0], key=shown and shown[1])
+        credentials = Credentials(
+            ca=certificate,
+            certificate=client_certificate and client_certificate[0],
+            key=client_certificate and client_certificate[1],
+        )
         # The certificate is for the name that others call the machine by.
         options = (*options, ("grpc.ssl_target_name_override", _name_in(certificate)))
     return ask_service(address, service, credentials, timeout_s=timeout_s, options=options)
@@ -89,7 +94,7 @@ def ask_service(
     timeout_s: float,
     options: tuple[tuple[str, str | int], ...] = (),
 ) -> Condition:
-    """Ask a service anywhere how it is.
+    """Query the health of a service.
 
     Args:
         address: `HOST:PORT`.
@@ -109,11 +114,11 @@ def ask_service(
         try:
             answer = ask(StringValue(value=service), timeout=timeout_s)
         except grpc.RpcError as error:
-            is_there = error.code() not in _UNANSWERED or (
+            is_alive = error.code() not in _UNANSWERED or (
                 # Nobody listens, or a handshake has failed.
                 error.code() is grpc.StatusCode.UNAVAILABLE and _takes_connections(address, timeout_s)
             )
-            return Condition(is_there, False, f"{error.code().name}: {error.details()}")
+            return Condition(is_alive, False, f"{error.code().name}: {error.details()}")
     status = _STATUSES[answer.value] if answer.value < len(_STATUSES) else f"status {answer.value}"
     return Condition(True, status == "SERVING", status, has_answered=True)
 
@@ -124,14 +129,16 @@ def ask_alive(
     *,
     timeout_s: float,
     certificate: Path | None = None,
-    shown: tuple[Path, Path] | None = None,
+    client_certificate: tuple[Path, Path] | None = None,
 ) -> Condition:
-    """The same for whoever ends a program that is not there: files that cannot be used do not speak against it.
+    """Query whether a service is alive, for whoever restarts dead programs: unusable certificate files do not count.
 
-    It may listen with what stood in them before.
+    The program may still use the earlier content of the files.
     """
     try:
-        return ask_health(address, service, timeout_s=timeout_s, certificate=certificate, shown=shown)
+        return ask_health(
+            address, service, timeout_s=timeout_s, certificate=certificate, client_certificate=client_certificate
+        )
     except SecurityError as error:
         return Condition(_takes_connections(address, timeout_s), False, str(error))
 

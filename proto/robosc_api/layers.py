@@ -4,7 +4,8 @@ An interceptor of grpc.aio costs every call a coroutine of its own, whatever it 
 """
 
 from abc import abstractmethod
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import aclosing
 from typing import Any
 
 import grpc
@@ -63,6 +64,31 @@ class Layers(grpc.aio.ServerInterceptor):
         for layer in self._inside_out:
             handler = layer.handler(handler, handler_call_details)
         return handler
+
+
+async def write_responses(made: Awaitable[Any] | AsyncIterator[Any], context: Any) -> None:
+    """Send what a handler makes: handlers of streams are generators, or coroutines that write by themselves.
+
+    Args:
+        made: Value that the handler gave when it was called. A generator is closed at once when the call ends before
+            it.
+        context: Context of the call.
+    """
+    if not hasattr(made, "__aiter__"):
+        await made
+        return
+    async with aclosing(made) as responses:  # type: ignore[type-var]  # generators of handlers can be closed
+        async for response in responses:
+            await context.write(response)
+
+
+def writing(answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Awaitable[None]]:
+    """A handler of a stream, of either kind, as a coroutine that writes by itself."""
+
+    async def write(request: Any, context: Any) -> None:
+        await write_responses(answer(request, context), context)
+
+    return write
 
 
 def behaviour_of(handler: Any) -> Callable[[Any, Any], Any]:

@@ -7,8 +7,7 @@ import grpc
 from google.protobuf.message import DecodeError
 
 from robosc_api.failures import failure_metadata
-from robosc_api.layers import Layer
-from robosc_api.streams import write_responses
+from robosc_api.layers import Layer, write_responses
 
 _MALFORMED = object()
 

@@ -1,4 +1,4 @@
-"""Calls that begin and then say nothing: they would hold a place, and where tokens are shown never show one."""
+"""Timeouts for calls whose request does not arrive: such calls would count as open calls for ever."""
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
@@ -8,8 +8,7 @@ import grpc
 import grpc.aio
 
 from robosc_api.failures import failure_metadata
-from robosc_api.layers import Layer
-from robosc_api.streams import writing
+from robosc_api.layers import Layer, writing
 
 REFLECTION_METHODS = tuple(
     f"/grpc.reflection.{version}.ServerReflection/ServerReflectionInfo" for version in ("v1", "v1alpha")
@@ -19,14 +18,14 @@ REFLECTION_METHODS = tuple(
 _CODE = grpc.StatusCode.INVALID_ARGUMENT
 
 
-class _SilentError(Exception):
-    """A caller has said nothing for too long."""
+class _RequestTimeoutError(Exception):
+    """The request of a caller did not arrive in time."""
 
 
-class PromptRequests(Layer):
-    """Ends them. What stands before it sees a call as soon as it begins; what stands behind it, with its request.
+class RequestTimeouts(Layer):
+    """Layer that ends calls whose requests do not arrive in time.
 
-    What stands before it is given handlers of streams of requests alone.
+    Layers outside see a call as soon as it begins, as a stream of requests; layers inside see it with its request.
 
     Args:
         limit_s: Time for the request of a call that has one, and for the first one of a stream, in seconds.
@@ -36,11 +35,11 @@ class PromptRequests(Layer):
 
     def __init__(self, limit_s: float, idle_s: Mapping[str, float] | None = None) -> None:
         super().__init__()
-        self._first = _Patience(limit_s)
-        self._next = {method: _Patience(seconds) for method, seconds in (idle_s or {}).items()}
+        self._first = _Timeout(limit_s)
+        self._next = {method: _Timeout(seconds) for method, seconds in (idle_s or {}).items()}
 
     def around(self, inner: Any, method: str) -> Any:
-        """A handler behind a wait for its request."""
+        """Wrap a handler in a wait for its request."""
         if inner.request_streaming and method not in self._next:
             return inner
         return self._behind(inner, method)
@@ -57,42 +56,42 @@ class PromptRequests(Layer):
     def _one(self, answer: Callable[[Any, Any], Awaitable[Any]]) -> Callable[[Any, Any], Awaitable[Any]]:
         wait, end = self._first.wait, grpc.aio.EOF
 
-        async def prompt(requests: Any, context: Any) -> Any:
+        async def answered(requests: Any, context: Any) -> Any:
             try:
                 request = await wait(context.read())
-            except _SilentError:
+            except _RequestTimeoutError:
                 request = end
             if request is end:
                 await _abort(context, f"the request comes within {self._first.limit_s:g} seconds")
             return await answer(request, context)
 
-        return prompt
+        return answered
 
     def _each(self, answer: Callable[[Any, Any], Awaitable[Any]], method: str) -> Callable[[Any, Any], Awaitable[Any]]:
         first, following = self._first, self._next[method]
 
-        async def spoken(requests: AsyncIterator[Any]) -> AsyncIterator[Any]:
-            patience = first
+        async def timed(requests: AsyncIterator[Any]) -> AsyncIterator[Any]:
+            timeout = first
             try:
                 while True:
-                    yield await patience.wait(anext(requests))
-                    patience = following
+                    yield await timeout.wait(anext(requests))
+                    timeout = following
             except StopAsyncIteration:
                 return
 
-        async def prompt(requests: Any, context: Any) -> Any:
+        async def answered(requests: Any, context: Any) -> Any:
             try:
-                return await answer(spoken(aiter(requests)), context)
-            except _SilentError:
+                return await answer(timed(aiter(requests)), context)
+            except _RequestTimeoutError:
                 # Here and not where it is read: that may be another task, which cannot end the call.
                 limits = f"{first.limit_s:g} seconds, and each further one within {following.limit_s:g}"
                 await _abort(context, f"the first request comes within {limits}")
 
-        return prompt
+        return answered
 
 
-class _Patience:
-    """Waits of one length: one timer for all of them, since most are over at once.
+class _Timeout:
+    """Timeouts of one duration, with one timer for all of them, since most requests arrive at once.
 
     A timer for each (`asyncio.timeout`) costs a call ten times as much.
 
@@ -105,43 +104,43 @@ class _Patience:
         # Since when each task waits, the one that has waited longest first.
         self._since_s: dict[asyncio.Task[Any], float] = {}
         self._overdue: set[asyncio.Task[Any]] = set()
-        self._is_looking = False
+        self._is_scheduled = False
 
     async def wait(self, answer: Awaitable[Any]) -> Any:
         """Wait for an answer and return it.
 
         Raises:
-            _SilentError: It does not come in time.
+            _RequestTimeoutError: It does not come in time.
         """
         loop = asyncio.get_running_loop()
         task: Any = asyncio.current_task()
         self._since_s[task] = loop.time()
-        if not self._is_looking:
-            self._is_looking = True
-            loop.call_later(self.limit_s, self._look)
+        if not self._is_scheduled:
+            self._is_scheduled = True
+            loop.call_later(self.limit_s, self._cancel_overdue)
         try:
             return await answer
         except asyncio.CancelledError:
             # Somebody else may have cancelled it as well.
             if task in self._overdue and task.uncancel() == 0:
-                raise _SilentError from None
+                raise _RequestTimeoutError from None
             raise
         finally:
             self._since_s.pop(task, None)
             self._overdue.discard(task)
 
-    def _look(self) -> None:
+    def _cancel_overdue(self) -> None:
         loop = asyncio.get_running_loop()
         late_s = loop.time() - self.limit_s
         while self._since_s:
             task, since_s = next(iter(self._since_s.items()))
             if since_s > late_s:
-                loop.call_at(since_s + self.limit_s, self._look)
+                loop.call_at(since_s + self.limit_s, self._cancel_overdue)
                 return
             del self._since_s[task]
             self._overdue.add(task)
             task.cancel()
-        self._is_looking = False
+        self._is_scheduled = False
 
 
 async def _abort(context: Any, message: str) -> None:

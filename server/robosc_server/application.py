@@ -14,7 +14,7 @@ from grpc_reflection.v1alpha import reflection
 from robosc import __version__
 from robosc_api.layers import Layers
 from robosc_api.malformed import MalformedRequests
-from robosc_api.prompt import REFLECTION_METHODS, PromptRequests
+from robosc_api.request_timeouts import REFLECTION_METHODS, RequestTimeouts
 from robosc_api.security import Guard, Rule, Scope, SecurityError, TokenFile, add_port, caller_of, token_or_host_of
 from robosc_server.jobs import (
     JOB_METHODS,
@@ -130,7 +130,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         # Reading certificates that nobody has shown takes longer than all the rest of it.
         caller_of if settings.client_ca is not None else token_or_host_of,
     )
-    prompt = PromptRequests(settings.request_seconds, dict.fromkeys(REFLECTION_METHODS, _REFLECTION_IDLE_S))
+    prompt = RequestTimeouts(settings.request_seconds, dict.fromkeys(REFLECTION_METHODS, _REFLECTION_IDLE_S))
     # What takes more looks at it by itself.
     malformed = MalformedRequests(
         JOB_SERVICE_NAME, health_names.SERVICE_NAME, reflection.SERVICE_NAME, limit=QUICK_BYTES

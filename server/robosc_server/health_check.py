@@ -44,8 +44,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SecurityError as error:
         sys.stderr.write(f"robosc-server: {error}\n")
         return 2
-    is_well = condition.is_there if given.alive else condition.is_serving
-    (sys.stdout if is_well else sys.stderr).write(condition.words + "\n")
+    is_well = condition.is_alive if given.alive else condition.is_serving
+    (sys.stdout if is_well else sys.stderr).write(condition.message + "\n")
     return 0 if is_well else 1
 
 
@@ -55,7 +55,9 @@ def _ask(settings: Settings, service: str, timeout_s: float, *, is_alive_enough:
     if settings.client_ca is not None and certificate is not None and key is not None:
         shown = certificate, key
     ask = ask_alive if is_alive_enough else ask_health
-    return ask(local_address(settings.address), service, timeout_s=timeout_s, certificate=certificate, shown=shown)
+    return ask(
+        local_address(settings.address), service, timeout_s=timeout_s, certificate=certificate, client_certificate=shown
+    )
 
 
 def _seconds(text: str) -> float:

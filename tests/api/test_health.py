@@ -36,13 +36,13 @@ def test_answers_are_told_apart() -> None:
     with answering(Status.SERVING) as address:
         well = ask_health(address, timeout_s=10)
         other = ask_health(address, "robosc_api.v1.None", timeout_s=10)
-    assert (well.is_there, well.is_serving, well.words) == (True, True, "SERVING")
-    assert (other.is_there, other.is_serving) == (True, False)
+    assert (well.is_alive, well.is_serving, well.message) == (True, True, "SERVING")
+    assert (other.is_alive, other.is_serving) == (True, False)
     with answering(Status.NOT_SERVING) as address:
         ill = ask_health(address, timeout_s=10)
-    assert (ill.is_there, ill.is_serving, ill.words) == (True, False, "NOT_SERVING")
+    assert (ill.is_alive, ill.is_serving, ill.message) == (True, False, "NOT_SERVING")
     nobody = ask_health(address, timeout_s=10)
-    assert (nobody.is_there, nobody.is_serving) == (False, False) and nobody.words.startswith("UNAVAILABLE")
+    assert (nobody.is_alive, nobody.is_serving) == (False, False) and nobody.message.startswith("UNAVAILABLE")
 
 
 def test_the_programs_own_certificate_is_believed_and_no_other(secure: ServerSecurity, tmp_path: Path) -> None:
@@ -51,15 +51,15 @@ def test_the_programs_own_certificate_is_believed_and_no_other(secure: ServerSec
         assert ask_health(address, timeout_s=10, certificate=secure.certificate).is_serving
         for certificate in (other, None):
             condition = ask_health(address, timeout_s=10, certificate=certificate)
-            assert (condition.is_there, condition.is_serving) == (True, False), condition
+            assert (condition.is_alive, condition.is_serving) == (True, False), condition
 
 
 def test_an_expired_certificate_is_not_well_but_ends_no_program(tmp_path: Path) -> None:
     certificate, key = Authority(tmp_path).sign("server", days=-1.0)
     with answering(Status.SERVING, ServerSecurity(certificate=certificate, key=key)) as address:
         condition = ask_health(address, timeout_s=10, certificate=certificate)
-    assert (condition.is_there, condition.is_serving) == (True, False) and "expired" in condition.words.lower()
-    assert not ask_health(address, timeout_s=10, certificate=certificate).is_there
+    assert (condition.is_alive, condition.is_serving) == (True, False) and "expired" in condition.message.lower()
+    assert not ask_health(address, timeout_s=10, certificate=certificate).is_alive
 
 
 def test_whoever_wants_a_certificate_is_shown_its_own(tmp_path: Path) -> None:
@@ -67,24 +67,26 @@ def test_whoever_wants_a_certificate_is_shown_its_own(tmp_path: Path) -> None:
     certificate, key = authority.sign("server")
     security = ServerSecurity(certificate=certificate, key=key, client_ca=authority.file)
     with answering(Status.SERVING, security) as address:
-        assert ask_health(address, timeout_s=10, certificate=certificate, shown=(certificate, key)).is_serving
+        assert ask_health(
+            address, timeout_s=10, certificate=certificate, client_certificate=(certificate, key)
+        ).is_serving
         without = ask_health(address, timeout_s=10, certificate=certificate)
-        assert (without.is_there, without.is_serving) == (True, False)
+        assert (without.is_alive, without.is_serving) == (True, False)
 
 
 def test_whoever_has_too_many_calls_is_there() -> None:
     with answering(Status.SERVING, most_calls=0) as address:
         condition = ask_health(address, timeout_s=10)
-    assert (condition.is_there, condition.is_serving) == (True, False)
-    assert condition.words.startswith("RESOURCE_EXHAUSTED")
+    assert (condition.is_alive, condition.is_serving) == (True, False)
+    assert condition.message.startswith("RESOURCE_EXHAUSTED")
 
 
 def test_whoever_listens_and_says_nothing_hangs() -> None:
     """The kernel takes connections for a program that stands still."""
     with socket.create_server(("127.0.0.1", 0)) as listening:
         condition = ask_health(joined(*listening.getsockname()), timeout_s=0.5)
-    assert (condition.is_there, condition.is_serving) == (False, False)
-    assert condition.words.startswith("DEADLINE_EXCEEDED")
+    assert (condition.is_alive, condition.is_serving) == (False, False)
+    assert condition.message.startswith("DEADLINE_EXCEEDED")
 
 
 def test_a_file_that_is_no_certificate_is_one_clear_error(secure: ServerSecurity, tmp_path: Path) -> None:
@@ -95,8 +97,8 @@ def test_a_file_that_is_no_certificate_is_one_clear_error(secure: ServerSecurity
     # Whoever listens has read another one, and goes on with it.
     with answering(Status.SERVING, secure) as address:
         condition = ask_alive(address, timeout_s=10, certificate=file)
-    assert (condition.is_there, condition.is_serving) == (True, False) and "server.pem" in condition.words
-    assert not ask_alive(address, timeout_s=10, certificate=file).is_there
+    assert (condition.is_alive, condition.is_serving) == (True, False) and "server.pem" in condition.message
+    assert not ask_alive(address, timeout_s=10, certificate=file).is_alive
 
 
 @pytest.mark.parametrize(("status", "code", "alive"), [(Status.SERVING, 0, 0), (Status.NOT_SERVING, 1, 0)])

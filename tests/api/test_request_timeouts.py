@@ -8,7 +8,7 @@ from typing import Any
 import grpc
 import pytest
 
-from robosc_api.prompt import PromptRequests
+from robosc_api.request_timeouts import RequestTimeouts
 from support.held_time import HeldLoop, on_held_time
 from support.small_server import SERVICE, call, small_server
 from support.waiting import PATIENCE_S, until
@@ -56,13 +56,13 @@ def silent(channel: Any, name: str) -> Any:
     return channel.stream_stream(f"/test.Kinds/{name}")(timeout=PATIENCE_S)
 
 
-def waits(prompt: PromptRequests, stream: str = "") -> int:
+def waits(timeouts: RequestTimeouts, stream: str = "") -> int:
     """Return the number of calls waiting for their first request, or of those of a kind waiting for a further one."""
-    return len((prompt._next[stream] if stream else prompt._first)._since_s)
+    return len((timeouts._next[stream] if stream else timeouts._first)._since_s)
 
 
-def is_waiting(prompt: PromptRequests, stream: str = "", count: int = 1) -> bool:
-    return waits(prompt, stream) == count
+def is_waiting(timeouts: RequestTimeouts, stream: str = "", count: int = 1) -> bool:
+    return waits(timeouts, stream) == count
 
 
 async def refusal(made: Any) -> tuple[Any, str]:
@@ -75,12 +75,12 @@ async def refusal(made: Any) -> tuple[Any, str]:
 @pytest.mark.parametrize("name", ["Unary", "Generator", "Writer"])
 def test_a_request_comes_in_time_or_the_call_ends(name: str) -> None:
     async def test(loop: HeldLoop) -> None:
-        prompt = PromptRequests(LIMIT_S)
-        async with small_server(interceptors=[prompt], setup=with_all_kinds) as (channel, _):
+        timeouts = RequestTimeouts(LIMIT_S)
+        async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
             made = [silent(channel, name) for _ in range(3)]
-            await until(lambda: waits(prompt) == 3)
+            await until(lambda: waits(timeouts) == 3)
             await loop.passed(LIMIT_S / 2)
-            assert waits(prompt) == 3
+            assert waits(timeouts) == 3
             await loop.passed(LIMIT_S / 2)
             for each in made:
                 assert await refusal(each) == (
@@ -98,7 +98,7 @@ def test_a_request_comes_in_time_or_the_call_ends(name: str) -> None:
 @pytest.mark.parametrize("name", ["Unary", "Writer"])
 def test_an_end_without_a_request_is_told_at_once(name: str) -> None:
     async def run() -> None:
-        async with small_server(interceptors=[PromptRequests(LONG_S)], setup=with_all_kinds) as (channel, _):
+        async with small_server(interceptors=[RequestTimeouts(LONG_S)], setup=with_all_kinds) as (channel, _):
             made = silent(channel, name)
             await made.done_writing()
             assert (await refusal(made))[0] is grpc.StatusCode.INVALID_ARGUMENT
@@ -114,16 +114,16 @@ def test_a_stream_of_requests_goes_on_as_long_as_they_come(name: str) -> None:
             ((LIMIT_S, LONG_S), "within 0.25 s"),
             ((LONG_S, LIMIT_S), "each further one within 0.25"),
         ):
-            prompt = PromptRequests(limits[0], {path: limits[1]})
-            async with small_server(interceptors=[prompt], setup=with_all_kinds) as (channel, _):
+            timeouts = RequestTimeouts(limits[0], {path: limits[1]})
+            async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
                 made = silent(channel, name)
                 if limits[0] == LONG_S:
                     for text in (b"a", b"b"):
                         await made.write(text)
                         assert name == "Collect" or await made.read() == text
-                    await until(partial(is_waiting, prompt, path))
+                    await until(partial(is_waiting, timeouts, path))
                 else:
-                    await until(partial(is_waiting, prompt))
+                    await until(partial(is_waiting, timeouts))
                 await loop.passed(LIMIT_S)
                 code, told = await refusal(made)
                 assert code is grpc.StatusCode.INVALID_ARGUMENT
@@ -137,10 +137,10 @@ def test_a_stream_of_requests_goes_on_as_long_as_they_come(name: str) -> None:
 
 def test_streams_that_nothing_is_said_of_are_left_alone() -> None:
     async def test(loop: HeldLoop) -> None:
-        prompt = PromptRequests(LIMIT_S)
-        async with small_server(interceptors=[prompt], setup=with_all_kinds) as (channel, _):
+        timeouts = RequestTimeouts(LIMIT_S)
+        async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
             quiet, other = silent(channel, "Both"), silent(channel, "Unary")
-            await until(lambda: waits(prompt) == 1)
+            await until(lambda: waits(timeouts) == 1)
             await loop.passed(LIMIT_S)
             await refusal(other)
             await quiet.write(b"at last")
@@ -165,12 +165,12 @@ def test_the_wait_is_for_the_request_alone() -> None:
         return request
 
     async def test(loop: HeldLoop) -> None:
-        prompt = PromptRequests(LIMIT_S)
-        async with small_server(interceptors=[prompt], unary=slow) as (channel, _):
+        timeouts = RequestTimeouts(LIMIT_S)
+        async with small_server(interceptors=[timeouts], unary=slow) as (channel, _):
             made: Any = channel.unary_unary(f"/{SERVICE}/Unary")
             stays, goes = made(b"stays", timeout=PATIENCE_S), made(b"goes", timeout=PATIENCE_S)
             late: Any = channel.stream_unary(f"/{SERVICE}/Unary")(timeout=PATIENCE_S)
-            await until(lambda: len(begun) == 2 and waits(prompt) == 1)
+            await until(lambda: len(begun) == 2 and waits(timeouts) == 1)
             await loop.passed(LIMIT_S)
             assert await late.code() is grpc.StatusCode.INVALID_ARGUMENT
             goes.cancel()
@@ -185,17 +185,17 @@ def test_the_wait_is_for_the_request_alone() -> None:
 
 def test_who_cancels_at_the_same_moment_is_obeyed() -> None:
     async def run() -> None:
-        patience = PromptRequests(LIMIT_S)._first
+        timeout = RequestTimeouts(LIMIT_S)._first
         never: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        task: asyncio.Task[Any] = asyncio.create_task(patience.wait(asyncio.shield(never)))
-        while not patience._since_s:
+        task: asyncio.Task[Any] = asyncio.create_task(timeout.wait(asyncio.shield(never)))
+        while not timeout._since_s:
             await asyncio.sleep(0)
-        patience._since_s[task] -= LIMIT_S
-        patience._look()
+        timeout._since_s[task] -= LIMIT_S
+        timeout._cancel_overdue()
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
             await task
-        assert not patience._since_s and not patience._overdue
+        assert not timeout._since_s and not timeout._overdue
         never.cancel()
 
     asyncio.run(run())
@@ -203,17 +203,17 @@ def test_who_cancels_at_the_same_moment_is_obeyed() -> None:
 
 def test_those_that_begin_while_others_wait_are_looked_for_later() -> None:
     async def test(loop: HeldLoop) -> None:
-        prompt = PromptRequests(LIMIT_S)
-        async with small_server(interceptors=[prompt], setup=with_all_kinds) as (channel, _):
+        timeouts = RequestTimeouts(LIMIT_S)
+        async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
             made = []
             for number in range(1, 4):
                 made.append(silent(channel, "Unary"))
-                await until(partial(is_waiting, prompt, count=number))
+                await until(partial(is_waiting, timeouts, count=number))
                 await loop.passed(LIMIT_S / 4)
-            assert waits(prompt) == 3
+            assert waits(timeouts) == 3
             for left in (2, 1, 0):
                 await loop.passed(LIMIT_S / 4)
-                assert waits(prompt) == left
+                assert waits(timeouts) == left
             for each in made:
                 assert (await refusal(each))[0] is grpc.StatusCode.INVALID_ARGUMENT
 

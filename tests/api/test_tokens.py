@@ -11,9 +11,9 @@ from robosc_api.security import (
     SecurityError,
     TokenFile,
     add_token_arguments,
+    issue_token,
     make_token,
     open_channel,
-    written_token,
 )
 from robosc_api.security.tokens import MAXIMUM_BYTES, MAXIMUM_TOKEN, parse_tokens
 
@@ -181,7 +181,7 @@ def test_a_token_is_written_for_its_owner_alone_and_never_over_a_file(tmp_path: 
     file = tmp_path / "token"
     before = os.umask(0)
     try:
-        shown, told = written_token(arguments("laptop", "-o", str(file)))
+        shown, told = issue_token(arguments("laptop", "-o", str(file)))
     finally:
         os.umask(before)
     assert shown == ""
@@ -190,7 +190,7 @@ def test_a_token_is_written_for_its_owner_alone_and_never_over_a_file(tmp_path: 
     assert token not in told
     assert TokenFile(written(tmp_path, told.splitlines()[-1])).find(token) is not None
     with pytest.raises(SecurityError, match="File exists"):
-        written_token(arguments("laptop", "-o", str(file)))
+        issue_token(arguments("laptop", "-o", str(file)))
     assert file.read_text().strip() == token
 
 
@@ -223,7 +223,7 @@ def test_quotas_stand_behind_the_digest(tmp_path: Path) -> None:
 def test_quotas_by_flags_where_a_service_has_them() -> None:
     parser = argparse.ArgumentParser()
     add_token_arguments(parser, (Scope.SYNTHESIZE,), has_quotas=True)
-    _, told = written_token(parser.parse_args(["a", "--per-minute", "60"]))
+    _, told = issue_token(parser.parse_args(["a", "--per-minute", "60"]))
     assert told.splitlines()[-1].endswith(" per_minute=60")
     for wrong in ("0", "-1", "x", "9999999999"):
         with pytest.raises(SystemExit):

@@ -10,7 +10,7 @@ import pytest
 from grpc_reflection.v1alpha import reflection_pb2
 
 from robosc_api.failures import reason_of
-from robosc_api.prompt import REFLECTION_METHODS
+from robosc_api.request_timeouts import REFLECTION_METHODS
 from robosc_api.v1 import jobs_pb2, synthesis_pb2, synthesis_pb2_grpc
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server import application

@@ -9,15 +9,14 @@ from typing import Any
 
 import grpc
 
-from robosc_api.layers import Layer, behaviour_of, with_behaviour
-from robosc_api.streams import writing
+from robosc_api.layers import Layer, behaviour_of, with_behaviour, writing
 
 OWN_END_S = 0.2
 """Time for a call to end by itself, with a last word."""
 
 
 class EndingCalls(Layer):
-    """Before `PromptRequests`, after which every method takes a stream of requests."""
+    """Before `RequestTimeouts`, after which every method takes a stream of requests."""
 
     def __init__(self) -> None:
         super().__init__()

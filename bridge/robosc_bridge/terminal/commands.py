@@ -14,7 +14,7 @@ from robosc_api.security import (
     add_client_arguments,
     add_token_arguments,
     credentials_of,
-    written_token,
+    issue_token,
 )
 
 ADDRESS_VARIABLE, ADDRESS = "ROBOSC_BRIDGE", "127.0.0.1:50061"
@@ -166,7 +166,7 @@ def _teleop(client: Any, arguments: argparse.Namespace) -> int:
 
 def _token(arguments: argparse.Namespace) -> int:
     try:
-        token, line = written_token(arguments)
+        token, line = issue_token(arguments)
     except SecurityError as error:
         return _failed(str(error), WRONG)
     sys.stdout.write(token)

@@ -52,11 +52,11 @@ def _health(arguments: argparse.Namespace) -> int:
     except SecurityError as error:
         raise CredentialsError(str(error)) from error
     if not found.has_answered:
-        if found.words.startswith(_NO_SUCH_SERVICE):
+        if found.message.startswith(_NO_SUCH_SERVICE):
             raise CommandError(f"there is no service {arguments.service!r} at {address}", ExitCode.FAILED)
-        raise CommandError(f"no server answers at {address}: {first_line(found.words)}", ExitCode.SERVICE)
+        raise CommandError(f"no server answers at {address}: {first_line(found.message)}", ExitCode.SERVICE)
     if arguments.json:
-        print_json({"server": address, "service": arguments.service, "status": found.words})
+        print_json({"server": address, "service": arguments.service, "status": found.message})
     else:
-        sys.stdout.write(f"{visible(found.words)}\n")
+        sys.stdout.write(f"{visible(found.message)}\n")
     return ExitCode.OK if found.is_serving else ExitCode.FAILED

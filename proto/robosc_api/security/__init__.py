@@ -12,15 +12,15 @@ from robosc_api.security.arguments import (
     add_server_arguments,
     add_token_arguments,
     credentials_of,
+    issue_token,
     server_security_of,
-    written_token,
 )
 from robosc_api.security.callers import CALLER, ENTRY, caller_of, is_admin, network_of, token_or_host_of
 from robosc_api.security.client import Credentials, check_credentials, open_async_channel, open_channel
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.guard import Guard, Rule
 from robosc_api.security.listening import ServerSecurity, add_port, check_files, check_listening
-from robosc_api.security.tokens import Entry, Quota, Scope, TokenFile, make_token, nobody_let_in
+from robosc_api.security.tokens import Entry, Quota, Scope, TokenFile, make_token, missing_scope
 
 __all__ = [
     "CALLER",
@@ -46,13 +46,13 @@ __all__ = [
     "is_admin",
     "is_loopback_host",
     "is_loopback_peer",
+    "issue_token",
     "joined",
     "make_token",
+    "missing_scope",
     "network_of",
-    "nobody_let_in",
     "open_async_channel",
     "open_channel",
     "server_security_of",
     "token_or_host_of",
-    "written_token",
 ]

@@ -131,7 +131,7 @@ def _amount(text: str) -> int:
     return int(text)
 
 
-def written_token(arguments: argparse.Namespace) -> tuple[str, str]:
+def issue_token(arguments: argparse.Namespace) -> tuple[str, str]:
     """A new token for standard output, if it is not in a file, and for people the line that lets it in.
 
     Raises:

@@ -8,11 +8,10 @@ from typing import Any
 import grpc
 
 from robosc_api.failures import failure_metadata
-from robosc_api.layers import Layer, behaviour_of, with_behaviour
+from robosc_api.layers import Layer, behaviour_of, with_behaviour, writing
 from robosc_api.security.addresses import is_loopback_peer
 from robosc_api.security.callers import CALLER, ENTRY
 from robosc_api.security.tokens import Entry, Scope, TokenFile
-from robosc_api.streams import writing
 
 _log = logging.getLogger(__name__)
 

@@ -154,7 +154,7 @@ def _checked(security: ServerSecurity) -> _Files:
     if security.client_ca is not None:
         check_certificates(security.client_ca)
     if security.key is not None:
-        warn_of_readers(security.key)
+        warn_if_readable_by_others(security.key)
     return files
 
 
@@ -186,11 +186,11 @@ def _read(security: ServerSecurity) -> _Files:
 def read_secret(path: Path) -> bytes:
     """The bytes of a file with a key or a token, as `read`; the log warns if others than its owner may read it."""
     data = read(path)
-    warn_of_readers(path)
+    warn_if_readable_by_others(path)
     return data
 
 
-def warn_of_readers(path: Path) -> None:
+def warn_if_readable_by_others(path: Path) -> None:
     """Tell the log if others than its owner may read a file that is to be secret."""
     try:
         mode = path.stat().st_mode

@@ -28,7 +28,7 @@ MAXIMUM_BYTES = 64 * 1024
 MAXIMUM_TOKEN = 512
 """Characters of a token that is looked at."""
 
-_LOOK_S = 1.0
+_CHECK_PERIOD_S = 1.0
 _PREFIX = "robosc_"
 _LINE = re.compile(
     r"(?P<name>[A-Za-z0-9._-]{1,64})\s+(?P<scopes>[a-z,]+)\s+sha256:(?P<digest>[0-9a-f]{64})(?P<quota>(\s+\S+)*)\Z"
@@ -149,7 +149,7 @@ def _quota(words: list[str], place: str) -> Quota:
     return Quota(**amounts)
 
 
-def nobody_let_in(entries: Iterable[Entry], needed: Scope) -> str | None:
+def missing_scope(entries: Iterable[Entry], needed: Scope) -> str | None:
     """Return a message if no token of a file has the scope that every call needs; None: one has it."""
     if any(needed in entry.scopes for entry in entries):
         return None
@@ -174,11 +174,11 @@ class TokenFile:
         self._path = path
         self._clock = clock
         self._needed = needed
-        self._is_nobody_let_in = False
+        self._is_scope_missing = False
         self._lock = threading.Lock()
         self._entries, self._stamp = _read(path)
-        self._tell_who_is_let_in()
-        self._looked_s = clock()
+        self._warn_if_scope_is_missing()
+        self._checked_s = clock()
 
     def find(self, token: str) -> Entry | None:
         """Return the entry of a token; None: it is nobody's. Takes as long for any token."""
@@ -200,23 +200,23 @@ class TokenFile:
 
     def _current(self) -> tuple[Entry, ...]:
         with self._lock:
-            if self._clock() - self._looked_s >= _LOOK_S:
-                self._looked_s = self._clock()
+            if self._clock() - self._checked_s >= _CHECK_PERIOD_S:
+                self._checked_s = self._clock()
                 try:
                     if _stamp(self._path.stat()) != self._stamp:
                         self._entries, self._stamp = _read(self._path)
                         _log.info("%s: read again", self._path)
-                        self._tell_who_is_let_in()
+                        self._warn_if_scope_is_missing()
                 except (OSError, SecurityError) as error:
                     _log.error("the tokens stay as they were: %s", error)
             return self._entries
 
-    def _tell_who_is_let_in(self) -> None:
+    def _warn_if_scope_is_missing(self) -> None:
         """Tell when it has become nobody."""
-        words = None if self._needed is None else nobody_let_in(self._entries, self._needed)
-        if words is not None and not self._is_nobody_let_in:
+        words = None if self._needed is None else missing_scope(self._entries, self._needed)
+        if words is not None and not self._is_scope_missing:
             _log.warning("%s: %s", self._path, words)
-        self._is_nobody_let_in = words is not None
+        self._is_scope_missing = words is not None
 
 
 def _stamp(status: os.stat_result) -> tuple[int, int, int]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from robosc.cli.running import Parser, guarded
-from robosc_api.security import Scope, SecurityError, add_token_arguments, written_token
+from robosc_api.security import Scope, SecurityError, add_token_arguments, issue_token
 from robosc_server.operations.settings import (
     Settings,
     SettingsError,
@@ -61,7 +61,7 @@ def new_token(argv: Sequence[str]) -> int:
     add_token_arguments(parser, (Scope.SYNTHESIZE,), has_quotas=True)
     arguments = parser.parse_args(argv)
     try:
-        token, line = written_token(arguments)
+        token, line = issue_token(arguments)
     except SecurityError as error:
         sys.stderr.write(f"robosc-server: {error}\n")
         return 2

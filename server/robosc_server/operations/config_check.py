@@ -30,7 +30,7 @@ from robosc_api.security import (
     check_files,
     check_listening,
     is_loopback_host,
-    nobody_let_in,
+    missing_scope,
 )
 from robosc_api.security.addresses import split
 from robosc_api.security.listening import read
@@ -160,7 +160,7 @@ def _tokens(settings: Settings) -> Iterator[tuple[Grade, str]]:
     except SecurityError as error:
         yield Grade.ERROR, str(error)
         return
-    problem = nobody_let_in(entries, Scope.SYNTHESIZE)
+    problem = missing_scope(entries, Scope.SYNTHESIZE)
     useful = sum(Scope.SYNTHESIZE in entry.scopes for entry in entries)
     if problem is not None:
         yield Grade.WARNING, f"{settings.tokens}: {problem}"

@@ -11,9 +11,8 @@ import grpc.aio
 import structlog
 
 from robosc_api.failures import reason_of
-from robosc_api.layers import Layer, behaviour_of, with_behaviour
+from robosc_api.layers import Layer, behaviour_of, with_behaviour, writing
 from robosc_api.security import CALLER
-from robosc_api.streams import writing
 from robosc_server.clock import monotonic
 from robosc_server.failures import RefusedError, abort, code_of, fault_message
 from robosc_server.operations.logs import REQUEST_ID, REQUEST_ID_HEADER, log_fault, request_id_of

@@ -10,7 +10,7 @@ import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection_pb2
 
-from robosc_api.prompt import REFLECTION_METHODS
+from robosc_api.request_timeouts import REFLECTION_METHODS
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.remote import RemoteFace

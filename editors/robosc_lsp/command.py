@@ -17,11 +17,11 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     found = argparse.ArgumentParser(
         prog="robosc-lsp",
-        description="The language server of RoboSC, for editors: it speaks the Language Server Protocol 3.17 on "
-        "standard input and output.",
+        description="The language server of RoboSC for editors: it uses the Language Server Protocol 3.17 on standard "
+        "input and output.",
     )
     found.add_argument("--version", action="version", version=f"robosc-lsp {__version__}")
-    found.add_argument("--stdio", action="store_true", help="speak on standard input and output (always so)")
+    found.add_argument("--stdio", action="store_true", help="use standard input and output (always enabled)")
     found.add_argument(
         "-L",
         "--library-path",
@@ -29,7 +29,7 @@ def parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="DIR",
-        help="also look for libraries here, if it is there (may be repeated)",
+        help="additional folder with libraries, if it exists (may be repeated)",
     )
     found.add_argument(
         "-I",
@@ -38,17 +38,17 @@ def parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="DIR",
-        help="also look for ROS packages here, if it is there (may be repeated)",
+        help="additional folder with ROS packages, if it exists (may be repeated)",
     )
     found.add_argument(
         "--synthesis-seconds",
         type=_seconds,
         default=60.0,
         metavar="S",
-        help="longest time of a synthesis beside the editor; 0: none (default: 60)",
+        help="time limit of background synthesis in seconds; 0 disables it (default: 60)",
     )
-    found.add_argument("--check", action="store_true", help="tell whether the server can be started here, and end")
-    found.add_argument("--log-file", type=Path, metavar="FILE", help="write what goes on to this file")
+    found.add_argument("--check", action="store_true", help="check whether the server can start, and exit")
+    found.add_argument("--log-file", type=Path, metavar="FILE", help="write a log to this file")
     return found
 
 
@@ -58,7 +58,7 @@ def _seconds(text: str) -> float:
     except ValueError:
         seconds = -1.0
     if not 0 <= seconds < _MOST_SECONDS:
-        raise argparse.ArgumentTypeError(f"'{text}' is no number of seconds from 0 to {_MOST_SECONDS:g}")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of seconds from 0 to {_MOST_SECONDS:g}")
     return seconds
 
 

@@ -168,7 +168,7 @@ class Server(LanguageServer):
                     self._begin_synthesis(uri, analysis)
             except Exception:
                 # A fault of ours: the other files are to be looked at for all that.
-                _LOG.exception("%s could not be looked at", uri)
+                _LOG.exception("analysis of %s failed", uri)
         self._last_analysis_s = time.monotonic() - begun_s
 
     def _publish(self, uri: str, analysis: Analysis) -> None:
@@ -206,7 +206,7 @@ class Server(LanguageServer):
         ]
         if found.reason and analysis.whole is not None:
             place = analysis.whole.definition.location
-            fix = "`robosc synth` tells what is to blame."
+            fix = "Run `robosc synth` for an explanation."
             items.append(Diagnostic(Severity.WARNING, "no-supervisor", found.reason.rstrip("."), place, fix))
         return tuple(items)
 
@@ -306,7 +306,9 @@ class Server(LanguageServer):
             return None
         wanted = name.removeprefix("^")
         if not (wanted.isascii() and wanted.isidentifier()) or len(wanted) > _LONGEST_NAME:
-            raise JsonRpcInvalidParams(f"'{name}' is no name: letters, digits and '_', not a digit first")
+            raise JsonRpcInvalidParams(
+                f"'{name}' is not a valid name: use letters, digits and '_', and no digit at the start"
+            )
         analysis, _, definition = found
         if wanted == definition.name:
             return lsp.WorkspaceEdit(changes={})
@@ -319,7 +321,7 @@ class Server(LanguageServer):
             if changes.keys() & set(other.uris.values()):
                 after = changed.analysis(other.uri)
                 if after is None or after.errors > other.errors or after.names.pattern() != other.names.pattern():
-                    raise JsonRpcInvalidParams(f"'{name}' means something else in {other.file} already")
+                    raise JsonRpcInvalidParams(f"'{name}' already has another meaning in {other.file}")
         return lsp.WorkspaceEdit(changes=changes)
 
     def _require_visible_uses(self, analysis: Analysis, definition: Definition) -> None:
@@ -338,11 +340,12 @@ class Server(LanguageServer):
                     line = other.text.range_of(place).start.line + 1
                     name = other.file or unquote(other.uri.rpartition("/")[2])
                     raise JsonRpcInvalidParams(
-                        f"'{definition.name}' stands in line {line} of {name}, where errors hide what it means"
+                        f"'{definition.name}' occurs in line {line} of {name}, where errors hide its meaning: "
+                        "fix them first"
                     )
         for path in self.project.unreadable():
             if definition.name.encode() in path.read_bytes():
-                raise JsonRpcInvalidParams(f"'{definition.name}' stands in {path.name}, which is not UTF-8")
+                raise JsonRpcInvalidParams(f"'{definition.name}' occurs in {path.name}, which is not UTF-8")
 
     def hover(self, uri: str, position: lsp.Position) -> lsp.Hover | None:
         """Return the hover text for the name at a position."""
@@ -456,7 +459,7 @@ class Server(LanguageServer):
         if outcome is None:
             if analysis.inspected.checked.model is None:
                 return []
-            title = "synthesis goes on" if self._synthesis_s > 0 else "synthesis is switched off"
+            title = "synthesis is running" if self._synthesis_s > 0 else "synthesis is disabled"
         elif outcome.unknown:
             title = outcome.unknown
         elif outcome.reason:

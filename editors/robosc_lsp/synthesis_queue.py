@@ -90,7 +90,7 @@ async def run_synthesis(bundle: Bundle, known: frozenset[str], limit_s: float) -
             answer = await _answer(process, msgspec.json.encode(request) + b"\n")
         return msgspec.json.decode(answer, type=SynthesisResponse)
     except TimeoutError:
-        return SynthesisResponse(f"synthesis takes longer than {limit_s:g} s")
+        return SynthesisResponse(f"synthesis exceeds the time limit of {limit_s:g} s")
     except (OSError, msgspec.DecodeError):
         return SynthesisResponse("synthesis failed")
     finally:

@@ -32,7 +32,7 @@ def outcome(request: SynthesisRequest) -> SynthesisResponse:
             bundle, deployment=Deployment.CONTROLLER, engine=EngineOptions(maximum_nodes=_MOST_NODES)
         )
     except NodeLimitError:
-        return SynthesisResponse("synthesis needs more memory than it may have beside an editor")
+        return SynthesisResponse("synthesis exceeds the memory limit of the language server")
     except RoboscError as error:
         return SynthesisResponse(reason=str(error))
     findings = tuple(

@@ -184,7 +184,7 @@ def test_without_synthesis_there_are_the_findings_of_the_checks(tmp_path: Path) 
         assert editor.codes("trap.rscd") == []
         place = editor.document("trap.rscd")
         (lens,) = editor.run(editor.client.text_document_code_lens_async(lsp.CodeLensParams(place)))
-        assert lens.command.title == "synthesis is switched off"
+        assert lens.command.title == "synthesis is disabled"
 
 
 # What is told
@@ -336,7 +336,7 @@ def test_nothing_is_renamed_while_a_use_may_be_hidden(editor: Editor, tmp_path: 
         "walker.rscd",
         ROBOT.replace("requirement walk needs Base.calm and Button.on_", "requirement walk needs Button.on_ and"),
     )
-    with pytest.raises(JsonRpcException, match=r"'on_' stands in line 17 of walker\.rscd"):
+    with pytest.raises(JsonRpcException, match=r"'on_' occurs in line 17 of walker\.rscd"):
         rename(editor, "walker.rscd", "goto |on_", "running")
     # Nothing of another name is hidden.
     assert "^state" in rename(editor, "walker.rscd", "goto |off", "state")["walker.rscd"]
@@ -344,7 +344,7 @@ def test_nothing_is_renamed_while_a_use_may_be_hidden(editor: Editor, tmp_path: 
     (tmp_path / "latin.rscd").write_bytes(
         "robot L { component Base from parts import Base // für calm\n }".encode("latin-1")
     )
-    with pytest.raises(JsonRpcException, match=r"'calm' stands in latin\.rscd, which is not UTF-8"):
+    with pytest.raises(JsonRpcException, match=r"'calm' occurs in latin\.rscd, which is not UTF-8"):
         rename(editor, "walker.rscd", "Base.|calm", "quiet")
 
 
@@ -366,13 +366,13 @@ def test_nothing_is_renamed_while_errors_hide_a_use_in_another_file(
     editor: Editor, tmp_path: Path, broken: str
 ) -> None:
     editor.replace("walker.rscd", broken)
-    with pytest.raises(JsonRpcException, match=r"'calm' stands in line \d+ of walker\.rscd, where errors hide"):
+    with pytest.raises(JsonRpcException, match=r"'calm' occurs in line \d+ of walker\.rscd, where errors hide"):
         rename(editor, "parts.rscd", "marked state |calm", "quiet")
     # So it is with one that is saved, and from a third file.
     editor.close("walker.rscd")
     (tmp_path / "walker.rscd").write_text(broken, "utf-8")
     editor.open("other.rscd", ROBOT)
-    with pytest.raises(JsonRpcException, match=r"'calm' stands in line \d+ of walker\.rscd, where errors hide"):
+    with pytest.raises(JsonRpcException, match=r"'calm' occurs in line \d+ of walker\.rscd, where errors hide"):
         rename(editor, "other.rscd", "Base.|calm", "quiet")
     # A name of the third file alone is nothing to it.
     assert "running" in rename(editor, "other.rscd", "goto |on_", "running")["other.rscd"]
@@ -393,14 +393,14 @@ def test_a_word_of_the_language_becomes_a_name(editor: Editor) -> None:
 @pytest.mark.parametrize(
     ("words", "new", "why"),
     [
-        ("|most: integer", "a b", "is no name"),
-        ("|most: integer", "", "is no name"),
-        ("|most: integer", "x }", "is no name"),
-        ("|most: integer", "größe", "is no name"),
+        ("|most: integer", "a b", "is not a valid name"),
+        ("|most: integer", "", "is not a valid name"),
+        ("|most: integer", "x }", "is not a valid name"),
+        ("|most: integer", "größe", "is not a valid name"),
         # Another of that name is there, or would be meant from then on.
-        ("state |off {", "on_", "means something else"),
-        ("variable |last", "on_", "means something else"),
-        ("component |Button", "Base", "means something else"),
+        ("state |off {", "on_", "already has another meaning"),
+        ("variable |last", "on_", "already has another meaning"),
+        ("component |Button", "Base", "already has another meaning"),
     ],
 )
 def test_a_name_that_cannot_be_is_refused(editor: Editor, words: str, new: str, why: str) -> None:

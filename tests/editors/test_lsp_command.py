@@ -169,7 +169,7 @@ def test_a_synthesis_that_takes_too_long_is_given_up(tmp_path: Path) -> None:
         parameters = lsp.CodeLensParams(editor.document("long.rscd"))
         editor.until(lambda: editor.lenses_refreshed > 0)
         (lens,) = editor.run(editor.client.text_document_code_lens_async(parameters))
-        assert lens.command.title == "synthesis takes longer than 0.5 s"
+        assert lens.command.title == "synthesis exceeds the time limit of 0.5 s"
         assert "no-supervisor" not in editor.codes("long.rscd")
 
 

@@ -134,7 +134,7 @@ def job_reader(job_id: str) -> Callable[[Any], Job]:
     def convert(message: Any) -> Job:
         job = jobs.job_in(message)
         if job.id != job_id:
-            raise malformed("it tells of another job")
+            raise malformed("it is about another job")
         return job
 
     return convert
@@ -158,7 +158,7 @@ class JobPages:
             ValueError: The size of a page is none.
         """
         if not 0 < page_size <= MAXIMUM_PAGE:
-            raise ValueError(f"a page has from 1 to {MAXIMUM_PAGE} jobs")
+            raise ValueError(f"page_size must be from 1 to {MAXIMUM_PAGE}")
         self._chosen = (states, kind)
         self._all_owners = all_owners
         self._page_size = page_size
@@ -190,7 +190,7 @@ class JobPages:
         found, token = page
         self._empty = 0 if found else self._empty + 1
         if (token and token == self._token) or self._empty > _EMPTY_PAGES:
-            raise malformed("a list of jobs has no end")
+            raise malformed("the list of jobs does not end")
         self._token = token
         self.is_over = not token
         return found
@@ -227,7 +227,7 @@ class JobWatch:
         job = job_reader(self._job_id)(message)
         # A job that has ended is told of even if nothing has changed.
         if job.revision < self._revision or (job.revision == self._revision and not job.state.has_ended):
-            raise malformed("a job's changes are not in their order")
+            raise malformed("the changes of the job are not in order")
         self._revision = job.revision
         self.is_over = job.state.has_ended
         return job

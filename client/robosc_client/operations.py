@@ -155,7 +155,7 @@ def verify(
             is_strict=is_strict,
         )
     elif properties or property_files or supervisor is not None or options or maximum_states is not None or is_strict:
-        raise TypeError("a task says by itself what is to be verified: give either a task or a model and the rest")
+        raise TypeError("a task contains all options: give either a task, or a model with options")
     return _streaming_task("Verify", task, VerificationReader, deadline_s, on_progress)
 
 

@@ -66,7 +66,7 @@ def require_made_for(supervisor: Supervisor, bundle: Bundle, deployment: Deploym
         ServiceError: It was made of others, or for another.
     """
     if supervisor.certificate.bundle_sha256 != bundle.digest:
-        raise ServiceError("the server's supervisor is refused: it was made of other texts than these")
+        raise ServiceError("the server's supervisor is refused: it was made from other files")
     require_deployment(supervisor, deployment)
 
 
@@ -98,7 +98,7 @@ def graph_of(found: StateGraph, bundle: Bundle, deployment: Deployment) -> Graph
         for state in found.states
     )
     if any(len((*item.components, *item.variables, *item.communications)) != len(columns) for item in states):
-        raise malformed("the graph is of another robot")
+        raise malformed("the graph belongs to another robot")
     transitions = tuple((source, visible(event), target) for source, event, target in found.transitions)
     return Graph(model.name, found.initial, columns, states, transitions)
 
@@ -154,11 +154,11 @@ def require_recheck(report: Mapping[str, Any]) -> Mapping[str, Any]:
     try:
         document = msgspec.convert(report, type=_Recheck)
     except msgspec.ValidationError as error:
-        raise malformed(f"the report is none: {error}") from error
+        raise malformed(f"the report is invalid: {error}") from error
     if any(
         len({part is UNSET for part in (fault.trace, fault.shortest, fault.state)}) > 1 for fault in document.faults
     ):
-        raise malformed("the report is none: a fault without its run")
+        raise malformed("the report is invalid: a fault has no trace")
     return report
 
 
@@ -187,16 +187,16 @@ def verdicts_of(
     try:
         entries = report["properties"]
         if len(entries) != len(properties):
-            raise malformed("verdicts of other properties")
+            raise malformed("it has verdicts of other properties")
         verdicts = tuple(_verdict(*pair, system, model) for pair in zip(entries, properties, strict=True))
     except (LookupError, TypeError, ValueError, AttributeError, LanguageError) as error:
-        raise malformed(f"a verdict is none: {error}") from error
+        raise malformed(f"a verdict is invalid: {error}") from error
     return verdicts, system, model
 
 
 def _verdict(entry: Any, claim: Property, system: System, model: Model) -> Verdict:
     if entry["property"] != claim.text or (entry["name"] or "") != claim.name or not isinstance(entry["holds"], bool):
-        raise malformed("a verdict of another property")
+        raise malformed("it has a verdict of another property")
     run = entry["run"]
     return Verdict(claim, entry["holds"], None if run is None else _run(run, system, model))
 
@@ -214,7 +214,7 @@ def _run(entry: Any, system: System, model: Model) -> EvidenceRun:
     )
     is_whole = len(found.states) == len(found.events) + 1
     if not is_whole or (found.loop is not None and found.loop not in range(len(found.states))):
-        raise malformed("a run that does not fit together")
+        raise malformed("a run is inconsistent")
     return found
 
 
@@ -233,7 +233,7 @@ def _state(entry: Any, system: System, model: Model) -> tuple[Value, ...]:
             # The plants of messages have one location only.
             (found,) = subject_domain(system, subject)
         if not isinstance(found, bool | int | float | str):
-            raise malformed("a value in a run is none")
+            raise malformed("a value in a run is invalid")
         return visible(found) if isinstance(found, str) else found
 
     return tuple(map(value, subjects(system)))
@@ -252,5 +252,5 @@ def _model(bundle: Bundle) -> Model:
     """
     model = check(bundle).model
     if model is None:
-        raise malformed("it is about a model that has errors")
+        raise malformed("it has a result for a model that has errors")
     return model

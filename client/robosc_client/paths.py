@@ -26,7 +26,7 @@ def path_problem(path: str) -> str:
     try:
         length = len(path.encode("utf-8"))
     except UnicodeEncodeError:
-        return "it is no Unicode"
+        return "it is not valid Unicode"
     if length > MAXIMUM_PATH_BYTES:
         return f"it has more than {MAXIMUM_PATH_BYTES} bytes"
     if not path.isprintable():
@@ -40,7 +40,7 @@ def path_problem(path: str) -> str:
             # What a shell, an editor or git obeys without being asked: no target makes such a file.
             return "a name in it begins with a full stop"
         if part.partition(".")[0].rstrip().casefold() in _DEVICES:
-            return "a name in it stands for a device on Windows"
+            return "a name in it is a device name on Windows"
     return ""
 
 
@@ -59,8 +59,8 @@ def paths_problem(paths: Iterable[str]) -> str:
             return f"{path[:100]!r}: {problem}"
         folded = PurePosixPath(unicodedata.normalize("NFKC", path).casefold())
         if str(folded) in files:
-            return f"{path!r}: two files of that name, but for the case of letters"
+            return f"{path!r}: two files differ only in the case of letters"
         files.add(str(folded))
         folders.update(str(parent) for parent in folded.parents)
     both = sorted(files & folders)
-    return f"{both[0]!r}: a file and a folder of that name" if both else ""
+    return f"{both[0]!r}: a file and a folder have the same name" if both else ""

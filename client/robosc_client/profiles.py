@@ -85,7 +85,7 @@ def settings_folder() -> Path:
     try:
         return (chosen if chosen.is_absolute() else Path.home() / ".config") / "robosc"
     except RuntimeError as error:
-        raise UsageError("there is no home, so there are no profiles: use --server") from error
+        raise UsageError("the user has no home folder for profiles: use --server") from error
 
 
 def profiles_file() -> Path:
@@ -109,10 +109,10 @@ def read_profiles() -> Profiles:
     found = document.pop("profiles", {})
     default = document.pop("default", None)
     if document or not isinstance(found, dict) or not (default is None or isinstance(default, str)):
-        raise UsageError(f"{file}: only 'default' (a name) and tables [profiles.NAME] may stand in it")
+        raise UsageError(f"{file}: the file may contain only 'default' (a name) and tables [profiles.NAME]")
     by_name = {name: _profile(file, name, entry) for name, entry in found.items()}
     if default is not None and default not in by_name:
-        raise UsageError(f"{file}: the default {default!r} is none of its profiles")
+        raise UsageError(f"{file}: the default {default!r} is not one of its profiles")
     return Profiles(default, by_name)
 
 
@@ -130,14 +130,14 @@ def add_profile(name: str, profile: Profile, *, token: str | None = None, is_def
         UsageError: The name is none, or taken; or a file cannot be written.
     """
     if not _NAME.match(name):
-        raise UsageError(f"a profile's name has letters, digits, '.', '-' and '_', at most 64: not {name!r}")
+        raise UsageError(f"invalid profile name {name!r}: use at most 64 letters, digits, '.', '-' and '_'")
     known = read_profiles()
     if name in known.by_name and not replaces:
-        raise UsageError(f"there is a profile {name!r}: --force replaces it")
+        raise UsageError(f"the profile {name!r} exists already: use --force to replace it")
     entry = profile.document()
     for key in _PATHS:
         if not _is_unicode(str(entry.get(key, ""))):
-            raise UsageError(f"the file for {key!r} cannot be kept in {profiles_file()}: its name is no UTF-8")
+            raise UsageError(f"the path for {key!r} cannot be stored in {profiles_file()}: it is not UTF-8")
     if token is not None:
         entry["token_file"] = str(_token_file(name))
         _write(_token_file(name), f"{token}\n")
@@ -184,7 +184,7 @@ def _profile(file: Path, name: str, entry: Any) -> Profile:
         return UsageError(f"{file}: profile {name!r}: {why}")
 
     if not _NAME.match(name):
-        raise refused("its name has other characters than letters, digits, '.', '-' and '_', or too many")
+        raise refused("its name must have at most 64 letters, digits, '.', '-' and '_'")
     if not isinstance(entry, dict) or not isinstance(entry.get("server"), str) or not is_address(entry["server"]):
         raise refused("'server' must be HOST:PORT")
     if not isinstance(entry.get("tls", False), bool):
@@ -193,12 +193,12 @@ def _profile(file: Path, name: str, entry: Any) -> Profile:
         if key not in ("server", "tls", *_PATHS):
             raise refused(f"unknown key {key!r}")
         if key in _PATHS and (not isinstance(value, str) or not value or "\0" in value):
-            raise refused(f"{key!r} must be the name of a file")
+            raise refused(f"{key!r} must be a file path")
     # What is relative is so to the file, wherever the command is called.
     try:
         paths = {key: file.parent / Path(entry[key]).expanduser() for key in _PATHS if key in entry}
     except RuntimeError as error:
-        raise refused("a file's name begins with '~', and nobody of that name has a home") from error
+        raise refused("a path begins with '~' and the name of an unknown user") from error
     return Profile(server=entry["server"], tls=entry.get("tls", False), **paths)
 
 
@@ -230,11 +230,11 @@ def _text(file: Path) -> str:
     except OSError as error:
         raise UsageError(f"cannot read {file}: {error.strerror or error}") from error
     if len(content) > MAXIMUM_BYTES:
-        raise UsageError(f"{file}: more than {MAXIMUM_BYTES} bytes")
+        raise UsageError(f"{file}: the file is larger than {MAXIMUM_BYTES} bytes")
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise UsageError(f"{file}: no UTF-8") from error
+        raise UsageError(f"{file}: the file is not UTF-8") from error
 
 
 def _write(file: Path, text: str) -> None:

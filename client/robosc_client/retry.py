@@ -67,7 +67,7 @@ class RetryPolicy:
     def __post_init__(self) -> None:
         is_sound = 0 < self.first_s <= self.longest_s and 1 <= self.factor <= 10
         if min(self.attempts, self.watch_attempts) < 1 or not is_sound:
-            raise ValueError("a call needs at least one attempt, and delays that grow by a factor from 1 to 10")
+            raise ValueError("a retry policy needs at least one attempt, and delays that grow by a factor from 1 to 10")
 
 
 DEFAULT_RETRIES = RetryPolicy()
@@ -159,7 +159,7 @@ class Attempts:
         code, reason, message = failure.code, failure.reason, failure.message
         if code is grpc.StatusCode.UNAVAILABLE:
             if reason:
-                return ServerUnavailableError(f"the server at {self._address} cannot do it now: {message}", reason)
+                return ServerUnavailableError(f"the server at {self._address} is unavailable: {message}", reason)
             why = f": {message}" if message else ""
             return ServerUnavailableError(f"no server answers at {self._address}{why}")
         if code is grpc.StatusCode.DEADLINE_EXCEEDED:
@@ -174,5 +174,5 @@ class Attempts:
         if code in _JOB_CODES:
             return JobError(f"the server at {self._address} answers: {message}", reason)
         if code is grpc.StatusCode.UNIMPLEMENTED:
-            return ServiceError(f"what answers at {self._address} is no RoboSC server of this version")
+            return ServiceError(f"the server at {self._address} is not a RoboSC server of this version")
         return ServiceError(f"the server at {self._address} failed ({code.name.lower()}): {message}", reason)

@@ -165,12 +165,12 @@ def _name_in(certificate: Path) -> str:
         first = x509.load_pem_x509_certificate(read(certificate))
         names = first.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     except (ValueError, x509.ExtensionNotFound) as error:
-        raise SecurityError(f"{certificate}: no certificate for the name of a machine") from error
+        raise SecurityError(f"{certificate}: the certificate names no host") from error
     found: Sequence[str] = [
         *names.get_values_for_type(x509.DNSName),
         *map(str, names.get_values_for_type(x509.IPAddress)),
     ]
     if not found:
-        raise SecurityError(f"{certificate}: no certificate for the name of a machine")
+        raise SecurityError(f"{certificate}: the certificate names no host")
     # A certificate for all machines of a domain is one for any of them.
     return found[0].replace("*", "health", 1)

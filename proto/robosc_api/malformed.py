@@ -16,7 +16,7 @@ class MalformedError(Exception):
     """Error that a stream of requests raises for one that is no message; whoever reads them lets it pass."""
 
 
-_CODE, _MESSAGE = grpc.StatusCode.INVALID_ARGUMENT, "the request is no message of this service"
+_CODE, _MESSAGE = grpc.StatusCode.INVALID_ARGUMENT, "the request is not a valid message of this service"
 
 
 class MalformedRequests(Layer):

@@ -62,7 +62,7 @@ class RequestTimeouts(Layer):
             except _RequestTimeoutError:
                 request = end
             if request is end:
-                await _abort(context, f"the request comes within {self._first.limit_s:g} seconds")
+                await _abort(context, f"the request did not arrive within {self._first.limit_s:g} seconds")
             return await answer(request, context)
 
         return answered
@@ -85,7 +85,7 @@ class RequestTimeouts(Layer):
             except _RequestTimeoutError:
                 # Here and not where it is read: that may be another task, which cannot end the call.
                 limits = f"{first.limit_s:g} seconds, and each further one within {following.limit_s:g}"
-                await _abort(context, f"the first request comes within {limits}")
+                await _abort(context, f"the first request must arrive within {limits}")
 
         return answered
 

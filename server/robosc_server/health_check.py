@@ -10,14 +10,15 @@ from robosc_api.security import SecurityError
 from robosc_server.operations.settings import Settings, SettingsError, add_settings_arguments, settings_of
 
 _EPILOG = """\
-Settings come from flags, environment and file as for the server itself, so that in its container and its unit nothing
-more needs to be said. Its certificate is the only one that is believed, and is shown to a server that wants callers'
-certificates: one of the authorities in client_ca must have signed it, for clients, too. Else use --alive.
+The settings come from flags, environment variables and the settings file, as for the server itself; inside its
+container or unit no further options are needed. The check trusts only the certificate of the server. If the server
+requires client certificates, the check presents that same certificate: an authority in
+client_ca must have signed it for client use. Otherwise use --alive.
 
 exit status:
-  0  it is well; with --alive: it answers, if by refusing the connection for a certificate
-  1  it is not
-  2  wrong use, or wrong settings
+  0  the server is serving; with --alive: it answers, even if it refuses the certificate of the check
+  1  the server is not serving, or does not answer
+  2  wrong options or settings
 """
 
 
@@ -25,14 +26,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Ask; returns the exit status."""
     parser = Parser(
         prog="robosc-server health",
-        description="Ask the server that the same settings have started how it is, by gRPC's health check.",
+        description="Query the gRPC health check of the server that was started with the same settings.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("--service", default="", metavar="NAME", help="one of its services (default: all of them)")
-    parser.add_argument("--alive", action="store_true", help="be content with any answer, such as that it is not well")
-    parser.add_argument("--timeout", type=_seconds, default=4.0, metavar="S", help="seconds to wait (default: 4)")
+    parser.add_argument(
+        "--service", default="", metavar="NAME", help="check only this service (default: the whole server)"
+    )
+    parser.add_argument("--alive", action="store_true", help="succeed on any answer, also NOT_SERVING")
+    parser.add_argument("--timeout", type=_seconds, default=4.0, metavar="S", help="timeout in seconds (default: 4)")
     add_settings_arguments(parser)
     given = parser.parse_args(argv)
     try:
@@ -63,7 +66,7 @@ def _ask(settings: Settings, service: str, timeout_s: float, *, is_alive_enough:
 def _seconds(text: str) -> float:
     number = float(text)
     if not 0 < number <= 3600:
-        raise argparse.ArgumentTypeError("a number of seconds above 0, at most 3600, is needed")
+        raise argparse.ArgumentTypeError("must be a number of seconds above 0 and up to 3600")
     return number
 
 

@@ -57,7 +57,9 @@ def _announce(address: str) -> None:
         sys.stdout.write(f"robosc-server listening on {address}\n")
         sys.stdout.flush()
     except OSError as error:
-        logging.getLogger(__name__).warning("listening on %s, which standard output does not take: %s", address, error)
+        logging.getLogger(__name__).warning(
+            "listening on %s; the address cannot be written to standard output: %s", address, error
+        )
         # The interpreter would try once more at its end.
         sys.stdout = None
 

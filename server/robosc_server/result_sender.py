@@ -73,9 +73,13 @@ class ResultSender:
         caller = caller_of(context)
         unread = self._unread[caller]
         if unread and unread + size > self._per_caller_bytes:
-            raise RefusedError(Reason.SERVER_BUSY, "results that were sent before are to be read first", _RETRY_S)
+            raise RefusedError(
+                Reason.SERVER_BUSY, "the caller has not read its earlier results yet: read them first", _RETRY_S
+            )
         if self._unread and self.unread_bytes + size > self._bytes_in_all:
-            raise RefusedError(Reason.SERVER_BUSY, "too many results wait to be read by others", _RETRY_S)
+            raise RefusedError(
+                Reason.SERVER_BUSY, "too many results of other callers are still unread; try again later", _RETRY_S
+            )
         self._unread[caller] += size
         is_held = True
 

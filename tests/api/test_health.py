@@ -135,4 +135,4 @@ def test_wrong_use_is_one_clear_error(tmp_path: Path, capsys: pytest.CaptureFixt
     assert bridge_health(["health", "--config", str(file)]) == 2
     assert "remote.grpc_address is not set" in capsys.readouterr().err
     assert server_health(["--port", "many"]) == 2
-    assert capsys.readouterr().err == "robosc-server: --port: a whole number is needed\n"
+    assert capsys.readouterr().err == "robosc-server: --port: must be a whole number\n"

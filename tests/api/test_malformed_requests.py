@@ -56,7 +56,7 @@ def test_they_are_refused_with_a_reason_and_messages_are_not() -> None:
                 refusals.append(stream(WRONG, timeout=PATIENCE_S))
             for refused in refusals:
                 assert await refused.code() is grpc.StatusCode.INVALID_ARGUMENT
-                assert await refused.details() == "the request is no message of this service"
+                assert await refused.details() == "the request is not a valid message of this service"
                 assert b"MALFORMED_REQUEST" in dict(await refused.trailing_metadata())["grpc-status-details-bin"]
 
     asyncio.run(run())

@@ -79,14 +79,14 @@ def test_a_token_has_a_scope() -> None:
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("robosc_secret", "tokens:1: not NAME SCOPE,SCOPE sha256:DIGEST"),
-        ("a watch sha256:1234", "tokens:1: not NAME"),
-        (f"a fly sha256:{'0' * 64}", "there is no scope 'fly', only watch, operate, synthesize, admin"),
-        (f"a watch sha256:{'0' * 64} secret", "tokens:1: after the digest there may be waiting=N, per_minute=N, cpu_"),
-        (f"a watch sha256:{'0' * 64} waiting=secret", "tokens:1: waiting is a whole number from 1 to"),
-        (f"a watch sha256:{'0' * 64} waiting=0", "tokens:1: waiting is a whole number from 1 to"),
-        (f"a watch sha256:{'0' * 64} waiting=1 waiting=2", "tokens:1: waiting stands there twice"),
-        (f"a watch sha256:{'0' * 64}\na watch sha256:{'1' * 64}", "tokens:2: 'a' stands there twice"),
+        ("robosc_secret", "tokens:1: expected NAME SCOPE,SCOPE sha256:DIGEST"),
+        ("a watch sha256:1234", "tokens:1: expected NAME"),
+        (f"a fly sha256:{'0' * 64}", "unknown scope 'fly': use watch, operate, synthesize, admin"),
+        (f"a watch sha256:{'0' * 64} secret", "tokens:1: only waiting=N, per_minute=N, cpu_"),
+        (f"a watch sha256:{'0' * 64} waiting=secret", "tokens:1: waiting must be a whole number from 1 to"),
+        (f"a watch sha256:{'0' * 64} waiting=0", "tokens:1: waiting must be a whole number from 1 to"),
+        (f"a watch sha256:{'0' * 64} waiting=1 waiting=2", "tokens:1: waiting occurs twice"),
+        (f"a watch sha256:{'0' * 64}\na watch sha256:{'1' * 64}", "tokens:2: the name 'a' occurs twice"),
     ],
 )
 def test_a_wrong_line_is_told_without_what_stands_there(text: str, problem: str) -> None:
@@ -118,7 +118,7 @@ def test_a_file_that_becomes_wrong_changes_nothing(tmp_path: Path, caplog: pytes
     file.unlink()
     clock.now_s = 2.0
     assert tokens.find(token) is not None
-    assert caplog.text.count("the tokens stay as they were") == 2
+    assert caplog.text.count("the changed token file is not used") == 2
 
 
 def test_that_nobody_is_let_in_is_told_once_each_time_it_becomes_so(
@@ -135,7 +135,7 @@ def test_that_nobody_is_let_in_is_told_once_each_time_it_becomes_so(
         written(tmp_path, *lines)
         clock.now_s = number
         assert len(tokens.entries) == len(lines)
-        told = caplog.text.count(f"{file}: no token has the scope 'synthesize', so nobody is let in")
+        told = caplog.text.count(f"{file}: no token has the scope 'synthesize', so every call is refused")
         assert told == times, lines
     caplog.clear()
     TokenFile(written(tmp_path, *useless))
@@ -147,14 +147,14 @@ def test_a_scope_that_there_is_not(capsys: pytest.CaptureFixture[str]) -> None:
         arguments("laptop", "--scope", "nonsense")
     assert raised.value.code == 2
     told = capsys.readouterr().err
-    assert "there is no scope 'nonsense', only watch, operate, synthesize, admin" in told
+    assert "unknown scope 'nonsense': use watch, operate, synthesize, admin" in told
 
 
 @pytest.mark.parametrize("mode", [0o620, 0o602])
 def test_a_file_that_others_may_write_is_refused(mode: int, tmp_path: Path) -> None:
     file = written(tmp_path)
     file.chmod(mode)
-    with pytest.raises(SecurityError, match="others than its owner may write it"):
+    with pytest.raises(SecurityError, match="other users may write this file"):
         TokenFile(file)
 
 
@@ -202,7 +202,7 @@ def test_a_token_that_others_may_read_is_told(
     file.write_text(make_token("a", (Scope.WATCH,))[0])
     file.chmod(mode)
     with open_channel("127.0.0.1:1", Credentials(token_file=file)):
-        assert (f"{file}: others than its owner may read it" in caplog.text) is is_told
+        assert (f"{file}: other users may read this file" in caplog.text) is is_told
 
 
 def test_quotas_stand_behind_the_digest(tmp_path: Path) -> None:

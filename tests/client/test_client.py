@@ -355,7 +355,7 @@ class TestErrors:
             server = grpc.server(threads)
             port = server.add_insecure_port("127.0.0.1:0")
             server.start()
-            with connect(f"127.0.0.1:{port}") as client, pytest.raises(ServiceError, match="no RoboSC server"):
+            with connect(f"127.0.0.1:{port}") as client, pytest.raises(ServiceError, match="not a RoboSC server"):
                 client.check(BUNDLE)
             server.stop(None).wait()
 
@@ -413,7 +413,7 @@ class TestCredentials:
         token.touch(0o600)
         token.write_text("secret")
         chosen = Credentials(token_file=token)
-        with pytest.raises(CredentialsError, match="TLS only"), connect("192.0.2.1:1", credentials=chosen):
+        with pytest.raises(CredentialsError, match="only with TLS"), connect("192.0.2.1:1", credentials=chosen):
             pass
         with (
             pytest.raises(CredentialsError, match="No such file"),
@@ -434,7 +434,7 @@ class TestCredentials:
             believing = Credentials(ca=authority.file)
             with (
                 client_of(kind, address, credentials=believing, retries=NO_RETRIES) as client,
-                pytest.raises(ServiceError, match="no RoboSC server"),
+                pytest.raises(ServiceError, match="not a RoboSC server"),
             ):
                 client.get_version()
             with client_of(kind, address, retries=NO_RETRIES) as client, pytest.raises(ServerUnavailableError):
@@ -593,7 +593,7 @@ class TestJobs:
             with (
                 scripted(ListJobs=pages) as (address, _),
                 connect(address) as client,
-                pytest.raises(ServiceError, match=r"no end|more than 2 jobs"),
+                pytest.raises(ServiceError, match=r"does not end|more than 2 jobs"),
             ):
                 list(client.list_jobs(page_size=2))
 

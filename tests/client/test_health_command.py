@@ -34,7 +34,7 @@ def test_well_and_not_well(asked: Any) -> None:
         assert asked("--server", address, "--service", "Jobs") == (1, "NOT_SERVING\n", "")
         assert asked("--server", address, "--service", "Odd") == (1, "UNKNOWN\n", "")
         status, out, err = asked("--server", address, "--service", "None")
-        assert (status, out, err) == (1, "", f"robosc-client: there is no service 'None' at {address}\n")
+        assert (status, out, err) == (1, "", f"robosc-client: the server at {address} has no service 'None'\n")
         assert json.loads(asked("--server", address, "--service", "None", "--json")[1])["error"]["status"] == 1
         status, out, _ = asked("--server", address, "--service", "Jobs", "--json")
         assert (status, json.loads(out)) == (1, {"server": address, "service": "Jobs", "status": "NOT_SERVING"})

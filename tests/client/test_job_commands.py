@@ -81,8 +81,8 @@ class TestSubmit:
             (["verify", MODEL, "--property", "AG nonsense"], "nonsense"),
             (["verify", "made.rsup", MODEL, "--reorder"], "they need --property"),
             (["verify", "made.rsup"], "needs its model"),
-            (["verify", MODEL, "--property", "EF true", "--max-nodes", str(2**64)], "--max-nodes is at most"),
-            (["synth", MODEL, "--max-nodes", str(2**64)], "--max-nodes is at most"),
+            (["verify", MODEL, "--property", "EF true", "--max-nodes", str(2**64)], "--max-nodes must be at most"),
+            (["synth", MODEL, "--max-nodes", str(2**64)], "--max-nodes must be at most"),
             (["format", "/nothing.rscd"], "cannot read /nothing.rscd"),
         ],
     )
@@ -410,8 +410,8 @@ class TestListAndCancel:
     @pytest.mark.parametrize(
         ("options", "words"),
         [
-            (["--most", "0"], "a number from 1 to 1,000,000 is needed"),
-            (["--most", "x"], "a number from 1 to 1,000,000 is needed"),
+            (["--most", "0"], "must be a number from 1 to 1,000,000"),
+            (["--most", "x"], "must be a number from 1 to 1,000,000"),
             (["--kind", "fly"], "'fly' is none of check, synthesize, generate, explore, verify, format, synth"),
             (["--state", "idle"], "'idle' is none of queued, running, succeeded, failed, cancelled"),
             (["--deadline", "inf"], "above 0 and below 1,000,000,000"),
@@ -470,7 +470,7 @@ class TestBench:
         options = ["--task", "synth", "--max-nodes", str(2**70), "-n", "1", *more]
         status, _, err = run(capfd, "bench", MODEL, *options, "--server", "127.0.0.1:1")
         assert status == 2
-        assert "--max-nodes is at most" in err
+        assert "--max-nodes must be at most" in err
 
     def test_errors_by_reason(self, capfd: pytest.CaptureFixture[str]) -> None:
         refusal = Refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, "busy", "SERVER_BUSY", 1.0)

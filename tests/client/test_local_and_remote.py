@@ -144,7 +144,7 @@ def test_paths_are_models(client: Client) -> None:
 def test_a_task_says_by_itself_what_is_to_be_verified(client: Client) -> None:
     task = Verify(bundle=robosc.load(NAVIGATION), properties=("AG EF Navigator.ready",))
     assert client.verify(task) == client.verify(NAVIGATION, "AG EF Navigator.ready")
-    with pytest.raises(TypeError, match="give either a task or a model and the rest"):
+    with pytest.raises(TypeError, match="give either a task, or a model with options"):
         client.verify(task, "invariant true")
 
 

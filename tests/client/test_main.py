@@ -452,7 +452,7 @@ class TestExitCodes:
         command = ["verify", supervisors / "right.rsup", NAVIGATION, "--limit", "0", "--server", "127.0.0.1:1"]
         status, error = self.run(capfd, *command)
         assert status == 2
-        assert error == "robosc-client: --limit 0 cannot be asked of a server: it searches one state at least\n"
+        assert error == "robosc-client: --limit must be at least 1 for a server\n"
 
     def test_no_file(self, tmp_path: Path, capfd: pytest.CaptureFixture[str], fake: Any) -> None:
         status, error = self.run(capfd, "check", tmp_path / "none.rscd", "--server", fake)
@@ -515,7 +515,7 @@ class TestExitCodes:
     ) -> None:
         status, error = self.run(capfd, command, NAVIGATION, option, 10**20, "--server", "127.0.0.1:1")
         assert status == 2
-        assert f"{option} is at most 18446744073709551615" in error
+        assert f"{option} must be at most 18446744073709551615" in error
 
     @pytest.mark.parametrize(
         ("answer", "status", "words"),

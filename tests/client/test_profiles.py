@@ -88,10 +88,10 @@ def test_what_could_never_be_used(
         (["--ca", none], str(none)),
         (["--ca", token], str(token)),
         (["--certificate", none, "--key", none], str(none)),
-        (["--key", token], "belong together"),
+        (["--key", token], "given together"),
         (["--tls", "--token-file", none], str(none)),
-        (["--token-file", token], "with TLS only"),
-        (["--token"], "with TLS only"),
+        (["--token-file", token], "only with TLS"),
+        (["--token"], "only with TLS"),
     ):
         status, out, err = run(capfd, "profile", "add", "lab", "--server", "lab.example:1", *options)
         assert (status, out) == (2, ""), options
@@ -135,7 +135,7 @@ def test_odd_files(capfd: pytest.CaptureFixture[str], text: str) -> None:
 def test_which_server_is_asked(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     status, _, err = run(capfd, "version")
     assert status == 2
-    assert "no server is named" in err
+    assert "no server is given" in err
     for name in ("a", "b", "c"):
         assert run(capfd, "profile", "add", name, "--server", f"{name}:1")[0] == 0
     assert target()[0] == "a:1"
@@ -191,7 +191,7 @@ def test_a_path_that_is_no_unicode(capfd: pytest.CaptureFixture[str], folder: Pa
     Authority(tmp_path).file.rename(ca)
     status, _, err = run(capfd, "profile", "add", "lab", "--server", "lab:1", "--ca", ca)
     assert status == 2
-    assert "no UTF-8" in err
+    assert "not UTF-8" in err
     assert list(folder.rglob("*")) == []
 
 
@@ -219,6 +219,6 @@ def test_ctrl_d_at_the_prompt(folder: Path) -> None:
     os.close(main_end)
     os.close(other_end)
     assert process.returncode == 2
-    assert err.splitlines()[-1] == "robosc-client: standard input holds no single token"
+    assert err.splitlines()[-1] == "robosc-client: standard input must contain exactly one token"
     assert "Traceback" not in err
     assert not folder.exists()

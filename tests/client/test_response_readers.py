@@ -67,13 +67,13 @@ class TestSynthesis:
         [
             ([], "without a result"),
             ([progress()], "without a result"),
-            ([pb.SynthesizeResponse()], "nothing that"),
+            ([pb.SynthesizeResponse()], "no field that"),
             ([synthesis(), synthesis()], "more than one"),
-            ([synthesis(), progress()], "after its end"),
+            ([synthesis(), progress()], "progress after its result"),
             ([synthesis(status=0)], "unknown status"),
             ([synthesis(status=17)], "unknown status"),
-            ([synthesis(status=pb.SYNTHESIS_STATUS_SUPERVISOR)], "do not fit"),
-            ([synthesis(supervisor=b"x")], "do not fit"),
+            ([synthesis(status=pb.SYNTHESIS_STATUS_SUPERVISOR)], "contradicts"),
+            ([synthesis(supervisor=b"x")], "contradicts"),
             ([supervisor(supervisor_digest=b"")], "digest"),
             ([supervisor(supervisor_digest=bytes(32))], "digest"),
             ([synthesis(supervisor_digest=bytes(32))], "digest"),
@@ -93,7 +93,7 @@ class TestSynthesis:
 
     def test_endless_progress(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(response_readers, "MAXIMUM_PROGRESS", 1000)
-        refused(SynthesisReader(), (progress(number) for number in iter(int, 1)), "for ever")
+        refused(SynthesisReader(), (progress(number) for number in iter(int, 1)), "too many progress messages")
 
 
 @pytest.mark.parametrize(
@@ -202,7 +202,7 @@ class TestGeneration:
         refused(GenerationReader(), generation({"a": (b"\xff", False)}), "UTF-8")
 
     def test_status_without_files(self) -> None:
-        refused(GenerationReader(), generation({}), "do not fit")
+        refused(GenerationReader(), generation({}), "contradicts")
 
     def test_not_sorted(self) -> None:
         head = generation()[0]
@@ -272,16 +272,16 @@ class TestExploration:
             ([exploration()[0], pb.ExploreResponse(chunk=b"")], "empty"),
             (exploration(piece=100_000)[1:], "before"),
             (exploration(size=2**27), "more than"),
-            (exploration(size=0), "do not fit"),
+            (exploration(size=0), "contradicts"),
             (exploration(digest=bytes(32)), "digest"),
             (exploration(states=3), "lacks"),
             (exploration(transitions=1), "lacks"),
             (exploration({**GRAPH, "initial": 2}), "lacks"),
             (exploration({**GRAPH, "initial": -1}), "lacks"),
             (exploration({**GRAPH, "transitions": [[0, "go", 1], [0, "go", 2]]}), "lacks"),
-            (exploration({**GRAPH, "states": 5}), "none"),
-            (exploration(b"[" * 100_000, 60_000), "none"),
-            (exploration(b"\xff"), "none"),
+            (exploration({**GRAPH, "states": 5}), "the graph is invalid"),
+            (exploration(b"[" * 100_000, 60_000), "the graph is invalid"),
+            (exploration(b"\xff"), "the graph is invalid"),
         ],
     )
     def test_refused(self, messages: Any, words: str) -> None:
@@ -298,7 +298,7 @@ class TestOthers:
 
     def test_check(self) -> None:
         assert assembled(check_reader(), [pb.CheckResponse()]) == ()
-        refused(check_reader(), [], "none")
+        refused(check_reader(), [], "it has no message")
         odd: Any = 9
         refused(check_reader(), [pb.CheckResponse(diagnostics=[pb.Diagnostic(severity=odd)])], "severity")
 
@@ -321,10 +321,10 @@ class TestOthers:
         assert assembled(JobResultReader(), enveloped("check", [pb.CheckResponse()])) == ()
         assert assembled(JobResultReader(), enveloped("format", [pb.FormatResponse(text="x")])).text == "x"
         refused(JobResultReader(), [], "without a result")
-        refused(JobResultReader(), [jobs_pb2.GetJobResultResponse()], "nothing that")
-        refused(JobResultReader(), enveloped("synthesize", [progress()]), "tells of work")
+        refused(JobResultReader(), [jobs_pb2.GetJobResultResponse()], "no field that")
+        refused(JobResultReader(), enveloped("synthesize", [progress()]), "progress messages")
         two = [*enveloped("synthesize", [synthesis()]), *enveloped("check", [pb.CheckResponse()])]
-        refused(JobResultReader(), two, "two kinds")
+        refused(JobResultReader(), two, "two task kinds")
 
 
 def test_the_digest_of_a_graph_is_of_its_bytes() -> None:

@@ -131,7 +131,7 @@ class TestSignatures:
 
     def test_no_name_of_a_file(self, capfd: pytest.CaptureFixture[str]) -> None:
         assert run(capfd, "synth", MODEL, "-o", ".", "--server", "127.0.0.1:1") == (
-            2, "", "robosc-client: -o needs the name of a file\n"
+            2, "", "robosc-client: -o needs a file path\n"
         )  # fmt: skip
 
     def test_no_name_for_what_a_job_has_found(

@@ -43,7 +43,7 @@ def test_whatever_is_called_the_request_comes_in_time() -> None:
         for place, method in enumerate(METHODS):
             stranger.call(2 * place + 1, method)
         assert eventually(lambda: stranger.ended == len(METHODS))
-        assert stranger.was_told(b"request comes within 0.3 seconds")
+        assert stranger.was_told(b"request did not arrive within 0.3 seconds")
         # The first has its request at once: its end.
         stranger.call(2 * len(METHODS) + 1, METHODS[0], flags=END_OF_HEADERS | END_OF_STREAM)
         assert eventually(lambda: stranger.ended == len(METHODS) + 1)

@@ -151,14 +151,14 @@ class TestTls:
                 shutil.copy(first.sign(f"other-{number}")[0], certificate)
                 for _ in range(3):
                     check(address, ca=first.file)
-                assert caplog.text.count("the certificate stays as it was") == number
+                assert caplog.text.count("the changed certificate is not used") == number
             certificate.unlink()
             for _ in range(3):
                 check(address, ca=first.file)
             assert caplog.text.count("No such file") == 1
             certificate.write_bytes(right)
             check(address, ca=first.file)
-        assert caplog.text.count("the certificate stays as it was") == 3
+        assert caplog.text.count("the changed certificate is not used") == 3
 
     def test_a_certificate_that_has_expired_is_refused_until_a_new_one_is_there(self, tmp_path: Path) -> None:
         authority = Authority(tmp_path)
@@ -189,7 +189,7 @@ class TestTls:
         certificate, key = Authority(tmp_path).sign("server")
         key.chmod(0o640)
         with serving(ServerSecurity(certificate=certificate, key=key)):
-            assert caplog.text.count(f"{key}: others than its owner may read it") == 1
+            assert caplog.text.count(f"{key}: other users may read this file") == 1
         caplog.clear()
         key.chmod(0o600)
         with serving(ServerSecurity(certificate=certificate, key=key)):
@@ -262,7 +262,7 @@ class TestTokens:
 
     def test_a_token_is_not_sent_in_the_clear_to_another_machine(self, tmp_path: Path) -> None:
         token, _ = token_in(tmp_path, Scope.SYNTHESIZE)
-        with pytest.raises(CredentialsError, match="with TLS only"):
+        with pytest.raises(CredentialsError, match="only with TLS"):
             Client("192.0.2.1:50051", Credentials(token_file=token))
 
     def test_a_token_is_never_logged(
@@ -292,7 +292,7 @@ class TestQuotas:
                 assert 0 < caught.value.retry_after_s <= 30
                 # What is kept costs nothing.
                 client.check(bundle_of("a"))
-                with pytest.raises(ServerBusyError, match="2 tasks in a minute"):
+                with pytest.raises(ServerBusyError, match="2 tasks per minute"):
                     client.submit(Check(bundle_of("d")))
             with Client(address, Credentials(token_file=other), retries=ONCE) as client:
                 client.check(bundle_of("c"))
@@ -333,7 +333,7 @@ class TestJobsOfOthers:
 class TestWhereItListens:
     @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
     def test_beyond_this_machine_only_with_tls(self, host: str) -> None:
-        refused = pytest.raises(StartError, match="can be reached from other machines")
+        refused = pytest.raises(StartError, match="is reachable from other machines")
         with refused, served(given_workers=Quick(), host=host):
             pass
 
@@ -352,14 +352,14 @@ class TestWhereItListens:
         empty = tmp_path / "empty"
         empty.touch()
         cases = [
-            (ServerSecurity(certificate=secure.certificate), "belong together"),
-            (ServerSecurity(client_ca=authority.file), "with TLS only"),
+            (ServerSecurity(certificate=secure.certificate), "given together"),
+            (ServerSecurity(client_ca=authority.file), "need TLS"),
             (ServerSecurity(certificate=secure.certificate, key=other_key), "cannot be used"),
             (ServerSecurity(certificate=tmp_path / "none", key=secure.key), "No such file"),
             (ServerSecurity(certificate=empty, key=secure.key), "cannot be used"),
             (
                 ServerSecurity(certificate=secure.certificate, key=secure.key, client_ca=empty),
-                "no certificates in PEM",
+                "no PEM certificates",
             ),
             (ServerSecurity(tokens=tmp_path / "none"), "No such file"),
         ]
@@ -387,7 +387,7 @@ class TestCommands:
     def test_wrong_use(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert main(["token", "not a name"]) == 2
         assert main(["--port", "0", "--tls-key", str(tmp_path / "none")]) == 1
-        assert "belong together" in capsys.readouterr().err
+        assert "given together" in capsys.readouterr().err
         assert main(["--host", "0.0.0.0", "--port", "0"]) == 1
         model = tmp_path / "robot.rscd"
         model.write_text("robot R { }")

@@ -135,7 +135,7 @@ class TestRequests:
         call = fake.unary_unary(f"/robosc_api.v1.SynthesisService/{name}")
         reason, details, error = refusal(lambda: call(b"\xff", timeout=PATIENCE_S))
         assert (reason, error.code()) == ("MALFORMED_REQUEST", grpc.StatusCode.INVALID_ARGUMENT)
-        assert details == "the request is no message of this service"
+        assert details == "the request is not a valid message of this service"
 
     @pytest.mark.parametrize("name", ["Synthesize", "Generate", "Explore", "Verify"])
     def test_bytes_that_are_no_message_of_a_stream(self, fake: Any, name: str) -> None:
@@ -333,7 +333,7 @@ class TestEnding:
                 for number in range(1, 12, 2):
                     deaf.call(number, "/robosc_api.v1.SynthesisService/Check")
                     deaf.message(number, pb.CheckRequest(bundle=bundle("size 2900000")).SerializeToString())
-                assert eventually(lambda: deaf.was_told(b"sent before are to be read first"))
+                assert eventually(lambda: deaf.was_told(b"not read its earlier results"))
             # The line is gone, and with it what was unread.
             with grpc.insecure_channel(address) as channel:
                 assert eventually(lambda: len(check(channel, "size 2900000")) > 2_000_000)

@@ -118,7 +118,7 @@ COSTLY = {
 def test_what_would_take_long_to_parse_is_not_parsed(what: str, submits: bool) -> None:
     request = COSTLY[what]
     assert len(request) < LIMITS.request_bytes
-    with pytest.raises(RefusedError, match="more than 8100 files") as caught:
+    with pytest.raises(RefusedError, match="more than 8100 fields") as caught:
         if submits:
             submission(delimited(1, delimited(1, request)), LIMITS)
         else:
@@ -131,6 +131,6 @@ def test_a_submission_that_is_none() -> None:
         with pytest.raises(RefusedError) as caught:
             submission(content, LIMITS)
         assert caught.value.reason is Reason.MALFORMED_REQUEST
-    with pytest.raises(RefusedError, match="takes at most") as caught:
+    with pytest.raises(RefusedError, match="accepts at most") as caught:
         submission(b"\0" * (LIMITS.submission_bytes + 1), LIMITS)
     assert caught.value.reason is Reason.REQUEST_TOO_LARGE

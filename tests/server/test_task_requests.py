@@ -144,7 +144,7 @@ class TestSizes:
         accept_request(TaskKind.CHECK, small_request(TaskKind.CHECK, "x" * 90).SerializeToString(), limits)
         found = refusal(TaskKind.CHECK, small_request(TaskKind.CHECK, "x" * 91), limits)
         assert found.reason is Reason.REQUEST_TOO_LARGE
-        assert found.message == "the names and texts have 101 bytes, this server takes at most 100"
+        assert found.message == "the names and texts have 101 bytes; this server accepts at most 100"
 
     @pytest.mark.parametrize(
         ("kind", "change"),

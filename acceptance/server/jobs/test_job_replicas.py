@@ -111,7 +111,7 @@ def test_who_watches_a_job_that_is_forgotten_elsewhere_is_told(database_url: str
             times.wall_s += 1.0
             await ours.manager.sweep()
             await theirs.manager.poll()
-            with pytest.raises(RefusedError, match="no job of that id"):
+            with pytest.raises(RefusedError, match="no job with this id"):
                 await following
 
     in_loop(test)

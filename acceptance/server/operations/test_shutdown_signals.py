@@ -68,4 +68,4 @@ def test_a_second_interrupt_ends_it_at_once(tmp_path: Path) -> None:
         process.send_signal(signal.SIGINT)
         _, log = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 128 + signal.SIGINT, log
-    assert "ended at once, by a second interrupt" in log
+    assert "exiting immediately after a second interrupt" in log

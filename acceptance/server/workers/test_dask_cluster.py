@@ -186,14 +186,14 @@ class TestTasks:
         assert eventually(lambda: not is_running(pid))
         with pytest.raises(WorkersError, match="was lost"):
             future.result(60)
-        with BackgroundLoop() as loop, pytest.raises(WorkersError, match="have ended"):
+        with BackgroundLoop() as loop, pytest.raises(WorkersError, match="workers are shut down"):
             loop.run(other.workers.run(fake_task("echo"), LIMITS, None))  # type: ignore[arg-type]  # never told
 
 
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ("import robosc\nrobosc.__version__ = '0.0.1'\n", "has RoboSC 0.0.1, and this server"),
+        ("import robosc\nrobosc.__version__ = '0.0.1'\n", "has RoboSC 0.0.1, but this server"),
         ("import sys\nsys.modules['robosc_server'] = None\n", "cannot load RoboSC: "),
     ],
 )
@@ -246,7 +246,7 @@ def test_losses(tmp_path: Path) -> None:
             if count == 2:
                 pid = running.next_pid(count)
         outcome = future.result(60)
-        assert outcome == Failure(Reason.WORKER_DIED, "two workers of the cluster were lost while they did this task")
+        assert outcome == Failure(Reason.WORKER_DIED, "two workers of the cluster were lost during this task")
 
         # The scheduler, under a task.
         assert eventually(lambda: running.workers.capacity == 2)
@@ -304,7 +304,7 @@ def test_workers_that_are_lost_before_they_begin_are_not_the_tasks_fault(tmp_pat
         future = running.start("echo never")
         for _ in range(3):
             lose_holder()
-        with pytest.raises(WorkersError, match="loses its workers before they begin a task"):
+        with pytest.raises(WorkersError, match="loses its workers before they start a task"):
             future.result(60)
         assert running.reports == []
 

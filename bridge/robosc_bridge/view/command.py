@@ -104,7 +104,7 @@ def _add_serving(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--open", action="store_true", help="open it in a browser")
     group.add_argument("--tls-certificate", type=Path, metavar="FILE", help="certificate chain (PEM): serve with TLS")
-    group.add_argument("--tls-key", type=Path, metavar="FILE", help="its private key (PEM)")
+    group.add_argument("--tls-key", type=Path, metavar="FILE", help="private key of the certificate (PEM)")
     group.add_argument(
         "--insecure-beyond-loopback",
         action="store_true",
@@ -118,16 +118,16 @@ def _add_client(parser: argparse.ArgumentParser) -> None:
     Written again, since that function would load gRPC for the help of every command.
     """
     group = parser.add_argument_group("security")
-    group.add_argument("--tls", action="store_true", help="with TLS, believing the usual certificate authorities")
+    group.add_argument("--tls", action="store_true", help="use TLS, and trust the system's certificate authorities")
     group.add_argument(
         "--ca",
         type=Path,
         metavar="FILE",
         default=_from_environment("ROBOSC_CA"),
-        help="with TLS, believing these certificates alone (PEM; default: $ROBOSC_CA)",
+        help="use TLS, and trust only these certificates (PEM; default: $ROBOSC_CA)",
     )
-    group.add_argument("--certificate", type=Path, metavar="FILE", help="own certificate chain (PEM)")
-    group.add_argument("--key", type=Path, metavar="FILE", help="its private key (PEM)")
+    group.add_argument("--certificate", type=Path, metavar="FILE", help="client certificate chain (PEM)")
+    group.add_argument("--key", type=Path, metavar="FILE", help="private key of the certificate (PEM)")
     group.add_argument(
         "--token-file",
         type=Path,

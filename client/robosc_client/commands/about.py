@@ -13,9 +13,9 @@ from robosc_client.commands.connection import add_connection_arguments, exit_sta
 
 def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the commands."""
-    targets = commands.add_parser("targets", help="list what a server can generate")
+    targets = commands.add_parser("targets", help="list the targets that a server can generate")
     targets.set_defaults(run=_targets)
-    version = commands.add_parser("version", help="tell the version, engines and limits of a server")
+    version = commands.add_parser("version", help="print the version, engines and limits of a server")
     version.set_defaults(run=_version)
     for parser in (targets, version):
         parser.add_argument("--json", action="store_true", help="print one JSON document for machines")

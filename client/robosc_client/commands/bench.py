@@ -19,12 +19,12 @@ from robosc_client.convert.requests import request_of
 from robosc_client.load import MAXIMUM_CONCURRENCY, Load, Measured, measure
 
 _DESCRIPTION = """\
-Ask a server for the same again and again, and tell how many calls a second it answers and how long they take. Each of
-the concurrent callers has one call under way at any time. The server answers what it knows from its store; with
---uncached, a comment in the model makes every request another one. Interrupted, it tells what it has measured so far.
+Send the same request repeatedly, and print the rate of answered calls and their duration. Each of the concurrent
+callers has one open call at any time. The server answers repeated requests from its cache; with --uncached, a comment
+in the model makes every request different. An interrupt prints the measurements so far.
 """
 
-_EPILOG = exit_statuses("every call was answered", "the model's file is no text", "a call was not answered")
+_EPILOG = exit_statuses("every call was answered", "the model file is not a text file", "a call was not answered")
 
 _RUN = secrets.token_hex(8)
 """Identifier of this process: a request of another process is no request of this one."""
@@ -37,7 +37,7 @@ _METHODS = {
 
 def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = commands.add_parser("bench", help="measure how many calls a server answers", description=_DESCRIPTION)
+    parser = commands.add_parser("bench", help="measure the rate and duration of calls", description=_DESCRIPTION)
     add_model_arguments(parser)
     parser.add_argument("--task", choices=list(_METHODS), default="check", help="call to make (default: %(default)s)")
     parser.add_argument(
@@ -46,10 +46,10 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         type=number_up_to(MAXIMUM_CONCURRENCY),
         default=8,
         metavar="N",
-        help="callers at once (default: %(default)s)",
+        help="number of concurrent callers (default: %(default)s)",
     )
     amount = parser.add_mutually_exclusive_group()
-    amount.add_argument("-n", "--count", type=number_up_to(10**9), metavar="N", help="calls in all")
+    amount.add_argument("-n", "--count", type=number_up_to(10**9), metavar="N", help="total number of calls")
     amount.add_argument(
         "-d",
         "--duration",
@@ -63,9 +63,9 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         type=number_up_to(MAXIMUM_CONCURRENCY),
         default=1,
         metavar="N",
-        help="connections (default: %(default)s)",
+        help="number of connections (default: %(default)s)",
     )
-    parser.add_argument("--uncached", action="store_true", help="make every request another one")
+    parser.add_argument("--uncached", action="store_true", help="make every request different")
     add_synthesis_arguments(parser)
     add_connection_arguments(parser, epilog=_EPILOG)
     parser.set_defaults(run_alone=_bench)

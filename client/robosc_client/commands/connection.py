@@ -12,10 +12,8 @@ from robosc_client.profiles import Profile, is_address, read_profiles, require_p
 
 PROFILE_VARIABLE = "ROBOSC_PROFILE"
 
-SERVICE = (
-    "the server is not there, refused, failed or did not answer before the deadline; or its answer is not believed"
-)
-SIGNED_SERVICE = f"{SERVICE}, such\n     as a supervisor that none of the keys of --signed-by has signed"
+SERVICE = "the server is unavailable, refused, failed or missed the deadline; or its answer was rejected"
+SIGNED_SERVICE = f"{SERVICE}, such\n     as a supervisor that no key of --signed-by has signed"
 """Meaning of the exit status 3; this one where signatures are asked for, and `SERVICE` elsewhere."""
 
 
@@ -27,14 +25,14 @@ def exit_statuses(done: str, failed: str | None = None, service: str | None = SE
         failed: Meaning of 1; None: it does not happen.
         service: Meaning of 3; None: no server is asked.
     """
-    told = {0: done, 1: failed, 2: "wrong use", 3: service, 130: "Ctrl-C"}
+    told = {0: done, 1: failed, 2: "wrong options", 3: service, 130: "Ctrl-C"}
     return "exit status:\n" + "".join(f"  {status}  {what}\n" for status, what in told.items() if what is not None)
 
 
 EPILOG = exit_statuses(
     "done; the model has no errors",
-    "the model has errors, no supervisor exists, one that was checked is wrong; or a job that is watched or asked for\n"
-    "     its result has failed or was cancelled",
+    "the model has errors, no supervisor exists, or a checked supervisor is wrong; or a watched job, or a job whose\n"
+    "     result was requested, has failed or was cancelled",
     SIGNED_SERVICE,
 )
 """Epilog of all commands together."""
@@ -62,7 +60,7 @@ def add_connection_arguments(
     server.add_argument(
         "--profile",
         metavar="NAME",
-        help=f"a server of 'robosc-client profile' (default: ${PROFILE_VARIABLE}, or the default profile)",
+        help=f"profile of the server, see 'profile --help' (default: ${PROFILE_VARIABLE}, or the default profile)",
     )
     add_client_arguments(parser)
     # What the environment says is about a server that is named, not about a profile: no token goes to another server.
@@ -73,8 +71,8 @@ def add_connection_arguments(
         type=seconds,
         default=deadline_s,
         metavar="SECONDS",
-        help="give up after so long "
-        f"(default: {'as long as the server works on it' if deadline_s is None else f'{deadline_s:g}'})",
+        help="deadline of the call "
+        f"(default: {'the time limit of the server' if deadline_s is None else f'{deadline_s:g}'})",
     )
 
 
@@ -95,7 +93,7 @@ def target_of(arguments: argparse.Namespace) -> tuple[str, Credentials]:
         defaults = {name: getattr(profile, name) for name in _FIELDS}
     found: dict[str, Path | None] = {name: getattr(arguments, name) or defaults[name] for name in _FIELDS}
     if (found["certificate"] is None) != (found["key"] is None):
-        raise UsageError("a certificate and its key belong together: --certificate and --key, or neither")
+        raise UsageError("a certificate and its key must be given together: use both --certificate and --key")
     is_secure = arguments.tls or (profile is not None and profile.tls)
     credentials = Credentials(is_secure=is_secure, **found)
     return (arguments.server if profile is None else profile.server), credentials
@@ -107,7 +105,7 @@ def _profile(arguments: argparse.Namespace) -> Profile | None:
     known = read_profiles()
     name = arguments.profile or os.environ.get(PROFILE_VARIABLE) or known.default
     if name is None:
-        raise UsageError("no server is named: --server HOST:PORT, or a profile (see robosc-client profile --help)")
+        raise UsageError("no server is given: use --server HOST:PORT or a profile (see robosc-client profile --help)")
     return require_profile(known, name)
 
 
@@ -125,7 +123,7 @@ def seconds(text: str) -> float:
     except ValueError:
         number = 0.0
     if not 0 < number < _ENDLESS_S:
-        raise argparse.ArgumentTypeError(f"a number of seconds above 0 and below {_ENDLESS_S:,.0f} is needed")
+        raise argparse.ArgumentTypeError(f"must be a number of seconds above 0 and below {_ENDLESS_S:,.0f}")
     return number
 
 
@@ -138,7 +136,7 @@ def number_up_to(most: int) -> Callable[[str], int]:
         except ValueError:
             number = 0
         if not 0 < number <= most:
-            raise argparse.ArgumentTypeError(f"a number from 1 to {most:,} is needed")
+            raise argparse.ArgumentTypeError(f"must be a number from 1 to {most:,}")
         return number
 
     return read

@@ -11,13 +11,13 @@ from robosc_client.convert.failures import first_line
 from robosc_client.errors import CredentialsError
 
 _DESCRIPTION = """\
-Ask a server whether it is well, by gRPC's health check: for scripts, monitors and people. It is asked once.
+Query the gRPC health check of a server once, for scripts and monitoring.
 """
 
 _EPILOG = exit_statuses(
-    "it is well",
-    "it says that it is not, as while it ends or cannot reach what it needs, or that it has no such service",
-    "it is not there, refused, or did not answer before the deadline",
+    "the server is serving",
+    "the server is not serving, for example while it shuts down, or has no such service",
+    "the server is unavailable, refused, or missed the deadline",
 )
 
 _DEADLINE_S = 5.0
@@ -28,12 +28,12 @@ _NO_SUCH_SERVICE = "NOT_FOUND:"
 
 def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command."""
-    parser = commands.add_parser("health", help="ask whether a server is well", description=_DESCRIPTION)
+    parser = commands.add_parser("health", help="query the health of a server", description=_DESCRIPTION)
     parser.add_argument(
         "--service",
         default="",
         metavar="NAME",
-        help="one of its services, such as robosc_api.v1.JobService (default: the server as a whole)",
+        help="check only this service, such as robosc_api.v1.JobService (default: the whole server)",
     )
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     add_connection_arguments(parser, deadline_s=_DEADLINE_S, epilog=_EPILOG)
@@ -53,7 +53,7 @@ def _health(arguments: argparse.Namespace) -> int:
         raise CredentialsError(str(error)) from error
     if not found.has_answered:
         if found.message.startswith(_NO_SUCH_SERVICE):
-            raise CommandError(f"there is no service {arguments.service!r} at {address}", ExitCode.FAILED)
+            raise CommandError(f"the server at {address} has no service {arguments.service!r}", ExitCode.FAILED)
         raise CommandError(f"no server answers at {address}: {first_line(found.message)}", ExitCode.SERVICE)
     if arguments.json:
         print_json({"server": address, "service": arguments.service, "status": found.message})

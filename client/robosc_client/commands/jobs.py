@@ -57,6 +57,7 @@ from robosc_client.commands.connection import (
 from robosc_client.commands.progress_line import ProgressLine
 from robosc_client.commands.supervisor_file import write_supervisor
 from robosc_client.commands.tasks import (
+    add_signed_by_argument,
     add_synthesis_arguments,
     are_understood,
     require_signature,
@@ -71,83 +72,82 @@ if TYPE_CHECKING:
     from robosc.signatures import PublicKey
 
 _SUBMIT = """\
-Have a server do something without waiting for it: the job's id is printed, and the job goes on whatever becomes of this
-computer or of the server. 'watch' tells how it gets on, 'get' what it has found.
+Submit a task as a job and print its id without waiting for the result. The job survives the loss of the connection and
+a restart of the server. Use 'watch' to follow it and 'get' to fetch its result.
 """
 
 _GET = """\
-Tell where a job is; with -o or --result, what it has found: -o writes a supervisor (with its signature beside it), a
-graph, a report or a text to a file, or generated files to a folder.
+Print the state of a job. With --result, print its result; with -o, write it: a supervisor (with its signature in a
+second file), a graph, a report or a text to a file, or generated files to a folder.
 """
 
 _EPILOG = exit_statuses("done")
 
 _SUBMIT_EPILOG = exit_statuses(
-    "the server has the job; with --watch: it has succeeded",
-    "the model's files are no texts; with --watch: the job has failed or was cancelled",
+    "the server has accepted the job; with --watch: it has succeeded",
+    "the model files are not text files; with --watch: the job has failed or was cancelled",
 )
 
 _WATCH_EPILOG = exit_statuses(
-    "the job has succeeded, which it also does where it finds that a model has errors",
-    "it has failed or was cancelled",
+    "the job has succeeded, even if its result is that the model has errors",
+    "the job has failed or was cancelled",
 )
 
 _GET_EPILOG = exit_statuses(
-    "told where the job is, also if it has failed; with --result or -o: done, and the model has no errors",
-    "with --result or -o: the job has failed or was cancelled; the model has errors, no supervisor exists, or\n"
-    "     one that was checked is wrong; a property fails",
+    "the state was printed, also of a failed job; with --result or -o: done, and the model has no errors",
+    "with --result or -o: the job has failed or was cancelled; the model has errors, no supervisor exists, a\n"
+    "     checked supervisor is wrong, or a property does not hold",
     SIGNED_SERVICE,
 )
 
 
 def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the commands."""
-    submit = commands.add_parser("submit", help="have something done as a job, without waiting", description=_SUBMIT)
+    submit = commands.add_parser("submit", help="submit a task as a job, without waiting", description=_SUBMIT)
     _add_tasks(submit)
 
-    watch = commands.add_parser("watch", help="tell how a job gets on, until it has ended")
+    watch = commands.add_parser("watch", help="follow a job until it has ended")
     watch.set_defaults(run=_watch)
-    get = commands.add_parser("get", help="tell where a job is, or what it has found", description=_GET)
-    get.add_argument("-o", "--output", type=given_path, metavar="PATH", help="write what it has found")
-    get.add_argument("--result", action="store_true", help="print what it has found, not only where it is")
-    get.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")
-    get.add_argument(
-        "--signed-by",
-        action="append",
-        default=[],
-        type=given_path,
-        metavar="FILE.pub",
-        help="the server must have signed the supervisor by a key of this file (may be repeated)",
-    )
+    get = commands.add_parser("get", help="print the state or the result of a job", description=_GET)
+    get.add_argument("-o", "--output", type=given_path, metavar="PATH", help="write the result to this file or folder")
+    get.add_argument("--result", action="store_true", help="print the result, not only the state")
+    get.add_argument("--force", action="store_true", help="overwrite generated files even if you have changed them")
+    add_signed_by_argument(get)
     get.add_argument(
         "--deployment",
         choices=[str(deployment) for deployment in Deployment],
         help="refuse a supervisor made for another deployment (default: any)",
     )
     get.set_defaults(run=_get)
-    cancel = commands.add_parser("cancel", help="end a job")
+    cancel = commands.add_parser("cancel", help="cancel a job")
     cancel.set_defaults(run=_cancel)
     for parser in (watch, get, cancel):
         parser.add_argument("job", metavar="JOB", help="the job's id")
 
-    listing = commands.add_parser("list", help="list jobs, the youngest first")
+    listing = commands.add_parser("list", help="list jobs, newest first")
     listing.add_argument(
         "--state",
         action="append",
         default=[],
         type=_one_of(JobState, {}),
         metavar="STATE",
-        help=f"only such: {', '.join(JobState)} (may be repeated)",
+        help=f"list only jobs in this state: {', '.join(JobState)} (may be repeated)",
     )
     listing.add_argument(
         "--kind",
         type=_one_of(TaskKind, {"synth": TaskKind.SYNTHESIZE}),
         metavar="KIND",
-        help=f"only jobs that do this: {', '.join(TaskKind)} (or synth)",
+        help=f"list only jobs of this kind: {', '.join(TaskKind)} (or synth)",
     )
-    listing.add_argument("--all", action="store_true", help="those of all owners (for a token with the scope admin)")
     listing.add_argument(
-        "--most", type=number_up_to(1_000_000), default=100, metavar="N", help="at most N (default: %(default)s)"
+        "--all", action="store_true", help="list the jobs of all owners (needs a token with the scope admin)"
+    )
+    listing.add_argument(
+        "--most",
+        type=number_up_to(1_000_000),
+        default=100,
+        metavar="N",
+        help="list at most N jobs (default: %(default)s)",
     )
     listing.set_defaults(run=_list)
     for parser, epilog in ((watch, _WATCH_EPILOG), (get, _GET_EPILOG), (cancel, _EPILOG), (listing, _EPILOG)):
@@ -169,7 +169,7 @@ def _one_of[Choice: StrEnum](choices: type[Choice], shorter: Mapping[str, Choice
 
 def _label(text: str) -> str:
     if len(text) > MAXIMUM_LABEL or not text.isprintable():
-        raise argparse.ArgumentTypeError(f"a label has at most {MAXIMUM_LABEL} printable characters")
+        raise argparse.ArgumentTypeError(f"a label must have at most {MAXIMUM_LABEL} printable characters")
     return text
 
 
@@ -177,13 +177,13 @@ def _idempotency_key(text: str) -> str:
     is_printable = all(" " <= character <= "~" for character in text)
     if not 0 < len(text) <= MAXIMUM_IDEMPOTENCY_KEY or not is_printable:
         raise argparse.ArgumentTypeError(
-            f"an idempotency key has 1 to {MAXIMUM_IDEMPOTENCY_KEY} printable ASCII characters"
+            f"an idempotency key must have 1 to {MAXIMUM_IDEMPOTENCY_KEY} printable ASCII characters"
         )
     return text
 
 
 def _add_tasks(submit: argparse.ArgumentParser) -> None:
-    tasks = submit.add_subparsers(title="what to do", dest="task", required=True, metavar="TASK")
+    tasks = submit.add_subparsers(title="tasks", dest="task", required=True, metavar="TASK")
     for name, what in (
         ("check", "find everything that is wrong with a model"),
         ("synth", "synthesize a supervisor"),
@@ -221,13 +221,16 @@ def _add_tasks(submit: argparse.ArgumentParser) -> None:
             "--idempotency-key",
             type=_idempotency_key,
             metavar="TEXT",
-            help="the same key again gives the same job (default: a new one)",
+            help="repeating a submission with the same key returns the same job (default: a new key)",
         )
         parser.add_argument(
-            "--keep", type=seconds, metavar="SECONDS", help="keep the job so long after its end (default: the server's)"
+            "--keep",
+            type=seconds,
+            metavar="SECONDS",
+            help="time for which the server stores the job after its end (default: the server's setting)",
         )
         parser.add_argument(
-            "--watch", action="store_true", help="print the id, and wait until it has ended, as 'watch' does"
+            "--watch", action="store_true", help="print the id, and follow the job until it has ended, as 'watch' does"
         )
         parser.set_defaults(run=_submit)
         add_connection_arguments(parser, epilog=_SUBMIT_EPILOG)
@@ -248,7 +251,7 @@ def _add_verify_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="verify up to N states of a supervisor file one by one (default: %(default)s)",
     )
-    parser.add_argument("--strict", action="store_true", help="permissiveness must have been checked, too")
+    parser.add_argument("--strict", action="store_true", help="fail if maximal permissiveness could not be checked")
     add_engine_options(parser)
     # A server knows no keys that it could check a file by.
     parser.set_defaults(signed_by=[])
@@ -319,7 +322,9 @@ def _submit(arguments: argparse.Namespace, client: Client) -> int:
         try:
             return _watch(arguments, client)
         except ClientError as error:
-            raise CommandError(f"job {found.job.id} was submitted, but: {error}", ExitCode.SERVICE) from error
+            raise CommandError(
+                f"job {found.job.id} was submitted, but watching it failed: {error}", ExitCode.SERVICE
+            ) from error
     if arguments.json:
         print_json({"job": job_json(found.job), "existed": found.existed})
     else:
@@ -343,7 +348,7 @@ def _watch(arguments: argparse.Namespace, client: Client) -> int:
 def _get(arguments: argparse.Namespace, client: Client) -> int:
     wants_result = arguments.result or arguments.output is not None
     if (arguments.signed_by or arguments.deployment) and not wants_result:
-        raise UsageError("--signed-by and --deployment are about what a job has found: they need -o or --result")
+        raise UsageError("--signed-by and --deployment apply to the result of a job: add -o or --result")
     keys = trusted_keys(arguments)
     job = client.get_job(arguments.job, deadline_s=arguments.deadline)
     if not wants_result:
@@ -398,7 +403,9 @@ def _require_sound(arguments: argparse.Namespace, found: TaskResult, keys: "Coll
     if supervisor is None or not isinstance(found, Synthesis):
         # Whatever else the server sends, a graph or a report, nobody has signed.
         if keys or arguments.deployment:
-            raise CommandError("the job has found no supervisor, and one is asked for", ExitCode.SERVICE)
+            raise CommandError(
+                "the job has no supervisor, but --signed-by or --deployment requires one", ExitCode.SERVICE
+            )
         return
     if arguments.deployment:
         require_deployment(supervisor, Deployment(arguments.deployment))
@@ -535,7 +542,7 @@ def _write(arguments: argparse.Namespace, found: TaskResult) -> bool:
 
     match found:
         case tuple():
-            raise UsageError("a check finds nothing that could be written to a file: see --result")
+            raise UsageError("a check has no result file: use --result to print its findings")
         case Synthesis() if found.supervisor:
             write_supervisor(arguments.output, found.supervisor, found.signature)
         case Generation() if found.files is not None:

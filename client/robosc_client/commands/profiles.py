@@ -20,8 +20,8 @@ from robosc_client.profiles import (
 )
 
 _DESCRIPTION = """\
-Servers by name, kept in ~/.config/robosc/client.toml (or below $XDG_CONFIG_HOME). The default profile is used by every
-command that names no server.
+Named servers, stored in ~/.config/robosc/client.toml (or below $XDG_CONFIG_HOME). Every command without --server or
+--profile uses the default profile.
 """
 
 
@@ -30,26 +30,26 @@ _EPILOG = exit_statuses("done", service=None)
 
 def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command with its own commands."""
-    parser = commands.add_parser("profile", help="keep servers by name", description=_DESCRIPTION)
+    parser = commands.add_parser("profile", help="manage named servers", description=_DESCRIPTION)
     actions = parser.add_subparsers(title="commands", dest="action", required=True, metavar="COMMAND")
 
-    add = actions.add_parser("add", help="keep a server")
+    add = actions.add_parser("add", help="add a server")
     add.add_argument("name", metavar="NAME", help="name of the profile")
     add.add_argument("--server", type=address, required=True, metavar="HOST:PORT", help="address of the server")
-    add.add_argument("--tls", action="store_true", help="with TLS, believing the usual certificate authorities")
+    add.add_argument("--tls", action="store_true", help="use TLS, and trust the system's certificate authorities")
     for name, what in (
-        ("ca", "with TLS, believing these certificates alone (PEM)"),
-        ("certificate", "own certificate chain (PEM)"),
-        ("key", "its private key (PEM)"),
+        ("ca", "use TLS, and trust only these certificates (PEM)"),
+        ("certificate", "client certificate chain (PEM)"),
+        ("key", "private key of the certificate (PEM)"),
     ):
         add.add_argument(f"--{name}", type=given_path, metavar="FILE", help=what)
     token = add.add_mutually_exclusive_group()
     token.add_argument("--token-file", type=given_path, metavar="FILE", help="file with a token")
     token.add_argument(
-        "--token", action="store_true", help="read a token from standard input, and keep it in a file of your own"
+        "--token", action="store_true", help="read a token from standard input, and store it in a private file"
     )
-    add.add_argument("--default", action="store_true", help="use it where no server is named (the first always is)")
-    add.add_argument("--force", action="store_true", help="replace a profile of that name")
+    add.add_argument("--default", action="store_true", help="make it the default profile (the first profile always is)")
+    add.add_argument("--force", action="store_true", help="replace an existing profile")
     add.set_defaults(run_alone=_add)
 
     shown = actions.add_parser("list", help="list the profiles")
@@ -57,7 +57,7 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     show = actions.add_parser("show", help="show a profile")
     show.add_argument("name", metavar="NAME", help="name of the profile")
     show.set_defaults(run_alone=_show)
-    remove = actions.add_parser("remove", help="forget a profile, and the token that is kept for it")
+    remove = actions.add_parser("remove", help="remove a profile and its stored token")
     remove.add_argument("name", metavar="NAME", help="name of the profile")
     remove.set_defaults(run_alone=_remove)
     for command in (add, shown, show, remove):
@@ -97,7 +97,9 @@ def _require_usable(profile: Profile, *, has_token: bool) -> None:
         raise UsageError(str(error)) from error
     is_secure = profile.tls or profile.ca is not None or profile.certificate is not None
     if has_token and not is_secure and not is_loopback_host(split(profile.server)[0]):
-        raise UsageError(f"a token is sent to another machine with TLS only: --tls or --ca for {profile.server}")
+        raise UsageError(
+            f"a token may be sent to another machine only with TLS: add --tls or --ca for {profile.server}"
+        )
 
 
 def _token() -> str:
@@ -111,7 +113,7 @@ def _token() -> str:
         given = ""
     token = given.strip()
     if not token or len(token) > MAXIMUM_TOKEN_BYTES or not token.isascii() or any(map(str.isspace, token)):
-        raise UsageError("standard input holds no single token")
+        raise UsageError("standard input must contain exactly one token")
     return token
 
 
@@ -140,7 +142,7 @@ def _show(arguments: argparse.Namespace) -> int:
 
 def _remove(arguments: argparse.Namespace) -> int:
     remove_profile(arguments.name)
-    return _print(arguments, f"{profiles_file()}: no profile {arguments.name} any more\n")
+    return _print(arguments, f"{profiles_file()}: removed profile {arguments.name}\n")
 
 
 def _print(arguments: argparse.Namespace, text: str) -> int:

@@ -67,14 +67,7 @@ def add_parsers(commands: Commands) -> None:
     add_output_argument(make)
     add_synthesis_arguments(make)
     add_verify_limit_argument(make, "--verify-limit", SYNTHESIS_STATES)
-    make.add_argument(
-        "--signed-by",
-        action="append",
-        default=[],
-        type=given_path,
-        metavar="FILE.pub",
-        help="the server must have signed the supervisor by a key of this file (may be repeated)",
-    )
+    add_signed_by_argument(make)
     make.set_defaults(run=_synth)
 
     generate = commands.add_parser("generate", help="generate a package that runs the supervisor")
@@ -109,6 +102,18 @@ def add_synthesis_arguments(parser: argparse.ArgumentParser, *, has_choice: bool
         add_livelock_argument(parser)
 
 
+def add_signed_by_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the argument for the keys of which one must have signed the supervisor."""
+    parser.add_argument(
+        "--signed-by",
+        action="append",
+        default=[],
+        type=given_path,
+        metavar="FILE.pub",
+        help="accept only a supervisor that a key of this file has signed (may be repeated)",
+    )
+
+
 def sendable(number: int | None, option: str) -> int | None:
     """A number of an option, if a request can say it.
 
@@ -116,7 +121,7 @@ def sendable(number: int | None, option: str) -> int | None:
         UsageError: It cannot.
     """
     if number is not None and number > _MAXIMUM_SENDABLE:
-        raise UsageError(f"{option} is at most {_MAXIMUM_SENDABLE}, which is all that a request can say")
+        raise UsageError(f"{option} must be at most {_MAXIMUM_SENDABLE}")
     return number
 
 
@@ -176,7 +181,7 @@ def _synth(arguments: argparse.Namespace, client: Client) -> int:
     from robosc_client.outcomes import outcome_from_response, require_made_for
 
     if arguments.output is not None and not arguments.output.name:
-        raise UsageError("-o needs the name of a file")
+        raise UsageError("-o needs a file path")
     require_other_file(arguments.output, arguments.model)
     keys = trusted_keys(arguments)
     bundle = read_bundle(arguments)
@@ -310,7 +315,7 @@ def _verify_supervisor(arguments: argparse.Namespace, client: Client) -> int:
     from robosc_client.outcomes import require_recheck
 
     if arguments.limit < 1:
-        raise UsageError("--limit 0 cannot be asked of a server: it searches one state at least")
+        raise UsageError("--limit must be at least 1 for a server")
     content = read_supervisor(arguments.supervisor)
     bundle = read_bundle(arguments)
     try:
@@ -374,7 +379,7 @@ def _report_verdicts(
     verdicts, system, model = verdicts_of(found.report, bundle, deployment, *property_texts(arguments))
     status = properties.report_verdicts(arguments, verdicts, system, model)
     if (status is ExitCode.OK) != (found.status is VerificationStatus.PASSED):
-        raise malformed("its status and its verdicts do not fit")
+        raise malformed("its status contradicts its verdicts")
     return status
 
 

@@ -37,12 +37,12 @@ def job_of(message: pb.Job) -> Job:
         ServiceError: The message is of no job.
     """
     if not _ID.match(message.id):
-        raise malformed("a job's id is none")
+        raise malformed("the id of a job is invalid")
     if message.kind not in _KINDS or message.state not in _STATES:
         raise malformed(f"unknown kind {message.kind} or state {message.state} of a job")
     state = _STATES[message.state]
     if (state is JobState.FAILED) != message.HasField("failure"):
-        raise malformed("a job's state and its failure do not fit")
+        raise malformed("the state of a job contradicts its failure")
     return Job(
         id=message.id,
         owner=_shown(message.owner),
@@ -89,4 +89,4 @@ def _time(message: Timestamp) -> datetime:
     try:
         return message.ToDatetime(UTC)
     except (ValueError, OverflowError) as error:
-        raise malformed("a time is none") from error
+        raise malformed("a time is invalid") from error

@@ -179,5 +179,5 @@ def _diagnostic(message: pb.Diagnostic) -> Diagnostic:
 
 def _count(text: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) <= _MAXIMUM_DIGITS):
-        raise malformed("a count is no decimal number")
+        raise malformed("a count is not a decimal number")
     return int(text)

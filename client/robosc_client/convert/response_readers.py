@@ -82,13 +82,13 @@ class UnaryReader[Message, Result]:
     def take(self, message: Message) -> None:
         """The answer."""
         if self._found:
-            raise malformed("there is more after its end")
+            raise malformed("it continues after its end")
         self._found.append(self._convert(message))
 
     def result(self) -> Result:
         """The answer."""
         if not self._found:
-            raise malformed("there is none")
+            raise malformed("it has no message")
         return self._found[0]
 
 
@@ -105,7 +105,7 @@ class _StreamReader:
             case "progress":
                 self._reports += 1
                 if self._has_result or self._reports > MAXIMUM_PROGRESS:
-                    raise malformed("it tells of work for ever, or after its end")
+                    raise malformed("it has too many progress messages, or progress after its result")
                 return progress_of(message.progress)
             case "result":
                 if self._has_result:
@@ -114,17 +114,17 @@ class _StreamReader:
                 self._take_result(message.result)
             case "chunk":
                 if not self._has_result:
-                    raise malformed("a piece comes before the result")
+                    raise malformed("a chunk comes before the result")
                 self._take_chunk(message.chunk)
             case _:
-                raise malformed("a message says nothing that a client of this version knows")
+                raise malformed("a message has no field that this version of the client knows")
         return None
 
     def _take_result(self, message: Any) -> None:
         raise NotImplementedError
 
     def _take_chunk(self, chunk: Any) -> None:
-        raise malformed("there is more after its end")
+        raise malformed("it continues after its end")
 
     def _require_result(self) -> None:
         if not self._has_result:
@@ -139,12 +139,12 @@ class SynthesisReader(_StreamReader):
     def _take_result(self, message: pb.SynthesisResult) -> None:
         status = status_of(message.status)
         if (status is SynthesisStatus.SUPERVISOR) != bool(message.supervisor):
-            raise malformed("its status and its supervisor do not fit")
+            raise malformed("its status contradicts its supervisor")
         expected = hashlib.sha256(message.supervisor).digest() if message.supervisor else b""
         if message.supervisor_digest != expected:
-            raise malformed("the supervisor's digest does not fit")
+            raise malformed("the digest of the supervisor does not match")
         if len(message.signature) > MAXIMUM_SIGNATURE_BYTES or (message.signature and not message.supervisor):
-            raise malformed("it has a signature that is none")
+            raise malformed("its signature is invalid")
         self._found = Synthesis(
             status=status,
             diagnostics=diagnostics_of(message.diagnostics),
@@ -182,7 +182,7 @@ class GenerationReader(_StreamReader):
     def _take_result(self, message: pb.GenerationResult) -> None:
         self._status = status_of(message.status)
         if (self._status is SynthesisStatus.SUPERVISOR) != bool(message.files):
-            raise malformed("its status and its files do not fit")
+            raise malformed("its status contradicts its files")
         if len(message.files) > MAXIMUM_FILES or sum(file.size for file in message.files) > MAXIMUM_BYTES:
             raise malformed(f"it has more than {MAXIMUM_FILES} files, or {MAXIMUM_BYTES} bytes")
         paths = [file.path for file in message.files]
@@ -192,23 +192,23 @@ class GenerationReader(_StreamReader):
         if problem:
             raise malformed(problem)
         if message.digest != (_files_digest(message) if message.files else b""):
-            raise malformed("the digest of its files does not fit")
+            raise malformed("the digest of its files does not match")
         self._head = message
         self._contents = [bytearray() for _ in message.files]
 
     def _take_chunk(self, chunk: pb.FileChunk) -> None:
         files = self._head.files
         if chunk.file >= len(files):
-            raise malformed("a piece of no file")
+            raise malformed("a chunk belongs to no file")
         while self._place < chunk.file and self._is_whole(self._place):
             self._place += 1
         content, size = self._contents[chunk.file], files[chunk.file].size
         if chunk.file != self._place or chunk.offset != len(content):
-            raise malformed("pieces of files are not in their order")
+            raise malformed("the chunks of files are not in order")
         # A piece of nothing would be a way to go on for ever; an empty file may have one.
         is_empty = not chunk.data and size > 0
         if is_empty or len(chunk.data) > MAXIMUM_CHUNK_BYTES or len(content) + len(chunk.data) > size:
-            raise malformed("a piece of a file is empty or too long")
+            raise malformed("a chunk of a file is empty or too long")
         content += chunk.data
         if not size:
             self._place += 1
@@ -238,11 +238,11 @@ class GenerationReader(_StreamReader):
         texts: dict[str, str] = {}
         for file, content in zip(self._head.files, self._contents, strict=True):
             if hashlib.sha256(content).digest() != file.digest:
-                raise malformed(f"the digest of {file.path!r} does not fit")
+                raise malformed(f"the digest of {file.path!r} does not match")
             try:
                 texts[file.path] = content.decode("utf-8")
             except UnicodeDecodeError as error:
-                raise malformed(f"{file.path!r} is no UTF-8") from error
+                raise malformed(f"{file.path!r} is not UTF-8") from error
         try:
             return GeneratedFiles(texts, frozenset(file.path for file in self._head.files if file.executable))
         except ValueError as error:
@@ -256,7 +256,7 @@ def _files_digest(message: pb.GenerationResult) -> bytes:
         try:
             path = file.path.encode("utf-8")
         except UnicodeEncodeError as error:
-            raise malformed("a path is no Unicode") from error
+            raise malformed("a path is not valid Unicode") from error
         listing.update(path + b"\0" + (b"\1" if file.executable else b"\0") + file.digest)
     return listing.digest()
 
@@ -274,14 +274,14 @@ class ExplorationReader(_StreamReader):
     def _take_result(self, message: pb.ExplorationResult) -> None:
         self._status = status_of(message.status)
         if (self._status is SynthesisStatus.SUPERVISOR) != bool(message.size):
-            raise malformed("its status and its graph do not fit")
+            raise malformed("its status contradicts its graph")
         if message.size > MAXIMUM_BYTES:
             raise malformed(f"the graph has more than {MAXIMUM_BYTES} bytes")
         self._head = message
 
     def _take_chunk(self, chunk: bytes) -> None:
         if not 0 < len(chunk) <= MAXIMUM_CHUNK_BYTES or len(self._content) + len(chunk) > self._head.size:
-            raise malformed("a piece of the graph is empty or too long")
+            raise malformed("a chunk of the graph is empty or too long")
         self._content += chunk
 
     def result(self) -> Exploration:
@@ -291,7 +291,7 @@ class ExplorationReader(_StreamReader):
         if len(self._content) != head.size:
             raise malformed("it ended in the middle of the graph")
         if head.digest != (hashlib.sha256(self._content).digest() if head.size else b""):
-            raise malformed("the graph's digest does not fit")
+            raise malformed("the digest of the graph does not match")
         return Exploration(
             self._status,
             diagnostics_of(head.diagnostics),
@@ -304,7 +304,7 @@ class ExplorationReader(_StreamReader):
         try:
             graph = msgspec.json.decode(self._content, type=StateGraph)
         except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-            raise malformed(f"the graph is none: {error}") from error
+            raise malformed(f"the graph is invalid: {error}") from error
         numbers = range(len(graph.states))
         is_whole = graph.initial in numbers and all(a in numbers and b in numbers for a, _, b in graph.transitions)
         if not is_whole or (len(graph.states), len(graph.transitions)) != (self._head.states, self._head.transitions):
@@ -321,7 +321,7 @@ class VerificationReader(_StreamReader):
         try:
             report = msgspec.json.decode(message.report, type=dict[str, Any]) if message.report else {}
         except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-            raise malformed(f"the report is none: {error}") from error
+            raise malformed(f"the report is invalid: {error}") from error
         self._found = Verification(
             verification_status_of(message.status), diagnostics_of(message.diagnostics), message.reason, report
         )
@@ -383,16 +383,16 @@ class JobResultReader:
         """Take the next message."""
         name = message.WhichOneof("response")
         if name is None or name not in TaskKind:
-            raise malformed("a message says nothing that a client of this version knows")
+            raise malformed("a message has no field that this version of the client knows")
         if self._kind is None:
             self._kind = TaskKind(name)
             if self._expected not in (None, self._kind):
-                raise malformed(f"the result of a job that is to {self._expected} is that of {self._kind}")
+                raise malformed(f"the job has the kind {self._expected}, but its result has the kind {self._kind}")
             self._inner = reader_for(self._kind)
         if self._kind is not TaskKind(name):
-            raise malformed("results of two kinds")
+            raise malformed("it has results of two task kinds")
         if self._inner.take(getattr(message, name)) is not None:
-            raise malformed("a result tells of work")
+            raise malformed("the result of a job has progress messages")
 
     def result(self) -> TaskResult:
         """The result."""

@@ -16,16 +16,19 @@ TOKEN_VARIABLE = "ROBOSC_TOKEN_FILE"  # its name
 def add_server_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options for securing a service."""
     group = parser.add_argument_group("security")
-    group.add_argument("--tls-certificate", type=Path, metavar="FILE", help="certificate chain (PEM): listen with TLS")
-    group.add_argument("--tls-key", type=Path, metavar="FILE", help="its private key (PEM)")
+    group.add_argument("--tls-certificate", type=Path, metavar="FILE", help="certificate chain (PEM); enables TLS")
+    group.add_argument("--tls-key", type=Path, metavar="FILE", help="private key of the certificate (PEM)")
     group.add_argument(
-        "--client-ca", type=Path, metavar="FILE", help="callers need a certificate that one of these (PEM) has signed"
+        "--client-ca",
+        type=Path,
+        metavar="FILE",
+        help="require client certificates signed by one of these authorities (PEM)",
     )
-    group.add_argument("--tokens", type=Path, metavar="FILE", help="callers need a token of this file (see `token`)")
+    group.add_argument("--tokens", type=Path, metavar="FILE", help="require a token of this file (see `token`)")
     group.add_argument(
         "--insecure-beyond-loopback",
         action="store_true",
-        help="listen without TLS where other machines reach it, on a network that you trust",
+        help="allow connections from other machines without TLS, on a trusted network",
     )
 
 
@@ -43,16 +46,16 @@ def server_security_of(arguments: argparse.Namespace) -> ServerSecurity:
 def add_client_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options for reaching a service."""
     group = parser.add_argument_group("security")
-    group.add_argument("--tls", action="store_true", help="with TLS, believing the usual certificate authorities")
+    group.add_argument("--tls", action="store_true", help="use TLS, and trust the system's certificate authorities")
     group.add_argument(
         "--ca",
         type=Path,
         metavar="FILE",
         default=_from_environment(CA_VARIABLE),
-        help=f"with TLS, believing these certificates alone (PEM; default: ${CA_VARIABLE})",
+        help=f"use TLS, and trust only these certificates (PEM; default: ${CA_VARIABLE})",
     )
-    group.add_argument("--certificate", type=Path, metavar="FILE", help="own certificate chain (PEM)")
-    group.add_argument("--key", type=Path, metavar="FILE", help="its private key (PEM)")
+    group.add_argument("--certificate", type=Path, metavar="FILE", help="client certificate chain (PEM)")
+    group.add_argument("--key", type=Path, metavar="FILE", help="private key of the certificate (PEM)")
     group.add_argument(
         "--token-file",
         type=Path,
@@ -82,20 +85,20 @@ def add_token_arguments(
     parser: argparse.ArgumentParser, scopes: tuple[Scope, ...], *, has_quotas: bool = False
 ) -> None:
     """Add the arguments for a token's owner and scopes, and where the service has quotas, for its quotas."""
-    parser.add_argument("name", metavar="NAME", help="whose token it is, for the log")
+    parser.add_argument("name", metavar="NAME", help="name of the token's owner, for the log")
     parser.add_argument(
         "--scope",
         action="append",
         type=_scope,
         metavar="SCOPE",
-        help=f"what it is for; may be given again (default: {', '.join(scopes)}). {_SCOPES_HELP}",
+        help=f"scope of the token; may be repeated (default: {', '.join(scopes)}). {_SCOPES_HELP}",
     )
     parser.add_argument(
         "-o",
         "--output",
         type=Path,
         metavar="FILE",
-        help="where the token is written, for its owner alone; a file that is there stays; default: standard output",
+        help="new file for the token, readable by its owner only (default: standard output)",
     )
     parser.set_defaults(default_scopes=scopes, waiting=None, per_minute=None, cpu_seconds_per_hour=None, calls=None)
     if has_quotas:
@@ -104,9 +107,8 @@ def add_token_arguments(
 
 
 _SCOPES_HELP = (
-    "Of a synthesis server: synthesize: everything that is the caller's own, without which nothing can be called; "
-    "admin, besides synthesize: jobs of all callers. Of a bridge: watch: status and the stream of states; operate: "
-    "this, and commands"
+    "Scopes of a synthesis server: synthesize: needed by every call; admin, besides synthesize: access to the jobs of "
+    "all callers. Scopes of a bridge: watch: status and the stream of states; operate: these and commands"
 )
 
 
@@ -114,20 +116,20 @@ def _scope(text: str) -> Scope:
     try:
         return Scope(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"there is no scope {text!r}, only {', '.join(Scope)}") from None
+        raise argparse.ArgumentTypeError(f"unknown scope {text!r}: use {', '.join(Scope)}") from None
 
 
 _QUOTA_HELP = {
-    "waiting": "tasks of it that may wait at once (default: what the server's settings say)",
-    "per_minute": "tasks that it may ask for in a minute (default: any number)",
-    "cpu_seconds_per_hour": "seconds of a processor's time that its tasks may take in an hour (default: any number)",
-    "calls": "calls of it that may be open at once (default: what the server's settings say)",
+    "waiting": "maximum number of waiting tasks (default: the server's setting)",
+    "per_minute": "maximum number of tasks per minute (default: unlimited)",
+    "cpu_seconds_per_hour": "maximum CPU time of its tasks per hour, in seconds (default: unlimited)",
+    "calls": "maximum number of open calls (default: the server's setting)",
 }
 
 
 def _amount(text: str) -> int:
     if not text.isascii() or not text.isdecimal() or not 1 <= len(text) <= 9 or int(text) == 0:
-        raise argparse.ArgumentTypeError("a whole number from 1 to 999999999 is needed")
+        raise argparse.ArgumentTypeError("must be a whole number from 1 to 999999999")
     return int(text)
 
 
@@ -140,11 +142,11 @@ def issue_token(arguments: argparse.Namespace) -> tuple[str, str]:
     quota = Quota(arguments.waiting, arguments.per_minute, arguments.cpu_seconds_per_hour, arguments.calls)
     token, line = make_token(arguments.name, tuple(arguments.scope or arguments.default_scopes), quota)
     if arguments.output is None:
-        return f"{token}\n", f"Keep the token secret; it is not shown again. The line for the file of tokens:\n{line}\n"
+        return f"{token}\n", f"Keep the token secret; it is not shown again. The line for the token file:\n{line}\n"
     try:
         # For its owner alone from the beginning: nobody can open it before its mode is set.
         with os.fdopen(os.open(arguments.output, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as stream:
             stream.write(f"{token}\n")
     except OSError as error:
         raise SecurityError(f"{arguments.output}: {error.strerror}") from error
-    return "", f"{arguments.output}: the token; keep it secret. The line for the file of tokens:\n{line}\n"
+    return "", f"{arguments.output}: the token; keep it secret. The line for the token file:\n{line}\n"

@@ -76,7 +76,9 @@ def _usable_token(address: str, credentials: Credentials) -> str | None:
     """The token, where it may be sent to the address."""
     token = None if credentials.token_file is None else _token(credentials.token_file)
     if token is not None and not _is_secure(credentials) and not is_loopback_host(_host(address)):
-        raise SecurityError(f"a token is sent to another machine with TLS only, and {address} is one")
+        raise SecurityError(
+            f"a token may be sent to another machine only with TLS, and {address} is on another machine"
+        )
     return token
 
 
@@ -100,7 +102,7 @@ def _host(address: str) -> str:
 
 def _channel_credentials(credentials: Credentials) -> grpc.ChannelCredentials:
     if (credentials.certificate is None) != (credentials.key is None):
-        raise SecurityError("a certificate and its key belong together: one of them is missing")
+        raise SecurityError("a certificate and its key must be given together: one of them is missing")
     return grpc.ssl_channel_credentials(
         None if credentials.ca is None else check_certificates(credentials.ca),
         None if credentials.key is None else read_secret(credentials.key),
@@ -114,7 +116,7 @@ def _token(path: Path) -> str:
     except UnicodeDecodeError:
         token = ""
     if not token.isprintable() or not 0 < len(token) <= MAXIMUM_TOKEN or any(map(str.isspace, token)):
-        raise SecurityError(f"{path}: not a single token")
+        raise SecurityError(f"{path}: must contain exactly one token")
     return token
 
 

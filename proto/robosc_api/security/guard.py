@@ -94,7 +94,7 @@ class Guard(Layer):
                 return None
             return (
                 grpc.StatusCode.PERMISSION_DENIED,
-                "without tokens this is for callers on the same machine alone",
+                "without tokens, only callers on the same machine may call this method",
             )
         entry = self._entry(self._tokens, metadata)
         if entry is None:

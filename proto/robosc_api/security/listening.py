@@ -61,7 +61,7 @@ def add_port(server: Any, address: str, security: ServerSecurity) -> str:
     except RuntimeError:
         got = 0
     if got == 0:
-        raise SecurityError(f"cannot listen on {name}: the address is in use or not this machine's")
+        raise SecurityError(f"cannot listen on {name}: the address is in use or does not belong to this machine")
     return joined(host, got)
 
 
@@ -75,13 +75,13 @@ def check_listening(address: str, security: ServerSecurity) -> None:
     host, _ = split(address)
     is_secure = security.certificate is not None
     if is_secure != (security.key is not None):
-        raise SecurityError("a certificate and its key belong together: one of them is missing")
+        raise SecurityError("a certificate and its key must be given together: one of them is missing")
     if security.client_ca is not None and not is_secure:
-        raise SecurityError("callers' certificates are checked with TLS only: certificate and key are missing")
+        raise SecurityError("client certificates need TLS: set certificate and key, too")
     if not is_secure and not security.insecure_beyond_loopback and not is_loopback_host(host):
         raise SecurityError(
-            f"{address} can be reached from other machines, and without TLS whoever is between reads and changes "
-            "everything: give a certificate and key, or say that it is to be insecure"
+            f"{address} is reachable from other machines, and a connection without TLS can be read and changed: set a "
+            "certificate and key, or allow insecure connections"
         )
 
 
@@ -126,11 +126,11 @@ def _credentials(security: ServerSecurity) -> grpc.ServerCredentials:
         except SecurityError as error:
             # It may be half written: what is used now stays. Told once for each change, not for each connection.
             if told != (found or str(error)):
-                _log.error("the certificate stays as it was: %s", error)
+                _log.error("the changed certificate is not used: %s", error)
             told = found or str(error)
             return None
         told = None
-        _log.info("%s: read again", security.certificate)
+        _log.info("%s: reloaded", security.certificate)
         return configuration(latest)
 
     return grpc.dynamic_ssl_server_credentials(
@@ -159,7 +159,7 @@ def _checked(security: ServerSecurity) -> _Files:
 
 
 def _no_password() -> bytes:
-    raise ValueError("the key is encrypted, and nobody is there to type a password")
+    raise ValueError("the key is encrypted: use a key without a password")
 
 
 def check_certificates(path: Path) -> bytes:
@@ -172,13 +172,13 @@ def check_certificates(path: Path) -> bytes:
     try:
         ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT).load_verify_locations(cadata=data.decode("ascii"))
     except (ssl.SSLError, ValueError) as error:
-        raise SecurityError(f"{path}: no certificates in PEM") from error
+        raise SecurityError(f"{path}: contains no PEM certificates") from error
     return data
 
 
 def _read(security: ServerSecurity) -> _Files:
     if security.certificate is None or security.key is None:
-        raise SecurityError("a certificate and its key belong together: one of them is missing")
+        raise SecurityError("a certificate and its key must be given together: one of them is missing")
     client_ca = None if security.client_ca is None else read(security.client_ca)
     return _Files(read(security.certificate), read(security.key), client_ca)
 
@@ -197,7 +197,7 @@ def warn_if_readable_by_others(path: Path) -> None:
     except OSError:
         return
     if os.name == "posix" and mode & (stat.S_IRGRP | stat.S_IROTH):
-        _log.warning("%s: others than its owner may read it: chmod go-r it", path)
+        _log.warning("%s: other users may read this file: run chmod go-r on it", path)
 
 
 def read(path: Path) -> bytes:

@@ -97,7 +97,7 @@ def make_token(name: str, scopes: tuple[Scope, ...], quota: Quota = Quota()) -> 
     line = f"{name} {','.join(dict.fromkeys(scopes))} sha256:{_digest(token)} {quota}".rstrip()
     if not _LINE.match(line):
         raise SecurityError(
-            "a token's name has 1 to 64 letters, digits, dots, dashes and underscores, and it has a scope"
+            "a token needs a scope, and a name of 1 to 64 letters, digits, dots, dashes and underscores"
         )
     return token, line
 
@@ -120,12 +120,12 @@ def parse_tokens(text: str, place: str) -> tuple[Entry, ...]:
         match = _LINE.match(bare)
         if not match:
             # Not the line itself: somebody may have written the token there.
-            raise SecurityError(f"{place}:{number}: not NAME SCOPE,SCOPE sha256:DIGEST")
+            raise SecurityError(f"{place}:{number}: expected NAME SCOPE,SCOPE sha256:DIGEST")
         unknown = [word for word in match["scopes"].split(",") if word not in set(Scope)]
         if unknown:
-            raise SecurityError(f"{place}:{number}: there is no scope '{unknown[0]}', only {', '.join(Scope)}")
+            raise SecurityError(f"{place}:{number}: unknown scope '{unknown[0]}': use {', '.join(Scope)}")
         if match["name"] in found:
-            raise SecurityError(f"{place}:{number}: '{match['name']}' stands there twice")
+            raise SecurityError(f"{place}:{number}: the name '{match['name']}' occurs twice")
         scopes = frozenset(Scope(word) for word in match["scopes"].split(","))
         quota = _quota(match["quota"].split(), f"{place}:{number}")
         found[match["name"]] = Entry(match["name"], scopes, match["digest"], quota)
@@ -138,13 +138,11 @@ def _quota(words: list[str], place: str) -> Quota:
         name, _, amount = word.partition("=")
         # Not the word itself, as above.
         if name not in _QUOTAS:
-            raise SecurityError(
-                f"{place}: after the digest there may be {', '.join(f'{known}=N' for known in _QUOTAS)}"
-            )
+            raise SecurityError(f"{place}: only {', '.join(f'{known}=N' for known in _QUOTAS)} may follow the digest")
         if not _AMOUNT.match(amount):
-            raise SecurityError(f"{place}: {name} is a whole number from 1 to 999999999")
+            raise SecurityError(f"{place}: {name} must be a whole number from 1 to 999999999")
         if name in amounts:
-            raise SecurityError(f"{place}: {name} stands there twice")
+            raise SecurityError(f"{place}: {name} occurs twice")
         amounts[name] = int(amount)
     return Quota(**amounts)
 
@@ -153,7 +151,7 @@ def missing_scope(entries: Iterable[Entry], needed: Scope) -> str | None:
     """Return a message if no token of a file has the scope that every call needs; None: one has it."""
     if any(needed in entry.scopes for entry in entries):
         return None
-    return f"no token has the scope '{needed}', so nobody is let in"
+    return f"no token has the scope '{needed}', so every call is refused"
 
 
 class TokenFile:
@@ -205,10 +203,10 @@ class TokenFile:
                 try:
                     if _stamp(self._path.stat()) != self._stamp:
                         self._entries, self._stamp = _read(self._path)
-                        _log.info("%s: read again", self._path)
+                        _log.info("%s: reloaded", self._path)
                         self._warn_if_scope_is_missing()
                 except (OSError, SecurityError) as error:
-                    _log.error("the tokens stay as they were: %s", error)
+                    _log.error("the changed token file is not used: %s", error)
             return self._entries
 
     def _warn_if_scope_is_missing(self) -> None:
@@ -231,7 +229,7 @@ def _read(path: Path) -> tuple[tuple[Entry, ...], tuple[int, int, int]]:
     except OSError as error:
         raise SecurityError(f"{path}: {error.strerror}") from error
     if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        raise SecurityError(f"{path}: others than its owner may write it: chmod go-w it")
+        raise SecurityError(f"{path}: other users may write this file: run chmod go-w on it")
     if len(data) > MAXIMUM_BYTES:
         raise SecurityError(f"{path}: larger than {MAXIMUM_BYTES} bytes")
     try:

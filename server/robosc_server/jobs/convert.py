@@ -69,7 +69,7 @@ def kind_and_request(task: pb.Task) -> tuple[TaskKind, bytes]:
     """
     name = task.WhichOneof("request")
     if name is None:
-        raise malformed("a job needs a task")
+        raise malformed("the request has no task: set one field of Task")
     return TaskKind(name), getattr(task, name).SerializeToString()
 
 
@@ -80,7 +80,7 @@ def checked_idempotency_key(text: str) -> str:
         RefusedError: It is none.
     """
     if len(text) > MAXIMUM_IDEMPOTENCY_KEY or not all(" " <= character <= "~" for character in text):
-        raise malformed(f"an idempotency key has 1 to {MAXIMUM_IDEMPOTENCY_KEY} printable ASCII characters")
+        raise malformed(f"an idempotency key must have 1 to {MAXIMUM_IDEMPOTENCY_KEY} printable ASCII characters")
     return text
 
 
@@ -91,7 +91,7 @@ def checked_label(text: str) -> str:
         RefusedError: It is none.
     """
     if len(text) > MAXIMUM_LABEL or not text.isprintable():
-        raise malformed(f"a label has at most {MAXIMUM_LABEL} printable characters")
+        raise malformed(f"a label must have at most {MAXIMUM_LABEL} printable characters")
     return text
 
 
@@ -105,7 +105,7 @@ def retention_s_of(request: pb.SubmitJobRequest) -> float | None:
         return None
     retention_s = request.retention.seconds + request.retention.nanos / 1e9
     if retention_s < 0 or not 0 <= request.retention.nanos < 1_000_000_000:
-        raise malformed("a retention is a time that is not negative")
+        raise malformed("the retention must be a valid duration of 0 s or more")
     return retention_s
 
 
@@ -116,9 +116,9 @@ def filter_of(request: pb.ListJobsRequest, caller: str) -> JobFilter:
         RefusedError: There are no such states or kinds.
     """
     if any(number not in _STATE_OF for number in request.states):
-        raise malformed("there is no such state of a job")
+        raise malformed("the filter names an unknown job state")
     if request.kind and request.kind not in _KIND_OF:
-        raise malformed("there is no such kind of task")
+        raise malformed("the filter names an unknown task kind")
     states = frozenset(_STATE_OF[number] for number in request.states)
     return JobFilter(None if request.all_owners else caller, states, _KIND_OF.get(request.kind))
 
@@ -146,9 +146,9 @@ def page_position(token: str, chosen: JobFilter) -> tuple[int, str] | None:
             raise ValueError
         created_us, job_id, digest = _TOKEN.unpack(urlsafe_b64decode(token.encode("ascii")))
     except (ValueError, struct.error) as error:
-        raise malformed("this is no page token of this server") from error
+        raise malformed("the page token is invalid: use next_page_token of the previous response") from error
     if digest != _digest(chosen) or created_us >= 2**63:
-        raise malformed("this page token is for another list: the other fields must be those of the page before")
+        raise malformed("the page token belongs to another list: repeat the other fields of the previous request")
     return created_us, job_id.hex()
 
 

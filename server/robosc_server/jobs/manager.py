@@ -251,11 +251,11 @@ class JobManager:
         """
         record = await self._find(job_id, caller)
         if record.state is JobState.FAILED:
-            raise RefusedError(Reason.JOB_HAS_FAILED, "the job has failed, and has no result")
+            raise RefusedError(Reason.JOB_HAS_FAILED, "the job has failed and has no result")
         if record.state is JobState.CANCELLED:
-            raise RefusedError(Reason.JOB_CANCELLED, "the job was cancelled, and has no result")
+            raise RefusedError(Reason.JOB_CANCELLED, "the job was cancelled and has no result")
         if record.result_key is None:
-            raise RefusedError(Reason.JOB_NOT_ENDED, "the job has not ended; watch it")
+            raise RefusedError(Reason.JOB_NOT_ENDED, "the job has not ended: wait for its end with WatchJob")
         if record.kind is TaskKind.SYNTHESIZE:
             # One message, and the only one that has something done to it before it is sent.
             result = await self._results.find(record.result_key)
@@ -334,9 +334,9 @@ def _same_task(record: JobRecord, task: Task) -> JobRecord:
         RefusedError: Its task is another one.
     """
     if record.key != task.key:
-        raise RefusedError(Reason.IDEMPOTENCY_KEY_REUSED, "the idempotency key was used for another task")
+        raise RefusedError(Reason.IDEMPOTENCY_KEY_REUSED, "the idempotency key belongs to another task: use a new key")
     return record
 
 
 def _no_such_job() -> RefusedError:
-    return RefusedError(Reason.NO_SUCH_JOB, "there is no job of that id that is yours")
+    return RefusedError(Reason.NO_SUCH_JOB, "there is no job with this id that the caller may see")

@@ -157,7 +157,7 @@ class ResultCache:
             except StoreUnavailableError as error:
                 await asyncio.sleep(error.retry_after_s or 1.0)
             except Exception:
-                _log.exception("a result cannot be kept")
+                _log.exception("storing a result in the database failed")
                 await asyncio.sleep(1.0)
 
     async def _write_some(self) -> None:

@@ -76,12 +76,13 @@ class Retention:
         if self._needed_bytes >= self._limits.results_bytes:
             # At once: whoever fills what was freed has others refused for a moment, not until the next round.
             self._is_wanted.set()
-            message = "the server keeps as many results of jobs as it may; try again when it has made room"
+            message = "the storage for job results is full; try again after the server has deleted old results"
             raise RefusedError(Reason.SERVER_BUSY, message, retry_after_s=2 * _SHORTEST_PAUSE_S)
 
     def too_many(self) -> RefusedError:
         """Return the error for a caller who has as many jobs as it may, none of which has ended."""
-        message = f"{self._limits.jobs_per_owner} jobs of yours have not ended; try again when some have"
+        count = self._limits.jobs_per_owner
+        message = f"the caller has {count} unfinished jobs, which is the limit; try again after some have ended"
         return RefusedError(Reason.QUOTA_EXCEEDED, message, retry_after_s=self._limits.sweep_s)
 
     def note(self, result: Result) -> None:
@@ -97,7 +98,7 @@ class Retention:
             except StoreUnavailableError:
                 pass  # It is tried again.
             except Exception:
-                _log.exception("what has expired cannot be deleted")
+                _log.exception("deleting expired jobs and results failed")
             await asyncio.sleep(min(_SHORTEST_PAUSE_S, self._limits.sweep_s))
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._is_wanted.wait(), max(0.0, self._limits.sweep_s - _SHORTEST_PAUSE_S))

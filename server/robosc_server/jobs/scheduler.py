@@ -164,7 +164,7 @@ class Scheduler:
             return await self.work(place, task, limits, on_report)
         except WorkerLostError:
             # Whoever asked would try the same again, if it were told that there are no workers.
-            return Failure(Reason.WORKER_DIED, "the worker was lost while it did this task, more than once")
+            return Failure(Reason.WORKER_DIED, "the worker process was lost more than once during this task")
         except WorkersError as error:
             raise _no_workers() from error
         finally:
@@ -207,7 +207,11 @@ class Scheduler:
             RefusedError: It would not.
         """
         if self._is_closed:
-            raise RefusedError(Reason.SHUTTING_DOWN, "the server ends; ask another one, or later", retry_after_s=1.0)
+            raise RefusedError(
+                Reason.SHUTTING_DOWN,
+                "the server is shutting down; call another server, or try again later",
+                retry_after_s=1.0,
+            )
         waiting = self._waiting + self._waiting_outside.total()
         is_free = not waiting and self._running < self._workers.capacity
         name = network_of(caller)
@@ -215,10 +219,14 @@ class Scheduler:
             own = len(self._ring.get(name, ())) + self._waiting_outside[name]
             if own and own >= self._waiting_of(caller):
                 after_s = self._retry_after_s(own * max(1, len(self._ring)))
-                raise RefusedError(Reason.SERVER_BUSY, "too many requests of yours wait already", after_s)
+                raise RefusedError(
+                    Reason.SERVER_BUSY, "too many tasks of this caller are waiting; try again later", after_s
+                )
             if waiting >= self._limits.waiting:
                 after_s = self._retry_after_s(waiting)
-                raise RefusedError(Reason.SERVER_BUSY, "the server has too much to do; try again later", after_s)
+                raise RefusedError(
+                    Reason.SERVER_BUSY, "too many tasks are waiting at this server; try again later", after_s
+                )
 
     def _is_reserved_for(self, line: str) -> bool:
         """Return True if a task of a line may begin although the workers are taken."""
@@ -323,4 +331,4 @@ class Scheduler:
 
 
 def _no_workers() -> RefusedError:
-    return RefusedError(Reason.WORKERS_UNAVAILABLE, "the server has no workers now; try again later", retry_after_s=2.0)
+    return RefusedError(Reason.WORKERS_UNAVAILABLE, "no worker is available; try again later", retry_after_s=2.0)

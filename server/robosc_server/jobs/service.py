@@ -118,7 +118,7 @@ class JobService(convert.JobServiceServicer):
         """List jobs, the youngest first."""
         caller = self._identify(context)
         if request.all_owners and not caller.is_admin:
-            raise RefusedError(Reason.PERMISSION_DENIED, "jobs of all owners are for the scope 'admin'")
+            raise RefusedError(Reason.PERMISSION_DENIED, "all_owners requires a token with the scope 'admin'")
         chosen = convert.filter_of(request, caller.name)
         size = convert.page_size_of(request)
         # One more than asked for tells whether there are more.
@@ -170,5 +170,5 @@ class _SerializedAdapter:
 def _checked_id(text: str) -> str:
     # Any other text is no id either; the database need not look for it.
     if not 0 < len(text) <= _ID_CHARACTERS or not text.isascii() or not text.isprintable():
-        raise RefusedError(Reason.NO_SUCH_JOB, "there is no job of that id that is yours")
+        raise RefusedError(Reason.NO_SUCH_JOB, "there is no job with this id that the caller may see")
     return text

@@ -22,9 +22,9 @@ from robosc_server.operations.settings_reference import example_file
 
 _CHECK_EPILOG = """\
 exit status:
-  0  a server could start (there may be warnings)
-  1  it could not
-  2  wrong use, or wrong settings
+  0  the server can start (there may be warnings)
+  1  the server cannot start
+  2  wrong options or settings
 """
 
 
@@ -57,7 +57,7 @@ def _health(argv: Sequence[str]) -> int:
 
 def new_token(argv: Sequence[str]) -> int:
     """Print a new token, and to standard error the line for the file of tokens; the exit status."""
-    parser = Parser(prog="robosc-server token", description="Make a token for a caller.", allow_abbrev=False)
+    parser = Parser(prog="robosc-server token", description="Create a token for a caller.", allow_abbrev=False)
     add_token_arguments(parser, (Scope.SYNTHESIZE,), has_quotas=True)
     arguments = parser.parse_args(argv)
     try:
@@ -71,7 +71,7 @@ def new_token(argv: Sequence[str]) -> int:
     if arguments.scope and Scope.SYNTHESIZE not in arguments.scope:
         # A comment, for whoever appends what is written here to the file of tokens.
         sys.stderr.write(
-            f"# warning: without the scope '{Scope.SYNTHESIZE}' nothing of this server can be called with the token\n"
+            f"# warning: the token cannot be used with this server: it lacks the scope '{Scope.SYNTHESIZE}'\n"
         )
     sys.stderr.write(line)
     return 0
@@ -81,7 +81,7 @@ def print_example(argv: Sequence[str]) -> int:
     """Print a file with every setting; the exit status."""
     parser = Parser(
         prog="robosc-server example-config",
-        description="Print a file of settings: each with what it is and its default, as a comment.",
+        description="Print a settings file that has the description and default of each setting as comments.",
         allow_abbrev=False,
     )
     parser.parse_args(argv)
@@ -96,13 +96,13 @@ def check_config(argv: Sequence[str]) -> int:
 
     parser = Parser(
         prog="robosc-server check-config",
-        description="Look whether a server could start with such settings: address, certificates, tokens, database, "
-        "workers. Nothing is started, made or changed.",
+        description="Check whether a server can start with these settings: address, certificates, tokens, database and "
+        "workers. Nothing is started, created or changed.",
         epilog=_CHECK_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("--json", action="store_true", help="one JSON document: ok, settings, findings, problems")
+    parser.add_argument("--json", action="store_true", help="print one JSON document: ok, settings, findings, problems")
     add_settings_arguments(parser)
     arguments = parser.parse_args(argv)
     try:

@@ -94,7 +94,7 @@ def _listening(settings: Settings) -> Iterator[tuple[Grade, str]]:
     yield _bindable(settings.host, settings.port)
     security = settings.security
     if security.tokens is None and security.client_ca is None and not is_loopback_host(settings.host):
-        yield Grade.WARNING, "whoever reaches the address may use the server: there are neither tokens nor a client_ca"
+        yield Grade.WARNING, "every host that reaches the address may use the server: set tokens or client_ca"
 
 
 def _bindable(host: str, port: int) -> tuple[Grade, str]:
@@ -110,7 +110,7 @@ def _bindable(host: str, port: int) -> tuple[Grade, str]:
             place.bind(address)
         except OSError as error:
             if error.errno == errno.EADDRINUSE:
-                return Grade.WARNING, f"{host}, port {port} is in use now"
+                return Grade.WARNING, f"{host}, port {port} is in use"
             return Grade.ERROR, f"cannot listen on {host}, port {port}: {error.strerror}"
     return Grade.OK, f"{host}, port {port or 'any that is free'}"
 
@@ -133,7 +133,7 @@ def _certificates(settings: Settings) -> Iterator[tuple[Grade, str]]:
 def _valid(file: Path) -> tuple[Grade, str]:
     """Check whether the certificates of a file are valid today."""
     if importlib.util.find_spec("cryptography") is None:
-        return Grade.OK, f"{file}: can be used; until when cannot be told without the extra `signing`"
+        return Grade.OK, f"{file}: usable; its expiry date can be checked only with the extra `signing`"
     from cryptography import x509
 
     try:
@@ -144,16 +144,16 @@ def _valid(file: Path) -> tuple[Grade, str]:
     begins = max(certificate.not_valid_before_utc for certificate in certificates)
     ends = min(certificate.not_valid_after_utc for certificate in certificates)
     if begins > now:
-        return Grade.ERROR, f"{file}: is valid from {begins:%Y-%m-%d %H:%M} UTC on"
+        return Grade.ERROR, f"{file}: not valid before {begins:%Y-%m-%d %H:%M} UTC"
     if ends <= now:
-        return Grade.ERROR, f"{file}: has expired at {ends:%Y-%m-%d %H:%M} UTC"
+        return Grade.ERROR, f"{file}: expired at {ends:%Y-%m-%d %H:%M} UTC; install a new certificate"
     grade = Grade.WARNING if ends - now < datetime.timedelta(days=_SOON_DAYS) else Grade.OK
     return grade, f"{file}: valid until {ends:%Y-%m-%d %H:%M} UTC"
 
 
 def _tokens(settings: Settings) -> Iterator[tuple[Grade, str]]:
     if settings.tokens is None:
-        yield Grade.OK, "callers need none"
+        yield Grade.OK, "callers need no token"
         return
     try:
         entries = TokenFile(settings.tokens).entries
@@ -165,7 +165,7 @@ def _tokens(settings: Settings) -> Iterator[tuple[Grade, str]]:
     if problem is not None:
         yield Grade.WARNING, f"{settings.tokens}: {problem}"
     else:
-        yield Grade.OK, f"{settings.tokens}: {useful} with the scope '{Scope.SYNTHESIZE}'"
+        yield Grade.OK, f"{settings.tokens}: tokens with the scope '{Scope.SYNTHESIZE}': {useful}"
 
 
 def _signing(settings: Settings) -> Iterator[tuple[Grade, str]]:
@@ -196,7 +196,7 @@ def _postgresql(text: str) -> tuple[Grade, str]:
         name = url.render_as_string(hide_password=True)
         version = inspect_postgresql(url, _CONNECT_S)
     except (ArgumentError, ValueError):
-        return Grade.ERROR, "database_url: postgresql://USER:PASSWORD@HOST:PORT/NAME is needed"
+        return Grade.ERROR, "database_url must have the form postgresql://USER:PASSWORD@HOST:PORT/NAME"
     except (ImportError, NoSuchModuleError):
         return Grade.ERROR, "PostgreSQL needs the extra `postgresql`: pip install 'robosc[postgresql]'"
     except StoreError as error:
@@ -210,7 +210,7 @@ def _sqlite(file: Path) -> tuple[Grade, str]:
     try:
         there = next(place for place in (folder, *folder.parents) if place.exists())
         if not there.is_dir():
-            return Grade.ERROR, f"{there} is no folder"
+            return Grade.ERROR, f"{there} is not a folder"
         problem = _unwritable(there)
         if problem is not None:
             return Grade.ERROR, f"{there} cannot be written: {problem}"
@@ -218,10 +218,10 @@ def _sqlite(file: Path) -> tuple[Grade, str]:
         if is_there:
             inspect_sqlite(file)
         if is_in_use(file):
-            return Grade.WARNING, f"{file} is in use now by another robosc-server"
+            return Grade.WARNING, f"{file} is in use by another robosc-server"
     except (OSError, StoreError) as error:
         return Grade.ERROR, f"{file}: {getattr(error, 'strerror', None) or error}"
-    return Grade.OK, f"SQLite in {file}" if is_there else f"{file} will be made"
+    return Grade.OK, f"SQLite in {file}" if is_there else f"{file} will be created"
 
 
 def _unwritable(folder: Path) -> str | None:
@@ -263,7 +263,7 @@ def _workers(settings: Settings) -> Iterator[tuple[Grade, str]]:
 def _confinement(settings: Settings) -> Iterator[tuple[Grade, str]]:
     """Check what the kernel keeps workers from, in a process of its own: confinement cannot be undone."""
     if settings.workers != "local":
-        yield Grade.OK, "each machine of the cluster sees to it"
+        yield Grade.OK, "each machine of the cluster confines its own workers"
         return
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     try:
@@ -276,12 +276,12 @@ def _confinement(settings: Settings) -> Iterator[tuple[Grade, str]]:
         )
         missing = json.loads(told.stdout)
     except (OSError, subprocess.SubprocessError, ValueError):
-        missing = ["it cannot be tried out"]
+        missing = ["the confinement test could not be run"]
     grade = Grade.ERROR if settings.confinement is Confinement.REQUIRED else Grade.WARNING
     for part in missing:
         yield grade, part
     if not missing:
-        yield Grade.OK, "workers reach no files but programs, no network and no other process"
+        yield Grade.OK, "workers can access only program files, no network and no other process"
 
 
 def _cluster(spec: str) -> tuple[Grade, str]:
@@ -309,7 +309,7 @@ def _unreachable(address: str) -> str | None:
 
 def _metrics(settings: Settings) -> Iterator[tuple[Grade, str]]:
     if settings.metrics_address is None:
-        yield Grade.OK, "nowhere"
+        yield Grade.OK, "disabled"
         return
     try:
         check_metrics_address(settings.metrics_address, beyond_loopback=settings.metrics_beyond_loopback)
@@ -322,7 +322,7 @@ def _metrics(settings: Settings) -> Iterator[tuple[Grade, str]]:
 def _tracing(settings: Settings) -> Iterator[tuple[Grade, str]]:
     endpoint = settings.tracing_endpoint
     if endpoint is None:
-        yield Grade.OK, "nowhere"
+        yield Grade.OK, "disabled"
         return
     try:
         is_there = importlib.util.find_spec("opentelemetry.exporter.otlp.proto.grpc") is not None

@@ -32,7 +32,7 @@ async def stop(server: Any, grace_s: float | None = None) -> None:
     if stopping.done():
         stopping.result()
     else:
-        structlog.get_logger().warning("gRPC does not let go of its connections; they end with the process")
+        structlog.get_logger().warning("gRPC has not closed its connections in time; they end with the process")
 
 
 async def drain(

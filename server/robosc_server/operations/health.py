@@ -58,9 +58,9 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
         if self._conditions[name] != holds:
             log = structlog.get_logger()
             if holds:
-                log.info("condition holds", condition=name)
+                log.info("condition met", condition=name)
             else:
-                log.warning("condition does not hold", condition=name)
+                log.warning("condition not met", condition=name)
             self._conditions[name] = holds
             self._notify()
 
@@ -98,7 +98,7 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
             async with asyncio.timeout(_PROBE_LIMIT_S):
                 holds = await probe()
         except Exception as error:
-            structlog.get_logger().debug("condition cannot be asked", condition=name, exc_info=error)
+            structlog.get_logger().debug("condition check failed", condition=name, exc_info=error)
             holds = False
         self.set_condition(name, holds)
 
@@ -110,7 +110,7 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
         """Return the health of a service."""
         is_serving = self.is_serving(request.service)
         if is_serving is None:
-            code, message = grpc.StatusCode.NOT_FOUND, "there is no such service here"
+            code, message = grpc.StatusCode.NOT_FOUND, "this server has no such service"
             await context.abort(code, message, failure_metadata(code, message, "NO_SUCH_SERVICE", context=context))
         return _Response(status=_status(is_serving))
 

@@ -176,7 +176,11 @@ def _code_of(context: Any) -> grpc.StatusCode:
 
 def _refuse(method: str) -> None:
     if not method.startswith(_HEALTH):
-        raise RefusedError(Reason.SHUTTING_DOWN, "the server ends; another one may answer", _REFUSED_RETRY_S)
+        raise RefusedError(
+            Reason.SHUTTING_DOWN,
+            "the server is shutting down; call another server, or try again later",
+            _REFUSED_RETRY_S,
+        )
 
 
 def internal_error(fault: BaseException | str) -> RefusedError:

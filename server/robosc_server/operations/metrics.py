@@ -78,10 +78,10 @@ class Metrics:
         ProcessCollector(registry=registry)
         PlatformCollector(registry=registry)
         GCCollector(registry=registry)
-        Info("robosc_server", "Which server this is.", registry=registry).info({"version": version})
-        self._calls = Counter("robosc_server_calls", "Calls that have ended.", ("method", "code"), registry=registry)
+        Info("robosc_server", "Version of the server.", registry=registry).info({"version": version})
+        self._calls = Counter("robosc_server_calls", "Completed calls.", ("method", "code"), registry=registry)
         self._refusals = Counter(
-            "robosc_server_failures", "Calls without an answer, by reason (ErrorInfo).", ("reason",), registry=registry
+            "robosc_server_failures", "Failed calls, by reason (ErrorInfo).", ("reason",), registry=registry
         )
         self._seconds = Histogram(
             "robosc_server_call_seconds",
@@ -91,24 +91,24 @@ class Metrics:
             registry=registry,
         )
         self._outcomes = Counter(
-            "robosc_server_tasks", "Tasks that workers have ended, by outcome.", ("kind", "outcome"), registry=registry
+            "robosc_server_tasks", "Completed tasks, by outcome.", ("kind", "outcome"), registry=registry
         )
         self._task_seconds = Histogram(
             "robosc_server_task_seconds",
-            "Time that workers were at tasks.",
+            "Duration of tasks at workers.",
             ("kind",),
             buckets=_TASK_SECONDS,
             registry=registry,
         )
         self._lookups = Counter(
             "robosc_server_result_lookups",
-            "Requests by where their result was found: memory, store, or none (a worker is needed).",
+            "Result lookups by location: memory, store, or none (a worker runs the task).",
             ("found",),
             registry=registry,
         )
         for where in ("memory", "store", "none"):
             self._lookups.labels(where)
-        Gauge("robosc_server_calls_under_way", "Calls that have begun and not ended.", registry=registry).set_function(
+        Gauge("robosc_server_calls_under_way", "Calls in progress.", registry=registry).set_function(
             lambda: self.calls_under_way
         )
         self._waiting: Callable[[], int] = _zero
@@ -116,10 +116,10 @@ class Metrics:
         self._jobs: Callable[[], Mapping[str, int]] = dict
         self._conditions: Callable[[], Mapping[str, bool]] = dict
         self._restarts: Callable[[], int] = _zero
-        Gauge("robosc_server_tasks_waiting", "Tasks that wait for a worker.", registry=registry).set_function(
+        Gauge("robosc_server_tasks_waiting", "Tasks waiting for a worker.", registry=registry).set_function(
             lambda: self._waiting()
         )
-        Gauge("robosc_server_tasks_running", "Tasks that workers are at.", registry=registry).set_function(
+        Gauge("robosc_server_tasks_running", "Tasks that workers are running.", registry=registry).set_function(
             lambda: self._running()
         )
         registry.register(_LabelledCollector(self))
@@ -197,17 +197,15 @@ class Metrics:
 
     def labelled_metrics(self) -> Iterable[Metric]:
         """Return the metrics whose values are asked for, and that have labels."""
-        jobs = GaugeMetricFamily("robosc_server_jobs", "Jobs that are kept, by state.", labels=("state",))
+        jobs = GaugeMetricFamily("robosc_server_jobs", "Stored jobs, by state.", labels=("state",))
         for state, number in sorted(self._jobs().items()):
             jobs.add_metric((state,), number)
         conditions = GaugeMetricFamily(
-            "robosc_server_condition", "Whether what the service needs is there: 1 or 0.", labels=("name",)
+            "robosc_server_condition", "1 if a condition of the service is met, else 0.", labels=("name",)
         )
         for name, holds in sorted(self._conditions().items()):
             conditions.add_metric((name,), float(holds))
-        restarts = CounterMetricFamily(
-            "robosc_server_worker_restarts", "How often what starts workers had to be started again."
-        )
+        restarts = CounterMetricFamily("robosc_server_worker_restarts", "Restarts of the fork server of the workers.")
         restarts.add_metric((), self._restarts())
         return jobs, conditions, restarts
 
@@ -258,9 +256,11 @@ class MetricsEndpoint:
         try:
             self._server = await asyncio.start_server(self._answer, host, port, limit=_HEAD_BYTES)
         except OSError as error:
-            raise SecurityError(f"cannot listen on {self.address} for metrics: {error.strerror or error}") from error
+            raise SecurityError(
+                f"the metrics endpoint cannot listen on {self.address}: {error.strerror or error}"
+            ) from error
         self.address = joined(host, self._server.sockets[0].getsockname()[1])
-        structlog.get_logger().info("metrics are shown", address=self.address)
+        structlog.get_logger().info("metrics endpoint is listening", address=self.address)
         return self
 
     async def __aexit__(
@@ -313,8 +313,8 @@ def check_metrics_address(address: str, *, beyond_loopback: bool) -> None:
     """
     if not beyond_loopback and not is_loopback_host(split(address)[0]):
         raise SecurityError(
-            f"{address} can be reached from other machines, and metrics are for everybody who reaches them: say that "
-            "they may be there (metrics_beyond_loopback), or give an address of this machine alone"
+            f"{address} is reachable from other machines, and metrics need no token: set metrics_beyond_loopback to "
+            "allow this, or use a loopback address"
         )
 
 

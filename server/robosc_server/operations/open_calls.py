@@ -108,10 +108,12 @@ class _CallSlots:
         entry = ENTRY.get()
         limit = self._limits.per_caller if entry is None or entry.quota.calls is None else entry.quota.calls
         if count >= limit:
-            message = f"a caller may have {limit} calls open at once, watches included"
+            message = f"the caller has reached its limit of {limit} open calls, watches included; try again later"
             raise RefusedError(Reason.QUOTA_EXCEEDED, message, _RETRY_S)
         if self.taken >= self._limits.calls:
-            raise RefusedError(Reason.SERVER_BUSY, "as many calls are open as this server has slots for", _RETRY_S)
+            raise RefusedError(
+                Reason.SERVER_BUSY, "the server has reached its limit of open calls; try again later", _RETRY_S
+            )
         self._by_caller[caller] = count + 1
         self.taken += 1
         # When the call is over for gRPC, too: whoever reads no answer holds it when the handler has long ended.

@@ -82,7 +82,7 @@ class Quotas:
         _check_seconds(account, now_s)
         if account.tasks is not None:
             if (wait_s := account.tasks.seconds_until(1.0, now_s)) > 0:
-                raise _exceeded(f"the token may ask for {account.tasks.size} tasks in a minute", wait_s)
+                raise _exceeded(f"the token has used up its quota of {account.tasks.size} tasks per minute", wait_s)
             account.tasks.take(1.0, now_s)
 
     def check(self, caller: str) -> None:
@@ -135,7 +135,7 @@ def _check_seconds(account: _Account, now_s: float) -> None:
     """
     if account.seconds is not None and (wait_s := account.seconds.seconds_until(0.0, now_s)) > 0:
         size = account.seconds.size
-        raise _exceeded(f"the token's tasks may take {size} seconds of a processor's time in an hour", wait_s)
+        raise _exceeded(f"the token has used up its quota of {size} CPU seconds per hour", wait_s)
 
 
 def _exceeded(message: str, wait_s: float) -> RefusedError:

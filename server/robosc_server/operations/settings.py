@@ -59,7 +59,7 @@ def _bytes(value: object) -> object:
     if isinstance(value, str):
         match = _SIZE.match(value.strip())
         if match is None:
-            raise PydanticCustomError("size", "a number of bytes such as 1048576 or 1MiB is needed")
+            raise PydanticCustomError("size", "must be a number of bytes, such as 1048576 or 1MiB")
         return int(match[1]) * _UNITS[match[2]]
     return value
 
@@ -67,7 +67,7 @@ def _bytes(value: object) -> object:
 def _whole(value: object) -> object:
     """Not true and false, which Python takes for 1 and 0, nor 2.0."""
     if isinstance(value, bool | float):
-        raise PydanticCustomError("whole", "a whole number is needed")
+        raise PydanticCustomError("whole", "must be a whole number")
     return value
 
 
@@ -75,7 +75,7 @@ def _host_and_port(text: str) -> str:
     try:
         split(text)
     except ValueError as error:
-        raise PydanticCustomError("address", "HOST:PORT is needed") from error
+        raise PydanticCustomError("address", "must be HOST:PORT") from error
     return text
 
 
@@ -84,11 +84,11 @@ def _workers(text: str) -> str:
     if text == "local":
         return text
     if kind not in ("dask", "dask+tls"):
-        raise PydanticCustomError("workers", "'local', 'dask://HOST:PORT' or 'dask+tls://HOST:PORT' is needed")
+        raise PydanticCustomError("workers", "must be 'local', 'dask://HOST:PORT' or 'dask+tls://HOST:PORT'")
     try:
         split(address)
     except ValueError as error:
-        raise PydanticCustomError("workers", "after :// there is HOST:PORT") from error
+        raise PydanticCustomError("workers", "must have HOST:PORT after ://") from error
     return text
 
 
@@ -97,7 +97,7 @@ def _database(text: str) -> str:
     scheme, separator, rest = text.partition("://")
     is_known = scheme in ("postgresql", "postgresql+psycopg") or (scheme == "sqlite" and len(rest) > 1)
     if not separator or not is_known:
-        raise PydanticCustomError("database", "postgresql://USER:PASSWORD@HOST:PORT/NAME or sqlite:///FILE is needed")
+        raise PydanticCustomError("database", "must be postgresql://USER:PASSWORD@HOST:PORT/NAME or sqlite:///FILE")
     return text
 
 
@@ -108,13 +108,13 @@ def _endpoint(text: str) -> str:
             raise ValueError
         split(address.rstrip("/"))
     except ValueError as error:
-        raise PydanticCustomError("endpoint", "http://HOST:PORT or https://HOST:PORT is needed") from error
+        raise PydanticCustomError("endpoint", "must be http://HOST:PORT or https://HOST:PORT") from error
     return text
 
 
 def _host(text: str) -> str:
     if not text or any(character.isspace() or not character.isprintable() for character in text):
-        raise PydanticCustomError("host", "a name or address is needed")
+        raise PydanticCustomError("host", "must be a host name or an address")
     return text
 
 
@@ -156,87 +156,91 @@ class Settings(BaseModel):
 
     host: Annotated[str, AfterValidator(_host)] = _setting("127.0.0.1", "address to listen on", _LISTENING)
     port: Annotated[int, BeforeValidator(_whole)] = _setting(
-        50051, "TCP port; 0 picks a free one", _LISTENING, ge=0, le=65535
+        50051, "TCP port to listen on; 0 selects a free port", _LISTENING, ge=0, le=65535
     )
     drain_seconds: Annotated[float, Field(ge=0, le=86400, allow_inf_nan=False)] = _setting(
-        30.0, "seconds that calls under way are given when the server is told to end", _LISTENING
+        30.0, "maximum time in seconds for open calls to finish when the server shuts down", _LISTENING
     )
 
     tls_certificate: Path | None = _setting(
-        None, "certificate chain (PEM): listen with TLS", _SECURITY, metavar="FILE", default_words="no TLS"
+        None, "certificate chain (PEM); enables TLS", _SECURITY, metavar="FILE", default_words="no TLS"
     )
-    tls_key: Path | None = _setting(None, "its private key (PEM)", _SECURITY, metavar="FILE")
+    tls_key: Path | None = _setting(None, "private key of the certificate (PEM)", _SECURITY, metavar="FILE")
     client_ca: Path | None = _setting(
         None,
-        "callers need a certificate that one of these (PEM) has signed",
+        "require client certificates signed by one of these authorities (PEM)",
         _SECURITY,
         metavar="FILE",
         default_words="callers need no certificate",
     )
     tokens: Path | None = _setting(
         None,
-        "callers need a token of this file (see `robosc-server token`)",
+        "require a token of this file (see `robosc-server token`)",
         _SECURITY,
         metavar="FILE",
         default_words="callers need no token",
     )
     insecure_beyond_loopback: bool = _setting(
-        False, "listen without TLS where other machines reach it, on a network that you trust", _SECURITY
+        False, "allow connections from other machines without TLS, on a trusted network", _SECURITY
     )
     signing_key: Path | None = _setting(
         None,
-        "Ed25519 private key (PEM) that supervisors are signed with",
+        "Ed25519 private key (PEM) for signing supervisors",
         _SECURITY,
         metavar="FILE",
         default_words="supervisors are not signed",
     )
 
-    bundle_bytes: _Bytes = _setting(2**20, "largest model with its libraries: all names and texts", _LIMITS)
-    bundle_files: _Count = _setting(1000, "most files of a model with its libraries", _LIMITS)
-    task_seconds: _Seconds = _setting(600.0, "longest time for one task by the clock, whatever its deadline", _LIMITS)
-    task_cpu_seconds: _Seconds = _setting(600.0, "most of a processor's time for one task, in seconds", _LIMITS)
+    bundle_bytes: _Bytes = _setting(2**20, "maximum size of a model with its libraries: all names and texts", _LIMITS)
+    bundle_files: _Count = _setting(1000, "maximum number of files of a model with its libraries", _LIMITS)
+    task_seconds: _Seconds = _setting(
+        600.0, "maximum wall-clock time of one task in seconds, regardless of its deadline", _LIMITS
+    )
+    task_cpu_seconds: _Seconds = _setting(600.0, "maximum CPU time of one task in seconds", _LIMITS)
     task_memory_bytes: Annotated[_Bytes, Field(ge=256 * 2**20)] = _setting(
-        2 * 2**30, "largest address space of the process of one task, its programs included", _LIMITS
+        2 * 2**30, "maximum address space of the worker process of one task, program code included", _LIMITS
     )
-    task_nodes: _Count = _setting(20_000_000, "most nodes of decision diagrams of one task", _LIMITS)
-    result_bytes: _Bytes = _setting(64 * 2**20, "largest result of one task", _LIMITS)
+    task_nodes: _Count = _setting(20_000_000, "maximum number of decision diagram nodes of one task", _LIMITS)
+    result_bytes: _Bytes = _setting(64 * 2**20, "maximum size of the result of one task", _LIMITS)
 
-    waiting_tasks: _Count = _setting(1000, "tasks that may wait, of all callers together", _QUEUE)
+    waiting_tasks: _Count = _setting(1000, "maximum number of waiting tasks of all callers", _QUEUE)
     waiting_tasks_per_caller: _Count = _setting(
-        100, "tasks of one caller that may wait, unless its token says otherwise", _QUEUE
+        100, "maximum number of waiting tasks of one caller, unless its token has a quota", _QUEUE
     )
 
-    open_calls: _Count = _setting(10_000, "calls that may be open at once, those that only watch included", _QUEUE)
+    open_calls: _Count = _setting(10_000, "maximum number of open calls, watches included", _QUEUE)
     open_calls_per_caller: _Count = _setting(
-        2000, "open calls of one caller, unless its token says otherwise; without tokens, of one host", _QUEUE
+        2000,
+        "maximum number of open calls of one caller, unless its token has a quota; without tokens, of one host",
+        _QUEUE,
     )
     request_seconds: _Seconds = _setting(
-        30.0, "seconds that the request of a call may take to arrive once the call has begun", _QUEUE
+        30.0, "maximum time in seconds between the start of a call and the arrival of its request", _QUEUE
     )
 
     workers: Annotated[str, AfterValidator(_workers)] = _setting(
         "local",
-        "who works: `local` processes, or a Dask cluster, `dask://HOST:PORT` or `dask+tls://HOST:PORT`",
+        "location of the workers: `local` processes, or the Dask cluster at `dask://HOST:PORT` or `dask+tls://HOST:PORT`",
         _WORKERS,
         metavar="WHERE",
     )
     worker_processes: Annotated[_Count, Field(le=1024)] = _setting(
         _processors,
-        "local tasks worked on at once, each in its own process",
+        "maximum number of tasks that run at once on this machine, each in its own process",
         _WORKERS,
         default_words="the number of processors",
     )
 
     confinement: Confinement = _setting(
         Confinement.BEST_EFFORT,
-        "required: no task is done where the kernel cannot keep its process from files, network and other processes;"
-        " best-effort: what is missing is told, and tasks are done",
+        "required: no task runs if the kernel cannot fully isolate its process from files, network and other processes;"
+        " best-effort: the log names the missing parts, and tasks run",
         _WORKERS,
     )
 
     state_dir: Path = _setting(
         _state_folder,
-        "folder for jobs and results, unless there is a database_url",
+        "folder of the SQLite database for jobs and results, if database_url is not set",
         _STORAGE,
         metavar="FOLDER",
         default_words="$XDG_STATE_HOME/robosc-server, or ~/.local/state/robosc-server",
@@ -251,40 +255,45 @@ class Settings(BaseModel):
         repr=False,
     )
     retention_seconds: _Seconds = _setting(
-        7 * 86400.0, "seconds that a job and its result are kept after its end", _STORAGE
+        7 * 86400.0, "time in seconds for which a job and its result are stored after its end", _STORAGE
     )
     jobs_per_caller: _Count = _setting(
-        10_000, "jobs of one caller that are kept; beyond, those that ended first are forgotten", _STORAGE
+        10_000,
+        "maximum number of stored jobs of one caller; beyond it, the jobs that ended first are deleted",
+        _STORAGE,
     )
     results_bytes: _Bytes = _setting(
         2 * 2**30,
-        "results kept, in the database; beyond, whoever has most gives first, of what was unused longest",
+        "maximum size of all results in the database; beyond it, the least recently used results of the caller with the"
+        " most data are deleted first",
         _STORAGE,
     )
     memory_cache_bytes: Annotated[int, BeforeValidator(_bytes), BeforeValidator(_whole), Field(ge=0, le=2**50)] = (
-        _setting(64 * 2**20, "results kept in memory as well; 0: none", _STORAGE)
+        _setting(64 * 2**20, "maximum size of the results cached in memory; 0 disables the cache", _STORAGE)
     )
 
-    log_format: LogFormat = _setting(LogFormat.TEXT, "how lines of the log look: text or json", _OPERATIONS)
+    log_format: LogFormat = _setting(LogFormat.TEXT, "format of log lines: text or json", _OPERATIONS)
     log_level: LogLevel = _setting(
-        LogLevel.INFO, "debug, info, warning or error; nothing of a model is logged above debug", _OPERATIONS
+        LogLevel.INFO,
+        "lowest level that is logged: debug, info, warning or error; only debug logs parts of models",
+        _OPERATIONS,
     )
     metrics_address: Annotated[str, AfterValidator(_host_and_port)] | None = _setting(
         None,
-        "where Prometheus finds metrics, over HTTP at /metrics",
+        "address of the metrics endpoint for Prometheus, over HTTP at /metrics",
         _OPERATIONS,
         metavar="HOST:PORT",
-        default_words="nowhere",
+        default_words="disabled",
     )
     metrics_beyond_loopback: bool = _setting(
-        False, "metrics may be where other machines reach them; they are in the clear and for everybody", _OPERATIONS
+        False, "allow other machines to read the metrics, without TLS and without a token", _OPERATIONS
     )
     tracing_endpoint: Annotated[str, AfterValidator(_endpoint)] | None = _setting(
         None,
-        "receiver of traces, with OTLP over gRPC, such as http://127.0.0.1:4317",
+        "OTLP receiver of traces over gRPC, such as http://127.0.0.1:4317",
         _OPERATIONS,
         metavar="URL",
-        default_words="nowhere",
+        default_words="disabled",
     )
 
     @property
@@ -392,20 +401,20 @@ def source_of(name: str, flags: Mapping[str, Any], config: Path | None) -> str:
 
 
 _PROBLEM_TEXTS = {
-    "extra_forbidden": "there is no such setting; `robosc-server example-config` prints all",
-    "int_parsing": "a whole number is needed",
-    "int_type": "a whole number is needed",
-    "float_parsing": "a number is needed",
-    "float_type": "a number is needed",
-    "bool_parsing": "true or false is needed",
-    "bool_type": "true or false is needed",
-    "string_type": "a text is needed",
-    "path_type": "a text is needed",
+    "extra_forbidden": "unknown setting; `robosc-server example-config` lists all settings",
+    "int_parsing": "must be a whole number",
+    "int_type": "must be a whole number",
+    "float_parsing": "must be a number",
+    "float_type": "must be a number",
+    "bool_parsing": "must be true or false",
+    "bool_type": "must be true or false",
+    "string_type": "must be a text",
+    "path_type": "must be a text",
 }
 
 
 def _problem_text(kind: str, message: str) -> str:
-    return _PROBLEM_TEXTS.get(kind) or message.replace("Input should be", "it should be")
+    return _PROBLEM_TEXTS.get(kind) or message.replace("Input should be", "must be")
 
 
 def read_file(path: Path) -> dict[str, Any]:
@@ -420,15 +429,15 @@ def read_file(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise SettingsError([f"{path}: {error.strerror}"]) from error
     if len(data) > MAXIMUM_FILE_BYTES:
-        raise SettingsError([f"{path}: larger than {MAXIMUM_FILE_BYTES} bytes"])
+        raise SettingsError([f"{path}: the file is larger than {MAXIMUM_FILE_BYTES} bytes"])
     try:
         return tomllib.loads(data.decode())
     except (UnicodeDecodeError, RecursionError) as error:
-        raise SettingsError([f"{path}: not TOML"]) from error
+        raise SettingsError([f"{path}: not valid TOML"]) from error
     except tomllib.TOMLDecodeError as error:
         # Only where: a line may hold a password.
         place = re.search(r"\(at (?:line \d+, column \d+|end of document)\)", str(error))
-        raise SettingsError([f"{path}: not TOML {place[0] if place else ''}".rstrip()]) from None
+        raise SettingsError([f"{path}: not valid TOML {place[0] if place else ''}".rstrip()]) from None
 
 
 def flag_of(name: str) -> str:
@@ -476,26 +485,26 @@ def description_of(name: str) -> str:
 
 _EPILOG = f"""\
 commands:
-  robosc-server token NAME       make a token for a caller
-  robosc-server check-config     look whether the server could start with such settings
-  robosc-server example-config   print a file with every setting and its default
-  robosc-server health           ask the server that such settings have started how it is
+  robosc-server token NAME       create a token for a caller
+  robosc-server check-config     check whether the server can start with these settings
+  robosc-server example-config   print a settings file with every setting and its default
+  robosc-server health           query the health of the server that runs with these settings
 
-Each setting is also a line of the file (state_dir = "/var/lib/robosc-server") and an environment variable
-({ENVIRONMENT_PREFIX}STATE_DIR). A flag goes before the environment, the environment before the file. Sizes may have
-a unit: 64MiB. Where other machines reach it, it listens with TLS only. SIGTERM and SIGINT end it gracefully.
+Each setting can also be set in the settings file (state_dir = "/var/lib/robosc-server") and by an environment variable
+({ENVIRONMENT_PREFIX}STATE_DIR). A flag overrides the environment, and the environment overrides the file. Sizes may
+have a unit: 64MiB. Addresses that other machines can reach need TLS. SIGTERM and SIGINT shut it down gracefully.
 
 exit status:
-  0  stopped by a signal
+  0  the server was stopped by a signal
   1  the address, a certificate, the tokens, the database or the workers cannot be used
-  2  wrong use, or wrong settings
+  2  wrong options or settings
 """
 
 
 def add_settings_arguments(parser: argparse.ArgumentParser) -> None:
     """A flag for each setting, and `--config`."""
     parser.add_argument(
-        "--config", type=Path, metavar="FILE", help=f"file of settings in TOML (default: ${CONFIG_VARIABLE})"
+        "--config", type=Path, metavar="FILE", help=f"settings file in TOML (default: ${CONFIG_VARIABLE})"
     )
     groups: dict[str, Any] = {}
     for name, field in Settings.model_fields.items():

@@ -35,9 +35,9 @@ _EXAMPLES = {
 def example_file() -> str:
     """The file, in TOML."""
     lines = [
-        "# Settings of robosc-server. Flags (--state-dir) and the environment (ROBOSC_SERVER_STATE_DIR) go before this",
-        "# file, which is given with --config or ROBOSC_SERVER_CONFIG. Paths that are not absolute begin where the",
-        "# server was started.",
+        "# Settings of robosc-server. Flags (--state-dir) and environment variables (ROBOSC_SERVER_STATE_DIR)",
+        "# override this file, which is selected with --config or ROBOSC_SERVER_CONFIG. Relative paths start",
+        "# at the working directory of the server.",
     ]
     group = ""
     for name in Settings.model_fields:

@@ -61,14 +61,14 @@ class ShutdownSignals:
         self._interrupts += number == signal.SIGINT
         if self._interrupts > 1:
             # Somebody at a terminal who does not want to wait.
-            _log.warning("ended at once, by a second interrupt")
+            _log.warning("exiting immediately after a second interrupt")
             os._exit(_BY_SIGNAL + number)
 
 
 def _log_pending_tasks() -> None:
     """Log where everything waits that has not ended, by places in the code alone."""
     for task in asyncio.all_tasks():
-        _log.error("the server does not end: %s waits at %s", task.get_name(), " < ".join(_places(task.get_coro())))
+        _log.error("the shutdown takes too long: %s waits at %s", task.get_name(), " < ".join(_places(task.get_coro())))
 
 
 def _places(waiting: Any) -> Iterator[str]:

@@ -216,7 +216,7 @@ class Database:
         if self.is_available:
             # Without the statement's parameters: they are a caller's.
             reason = error.orig if isinstance(error, DBAPIError) else type(error).__name__
-            _log.error("the database cannot be used: %s", reason)
+            _log.error("the database is unavailable: %s", reason)
         self._is_failing[is_write] = True
         if self.dialect != "sqlite":
             self._paused_until_s = self._clock() + _PAUSE_S
@@ -227,7 +227,7 @@ class Database:
         # What can be changed can be read.
         self._is_failing = {False: False, True: self._is_failing[True] and not is_write}
         if self.is_available:
-            _log.warning("the database can be used again")
+            _log.warning("the database is available again")
 
 
 def _consume_outcome(future: asyncio.Future[Any]) -> None:

@@ -18,5 +18,5 @@ class StoreUnavailableError(RefusedError):
 
     def __init__(self) -> None:
         super().__init__(
-            Reason.STORE_UNAVAILABLE, "the server cannot use its database now; try again later", retry_after_s=_RETRY_S
+            Reason.STORE_UNAVAILABLE, "the database is unavailable; try again later", retry_after_s=_RETRY_S
         )

@@ -63,13 +63,15 @@ def open_store(state_dir: Path, database_url: str | None = None, wall_clock: Cal
             url = make_url(database_url)
         except ArgumentError as error:
             # Not the text itself: it may hold a password.
-            raise StoreError("the database's URL is none; write postgresql://USER:PASSWORD@HOST:PORT/NAME") from error
+            raise StoreError(
+                "the database URL is invalid: it must have the form postgresql://USER:PASSWORD@HOST:PORT/NAME"
+            ) from error
         if url.drivername in {"postgresql", "postgresql+psycopg"}:
             return Store(_open_postgresql(url), wall_clock=wall_clock)
         if url.drivername not in {"sqlite", "sqlite+pysqlite"}:
-            raise StoreError(f"the database '{url.drivername}' is not supported, only postgresql and sqlite")
+            raise StoreError(f"the database '{url.drivername}' is not supported: use postgresql or sqlite")
         if not url.database or url.database == ":memory:" or url.query:
-            raise StoreError("a URL of SQLite names a file: sqlite:///FILE")
+            raise StoreError("an SQLite URL must name a file: sqlite:///FILE")
         path = Path(url.database)
     database, lock = _open_sqlite(path)
     return Store(database, lambda: _unlock(lock), wall_clock)

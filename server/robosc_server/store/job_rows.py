@@ -17,7 +17,7 @@ from robosc_server.store.schema import JOBS, REPLICAS, REQUESTS, RESULTS
 from robosc_server.tasks.task import Failure, Reason, Report, Result, TaskKind
 
 _MESSAGE_CHARACTERS = 4096
-_SERVER_DIED = "the server died while it was at this job, more than once"
+_SERVER_DIED = "the server crashed more than once while it ran this job"
 
 MAXIMUM_ATTEMPTS = 2
 """Begun so often and interrupted each time, a job has failed."""

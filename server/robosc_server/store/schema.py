@@ -156,13 +156,13 @@ def version_of(connection: Connection) -> int | None:
     names = set(inspect(connection).get_table_names())
     if SCHEMA.name not in names:
         if names & set(METADATA.tables):
-            raise StoreError("the database holds tables of something else with the names of RoboSC's")
+            raise StoreError("foreign tables use RoboSC's table names: use another database")
         return None
     versions = list(connection.scalars(select(SCHEMA.c.version)))
     if len(versions) == 1 and (versions[0] == VERSION or versions[0] in _STEPS):
         return int(versions[0])
     found = versions[0] if len(versions) == 1 else "unknown"
     raise StoreError(
-        f"the database has tables of version {found}, and this server knows version {VERSION} and those before; it was "
-        "written by another version of RoboSC"
+        f"the tables have schema version {found}, but this server supports version {VERSION} and earlier: use the "
+        "version of RoboSC that created them, or another database"
     )

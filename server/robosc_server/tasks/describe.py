@@ -52,7 +52,7 @@ def targets_response() -> pb.ListTargetsResponse:
     from robosc.targets import ALL, available_targets
 
     descriptions = {info.name: info.description for info in available_targets()}
-    descriptions[ALL] = "all of them, each in a folder of its own"
+    descriptions[ALL] = "all targets, each in its own folder"
     return pb.ListTargetsResponse(
         targets=[pb.Target(name=name, description=descriptions[name]) for name in sorted(descriptions)]
     )

@@ -23,7 +23,7 @@ from robosc_server.failures import RefusedError
 from robosc_server.tasks.fields import Nested, has_few_fields, nested_of
 from robosc_server.tasks.task import Reason, Task, TaskKind
 
-NOT_A_MESSAGE = "the request is no message of this service"
+NOT_A_MESSAGE = "the request is not a valid message of this service"
 
 _PLUGINS = ("robosc.targets", "robosc.bdd_engines")
 """Groups of entry points of packages that have a say in results."""
@@ -94,7 +94,7 @@ def require_short(content: bytes, limit: int) -> None:
         RefusedError: It has.
     """
     if len(content) > limit:
-        raise _too_large(f"the request has {len(content)} bytes, this server takes at most {limit}")
+        raise _too_large(f"the request has {len(content)} bytes; this server accepts at most {limit}")
 
 
 def require_parsable(content: bytes, nested: Nested, limits: RequestLimits) -> None:
@@ -109,7 +109,7 @@ def require_parsable(content: bytes, nested: Nested, limits: RequestLimits) -> N
         RefusedError: It has too many fields.
     """
     if len(content) > QUICK_BYTES and not has_few_fields(content, nested, limits.fields):
-        raise _too_large(f"the request has more than {limits.fields} files, names, texts and the like")
+        raise _too_large(f"the request has more than {limits.fields} fields (files, names and texts)")
 
 
 def accept_request(kind: TaskKind, request: bytes, limits: RequestLimits) -> Task:
@@ -205,7 +205,7 @@ class _RequestReader:
         """
         limit = self._limits.bundle_bytes
         if self._bytes > limit:
-            raise _too_large(f"the names and texts have {self._bytes} bytes, this server takes at most {limit}")
+            raise _too_large(f"the names and texts have {self._bytes} bytes; this server accepts at most {limit}")
 
     def require_few(self, count: int, what: str) -> None:
         """Do nothing if there are no more files, or other things, than there may be.
@@ -215,7 +215,7 @@ class _RequestReader:
         """
         limit = self._limits.bundle_files
         if count > limit:
-            raise _too_large(f"the request has {count} {what}, this server takes at most {limit}")
+            raise _too_large(f"the request has {count} {what}; this server accepts at most {limit}")
 
     def bundle(self, message: Any) -> tuple[object, ...]:
         """Return the meaning of a bundle, whatever the order of its libraries and of its interfaces.
@@ -225,7 +225,7 @@ class _RequestReader:
         """
         libraries, interfaces, searched = message.libraries, message.interfaces, message.searched
         self.require_few(1 + len(libraries) + len(interfaces), "files")
-        self.require_few(len(searched), "places that were searched")
+        self.require_few(len(searched), "searched places")
         if not message.HasField("main"):
             raise _malformed("the bundle has no main file")
         main = self.file(message.main)
@@ -235,7 +235,7 @@ class _RequestReader:
         for group in others:
             for name, _ in group:
                 if name in names:
-                    raise _malformed(f"two files of the bundle are called '{name}'")
+                    raise _malformed(f"two files of the bundle have the name '{name}'")
                 names.add(name)
         return main, *others, [self.text(place) for place in searched]
 
@@ -256,7 +256,7 @@ class _RequestReader:
             RefusedError: It is something else.
         """
         if not name.isprintable():
-            raise _malformed(f"{what} has a character that cannot be printed, such as NUL")
+            raise _malformed(f"{what} contains a character that cannot be printed, such as NUL")
         size = len(name) if name.isascii() else len(name.encode("utf-8"))
         if size > self._limits.name_bytes:
             raise _malformed(f"{what} has {size} bytes, more than {self._limits.name_bytes}")
@@ -284,7 +284,7 @@ class _RequestReader:
         """
         chosen = message.deployment or deployment
         if chosen not in _DEPLOYMENTS:
-            raise _malformed(f"there is no deployment of number {chosen}")
+            raise _malformed(f"the request has the unknown deployment {chosen}")
         engine = self.name(message.engine, "the engine's name") or "auto"
         nodes = min(message.maximum_nodes or self._limits.nodes, self._limits.nodes)
         states = message.verified_states if message.HasField("verified_states") else _DEFAULT_MADE_STATES
@@ -342,7 +342,7 @@ def _explore(message: Any, reader: _RequestReader) -> object:
 def _verify(message: Any, reader: _RequestReader) -> object:
     is_given = bool(message.supervisor)
     if not is_given and (message.maximum_states or message.strict):
-        raise _malformed("maximum_states and strict say how to check a supervisor: the request has none")
+        raise _malformed("maximum_states and strict apply only to a given supervisor, and the request has none")
     if not is_given and not message.properties and not message.property_files:
         raise _malformed("the request has neither a supervisor nor properties")
     if message.maximum_states > _MAXIMUM_VERIFIED_STATES:

@@ -90,13 +90,13 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
     except NodeLimitError as error:
         return Failure(Reason.NODE_LIMIT, str(error))
     except MemoryError:
-        return Failure(Reason.MEMORY_LIMIT, f"the work needs more than {limits.memory_bytes} bytes of memory")
+        return Failure(Reason.MEMORY_LIMIT, f"the task needs more than {limits.memory_bytes} bytes of memory")
     except _ResultTooLargeError:
         return Failure(Reason.RESULT_TOO_LARGE, f"the result has more than {limits.result_bytes} bytes")
     except (UnknownTargetError, UnknownEngineError, from_proto.OptionError, NoPropertyError) as error:
         return Failure(Reason.MALFORMED_REQUEST, str(error))
     except Exception as error:  # The worker's border: whatever it was, the server logs it and lives on.
-        return Failure(Reason.INTERNAL_FAULT, "a fault of the server", _places(error))
+        return Failure(Reason.INTERNAL_FAULT, "the server has an internal error", _places(error))
 
 
 PRELOADED = ("robosc",)

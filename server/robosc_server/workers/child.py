@@ -26,7 +26,7 @@ type TaskFunction = Callable[[TaskKind, bytes, TaskLimits, Callable[[Report], No
 _COLLECT_EVERY = 20_000
 """New objects of Python after which those that refer to each other in circles are looked for."""
 
-OUT_OF_MEMORY = "the work took more memory than a task may have"
+OUT_OF_MEMORY = "the task exceeded its memory limit"
 
 
 def run_worker(
@@ -71,7 +71,7 @@ def _answer(
         outcome = Failure(Reason.MEMORY_LIMIT, OUT_OF_MEMORY)
     except BaseException:  # The worker's border: whatever it was, the server logs it and lives on.
         confinement.raise_memory_limit()
-        outcome = Failure(Reason.INTERNAL_FAULT, "the server is at fault", traceback.format_exc())
+        outcome = Failure(Reason.INTERNAL_FAULT, "the server has an internal error", traceback.format_exc())
     confinement.raise_memory_limit()
     _send(connection, outcome, limits)
 

@@ -41,7 +41,7 @@ _CLOSE_POLL_S = 0.01
 _CPU_REPORT_S = 10.0
 _CHECK_S = 3.0
 _KEPT_REPORTS = 64
-_LOST = "two workers of the cluster were lost while they did this task"
+_LOST = "two workers of the cluster were lost during this task"
 
 
 class _TaskEvents:
@@ -117,20 +117,20 @@ class DaskWorkers:
         self._connection_task: asyncio.Task[None] | None = None
         self._first_poll_done = asyncio.Event()
         self._is_closing = asyncio.Event()
-        self.fault = f"the Dask scheduler at {address} was not reached yet"
+        self.fault = f"the Dask scheduler at {address} has not been reached yet"
 
     async def __aenter__(self) -> Self:
         self._connection_task = asyncio.create_task(self._keep_connected())
         await self._first_poll_done.wait()
         if self.fault:
-            _LOG.error("%s; it is tried again", self.fault)
+            _LOG.error("%s; retrying", self.fault)
         return self
 
     async def __aexit__(self, *_: object) -> None:
         if self._connection_task is not None:
             self._connection_task.cancel()
             await asyncio.gather(self._connection_task, return_exceptions=True)
-        self.fault = "the server's workers have ended"
+        self.fault = "the workers are shut down"
         # Whoever waits for a task is told, as long as there is a loop to tell it in.
         self._is_closing.set()
         with contextlib.suppress(TimeoutError):
@@ -166,7 +166,7 @@ class DaskWorkers:
             if events.begun >= _ATTEMPTS:
                 return Failure(Reason.WORKER_DIED, _LOST)
         # It has done nothing that workers could have been lost for.
-        raise WorkersError(f"the Dask cluster at {self._address} loses its workers before they begin a task")
+        raise WorkersError(f"the Dask cluster at {self._address} loses its workers before they start a task")
 
     async def _run_once(
         self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime, events: _TaskEvents
@@ -231,16 +231,16 @@ class DaskWorkers:
             return None
         except Exception as error:  # Whatever was raised there, or on the way from there.
             told = f"{type(error).__name__}: {error}"
-            raise WorkersError(f"the Dask cluster at {self._address} cannot do tasks: {told[:1000]}") from error
+            raise WorkersError(f"the Dask cluster at {self._address} cannot run tasks: {told[:1000]}") from error
         if isinstance(content, bytes) and content[:1] == ANSWER:
             try:
                 return outcome_of(content[1:], limits)
             except FrameError as error:
-                return Failure(Reason.WORKER_DIED, "the worker process sent what is no answer", str(error))
+                return Failure(Reason.WORKER_DIED, "the worker process sent an invalid answer", str(error))
         if isinstance(content, bytes) and content[:1] in (NO_WORKER, LOST):
             kind = WorkerLostError if content[:1] == LOST else WorkersError
             raise kind(content[1:1000].decode("utf-8", "replace"))
-        raise WorkersError(f"the Dask cluster at {self._address} answered what is no answer of RoboSC")
+        raise WorkersError(f"the Dask cluster at {self._address} sent an answer that RoboSC does not know")
 
     async def _watch_for_loss(
         self, client: Any, events: _TaskEvents, limits: TaskLimits, allowed: list[str] | None
@@ -275,7 +275,7 @@ class DaskWorkers:
             if now - last_worker_at > _GRACE_S:
                 raise WorkersError(self.fault or f"the Dask cluster at {self._address} has no worker")
             if events.begun and now - events.begun_at > limits.seconds + _GRACE_S:
-                return Failure(Reason.TIME_LIMIT, "the work took longer than a task may take")
+                return Failure(Reason.TIME_LIMIT, "the task exceeded its time limit")
 
     async def _keep_connected(self) -> None:
         """Have a client of the cluster, whenever that is there."""
@@ -372,9 +372,9 @@ class DaskWorkers:
     def _note_fault(self, fault: str) -> None:
         if fault != self.fault and self._first_poll_done.is_set():
             if fault:
-                _LOG.error("%s; it is tried again", fault)
+                _LOG.error("%s; retrying", fault)
             else:
-                _LOG.info("the Dask cluster at %s is there again", self._address)
+                _LOG.info("the Dask cluster at %s is available again", self._address)
         self.fault = fault
 
 

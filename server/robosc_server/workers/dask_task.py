@@ -104,12 +104,14 @@ def run_on_cluster(
     except StoppedError:
         return NO_WORKER + b"stopped"
     except Exception:  # The task's border: whatever it was, the server logs it, and does not try the same for ever.
-        return ANSWER + answer(Failure(Reason.INTERNAL_FAULT, "the server is at fault", traceback.format_exc()))
+        return ANSWER + answer(
+            Failure(Reason.INTERNAL_FAULT, "the server has an internal error", traceback.format_exc())
+        )
 
 
 def mismatch(address: str, theirs: str, ours: str) -> str:
     """Return the message about a worker with another version."""
-    return f"the Dask worker at {address} has RoboSC {theirs}, and this server {ours}: they must be the same"
+    return f"the Dask worker at {address} has RoboSC {theirs}, but this server has {ours}: install the same version"
 
 
 def answer(outcome: Outcome) -> bytes:

@@ -12,8 +12,8 @@ from robosc_server.clock import monotonic
 from robosc_server.tasks.task import Failure, Reason, TaskLimits
 from robosc_server.workers.child import OUT_OF_MEMORY
 
-OUT_OF_PROCESSOR = "the work took more of a processor's time than a task may have"
-OUT_OF_TIME = "the work took longer than a task may take"
+OUT_OF_PROCESSOR = "the task exceeded its CPU time limit"
+OUT_OF_TIME = "the task exceeded its time limit"
 
 _REMEMBERED_S = 1.0
 _NEAR_THE_LIMIT = 0.9
@@ -37,7 +37,7 @@ class ProcessExit:
 
 EXIT_DESCRIPTION = re.compile(
     r"(ended with status \d{1,3} and no answer|was ended by (SIG[A-Z0-9]{2,8}|signal \d{1,3})) "
-    r"after \d{1,9}\.\d\d s of a processor's time, with at most \d{1,15} bytes resident"
+    r"after \d{1,9}\.\d\d s of CPU time, with at most \d{1,15} bytes resident"
 )
 """Pattern of the text that `exit_description` returns: nobody can say anything of a model in this form."""
 
@@ -45,7 +45,7 @@ EXIT_DESCRIPTION = re.compile(
 def exit_description(end: ProcessExit) -> str:
     """Return a description of a process's end, in one line."""
     return (
-        f"{_status_text(end.exit_code)} after {end.cpu_s:.2f} s of a processor's time, "
+        f"{_status_text(end.exit_code)} after {end.cpu_s:.2f} s of CPU time, "
         f"with at most {end.peak_bytes} bytes resident"
     )
 
@@ -64,7 +64,7 @@ def failure_of(end: ProcessExit, limits: TaskLimits, crash_output: str, was_memo
     if end.exit_code == -signal.SIGXCPU or (end.exit_code == -signal.SIGKILL and out_of_processor):
         return Failure(Reason.CPU_LIMIT, OUT_OF_PROCESSOR, details)
     if end.exit_code == -signal.SIGKILL and was_memory_short:
-        return Failure(Reason.MEMORY_LIMIT, "the machine ran out of memory, and ended the work", details)
+        return Failure(Reason.MEMORY_LIMIT, "the machine ran out of memory and killed the task", details)
     if end.exit_code and end.peak_bytes + _NEVER_RESIDENT_BYTES >= _NEAR_THE_LIMIT * limits.memory_bytes:
         # Libraries in C end the process where memory is refused to them: CUDD by exit(1), others by abort().
         return Failure(Reason.MEMORY_LIMIT, OUT_OF_MEMORY, details)

@@ -152,12 +152,14 @@ def main() -> None:
         function = _load(sys.argv[2])
         threads = len(list(Path("/proc/self/task").iterdir()))
         if threads > 1:
-            raise RuntimeError(f"there are {threads} threads where workers are forked from")
+            raise RuntimeError(f"the fork server has {threads} threads and cannot fork safely")
     except Exception as error:  # Whatever it was: the server tells it in one sentence.
         _give_up(line, f"cannot load {sys.argv[2]}: {type(error).__name__}: {error}")
     sandbox = Sandbox()
     if sandbox.missing and sys.argv[4] == MUST_BE_CONFINED:
-        _give_up(line, f"workers cannot be confined as they must be here: {'; '.join(sandbox.missing)}")
+        _give_up(
+            line, f"confinement is required, but this machine cannot confine workers: {'; '.join(sandbox.missing)}"
+        )
     line.send(json.dumps({"is": "confined", "missing": sandbox.missing}).encode())
     # Workers copy each page that they write to; a collection would write to all of them.
     gc.collect()

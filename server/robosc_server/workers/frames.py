@@ -112,9 +112,7 @@ def failure_frame(failure: Failure) -> bytes:
 
 def too_large(limits: TaskLimits) -> Failure:
     """The failure of a task whose result is larger than it may be."""
-    return Failure(
-        Reason.RESULT_TOO_LARGE, f"the result is larger than {limits.result_bytes} bytes, which is as much as may be"
-    )
+    return Failure(Reason.RESULT_TOO_LARGE, f"the result exceeds the limit of {limits.result_bytes} bytes")
 
 
 class AnswerReader:

@@ -84,7 +84,7 @@ class LocalWorkers:
         for _ in range(_ATTEMPTS):
             with contextlib.suppress(ForkServerLostError):
                 return await self._run_once(task, limits, on_report, on_cpu_time)
-        raise WorkerLostError("the process that starts workers ended twice under one task")
+        raise WorkerLostError("the fork server of the workers ended twice during one task")
 
     async def _run_once(self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime) -> Outcome:
         worker = await self._pool.acquire()

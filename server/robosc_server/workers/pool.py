@@ -74,7 +74,7 @@ class WorkerPool:
                     await self._state_change()
         except TimeoutError:
             await self._close()
-            raise WorkersError(f"no worker process stood ready within {START_S:.0f} s") from None
+            raise WorkersError(f"no worker process was ready within {START_S:.0f} s") from None
         except BaseException:
             await self._close()
             raise
@@ -108,14 +108,14 @@ class WorkerPool:
         end = monotonic() + START_S
         while (worker := self._next_live_worker()) is None:
             if self._is_closed:
-                raise WorkersError("the server's workers have ended")
+                raise WorkersError("the workers are shut down")
             if self.is_failing:
                 raise WorkersError(self.fault)
             try:
                 async with asyncio.timeout(end - monotonic()):
                     await self._state_change()
             except TimeoutError:
-                raise WorkersError(self.fault or f"no worker process stood ready within {START_S:.0f} s") from None
+                raise WorkersError(self.fault or f"no worker process was ready within {START_S:.0f} s") from None
         self._request_forks(1)
         return worker
 
@@ -130,7 +130,7 @@ class WorkerPool:
 
     def _replace(self, worker: WorkerProcess) -> None:
         """Bury a worker that died without a task, and have another one; if that goes on, a few times a second."""
-        _LOG.warning("a waiting worker process ended")
+        _LOG.warning("an idle worker process ended")
         self.terminate(worker)
         asyncio.get_running_loop().call_later(_REPLACEMENT_PAUSE_S, self._request_forks, 1)
 
@@ -172,8 +172,8 @@ class WorkerPool:
             status = await self._run_fork_server()
             self.restarts += 1
             self._failures += 1
-            self.fault = self.fault or f"the process that starts workers ended with status {status}"
-            _LOG.error("%s; it is started again%s", self.fault, _tasks_under_way(self._lost))
+            self.fault = self.fault or f"the fork server of the workers ended with status {status}"
+            _LOG.error("%s; restarting it%s", self.fault, _tasks_under_way(self._lost))
             self._changed.set()
             await asyncio.sleep(_PAUSES_S[min(self._failures, len(_PAUSES_S) - 1)])
 
@@ -200,7 +200,7 @@ class WorkerPool:
             self._request_forks(self._spare)
             return await process.wait()
         except OSError as error:
-            self.fault = f"cannot start the process that starts workers: {error.strerror}"
+            self.fault = f"cannot start the fork server of the workers: {error.strerror}"
             return None
         finally:
             if process is not None and process.returncode is None:
@@ -245,8 +245,8 @@ class WorkerPool:
                 # for when there may be room.
                 for number in descriptors:
                     os.close(number)
-                self.fault = "this process may have no more files open"
-                _LOG.error("%s; no worker can be had", self.fault)
+                self.fault = "this process has reached its limit of open files"
+                _LOG.error("%s: no worker can be started", self.fault)
                 asyncio.get_running_loop().call_later(_REPLACEMENT_PAUSE_S, self._request_forks, 1)
             case "worker":
                 connection, descriptor, crash_output = descriptors
@@ -273,7 +273,7 @@ class WorkerPool:
             return
         self.missing = missing
         for part in missing:
-            _LOG.warning("workers are not confined as they should be: %s", part)
+            _LOG.warning("workers are not fully confined: %s", part)
         if not missing:
             _LOG.info("workers are confined")
 

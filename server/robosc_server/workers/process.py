@@ -88,7 +88,7 @@ class WorkerProcess:
         except (asyncio.IncompleteReadError, ConnectionError):
             return await self._failure(limits, kills)
         except FrameError as error:
-            return Failure(Reason.WORKER_DIED, "the worker process sent what is no answer", str(error))
+            return Failure(Reason.WORKER_DIED, "the worker process sent an invalid answer", str(error))
 
     async def _answer(self, reader: asyncio.StreamReader, limits: TaskLimits, on_report: OnReport) -> Outcome:
         answer = AnswerReader(limits)
@@ -111,7 +111,7 @@ class WorkerProcess:
             async with asyncio.timeout(_EXIT_S):
                 end = await asyncio.shield(self.exit)
         except TimeoutError:
-            return Failure(Reason.WORKER_DIED, "the worker process ended, and nothing is known of how")
+            return Failure(Reason.WORKER_DIED, "the worker process ended for an unknown reason")
         if end is None:
             raise ForkServerLostError
         return failure_of(end, limits, self._read_crash_output(), oom_kills() > kills)

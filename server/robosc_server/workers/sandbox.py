@@ -18,7 +18,7 @@ from robosc_server.workers.system_calls import prepare_filter, restrict_system_c
 _STANDARD_ERROR = 2
 _HIGHEST_DESCRIPTOR = 2**31 - 1
 _ANSWER_BYTES = 1000
-_KILLED = "who tries it is ended"
+_KILLED = "the attempt was killed"
 
 
 class SandboxError(Exception):
@@ -41,9 +41,9 @@ class Sandbox:
         prepare_filter()
         # The last one keeps a process from entering the others.
         self._parts: dict[str, Callable[[], None]] = {
-            "the superuser's rights stay": kernel.drop_capabilities,
-            "files can be read (no Landlock)": self._restrict_files,
-            "calls of the kernel are not filtered (no seccomp)": restrict_system_calls,
+            "capabilities cannot be dropped": kernel.drop_capabilities,
+            "file access is not restricted (no Landlock)": self._restrict_files,
+            "system calls are not filtered (no seccomp)": restrict_system_calls,
         }
         self._faults = {words: fault for words, restrict in self._parts.items() if (fault := _failure_of(restrict))}
 

@@ -251,7 +251,7 @@ def restrict_system_calls() -> None:
     """
     machine = os.uname().machine
     if machine not in ARCHITECTURES or sys.maxsize < 2**32:
-        raise OSError(errno.ENOSYS, f"no list of calls for machines of the kind {machine}")
+        raise OSError(errno.ENOSYS, f"there is no list of system calls for the architecture {machine}")
     instructions = _own_program(machine)
     program = _Program(len(instructions) // 8, instructions)
     kernel.prctl(kernel.SET_NO_NEW_PRIVILEGES, 1)

@@ -86,10 +86,10 @@ def test_a_face_that_cannot_start_opens_no_device_and_stops_the_others(superviso
 @pytest.mark.parametrize(
     ("remote", "why"),
     [
-        ("{grpc_address: '0.0.0.0:50061'}", "remote: 0.0.0.0:50061 can be reached from other machines"),
+        ("{grpc_address: '0.0.0.0:50061'}", "remote: 0.0.0.0:50061 is reachable from other machines"),
         ("{grpc_address: '127.0.0.1:70000'}", "remote: not HOST:PORT"),
-        ("{grpc_address: '127.0.0.1:1', tls_key: k}", "remote: a certificate and its key belong together"),
-        ("{grpc_address: '127.0.0.1:1', client_ca: c}", "remote: callers' certificates are checked with TLS only"),
+        ("{grpc_address: '127.0.0.1:1', tls_key: k}", "remote: a certificate and its key must be given together"),
+        ("{grpc_address: '127.0.0.1:1', client_ca: c}", "remote: client certificates need TLS"),
     ],
 )
 def test_a_face_that_may_not_listen_so_is_refused_before_anything_is_made(
@@ -148,7 +148,10 @@ TLS = "{grpc_address: '127.0.0.1:1', tls_certificate: CERTIFICATE, tls_key: KEY"
         ),
         (("skills:", "supervisor: {ca: NONE}\nskills:"), "supervisor: NONE: "),
         (("skills:", "supervisor: {token_file: NONE}\nskills:"), "supervisor: NONE: "),
-        (("skills:", "supervisor: {key: NONE}\nskills:"), "supervisor: a certificate and its key belong together"),
+        (
+            ("skills:", "supervisor: {key: NONE}\nskills:"),
+            "supervisor: a certificate and its key must be given together",
+        ),
     ],
 )
 def test_what_cannot_be_used_is_refused_without_a_start(

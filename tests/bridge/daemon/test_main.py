@@ -181,7 +181,7 @@ def test_a_file_is_not_overwritten(bridge: Bridge, tmp_path: Path) -> None:
             ("check", "run"),
             "remote.mavlink_url: 'udpbcast:10.0.0.255:14550' cannot be used; it is udpin:HOST:PORT",
         ),
-        ("grpc_address", "0.0.0.0:0", ("run",), "can be reached from other machines"),
+        ("grpc_address", "0.0.0.0:0", ("run",), "is reachable from other machines"),
     ],
 )
 def test_an_address_that_cannot_be_used_is_one_line(

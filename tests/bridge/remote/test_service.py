@@ -421,7 +421,7 @@ class TestHostileCallers:
             call = channel.unary_unary(f"/robosc_api.v1.BridgeService/{method}")
             code, details = failure(lambda: call(b"\xff", timeout=PATIENCE_S))
         assert code is grpc.StatusCode.INVALID_ARGUMENT
-        assert details == "the request is no message of this service"
+        assert details == "the request is not a valid message of this service"
         assert daemon.orders == []
 
     def test_bytes_that_are_no_message_in_streams(self, face: RemoteFace) -> None:
@@ -460,7 +460,7 @@ class TestFace:
             serve(daemon.operations, RemoteSettings(face.address))
 
     def test_beyond_this_machine_only_with_tls(self, daemon: FakeDaemon) -> None:
-        with pytest.raises(RemoteError, match="can be reached from other machines"):
+        with pytest.raises(RemoteError, match="is reachable from other machines"):
             serve(daemon.operations, RemoteSettings("0.0.0.0:0"))
 
     def test_it_ends_and_gives_its_port_back(self, daemon: FakeDaemon) -> None:

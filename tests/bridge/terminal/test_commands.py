@@ -139,7 +139,7 @@ class TestSecurity:
         empty = tmp_path / "empty"
         empty.touch()
         assert main(["stop", "--address", NOWHERE, "--token-file", str(empty)]) == 2
-        assert "not a single token" in capsys.readouterr().err
+        assert "exactly one token" in capsys.readouterr().err
         assert main(["stop", "--address", NOWHERE, "--ca", str(empty)]) == 2
         assert main(["stop", "--address", NOWHERE, "--certificate", str(empty)]) == 2
 

@@ -138,7 +138,7 @@ def test_all_addresses_of_one_network_stand_in_one_line() -> None:
         scheduler = Scheduler(ScriptedWorkers(1), QueueLimits(100, 2))
         taken = scheduler.enter("2001:db8::1")
         waiting = [scheduler.enter(f"2001:db8::{number}") for number in (2, 3)]
-        with pytest.raises(RefusedError, match="of yours"):
+        with pytest.raises(RefusedError, match="of this caller"):
             scheduler.enter("2001:db8::4")
         others = [scheduler.enter(name) for name in ("2001:db8:0:1::1", "192.0.2.1", "192.0.2.2", "robot")]
         # One after the other: whoever has had a turn goes to the end.

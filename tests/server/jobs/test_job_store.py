@@ -56,12 +56,12 @@ def test_a_newer_or_foreign_database_is_not_touched(tmp_path: Path) -> None:
     with sqlite3.connect(path) as connection:
         connection.execute("UPDATE robosc_schema SET version = 3")
     connection.close()
-    with pytest.raises(StoreError, match="version 3, and this server knows version 2"):
+    with pytest.raises(StoreError, match="version 3, but this server supports version 2"):
         open_store(tmp_path)
     with sqlite3.connect(path) as connection:
         connection.execute("DROP TABLE robosc_schema")
     connection.close()
-    with pytest.raises(StoreError, match="of something else"):
+    with pytest.raises(StoreError, match="foreign tables"):
         open_store(tmp_path)
     path.write_bytes(b"This is no database, whatever its name says. " * 100)
     with pytest.raises(StoreError, match="not a database"):
@@ -71,10 +71,10 @@ def test_a_newer_or_foreign_database_is_not_touched(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("url", "message"),
     [
-        ("nonsense", "the database's URL is none"),
+        ("nonsense", "the database URL is invalid"),
         ("mysql://me:secret@host/name", "'mysql' is not supported"),
-        ("sqlite://", "names a file"),
-        ("sqlite:///:memory:", "names a file"),
+        ("sqlite://", "must name a file"),
+        ("sqlite:///:memory:", "must name a file"),
         ("postgresql://me:secret@127.0.0.1:1/name", "cannot be used"),
     ],
 )

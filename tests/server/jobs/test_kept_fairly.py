@@ -134,14 +134,14 @@ def test_a_greedy_caller_pushes_out_nothing_of_others(tmp_path: Path, monkeypatc
 
             await until(is_written)
             # Jobs refer to as much as may stay: whoever comes has to wait until there is room, which is soon.
-            with pytest.raises(RefusedError, match="when it has made room") as refused:
+            with pytest.raises(RefusedError, match="storage for job results is full") as refused:
                 await made.manager.submit(task_of("more"), you)
             assert refused.value.reason is Reason.SERVER_BUSY
             await made.manager.sweep()
             await made.manager.submit(task_of("more"), you)
             assert (await made.manager.get(theirs.id, you)).state is JobState.SUCCEEDED
             assert await made.store.find_result("of a call") is not None
-            with pytest.raises(RefusedError, match="no job of that id"):
+            with pytest.raises(RefusedError, match="no job with this id"):
                 await made.manager.get(greedy[0].id, ME)
             for job in greedy[1:]:
                 assert (await made.manager.get(job.id, ME)).state is JobState.SUCCEEDED
@@ -165,14 +165,14 @@ def test_beyond_the_bound_of_jobs_those_of_a_caller_are_forgotten_that_ended_fir
             await ended(made.manager, second.id)
             # Which began first, but has not ended.
             third, _ = await made.manager.submit(task_of(_NEVER), ME)
-            with pytest.raises(RefusedError, match="no job of that id"):
+            with pytest.raises(RefusedError, match="no job with this id"):
                 await made.manager.get(first.id, ME)
             assert await is_in(made.manager, second.id, JobState.FAILED)
             fourth, _ = await made.manager.submit(task_of(f"{_NEVER}\n4"), ME)
-            with pytest.raises(RefusedError, match="no job of that id"):
+            with pytest.raises(RefusedError, match="no job with this id"):
                 await made.manager.get(second.id, ME)
             # Now nothing has ended.
-            with pytest.raises(RefusedError, match="3 jobs of yours have not ended") as refused:
+            with pytest.raises(RefusedError, match="3 unfinished jobs") as refused:
                 await made.manager.submit(task_of("more"), ME)
             assert refused.value.reason is Reason.QUOTA_EXCEEDED
             assert await made.manager.submit(task_of(f"until {gate}"), ME, idempotency_key="k")

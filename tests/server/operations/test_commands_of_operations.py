@@ -91,7 +91,7 @@ def test_wrong_settings(capsys: pytest.CaptureFixture[str]) -> None:
     assert checked.document["ok"] is False
     assert len(checked.document["problems"]) == 2
     assert run_command(["check-config", "--task-nodes", "0"]) == 2
-    assert "--task-nodes: it should be" in capsys.readouterr().err
+    assert "--task-nodes: must be" in capsys.readouterr().err
 
 
 def test_certificates(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -106,19 +106,19 @@ def test_certificates(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Non
     checked = Checked(capsys, words[0], str(old), words[2], str(old_key))
     assert checked.status == 1
     yesterday = datetime.datetime.now(datetime.UTC) - datetime.timedelta(days=1)
-    assert f"{old}: has expired at {yesterday:%Y-%m-%d}" in checked.of("certificates")[0][1]
+    assert f"{old}: expired at {yesterday:%Y-%m-%d}" in checked.of("certificates")[0][1]
     checked = Checked(capsys, *words[:3], str(soon_key))
     assert "cannot be used" in checked.of("certificates")[0][1]
     (tmp_path / "empty").touch()
     checked = Checked(capsys, *words, "--client-ca", str(tmp_path / "empty"))
-    assert "no certificates in PEM" in checked.of("certificates")[0][1]
+    assert "no PEM certificates" in checked.of("certificates")[0][1]
 
 
 def test_tokens(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / "tokens"
     file.write_text(make_token("watcher", (Scope.WATCH,))[1])
     file.chmod(0o600)
-    assert "nobody is let in" in Checked(capsys, "--tokens", str(file)).of("tokens")[0][1]
+    assert "every call is refused" in Checked(capsys, "--tokens", str(file)).of("tokens")[0][1]
     file.write_text(make_token("caller", (Scope.SYNTHESIZE,))[1])
     assert Checked(capsys, "--tokens", str(file)).grade("tokens") == "ok"
     file.write_text("wrong")
@@ -184,7 +184,7 @@ def test_tables_of_another_version_are_told_and_nothing_is_left_behind(
     store = open_store(state)
     open_now = found()
     store.close()
-    assert open_now == [("warning", f"{state / DATABASE_FILE} is in use now by another robosc-server")]
+    assert open_now == [("warning", f"{state / DATABASE_FILE} is in use by another robosc-server")]
     assert found() == [("ok", f"SQLite in {state / DATABASE_FILE}")]
     newer = "UPDATE robosc_schema SET version = version + 1"
     # In the log of changes, which a server that was killed leaves, and later in the file itself.
@@ -200,14 +200,14 @@ def test_tables_of_another_version_are_told_and_nothing_is_left_behind(
     with pytest.raises(StoreError) as refused:
         open_store(state)
     assert message.removeprefix(f"{state / DATABASE_FILE}: ") in str(refused.value)
-    assert f"version {VERSION + 1}, and this server knows version {VERSION} and those before" in message
+    assert f"version {VERSION + 1}, but this server supports version {VERSION} and earlier" in message
 
 
 def test_a_database_that_a_running_server_has(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     state = tmp_path / "state"
     link = tmp_path / "link"
     link.symlink_to(state)
-    in_use = f"{DATABASE_FILE} is in use now by another robosc-server"
+    in_use = f"{DATABASE_FILE} is in use by another robosc-server"
     with held_store(state) as told:
         assert told == "open"
         before = {path.name for path in state.iterdir()}
@@ -277,7 +277,7 @@ def test_tables_of_another_version_in_postgresql(capsys: pytest.CaptureFixture[s
         engine.dispose()
         ((grade, message),) = Checked(capsys, "--database-url", url).of("database")
         assert grade == "error"
-        assert f"version {VERSION + 1}, and this server knows version {VERSION} and those before" in message
+        assert f"version {VERSION + 1}, but this server supports version {VERSION} and earlier" in message
         assert Checked(capsys, "--database-url", url.replace("test0", "nowhere")).grade("database") == "error"
 
 
@@ -329,7 +329,7 @@ def test_a_token_with_which_nothing_can_be_called(
     captured = capsys.readouterr()
     assert captured.out.startswith("robosc_")
     assert captured.out.count("\n") == 1
-    assert ("without the scope 'synthesize' nothing of this server can be called" in captured.err) is is_told
+    assert ("cannot be used with this server: it lacks the scope 'synthesize'" in captured.err) is is_told
     assert parse_tokens(captured.err.splitlines()[-1], "line")
 
 
@@ -345,7 +345,7 @@ def test_a_server_that_lets_nobody_in_says_so(tmp_path: Path, caplog: pytest.Log
     file = tmp_path / "tokens"
     file.write_text(make_token("watcher", (Scope.WATCH, Scope.ADMIN))[1])
     file.chmod(0o600)
-    words = f"{file}: no token has the scope 'synthesize', so nobody is let in"
+    words = f"{file}: no token has the scope 'synthesize', so every call is refused"
     with served(given_workers=StartedWorkers(), tokens=file):
         pass
     assert caplog.text.count(words) == 1

@@ -113,7 +113,7 @@ def test_conditions_are_asked_for_again_and_again_and_who_raises_says_no() -> No
 
     with logged() as log:
         limited(run())
-    assert [line["condition"] for line in log.lines("condition does not hold")] == ["store"]
+    assert [line["condition"] for line in log.lines("condition not met")] == ["store"]
 
 
 async def is_draining(channel: Any) -> bool:
@@ -202,7 +202,7 @@ def test_connections_that_grpc_does_not_let_go_of_keep_nobody_from_ending(monkey
 
     with logged() as log:
         limited(drain(Stuck(), Health({}), CallInterceptor(Metrics("1")), 0.0))
-    assert len(log.lines("gRPC does not let go of its connections; they end with the process")) == 1
+    assert len(log.lines("gRPC has not closed its connections in time; they end with the process")) == 1
 
 
 def test_what_does_not_end_is_cancelled_and_what_is_idle_is_not_waited_for() -> None:

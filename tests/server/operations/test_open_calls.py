@@ -76,14 +76,14 @@ def test_a_caller_has_its_places_and_no_more(small: str) -> None:
         hold(first, 4)
         hold(second, 3)
         assert eventually(lambda: first.ended + second.ended == 3)
-        assert any(each.was_told(b"may have 4 calls open") for each in (first, second))
+        assert any(each.was_told(b"limit of 4 open calls") for each in (first, second))
         # Another one, by its address.
         assert is_answered(small)
     with strangers(small, 1) as (ours,):
         # One more than there are places for: when it is refused, the others have theirs.
         hold(ours, 5)
         assert eventually(lambda: ours.ended == 1)
-        words = "a caller may have 4 calls open at once, watches included"
+        words = "the caller has reached its limit of 4 open calls, watches included; try again later"
         assert refusal(small) == ("QUOTA_EXCEEDED", words)
         assert health(small)
     assert eventually(lambda: is_answered(small))
@@ -158,7 +158,7 @@ def test_an_answer_that_nobody_reads_keeps_its_place(small: str) -> None:
         for number in range(5):
             deaf.call(2 * number + 1, GET_VERSION)
             deaf.message(2 * number + 1, b"")
-        assert eventually(lambda: deaf.was_told(b"may have 4 calls open"))
+        assert eventually(lambda: deaf.was_told(b"limit of 4 open calls"))
 
 
 def test_a_token_says_how_many(tmp_path: Path) -> None:
@@ -175,10 +175,10 @@ def test_a_token_says_how_many(tmp_path: Path) -> None:
         with strangers(address, 1) as (stranger,):
             hold(stranger, 3, metadata=tokens[0])
             assert eventually(lambda: stranger.ended == 1)
-            assert "have 2 calls" in refusal(address, metadata=few)[1]
+            assert "limit of 2 open calls" in refusal(address, metadata=few)[1]
             assert is_answered(address, metadata=usual)
         with strangers(address, 1) as (stranger,):
             hold(stranger, 5, metadata=tokens[1])
             assert eventually(lambda: stranger.ended == 1)
-            assert "have 4 calls" in refusal(address, metadata=usual)[1]
+            assert "limit of 4 open calls" in refusal(address, metadata=usual)[1]
             assert is_answered(address, metadata=few)

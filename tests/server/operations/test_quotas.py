@@ -67,7 +67,7 @@ def test_so_many_tasks_in_a_minute_and_then_at_their_pace(tmp_path: Path) -> Non
     for _ in range(6):
         quotas.admit("a")
     error = refused(quotas, "a")
-    assert error.message == "the token may ask for 6 tasks in a minute"
+    assert error.message == "the token has used up its quota of 6 tasks per minute"
     assert error.retry_after_s == pytest.approx(10.0)
     for _ in range(100):
         quotas.admit("b")
@@ -98,7 +98,7 @@ def test_time_of_a_processor_is_counted_afterwards(tmp_path: Path) -> None:
     quotas.admit("a")
     quotas.spent("a", 40.0)
     error = refused(quotas, "a")
-    assert error.message == "the token's tasks may take 100 seconds of a processor's time in an hour"
+    assert error.message == "the token has used up its quota of 100 CPU seconds per hour"
     assert error.retry_after_s == pytest.approx(30 * 36)
     clock.now_s += 30 * 36 + 1
     quotas.admit("a")
@@ -138,7 +138,7 @@ def test_the_line_before_the_workers_keeps_to_a_tokens_own_bound_and_notes_what_
         at_work = scheduler.enter("timed")
         overtaken = asyncio.create_task(scheduler.run(task_of("a"), "timed", TaskLimits(), drop))
         little = scheduler.enter("little")
-        with pytest.raises(RefusedError, match="too many requests of yours"):
+        with pytest.raises(RefusedError, match="too many tasks of this caller"):
             scheduler.enter("little")
         for _ in range(3):
             scheduler.leave(scheduler.enter("anybody"))

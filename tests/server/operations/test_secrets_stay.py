@@ -51,7 +51,7 @@ def program(folder: Path, *words: str) -> Iterator[tuple[str, str]]:
         assert line.startswith("robosc-server listening on "), (folder / "log").read_text()
         yield (
             line.split()[-1],
-            next(entry["address"] for entry in log_of(folder) if entry["event"] == "metrics are shown"),
+            next(entry["address"] for entry in log_of(folder) if entry["event"] == "metrics endpoint is listening"),
         )
         process.send_signal(signal.SIGTERM)
         assert process.wait(PATIENCE_S) == 0

@@ -112,7 +112,7 @@ def test_how_a_worker_died_is_logged_and_an_exception_in_it_is_not() -> None:
         facts = exit_description(ProcessExit(-11, 1.5, 2**20))
         died = public_failure(Failure(Reason.WORKER_DIED, "it died", f"{facts}\nFatal Python error\n{MARKER}"))
         fault = public_failure(Failure(Reason.INTERNAL_FAULT, "a fault", f"Traceback\nKeyError: {MARKER}"))
-    ending = "was ended by SIGSEGV after 1.50 s of a processor's time, with at most 1048576 bytes resident"
+    ending = "was ended by SIGSEGV after 1.50 s of CPU time, with at most 1048576 bytes resident"
     assert log.lines("fault")[0]["ending"] == ending
     assert MARKER not in log.text
     assert [line["reason"] for line in log.lines("fault")] == ["WORKER_DIED", "INTERNAL_FAULT"]
@@ -123,8 +123,8 @@ def test_how_a_worker_died_is_logged_and_an_exception_in_it_is_not() -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        f"was ended by SIGSEGV after 1.50 s of a processor's time, with at most 1 bytes resident{MARKER}",
-        f"{MARKER}\nwas ended by SIGSEGV after 1.50 s of a processor's time, with at most 1 bytes resident",
+        f"was ended by SIGSEGV after 1.50 s of CPU time, with at most 1 bytes resident{MARKER}",
+        f"{MARKER}\nwas ended by SIGSEGV after 1.50 s of CPU time, with at most 1 bytes resident",
         f'  File "/x/robosc_server/{MARKER}.py", line 3, in run\n',
         f'  File "/x/{MARKER}/x.py", line 3, in {MARKER}\n',
         f'  File "/x/robosc_server/tasks/run.py", line 3, in {MARKER}\n',

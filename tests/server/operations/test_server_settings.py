@@ -95,20 +95,20 @@ def test_every_problem_is_told_with_its_place(
         capsys, "--config", str(file), "--database-url", "secret", "--result-bytes", "3 apples", "--host", "a b"
     )
     assert set(found) == {
-        f"{file}: port: a whole number is needed",
-        f"{file}: prot: there is no such setting; `robosc-server example-config` prints all",
-        f"{file}: part: there is no such setting; `robosc-server example-config` prints all",
-        f"{file}: task_seconds: it should be a finite number",
-        f"{file}: bundle_files: a whole number is needed",
-        f"{file}: waiting_tasks: a whole number is needed",
-        f"{file}: workers: after :// there is HOST:PORT",
-        f"{file}: log_format: it should be 'text' or 'json'",
-        f"{file}: metrics_address: HOST:PORT is needed",
-        f"{file}: tls_key: a text is needed",
-        "$ROBOSC_SERVER_TASK_NODES: it should be greater than or equal to 1",
-        "--database-url: postgresql://USER:PASSWORD@HOST:PORT/NAME or sqlite:///FILE is needed",
-        "--result-bytes: a number of bytes such as 1048576 or 1MiB is needed",
-        "--host: a name or address is needed",
+        f"{file}: port: must be a whole number",
+        f"{file}: prot: unknown setting; `robosc-server example-config` lists all settings",
+        f"{file}: part: unknown setting; `robosc-server example-config` lists all settings",
+        f"{file}: task_seconds: must be a finite number",
+        f"{file}: bundle_files: must be a whole number",
+        f"{file}: waiting_tasks: must be a whole number",
+        f"{file}: workers: must have HOST:PORT after ://",
+        f"{file}: log_format: must be 'text' or 'json'",
+        f"{file}: metrics_address: must be HOST:PORT",
+        f"{file}: tls_key: must be a text",
+        "$ROBOSC_SERVER_TASK_NODES: must be greater than or equal to 1",
+        "--database-url: must be postgresql://USER:PASSWORD@HOST:PORT/NAME or sqlite:///FILE",
+        "--result-bytes: must be a number of bytes, such as 1048576 or 1MiB",
+        "--host: must be a host name or an address",
     }
 
 
@@ -139,16 +139,16 @@ def test_files_that_are_none(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert "No such file" in problems(capsys, "--config", str(tmp_path / "none"))[0]
     secret = written(tmp_path, 'database_url = "postgresql://u:password@h/n')
     (problem,) = problems(capsys, "--config", str(secret))
-    assert problem.startswith(f"{secret}: not TOML")
+    assert problem.startswith(f"{secret}: not valid TOML")
     assert "password" not in problem
     (tmp_path / "server.toml").write_bytes(b"\xff\xfe")
-    with pytest.raises(SettingsError, match="not TOML"):
+    with pytest.raises(SettingsError, match="not valid TOML"):
         read_file(secret)
     written(tmp_path, "#" * (MAXIMUM_FILE_BYTES + 1))
     with pytest.raises(SettingsError, match="larger than"):
         read_file(secret)
     written(tmp_path, "a = " + "[" * 100_000)
-    with pytest.raises(SettingsError, match="not TOML"):
+    with pytest.raises(SettingsError, match="not valid TOML"):
         read_file(secret)
 
 

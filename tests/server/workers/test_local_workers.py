@@ -71,7 +71,7 @@ class TestLimits:
     def test_memory(self, running: Running, text: str) -> None:
         failure = running.failure(text, replace(LIMITS, memory_bytes=2**28))
         assert failure.reason is Reason.MEMORY_LIMIT
-        assert failure.message == "the work took more memory than a task may have"
+        assert failure.message == "the task exceeded its memory limit"
 
     def test_processor_time(self, running: Running) -> None:
         # Side by side: the kernel counts in whole seconds.
@@ -79,7 +79,7 @@ class TestLimits:
         for failure in (task.result(PATIENCE_S) for task in tasks):
             assert isinstance(failure, Failure)
             assert failure.reason is Reason.CPU_LIMIT
-            assert failure.message == "the work took more of a processor's time than a task may have"
+            assert failure.message == "the task exceeded its CPU time limit"
 
     def test_time_by_the_clock(self) -> None:
         clock = HeldLoop()
@@ -92,7 +92,7 @@ class TestLimits:
                 clock.advance(49.0)
                 assert not future.done()
                 clock.advance(1.0)
-                told = Failure(Reason.TIME_LIMIT, "the work took longer than a task may take")
+                told = Failure(Reason.TIME_LIMIT, "the task exceeded its time limit")
                 assert future.result(PATIENCE_S) == told
             loop.run(workers.__aexit__())
 
@@ -113,7 +113,7 @@ class TestDeaths:
             ("exit 0", "the worker process ended with status 0 and no answer"),
             ("die 9", "the worker process was ended by SIGKILL"),
             ("die 11", "the worker process was ended by SIGSEGV"),
-            ("garbage", "the worker process sent what is no answer"),
+            ("garbage", "the worker process sent an invalid answer"),
         ],
     )
     def test_a_process_that_dies_ends_its_task_alone(self, running: Running, text: str, message: str) -> None:
@@ -174,15 +174,15 @@ class TestDeaths:
         os.kill(again, signal.SIGCONT)
         assert said(future.result(60)) == "twice"
         assert running.local.restarts == restarts + 1
-        told = "ended with status -9; it is started again; tasks under way: check 0000000000000000"
-        assert f"the process that starts workers {told}" in caplog.text
+        told = "ended with status -9; restarting it; tasks under way: check 0000000000000000"
+        assert f"the fork server of the workers {told}" in caplog.text
         assert eventually(lambda: has_ended(pid))
 
         future, reports = running.start("pid\nsleep 600")
         for count in (1, 2):
             assert eventually(lambda count=count: len(reports) == count)  # type: ignore[misc]
             os.kill(parent_of(int(reports[-1].message)), signal.SIGKILL)
-        with pytest.raises(WorkerLostError, match="ended twice under one task"):
+        with pytest.raises(WorkerLostError, match="ended twice during one task"):
             future.result(60)
         assert said(running.run("echo again")) == "again"
 
@@ -227,9 +227,9 @@ class TestDeaths:
             fork_server = parent_of(pid)
             loop.run(workers.__aexit__())
             assert eventually(lambda: has_ended(pid) and has_ended(fork_server))
-            with pytest.raises(WorkersError, match="have ended"):
+            with pytest.raises(WorkersError, match="workers are shut down"):
                 future.result(60)
-            with pytest.raises(WorkersError, match="have ended"):
+            with pytest.raises(WorkersError, match="workers are shut down"):
                 running.run("echo")
 
 

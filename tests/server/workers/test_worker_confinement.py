@@ -130,7 +130,7 @@ class TestHostileCode:
                 pass
         error: Any = caught.value
         assert error.code() is grpc.StatusCode.INTERNAL
-        assert "sent what is no answer" in error.details()
+        assert "sent an invalid answer" in error.details()
         assert tried(fake, "list /") == "EACCES"
 
 
@@ -204,7 +204,7 @@ def without(number: int, *command: str, instead: int = 0x50026) -> list[str]:
 
 
 LANDLOCK = 444
-NO_LANDLOCK = "files can be read (no Landlock): Function not implemented"
+NO_LANDLOCK = "file access is not restricted (no Landlock): Function not implemented"
 
 
 class TestAKernelWithoutAPart:
@@ -212,7 +212,10 @@ class TestAKernelWithoutAPart:
         command = without(LANDLOCK, "-m", "robosc_server.main", "--port", "0", "--state-dir", str(tmp_path / "state"))
         told = subprocess.run([*command, "--confinement", "required"], capture_output=True, text=True, timeout=100)
         assert told.returncode == 1
-        assert f"robosc-server: workers cannot be confined as they must be here: {NO_LANDLOCK}" in told.stderr
+        assert (
+            f"robosc-server: confinement is required, but this machine cannot confine workers: {NO_LANDLOCK}"
+            in told.stderr
+        )
 
     def test_a_server_that_does_not_need_it_tells_and_keeps_the_rest(self, tmp_path: Path) -> None:
         program = (
@@ -234,14 +237,14 @@ class TestAKernelWithoutAPart:
         command = without(LANDLOCK, "-c", program)
         told = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100)
         assert told.stdout.splitlines() == [str((NO_LANDLOCK,)), "done", "EPERM", "EPERM"]
-        assert told.stderr.splitlines() == [f"workers are not confined as they should be: {NO_LANDLOCK}"]
+        assert told.stderr.splitlines() == [f"workers are not fully confined: {NO_LANDLOCK}"]
 
     @pytest.mark.parametrize(
         ("is_there", "setting", "grade", "message", "status"),
         [
             (False, "required", "error", NO_LANDLOCK, 1),
             (False, "best-effort", "warning", NO_LANDLOCK, 0),
-            (True, "required", "ok", "workers reach no files but programs, no network and no other process", 0),
+            (True, "required", "ok", "workers can access only program files, no network and no other process", 0),
         ],
     )
     def test_is_told_before_a_server_is_started(
@@ -257,7 +260,7 @@ class TestAKernelWithoutAPart:
     def test_also_where_who_tries_it_is_ended(self) -> None:
         command = without(LANDLOCK + 2, "-m", "robosc_server.workers.sandbox", instead=KILL)
         told = subprocess.run(command, capture_output=True, text=True, timeout=100)
-        assert json.loads(told.stdout) == ["files can be read (no Landlock): who tries it is ended"]
+        assert json.loads(told.stdout) == ["file access is not restricted (no Landlock): the attempt was killed"]
 
 
 class TestTheServerItself:

@@ -34,7 +34,7 @@ from support.answers import (
     verification,
     watched,
 )
-from support.client_commands import FINDING, MADE, MODEL, NOTHING, SUCCEEDED, job_answers, run
+from support.client_commands import FINDING, MADE, MODEL, NOTHING, SUCCEEDED, interrupted, job_answers, run
 from support.models import bundle_of
 from support.scripted_service import Refusal, scripted
 from support.waiting import PATIENCE_S
@@ -491,13 +491,8 @@ class TestBench:
         refusal = Refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, "busy", "SERVER_BUSY", 1.0)
         with scripted(Check=[[pb.CheckResponse()], [refusal], [pb.CheckResponse()], [stuck]]) as (address, _):
             words = ["-m", "robosc_client.command", "bench", MODEL, "-c", "1", "--server", address, *json_flag]
-            with subprocess.Popen(
-                [sys.executable, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-            ) as process:
-                assert begun.wait(PATIENCE_S)
-                process.send_signal(signal.SIGINT)
-                output, error = process.communicate(timeout=PATIENCE_S)
-        assert (process.returncode, error) == (130, "robosc-client: interrupted\n")
+            status, output, error = interrupted(words, begun)
+        assert (status, error) == (130, "robosc-client: interrupted\n")
         if json_flag:
             told = json.loads(output)
             assert (told["calls"], told["errors"], told["interrupted"]) == (2, {"SERVER_BUSY": 1}, True)

@@ -25,6 +25,7 @@ from robosc_client.main import main as robosc_client
 from support.answers import exploration, job, supervisor, synthesis, verification
 from support.background import has_ended
 from support.certificates import Authority
+from support.client_commands import interrupted
 from support.fake_tasks import TASK_FUNCTION
 from support.health_servers import answering
 from support.long_work import long_work
@@ -645,13 +646,8 @@ class TestPrograms:
         with scripted(**answers) as (address, _):
             given = [str(model) if word == "MODEL" else word for word in command]
             words = ["-m", "robosc_client.command", *given, "--server", address]
-            with subprocess.Popen(
-                [sys.executable, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-            ) as process:
-                assert begun.wait(PATIENCE_S)
-                process.send_signal(signal.SIGINT)
-                output, error = process.communicate(timeout=PATIENCE_S)
-            assert (process.returncode, output, error) == (130, "", "robosc-client: interrupted\n")
+            status, output, error = interrupted(words, begun)
+            assert (status, output, error) == (130, "", "robosc-client: interrupted\n")
             assert ended.wait(PATIENCE_S)
 
     @pytest.mark.parametrize("json", [[], ["--json"]])

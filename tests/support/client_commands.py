@@ -1,5 +1,9 @@
 """Commands of the client in this process, and what a server that a test has written answers them with."""
 
+import signal
+import subprocess
+import sys
+import threading
 from typing import Any
 
 import pytest
@@ -11,6 +15,7 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.main import main
 from support.answers import enveloped, job, supervisor
 from support.models import EXAMPLES, example_bundle
+from support.waiting import PATIENCE_S
 
 MODEL = str(EXAMPLES / "line_follower" / "line_follower.rscd")
 
@@ -36,6 +41,17 @@ def run(capfd: pytest.CaptureFixture[str], *arguments: Any) -> Any:
     printed = capfd.readouterr()
     assert "Traceback" not in printed.err
     return status, printed.out, printed.err
+
+
+def interrupted(words: list[str], begun: threading.Event) -> tuple[int, str, str]:
+    """Exit status, output and errors of a program that is interrupted once its call has begun."""
+    with subprocess.Popen(
+        [sys.executable, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert begun.wait(PATIENCE_S)
+        process.send_signal(signal.SIGINT)
+        output, error = process.communicate(timeout=PATIENCE_S)
+    return process.returncode, output, error
 
 
 def job_answers(kind: str, messages: Any) -> Any:

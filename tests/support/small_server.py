@@ -1,5 +1,6 @@
 """A small real server of grpc.aio, whose handlers a test writes, and a log that it can read."""
 
+import asyncio
 import io
 import json
 import logging
@@ -12,11 +13,31 @@ import grpc.aio
 import structlog
 from google.rpc import error_details_pb2, status_pb2
 
-from robosc_server.operations.logs import configure_logging
+from robosc_server.failures import RefusedError
+from robosc_server.operations.logs import REQUEST_ID, configure_logging
 from robosc_server.operations.settings import LogFormat, LogLevel
+from robosc_server.tasks.task import Reason
 from support.waiting import PATIENCE_S
 
 SERVICE = "test.Service"
+
+MARKER = "a_word_of_the_model"
+
+
+async def answer(request: bytes, context: Any) -> bytes:
+    """A unary handler that ends as the request says; else it returns the id of the request."""
+    match request:
+        case b"busy":
+            raise RefusedError(Reason.SERVER_BUSY, "come again", 1.5)
+        case b"fault":
+            raise KeyError(MARKER)
+        case b"abort":
+            await context.abort(grpc.StatusCode.DATA_LOSS, "lost")
+        case b"stuck":
+            await asyncio.Event().wait()
+        case b"code":
+            context.set_code(grpc.StatusCode.ABORTED)
+    return REQUEST_ID.get().encode()
 
 
 @asynccontextmanager

@@ -6,30 +6,10 @@ from typing import Any
 import grpc
 import pytest
 
-from robosc_server.failures import RefusedError
 from robosc_server.operations.interceptor import CallInterceptor
-from robosc_server.operations.logs import REQUEST_ID
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.settings import LogLevel
-from robosc_server.tasks.task import Reason
-from support.small_server import SERVICE, logged
-
-MARKER = "a_word_of_the_model"
-
-
-async def answer(request: bytes, context: Any) -> bytes:
-    match request:
-        case b"busy":
-            raise RefusedError(Reason.SERVER_BUSY, "come again", 1.5)
-        case b"fault":
-            raise KeyError(MARKER)
-        case b"abort":
-            await context.abort(grpc.StatusCode.DATA_LOSS, "lost")
-        case b"stuck":
-            await asyncio.Event().wait()
-        case b"code":
-            context.set_code(grpc.StatusCode.ABORTED)
-    return REQUEST_ID.get().encode()
+from support.small_server import SERVICE, answer, logged
 
 
 @pytest.mark.real_time

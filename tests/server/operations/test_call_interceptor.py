@@ -12,32 +12,13 @@ from opentelemetry.sdk.trace.export import SimpleSpanProcessor
 from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
 
 from robosc_api.security import Guard, Rule, Scope, TokenFile, make_token
-from robosc_server.failures import RefusedError
 from robosc_server.operations.interceptor import CallInterceptor
 from robosc_server.operations.logs import REQUEST_ID
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.settings import LogLevel
 from robosc_server.operations.tracing import OtlpTracing
-from robosc_server.tasks.task import Reason
-from support.small_server import SERVICE, Ended, call, logged, small_server
+from support.small_server import MARKER, SERVICE, Ended, answer, call, logged, small_server
 from support.waiting import PATIENCE_S, limited, until
-
-MARKER = "a_word_of_the_model"
-
-
-async def answer(request: bytes, context: Any) -> bytes:
-    match request:
-        case b"busy":
-            raise RefusedError(Reason.SERVER_BUSY, "come again", 1.5)
-        case b"fault":
-            raise KeyError(MARKER)
-        case b"abort":
-            await context.abort(grpc.StatusCode.DATA_LOSS, "lost")
-        case b"stuck":
-            await asyncio.Event().wait()
-        case b"code":
-            context.set_code(grpc.StatusCode.ABORTED)
-    return REQUEST_ID.get().encode()
 
 
 def outcome(request: bytes, metrics: Metrics | None = None, unary: Any = answer, **more: Any) -> Ended:
@@ -102,7 +83,7 @@ def test_a_fault_is_told_by_its_id_alone() -> None:
     (line,) = log.lines("fault")
     assert line["fault"] in ended.message
     assert line["error"] == "KeyError"
-    assert "test_call_interceptor.py" in line["places"][-1]
+    assert "small_server.py" in line["places"][-1]
     assert line["request"] == ended.trailing["x-request-id"]
     assert MARKER not in log.text + ended.message
 

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 from datetime import datetime
-from enum import StrEnum
 
+from robosc_api.jobs import JobState, TaskKind
 from robosc_client.results import Progress
 
 MAXIMUM_LABEL = 200
@@ -11,33 +11,6 @@ MAXIMUM_LABEL = 200
 
 MAXIMUM_IDEMPOTENCY_KEY = 128
 """Characters of an idempotency key."""
-
-
-class TaskKind(StrEnum):
-    """Kind of a task."""
-
-    CHECK = "check"
-    SYNTHESIZE = "synthesize"
-    GENERATE = "generate"
-    EXPLORE = "explore"
-    VERIFY = "verify"
-    FORMAT = "format"
-
-
-class JobState(StrEnum):
-    """State of a job."""
-
-    QUEUED = "queued"
-    RUNNING = "running"
-    SUCCEEDED = "succeeded"
-    """It has a result, also one that says that a model has errors."""
-    FAILED = "failed"
-    CANCELLED = "cancelled"
-
-    @property
-    def has_ended(self) -> bool:
-        """True if the state does not change any more."""
-        return self not in (JobState.QUEUED, JobState.RUNNING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,3 +78,6 @@ class Submission:
 
     job: Job
     existed: bool
+
+
+__all__ = ["MAXIMUM_IDEMPOTENCY_KEY", "MAXIMUM_LABEL", "Job", "JobFailure", "JobState", "Submission", "TaskKind"]

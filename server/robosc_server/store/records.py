@@ -3,8 +3,8 @@
 import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
+from robosc_api.jobs import JobState
 from robosc_server.tasks.task import Failure, Report, TaskKind
 
 STEP = 2**20
@@ -18,22 +18,7 @@ _BLOCK_BYTES = 512 * 1024
 _LENGTH = struct.Struct("<I")
 
 
-class JobState(StrEnum):
-    """State of a job."""
-
-    QUEUED = "queued"
-    RUNNING = "running"
-    SUCCEEDED = "succeeded"
-    FAILED = "failed"
-    CANCELLED = "cancelled"
-
-    @property
-    def has_ended(self) -> bool:
-        """True if the state does not change any more."""
-        return self not in ACTIVE
-
-
-ACTIVE = frozenset({JobState.QUEUED, JobState.RUNNING})
+ACTIVE = frozenset(state for state in JobState if not state.has_ended)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,3 +108,6 @@ def messages_of(block: bytes) -> Iterator[bytes]:
         place += _LENGTH.size
         yield block[place : place + size]
         place += size
+
+
+__all__ = ["ACTIVE", "STEP", "JobFilter", "JobRecord", "JobState", "blocks_of", "messages_of"]

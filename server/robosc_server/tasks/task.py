@@ -3,16 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-
-class TaskKind(StrEnum):
-    """Kind of a task; each has a message of the API for its request, and one for its responses."""
-
-    CHECK = "check"
-    SYNTHESIZE = "synthesize"
-    GENERATE = "generate"
-    EXPLORE = "explore"
-    VERIFY = "verify"
-    FORMAT = "format"
+from robosc_api.jobs import TaskKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,3 +101,5 @@ class Failure:
 
 
 type Outcome = Result | Failure
+
+__all__ = ["Failure", "Outcome", "Reason", "Report", "Result", "Task", "TaskKind", "TaskLimits"]

@@ -76,9 +76,6 @@ class Synthesis(Outcome):
     def _made(self) -> object:
         return self.summary
 
-    def _why(self) -> object:
-        return self.explanation
-
 
 class StateValues(msgspec.Struct, frozen=True, gc=False):
     """One state of the robot under its supervisor.
@@ -133,9 +130,6 @@ class Exploration(Outcome):
 
     def _made(self) -> object:
         return self.graph
-
-    def _why(self) -> object:
-        return self.explanation
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,9 +38,6 @@ class Exploration(Outcome):
     def _made(self) -> object:
         return self.graph
 
-    def _why(self) -> object:
-        return self.explanation if isinstance(self.explanation, EmptyExplanation) else None
-
 
 def explore(
     model: ModelLike | CoreSupervisor,

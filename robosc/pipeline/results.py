@@ -103,9 +103,10 @@ class Outcome:
         """The value that was made, or None."""
         return None
 
-    def _why(self) -> object:
+    def _why(self) -> EmptyExplanation | None:
         """An explanation of why nothing was made, beyond the reason; None where there is none."""
-        return None
+        explanation = getattr(self, "explanation", None)
+        return explanation if isinstance(explanation, EmptyExplanation) else None
 
     def __repr__(self) -> str:
         made = self._made()
@@ -175,9 +176,6 @@ class Generation(Outcome):
 
     def _made(self) -> object:
         return self.files
-
-    def _why(self) -> object:
-        return self.explanation
 
 
 @dataclass(frozen=True, slots=True, repr=False)

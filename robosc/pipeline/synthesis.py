@@ -60,9 +60,6 @@ class Synthesis(Outcome):
     def _made(self) -> object:
         return self.supervisor
 
-    def _why(self) -> object:
-        return self.explanation if isinstance(self.explanation, EmptyExplanation) else None
-
 
 @overload
 def synthesize(

@@ -20,7 +20,7 @@ from robosc.language import load_bundle
 from robosc.model import check
 from robosc.model.layers import layer_findings
 from robosc.model.structure import Deployment, Model
-from robosc_bridge.configuration import init, load, schema, tie
+from robosc_bridge.configuration import init, load, map_channels, schema
 from robosc_bridge.configuration.structure import TURTLEBOTS
 from robosc_bridge.configuration.template import DriveDriver, ScannerDriver
 from robosc_bridge.daemon.assembly import assemble, check_settings, safety_limits
@@ -37,7 +37,7 @@ from robosc_bridge.daemon.supervisors import (
     obtain,
     trusted_keys,
 )
-from robosc_bridge.drivers import Kind, available_drivers
+from robosc_bridge.driver_registry import Kind, available_drivers
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.health_check import add_command as add_health_command
 from robosc_bridge.terminal.commands import add_commands
@@ -162,11 +162,11 @@ def _model(file: Path, deployment: Deployment = Deployment.CONTROLLER) -> Model:
 def _check(arguments: argparse.Namespace) -> int:
     loaded = load(arguments.config)
     deployment = arguments.deployment or Deployment.CONTROLLER
-    ties = tie(_model(arguments.model, deployment), loaded.configuration, loaded.document)
+    mapping = map_channels(_model(arguments.model, deployment), loaded.configuration, loaded.document)
     # What `run` asks, too, by `assemble`.
-    check_settings(loaded.configuration, ties, deployment)
+    check_settings(loaded.configuration, mapping, deployment)
     trusted_keys(loaded.configuration.supervisor.trusted_keys)
-    sys.stdout.write(f"{arguments.config}: {len(ties.communications)} communications are tied\n")
+    sys.stdout.write(f"{arguments.config}: {len(mapping.communications)} communications are mapped\n")
     return OK
 
 
@@ -216,12 +216,12 @@ def _run(arguments: argparse.Namespace) -> int:
     kept = None if server is None else kept_folder(arguments.keep, configuration.supervisor)
     source = Source(arguments.model, deployment, server, kept, trusted, credentials, arguments.allow_livelock)
     supervisor = obtain(source, tell)
-    ties = tie(supervisor.model, configuration, loaded.document)
+    mapping = map_channels(supervisor.model, configuration, loaded.document)
     log: EventLog = NullLog()
     if configuration.log.folder is not None:
         log = open_event_log(configuration.log.folder, supervisor.model.name, time.time())
     try:
-        machine = assemble(configuration, ties, supervisor, log, deployment, starts_itself=not arguments.standby)
+        machine = assemble(configuration, mapping, supervisor, log, deployment, starts_itself=not arguments.standby)
         faces = make_faces(configuration, machine.operations, safety_limits(configuration))
         for number in _SIGNALS:
             signal.signal(number, lambda *_: machine.quit())

@@ -10,7 +10,7 @@ from robosc.execution.runtime.clock import ManualClock
 from robosc.execution.runtime.event_log import MemoryLog
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
-from robosc_bridge.configuration import parse, tie
+from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.loop import Daemon
@@ -107,12 +107,18 @@ class Scene:
     ) -> None:
         supervisor = supervisor_of(model, Deployment.LAYER if is_layer else Deployment.CONTROLLER)
         configuration = parse(text.encode(), "test.yaml").configuration
-        ties = tie(supervisor.model, configuration)
+        mapping = map_channels(supervisor.model, configuration)
         self.clock = ManualClock(now_s=50.0)
         self.log = MemoryLog()
         self.safety = SafetyLayer(LIMITS)
         job = Job(
-            supervisor, ties, ties.settings(configuration.execution), needs_scanner, starts_itself, stays, is_layer
+            supervisor,
+            mapping,
+            mapping.settings(configuration.execution),
+            needs_scanner,
+            starts_itself,
+            stays,
+            is_layer,
         )
         stop = EmergencyStop(configuration.skills.emergency_stop)
         self.feed = Feed()

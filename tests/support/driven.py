@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from robosc.execution.runtime.event_log import MemoryLog
-from robosc_bridge.configuration import parse, tie
+from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.daemon.assembly import Machine, assemble, safety_limits
 from robosc_bridge.daemon.states import State
 from robosc_bridge.host import Host, Thread
@@ -294,8 +294,8 @@ def driven(
         before(robot)
         configuration = parse(configured(robot, base, lidar, sections).encode(), "test.yaml").configuration
         log = HangingLog(host)
-        ties = tie(supervisor.model, configuration)
-        machine = assemble(configuration, ties, supervisor, log, starts_itself=True, host=host)
+        mapping = map_channels(supervisor.model, configuration)
+        machine = assemble(configuration, mapping, supervisor, log, starts_itself=True, host=host)
         found = Driven(host, robot, machine, safety_limits(configuration), log, trace, handler.texts)
         found.thread.start()
         try:

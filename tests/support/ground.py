@@ -12,7 +12,7 @@ from robosc.execution.runtime.event_log import Entry
 from robosc.model import check
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
-from robosc_bridge.configuration import parse, tie
+from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.daemon.feed import Feed, Snapshot
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.programs import FromProgram
@@ -113,11 +113,11 @@ class PlayedDaemon:
         assert checked.model is not None, checked.diagnostics
         self.feed = Feed()
         configuration = parse(self.configuration.encode(), "test.yaml").configuration
-        ties = tie(checked.model, configuration)
+        mapping = map_channels(checked.model, configuration)
         deployment = Deployment.LAYER if self.is_layer else Deployment.CONTROLLER
         supervisor = Supervisor(checked.model, deployment, (), CERTIFICATE)
         self.operations = Operations(
-            supervisor, ties, self.feed, self._post, self._operator_seen, is_layer=self.is_layer
+            supervisor, mapping, self.feed, self._post, self._operator_seen, is_layer=self.is_layer
         )
         self.snapshot = STANDBY
         self._showing = threading.Lock()

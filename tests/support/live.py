@@ -18,8 +18,8 @@ from msgspec import structs
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
+from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import GrpcChannel
-from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.feed import Feed, Snapshot
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.programs import FromProgram
@@ -113,8 +113,10 @@ class LiveRobot:
         self._number = 0
         self._begin_s = time.monotonic()
         self._lock = threading.Lock()
-        ties = Ties({item.name: GrpcChannel() for item in self._model.communications}, self._model.communications)
-        self.operations = Operations(supervisor, ties, self.feed, self._post, lambda: None, is_layer=False)
+        mapping = ChannelMapping(
+            {item.name: GrpcChannel() for item in self._model.communications}, self._model.communications
+        )
+        self.operations = Operations(supervisor, mapping, self.feed, self._post, lambda: None, is_layer=False)
         self._names = [f"{item.name}.request" for item in self._model.communications if _is_requested(item.kind)]
         self.show()
 

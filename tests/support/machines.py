@@ -5,7 +5,7 @@ import sys
 from robosc.certification import make_supervisor
 from robosc.execution.runtime.event_log import NullLog
 from robosc.supervisor import Supervisor
-from robosc_bridge.configuration import parse, tie
+from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.daemon.assembly import Machine, assemble
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.errors import BridgeError
@@ -25,8 +25,8 @@ def controller() -> Supervisor:
 def machine(supervisor: Supervisor, text: str, *, starts_itself: bool = True, host: Host = SYSTEM_HOST) -> Machine:
     """Return what is assembled of the text of a configuration."""
     configuration = parse(text.encode(), "test.yaml").configuration
-    ties = tie(supervisor.model, configuration)
-    return assemble(configuration, ties, supervisor, NullLog(), starts_itself=starts_itself, host=host)
+    mapping = map_channels(supervisor.model, configuration)
+    return assemble(configuration, mapping, supervisor, NullLog(), starts_itself=starts_itself, host=host)
 
 
 class RecordedFace:

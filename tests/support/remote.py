@@ -16,7 +16,7 @@ from robosc.supervisor import Supervisor
 from robosc_api.security import Credentials, open_channel
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_api.v1 import bridge_pb2_grpc
-from robosc_bridge.configuration import parse, tie
+from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.daemon.feed import Feed, Snapshot
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.programs import FromProgram, Program
@@ -127,9 +127,9 @@ class FakeDaemon:
         checked = model()
         loaded = parse(CONFIGURATION, "test.yaml")
         self.feed = Feed()
-        ties = tie(checked, loaded.configuration, loaded.document)
+        mapping = map_channels(checked, loaded.configuration, loaded.document)
         supervisor = Supervisor(checked, Deployment.LAYER if is_layer else Deployment.CONTROLLER, (), CERTIFICATE)
-        self.operations = Operations(supervisor, ties, self.feed, self._post, self._see, is_layer=is_layer)
+        self.operations = Operations(supervisor, mapping, self.feed, self._post, self._see, is_layer=is_layer)
         self.seen = 0
         self.refusal: str | None = ""
         self.orders: list[Order] = []

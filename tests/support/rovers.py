@@ -5,13 +5,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from robosc_bridge.devices.factory import make_drive_base
 from robosc_bridge.devices.interface import (
     STANDSTILL,
     DriveReading,
     Velocity,
 )
 from robosc_bridge.devices.mavlink_rover import MavlinkRover
-from robosc_bridge.devices.registry import make_drive_base
 from robosc_bridge.devices.robots import Body
 from robosc_bridge.host import Host, Thread
 from robosc_bridge.simulated import BODIES, DatagramLine, Rover, SimulatedLine, Timebase, World, room

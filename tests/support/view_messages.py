@@ -53,7 +53,7 @@ def component(name: str, communications: Sequence[str], drawn: Message | None) -
 
 
 def communication(name: str, owner: str, kind: str) -> Message:
-    """One that is tied to a topic of its name."""
+    """One that is mapped to a topic of its name."""
     return {"name": name, "component": owner, "kind": kind, "identifier": f"/{name}", "channel": "grpc"}
 
 

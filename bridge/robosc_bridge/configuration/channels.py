@@ -1,4 +1,4 @@
-"""The channels of the bridge: what a communication of a model can be tied to, with the shape of its data.
+"""The channels of the bridge: what a communication of a model can be mapped to, with the shape of its data.
 
 One table, `CHANNELS`, from which the check of a configuration, its template and its documentation are made. Shapes
 follow the ROS messages that models link to (geometry_msgs/Twist, sensor_msgs/LaserScan, Imu and BatteryState,
@@ -162,12 +162,12 @@ class ChannelInfo:
     """Purpose of a channel.
 
     Attributes:
-        uses: The kinds of communication that can be tied to it, and the data of each.
-        heeded: Parts of a request that the channel uses, where all other parts must be 0; empty: all.
+        uses: The kinds of communication that can be mapped to it, and the data of each.
+        used_parts: Parts of a request that the channel uses, where all other parts must be 0; empty: all.
     """
 
     uses: Mapping[CommunicationKind, Use]
-    heeded: frozenset[str] = field(default_factory=frozenset)
+    used_parts: frozenset[str] = field(default_factory=frozenset)
 
 
 _N = Leaf.NUMBER
@@ -208,7 +208,7 @@ _IN, _OUT = CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSA
 _SERVICE, _ACTION = CommunicationKind.SERVICE, CommunicationKind.ACTION
 
 
-def _told(shape: Shape) -> ChannelInfo:
+def _reported(shape: Shape) -> ChannelInfo:
     return ChannelInfo({_OUT: Use(response=shape)})
 
 
@@ -225,18 +225,18 @@ CHANNELS: dict[type[Channel], ChannelInfo] = {
             _ACTION: Use(_ANGLE, _OUTCOME, OneOf((Fields({"remaining": _N}), _N))),
         }
     ),
-    RotatedChannel: _told(Leaf.NOTHING),
-    ScannerChannel: _told(_SCAN),
-    OdometryChannel: _told(_ODOMETRY),
-    ImuChannel: _told(_IMU),
-    BatteryChannel: _told(_BATTERY),
-    ButtonChannel: _told(_SWITCH),
-    BumperChannel: _told(_SWITCH),
-    KeyChannel: _told(Leaf.NOTHING),
-    EmergencyStopChannel: _told(Leaf.NOTHING),
-    LineChannel: _told(_or_data(_N)),
-    LineLostChannel: _told(Leaf.NOTHING),
-    FaultChannel: _told(_or_data(Leaf.TEXT)),
+    RotatedChannel: _reported(Leaf.NOTHING),
+    ScannerChannel: _reported(_SCAN),
+    OdometryChannel: _reported(_ODOMETRY),
+    ImuChannel: _reported(_IMU),
+    BatteryChannel: _reported(_BATTERY),
+    ButtonChannel: _reported(_SWITCH),
+    BumperChannel: _reported(_SWITCH),
+    KeyChannel: _reported(Leaf.NOTHING),
+    EmergencyStopChannel: _reported(Leaf.NOTHING),
+    LineChannel: _reported(_or_data(_N)),
+    LineLostChannel: _reported(Leaf.NOTHING),
+    FaultChannel: _reported(_or_data(Leaf.TEXT)),
     GrpcChannel: ChannelInfo(dict.fromkeys(CommunicationKind, _ANY)),
     LogChannel: ChannelInfo({_IN: _ANY}),
     NoneChannel: ChannelInfo({_IN: _ANY, _OUT: _ANY}),

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import msgspec
 
 from robosc_bridge.configuration.document import Document
-from robosc_bridge.configuration.problems import ConfigurationError, Path, Problem, hint, shown
+from robosc_bridge.configuration.problems import ConfigurationError, Path, Problem, hint, value_text
 
 _WRONG = object()
 _WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
@@ -59,7 +59,7 @@ class _Decoder:
 
     def _struct(self, target: Any, given: object, path: Path, ignored: frozenset[str] = frozenset()) -> Any:
         if not isinstance(given, Mapping):
-            return self._wrong(f"is {shown(given)}; it must be a mapping with {_names(target)}", path)
+            return self._wrong(f"is {value_text(given)}; it must be a mapping with {_names(target)}", path)
         fields = {field.name: field for field in msgspec.structs.fields(target)}
         for key in given:
             if key not in fields and key not in ignored:
@@ -78,22 +78,22 @@ class _Decoder:
         field = structures[0].__struct_config__.tag_field
         by_tag = {item.__struct_config__.tag: item for item in structures}
         if not isinstance(given, Mapping) or field not in given:
-            begin = "is not filled in" if given is None else f"is {shown(given)}"
+            begin = "is not filled in" if given is None else f"is {value_text(given)}"
             return self._wrong(f"{begin}; it must be {{{field}: NAME}} with one of {', '.join(sorted(by_tag))}", path)
         tag = given[field]
         if not isinstance(tag, str) or tag not in by_tag:
-            return self._wrong(f"there is no {field} {shown(tag)}; {hint(str(tag), by_tag)}", (*path, field))
+            return self._wrong(f"there is no {field} {value_text(tag)}; {hint(str(tag), by_tag)}", (*path, field))
         return self._struct(by_tag[tag], given, path, frozenset({field}))
 
     def _collection(self, annotation: Any, plain: Any, given: object, path: Path) -> Any:
         arguments = get_args(plain)
         if get_origin(plain) is tuple:
             if not isinstance(given, list):
-                return self._wrong(f"is {shown(given)}; it must be {expected(annotation)}", path)
+                return self._wrong(f"is {value_text(given)}; it must be {expected(annotation)}", path)
             items = tuple(self.value(arguments[0], item, (*path, place)) for place, item in enumerate(given))
             return _WRONG if _WRONG in items else items
         if not isinstance(given, Mapping):
-            return self._wrong(f"is {shown(given)}; it must be {expected(annotation)}", path)
+            return self._wrong(f"is {value_text(given)}; it must be {expected(annotation)}", path)
         found = {}
         for key, item in given.items():
             place = (*path, key)
@@ -104,7 +104,7 @@ class _Decoder:
         try:
             return msgspec.convert(given, annotation, strict=True)
         except msgspec.ValidationError:
-            return self._wrong(f"is {shown(given)}; it must be {expected(annotation)}", path)
+            return self._wrong(f"is {value_text(given)}; it must be {expected(annotation)}", path)
 
     def _wrong(self, message: str, path: Path) -> object:
         if not path:

@@ -17,7 +17,7 @@ from typing import Any
 
 import yaml
 
-from robosc_bridge.configuration.problems import ConfigurationError, Path, Problem, shown
+from robosc_bridge.configuration.problems import ConfigurationError, Path, Problem, value_text
 
 MAXIMUM_BYTES = 256 * 1024
 MAXIMUM_DEPTH = 12
@@ -197,7 +197,7 @@ class _Builder:
         if _FLOAT.match(text):
             number = float(text)
             if not math.isfinite(number):
-                self.problems.append(Problem(f"{shown(text)} is too large a number", path, _line(event)))
+                self.problems.append(Problem(f"{value_text(text)} is too large a number", path, _line(event)))
             return number
         return text
 

@@ -60,11 +60,11 @@ def path_text(path: Path) -> str:
         elif _PLAIN_KEY.match(step):
             found += f".{step}" if found else step
         else:
-            found += f"[{shown(step)}]"
+            found += f"[{value_text(step)}]"
     return found
 
 
-def shown(value: object) -> str:
+def value_text(value: object) -> str:
     """A value in a message: short, and on one line whatever is in it."""
     if isinstance(value, Mapping):
         return "a mapping"

@@ -9,7 +9,7 @@ import msgspec
 from robosc.model.structure import CommunicationKind
 from robosc_bridge.configuration.channels import CHANNELS, Use, channel_name
 from robosc_bridge.configuration.decoding import expected, is_struct, members
-from robosc_bridge.configuration.problems import shown
+from robosc_bridge.configuration.problems import value_text
 from robosc_bridge.configuration.shapes import Leaf, shape_text
 from robosc_bridge.configuration.structure import Configuration
 
@@ -68,7 +68,7 @@ def _others(annotation: Any) -> list[str]:
 def _default(default: Any) -> str:
     if default is msgspec.NODEFAULT:
         return "required"
-    return f"`{'null' if default is None else default if default in ({}, []) else shown(default)}`"
+    return f"`{'null' if default is None else default if default in ({}, []) else value_text(default)}`"
 
 
 def _channels() -> Iterator[str]:

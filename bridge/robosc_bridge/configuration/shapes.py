@@ -53,14 +53,14 @@ class OneOf:
 Shape = Leaf | Fields | Array | OneOf
 
 
-class Way(StrEnum):
+class Direction(StrEnum):
     """Direction in which data goes."""
 
     TO_MODEL = "to the model"
     TO_ROBOT = "to the robot"
 
 
-def misfits(model: Model, type_: Type, shape: Shape, way: Way) -> tuple[str, ...]:
+def mismatches(model: Model, type_: Type, shape: Shape, direction: Direction) -> tuple[str, ...]:
     """Return the reasons why a type does not fit a shape, part by part; empty: it fits.
 
     Args:
@@ -68,12 +68,12 @@ def misfits(model: Model, type_: Type, shape: Shape, way: Way) -> tuple[str, ...
         type_: Type that the model reads or gives. A message without data can be reported by any data, but not the
             reverse.
         shape: Shape of the data that the channel has or takes.
-        way: Direction of the data. Numbers of the model may be integers on the way to the robot; the reverse would
-            cut them.
+        direction: Direction of the data. Numbers of the model may be integers on the way to the robot; the reverse
+            would cut them.
     """
-    if way is Way.TO_MODEL and isinstance(type_, NoneType):
+    if direction is Direction.TO_MODEL and isinstance(type_, NoneType):
         return ()
-    return tuple(_misfits(model, type_, shape, way, ""))
+    return tuple(_mismatches(model, type_, shape, direction, ""))
 
 
 def shape_text(shape: Shape) -> str:
@@ -88,37 +88,37 @@ def shape_text(shape: Shape) -> str:
     return str(shape)
 
 
-def _misfits(model: Model, type_: Type, shape: Shape, way: Way, path: str) -> Iterator[str]:
+def _mismatches(model: Model, type_: Type, shape: Shape, direction: Direction, path: str) -> Iterator[str]:
     if shape is Leaf.ANYTHING:
         return
     if isinstance(shape, OneOf):
-        found = [tuple(_misfits(model, type_, item, way, path)) for item in shape.shapes]
+        found = [tuple(_mismatches(model, type_, item, direction, path)) for item in shape.shapes]
         if all(found):
             yield from found[0]
         return
     match type_, shape:
-        case EnumType(name=name), _ if way is Way.TO_MODEL:
-            yield from _misfits(model, model.enum(name).source, shape, way, path)
+        case EnumType(name=name), _ if direction is Direction.TO_MODEL:
+            yield from _mismatches(model, model.enum(name).source, shape, direction, path)
         case ObjectType(name=name), Fields(parts=parts):
             for item in model.object(name).properties:
                 place = f"{path}.{item.name}" if path else item.name
                 if item.name in parts:
-                    yield from _misfits(model, item.type, parts[item.name], way, place)
+                    yield from _mismatches(model, item.type, parts[item.name], direction, place)
                 else:
                     yield f"has no field '{place}'; there is {', '.join(parts)}"
         case ArrayType(element=element), Array(element=inner):
-            yield from _misfits(model, element, inner, way, f"{path}[]")
-        case _ if not _is_same(type_, shape, way):
+            yield from _mismatches(model, element, inner, direction, f"{path}[]")
+        case _ if not _is_same(type_, shape, direction):
             place = f"'{path}' is {shape_text(shape)}" if path else f"the data is {shape_text(shape)}"
             yield f"{place}, not {_text(model, type_)}"
 
 
-def _is_same(type_: Type, shape: Shape, way: Way) -> bool:
+def _is_same(type_: Type, shape: Shape, direction: Direction) -> bool:
     match type_:
         case BooleanType():
             return shape is Leaf.BOOLEAN
         case IntegerType():
-            return shape is Leaf.NUMBER and way is Way.TO_ROBOT
+            return shape is Leaf.NUMBER and direction is Direction.TO_ROBOT
         case DoubleType():
             return shape is Leaf.NUMBER
         case StringType():

@@ -75,7 +75,7 @@ class Execution(_Section, frozen=True):
     seed: Annotated[int, Meta(ge=0, le=2**31 - 1, description="Seed of the policy `random`.")] = 0
     release_identifiers: Annotated[
         tuple[_Text, ...] | None,
-        Meta(description="Identifiers whose last message keeps acting; null: all that are tied to the drive."),
+        Meta(description="Identifiers whose last message keeps acting; null: all that are mapped to the drive."),
     ] = None
     max_age_s: Annotated[
         dict[_Text, Annotated[float, Meta(gt=0, le=86400)]],
@@ -267,7 +267,7 @@ class Log(_Section, frozen=True):
 
 
 class Configuration(_Section, frozen=True):
-    """A robot and what the communications of a model are tied to."""
+    """A robot and what the communications of a model are mapped to."""
 
     robot: Annotated[TurtleBot | Body, Meta(description="The TurtleBot3, or the body of another robot.")]
     drive: Annotated[Drive, Meta(description="The drive base.")]
@@ -281,7 +281,7 @@ class Configuration(_Section, frozen=True):
     log: Annotated[Log, Meta(description="Log of what happens.")] = Log()
     channels: Annotated[
         dict[_Text, Channel],
-        Meta(description="By identifier (or name) of each communication of the model, what it is tied to."),
+        Meta(description="By identifier (or name) of each communication of the model, what it is mapped to."),
     ] = {}
 
 

@@ -1,4 +1,4 @@
-"""A first configuration for a robot and a model: what is plain is tied, the rest is left to be filled in."""
+"""A first configuration for a robot and a model: what is plain is mapped, the rest is left to be filled in."""
 
 import json
 from collections.abc import Iterator
@@ -10,11 +10,11 @@ import msgspec
 from robosc.expressions import type_text
 from robosc.model.structure import Communication, CommunicationKind, Model
 from robosc_bridge.configuration import channels as kinds
+from robosc_bridge.configuration.channel_mapping import unsuitable_because
 from robosc_bridge.configuration.channels import CHANNELS, Channel, channel_name
 from robosc_bridge.configuration.reference import default_of, struct_of, summary
 from robosc_bridge.configuration.structure import Configuration, Safety, Scanner, TurtleBot
-from robosc_bridge.configuration.ties import why_not
-from robosc_bridge.drivers import PANEL, Facts, facts_of
+from robosc_bridge.driver_registry import PANEL, DriverFeatures, features_of
 
 DriveDriver = Literal["opencr", "dynamixel"]
 ScannerDriver = Literal["lds01", "lds02", "lds03"]
@@ -45,7 +45,7 @@ def init(robot: TurtleBot, drive: DriveDriver, scanner: ScannerDriver, model: Mo
         robot: The TurtleBot3.
         drive: Driver that reaches its wheels.
         scanner: Driver of its LiDAR.
-        model: Model whose communications are to be tied.
+        model: Model whose communications are to be mapped.
     """
     lines = [
         f"# Configuration of the RoboSC bridge for {model.name}. All settings are shown.",
@@ -55,7 +55,7 @@ def init(robot: TurtleBot, drive: DriveDriver, scanner: ScannerDriver, model: Mo
         *_device("drive", drive),
         *_device("scanner", scanner),
         *_sections(scanner),
-        "# What each communication of the model is tied to.",
+        "# What each communication of the model is mapped to.",
         *_channels(model, drive),
     ]
     return "\n".join(lines) + "\n"
@@ -65,20 +65,20 @@ def obvious_channel(model: Model, communication: Communication, drive: str) -> C
     """Return the channel that a communication is meant for, by its identifier and its data; None: it is not clear."""
     for words, used, channel in _guesses(communication):
         is_meant = communication.kind in used and _last_words(communication.identifier) in words
-        if is_meant and not why_not(model, communication, type(channel)):
-            return channel if _has(facts_of(drive) or Facts(), channel) else None
+        if is_meant and not unsuitable_because(model, communication, type(channel)):
+            return channel if _has(features_of(drive) or DriverFeatures(), channel) else None
     return None
 
 
-def _has(facts: Facts, channel: Channel) -> bool:
+def _has(features: DriverFeatures, channel: Channel) -> bool:
     """Return True if a drive has the hardware that a channel is about."""
     match channel:
         case kinds.ButtonChannel(name=name):
-            return name in facts.buttons
+            return name in features.buttons
         case kinds.BumperChannel():
-            return facts.has_bumpers
+            return features.has_bumpers
         case kinds.ImuChannel():
-            return facts.has_imu
+            return features.has_imu
     return True
 
 
@@ -169,7 +169,9 @@ def _entry(model: Model, key: str, items: list[Communication], channel: Channel 
     if channel is not None:
         yield f"  {quoted(key)}: {_flow(channel)}"
         return
-    possible = [channel_name(kind) for kind in CHANNELS if not any(why_not(model, item, kind) for item in items)]
+    possible = [
+        channel_name(kind) for kind in CHANNELS if not any(unsuitable_because(model, item, kind) for item in items)
+    ]
     yield f"  # To be filled in: {{channel: NAME}} with one of {', '.join(possible)}."
     yield f"  {quoted(key)}:"
 

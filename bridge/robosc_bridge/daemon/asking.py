@@ -10,9 +10,9 @@ from dataclasses import replace
 from typing import Any
 
 from robosc.model.structure import Communication, CommunicationKind, Model
+from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import CHANNELS, Channel, RotateChannel, channel_name
 from robosc_bridge.configuration.shapes import Shape
-from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.plain_data import accepted, completed, is_number, why_not_shaped, why_not_typed
 from robosc_bridge.daemon.programs import Called, CancelWanted, FromProgram, GoalSent, Requested
 from robosc_bridge.daemon.wheel_messages import angle_of
@@ -34,20 +34,20 @@ class Asking:
 
     Args:
         model: Model of the supervisor.
-        ties: Channel that each communication is tied to.
+        mapping: Channel that each communication is mapped to.
         is_layer: True if programs may ask for anything.
 
     Attributes:
         messages: Messages that programs may send to the robot, by identifier.
     """
 
-    def __init__(self, model: Model, ties: Ties, *, is_layer: bool) -> None:
+    def __init__(self, model: Model, mapping: ChannelMapping, *, is_layer: bool) -> None:
         self._model = model
-        self._channels = ties.channels
+        self._channels = mapping.channels
         self._is_layer = is_layer
         messages: dict[str, list[Communication]] = {}
         self._others: dict[tuple[CommunicationKind, str], Communication] = {}
-        for item in ties.communications:
+        for item in mapping.communications:
             if item.kind is CommunicationKind.INCOMING_MESSAGE:
                 messages.setdefault(item.identifier, []).append(item)
             elif item.kind is not CommunicationKind.OUTGOING_MESSAGE:
@@ -55,7 +55,7 @@ class Asking:
         self.messages: Mapping[str, list[Communication]] = messages
         self._shapes: dict[str, Shape] = {}
         for item in (*(item for found in messages.values() for item in found), *self._others.values()):
-            shape = CHANNELS[type(ties.channels[item.name])].uses[item.kind].request
+            shape = CHANNELS[type(mapping.channels[item.name])].uses[item.kind].request
             self._shapes[item.name] = accepted(model, item.request, shape)
 
     def identifier(self, kind: CommunicationKind, name: str) -> str:
@@ -107,7 +107,7 @@ class Asking:
             UnfitError: It is not.
         """
         channel = self._channels[communication.name]
-        heeded = CHANNELS[type(channel)].heeded
+        heeded = CHANNELS[type(channel)].used_parts
         why = why_not_shaped(self._shapes[communication.name], data)
         why = why or why_not_typed(self._model, communication.request, data)
         if why:
@@ -115,7 +115,7 @@ class Asking:
         for path, value in _leaves(data, "") if heeded else ():
             if path not in heeded and value:
                 raise UnfitError(
-                    f"'{communication.name}': '{path}' must be 0: '{channel_name(channel)}' does not go by it"
+                    f"'{communication.name}': '{path}' must be 0: '{channel_name(channel)}' does not use it"
                 )
         _require_turn(communication, channel, data)
 

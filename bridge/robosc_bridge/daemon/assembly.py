@@ -14,9 +14,9 @@ from robosc.execution.runtime.settings import Settings, SettingsError, require_s
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc_api.security import SecurityError, check_listening
+from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import GrpcChannel
 from robosc_bridge.configuration.structure import Configuration, Scanner
-from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.device_thread import DeviceThread
 from robosc_bridge.daemon.faces import Face, Living, is_remote, is_startable
 from robosc_bridge.daemon.feed import Feed
@@ -27,11 +27,11 @@ from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.sight import camera_worker, needs_camera, sight_problems
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
+from robosc_bridge.devices.factory import make_drive_base, make_range_scanner
 from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
 from robosc_bridge.devices.options import checked_options
-from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
 from robosc_bridge.devices.robots import ROBOTS, Body, Robot
-from robosc_bridge.drivers import Facts, Kind, facts_of, find_driver
+from robosc_bridge.driver_registry import DriverFeatures, Kind, features_of, find_driver
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.host import Host
 from robosc_bridge.protocol.mavlink_signing import SigningError
@@ -69,7 +69,7 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
         AssemblyError: They do not go together.
     """
     robot, chosen = _robot(configuration), configuration.safety
-    facts = facts_of(configuration.drive.driver) or Facts()
+    features = features_of(configuration.drive.driver) or DriverFeatures()
     if configuration.execution.period_s > LONGEST_PERIOD_S:
         raise AssemblyError(f"execution.period_s may be {LONGEST_PERIOD_S:g} at most")
     can = robot.limits if isinstance(robot, Body) else robot.limits(robot.motor.velocity_limit_raw)
@@ -92,7 +92,7 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
             operator_timeout_s=chosen.operator_link_timeout_s,
             battery_warn_v=chosen.battery_warning_v,
             battery_stop_v=chosen.battery_stop_v,
-            torque_on_s=facts.torque_on_s or SafetyLimits.torque_on_s,
+            torque_on_s=features.torque_on_s or SafetyLimits.torque_on_s,
             min_valid_share=chosen.min_valid_share,
             is_torque_off_on_operator_stop=chosen.torque_off_on_operator_stop,
             is_stopped_when_blind=chosen.stops_when_blind,
@@ -101,12 +101,12 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
         raise AssemblyError(f"safety: {error}") from error
 
 
-def check_settings(configuration: Configuration, ties: Ties, deployment: Deployment) -> Settings:
+def check_settings(configuration: Configuration, mapping: ChannelMapping, deployment: Deployment) -> Settings:
     """Return the executor's settings; find whatever else `assemble` would refuse as well, and open nothing.
 
     Args:
         configuration: Configuration of the robot.
-        ties: Channels that the model's communications are tied to.
+        mapping: Channels that the model's communications are mapped to.
         deployment: Deployment of the supervisor.
 
     Raises:
@@ -114,7 +114,7 @@ def check_settings(configuration: Configuration, ties: Ties, deployment: Deploym
         GroundSettingsError: The ground station cannot be reached as configured.
         UnknownDriverError: There is no such driver.
     """
-    _require_faces(configuration, ties)
+    _require_faces(configuration, mapping)
     if deployment is Deployment.LAYER and not is_remote(configuration):
         raise AssemblyError("a supervision layer needs 'remote.grpc_address' or 'remote.mavlink_url' for who asks it")
     limits = safety_limits(configuration)
@@ -122,15 +122,15 @@ def check_settings(configuration: Configuration, ties: Ties, deployment: Deploym
     drive_base(configuration)
     if configuration.scanner is not None:
         range_scanner(configuration.scanner)
-    settings = ties.settings(configuration.execution)
+    settings = mapping.settings(configuration.execution)
     problems = [
         *file_problems(configuration, fastest),
-        *sight_problems(configuration.skills.line, ties, settings),
+        *sight_problems(configuration.skills.line, mapping, settings),
         *_scan_problems(configuration),
     ]
     if problems:
         raise AssemblyError("; ".join(problems))
-    kept = ties.never_released(settings) if deployment is Deployment.LAYER else ()
+    kept = mapping.never_released(settings) if deployment is Deployment.LAYER else ()
     if kept:
         # A velocity would outlive the program that asked for it.
         names = ", ".join(f"'{identifier}'" for identifier in kept)
@@ -145,18 +145,20 @@ def check_settings(configuration: Configuration, ties: Ties, deployment: Deploym
 def _scan_problems(configuration: Configuration) -> list[str]:
     """A time within which no turn can be complete would stop the robot for ever."""
     scanner, timeout_s = configuration.scanner, configuration.safety.scan_timeout_s
-    facts = None if scanner is None else facts_of(scanner.driver, Kind.RANGE_SCANNER)
-    if facts is None or facts.turn_s is None or timeout_s > facts.turn_s:
+    features = None if scanner is None else features_of(scanner.driver, Kind.RANGE_SCANNER)
+    if features is None or features.revolution_s is None or timeout_s > features.revolution_s:
         return []
-    return [f"safety.scan_timeout_s: a turn of the LiDAR takes {facts.turn_s:g} s, so it must be longer than that"]
+    return [
+        f"safety.scan_timeout_s: a turn of the LiDAR takes {features.revolution_s:g} s, so it must be longer than that"
+    ]
 
 
 def _robot(configuration: Configuration) -> Robot | Body:
     """The robot, as its drive needs it."""
-    chosen, facts = configuration.robot, facts_of(configuration.drive.driver)
+    chosen, features = configuration.robot, features_of(configuration.drive.driver)
     if isinstance(chosen, str):
         known = ROBOTS[chosen]
-        return known if facts is not None and facts.needs_turtlebot3 else known.body
+        return known if features is not None and features.needs_turtlebot3 else known.body
     return Body(chosen.linear_m_s, chosen.angular_rad_s, chosen.wheel_separation_m)
 
 
@@ -199,7 +201,7 @@ class Machine:
         daemon: The loop, run by whoever calls `run`.
         drive: The drive base's thread.
         scanner: The LiDAR's thread; None: there is none.
-        camera: The camera's thread; None: nothing is tied to what it shows.
+        camera: The camera's thread; None: nothing is mapped to what it shows.
         operations: The daemon as remote faces see it.
         living: Threads and faces that must not end by themselves.
     """
@@ -242,11 +244,11 @@ class Machine:
         self.daemon.post(Command.QUIT)
 
 
-def _require_faces(configuration: Configuration, ties: Ties) -> None:
+def _require_faces(configuration: Configuration, mapping: ChannelMapping) -> None:
     """Require a remote face that may listen at its address, for everything that is reached from elsewhere."""
-    needing = [f"'{item.name}' ('{item.identifier}')" for item, _ in ties.tied_to(GrpcChannel)]
+    needing = [f"'{item.name}' ('{item.identifier}')" for item, _ in mapping.mapped_to(GrpcChannel)]
     if needing and configuration.remote.grpc_address is None:
-        raise AssemblyError(f"tied to 'grpc', which needs 'remote.grpc_address': {', '.join(needing)}")
+        raise AssemblyError(f"mapped to 'grpc', which needs 'remote.grpc_address': {', '.join(needing)}")
     if configuration.safety.operator_link_timeout_s is not None and not is_remote(configuration):
         raise AssemblyError("'safety.operator_link_timeout_s' needs 'remote.grpc_address' or 'remote.mavlink_url'")
     face = settings_of(configuration)
@@ -273,7 +275,7 @@ def _require_faces(configuration: Configuration, ties: Ties) -> None:
 
 def assemble(
     configuration: Configuration,
-    ties: Ties,
+    mapping: ChannelMapping,
     supervisor: Supervisor,
     log: EventLog,
     deployment: Deployment = Deployment.CONTROLLER,
@@ -285,7 +287,7 @@ def assemble(
 
     Args:
         configuration: Configuration of the robot.
-        ties: Channels that the model's communications are tied to.
+        mapping: Channels that the model's communications are mapped to.
         supervisor: Supervisor that is executed.
         log: Log that its events are written to.
         deployment: Deployment of the supervisor: it decides itself, or lets requests of programs through.
@@ -296,7 +298,7 @@ def assemble(
         AssemblyError: A device or number does not fit, or the supervisor has another deployment.
         UnknownDriverError: There is no such driver.
     """
-    settings = check_settings(configuration, ties, deployment)
+    settings = check_settings(configuration, mapping, deployment)
     if not starts_itself and not is_startable(configuration):
         needed = "'remote.grpc_address', 'remote.mavlink_url' or 'view.address'"
         raise AssemblyError(f"to wait in standby, the bridge needs {needed}")
@@ -306,10 +308,10 @@ def assemble(
     is_layer = deployment is Deployment.LAYER
     job = Job(
         supervisor,
-        ties,
+        mapping,
         settings,
         needs_scanner=configuration.scanner is not None,
-        needs_camera=needs_camera(ties),
+        needs_camera=needs_camera(mapping),
         starts_itself=starts_itself,
         stays_after_fault=is_startable(configuration),
         is_layer=is_layer,
@@ -346,6 +348,6 @@ def assemble(
     living = Living(threads)
     daemon.connect(drive.hurry, worker.reset, living.are_alive)
     operations = Operations(
-        supervisor, ties, feed, daemon.post, lambda: safety.operator_seen(host.monotonic()), is_layer=is_layer
+        supervisor, mapping, feed, daemon.post, lambda: safety.operator_seen(host.monotonic()), is_layer=is_layer
     )
     return Machine(daemon, drive, scanner, camera, operations, living)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from robosc.model.structure import Communication, CommunicationKind
+from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import GrpcChannel
-from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.programs import (
     CallFailed,
     CallMade,
@@ -61,14 +61,14 @@ class Exchange:
     """Exchange between the model and programs.
 
     Args:
-        ties: Channel that each communication is tied to.
+        mapping: Channel that each communication is mapped to.
         listeners: Identifiers that each kind of channel reports to.
         roster: Connected programs.
     """
 
-    def __init__(self, ties: Ties, listeners: Listeners, roster: Roster) -> None:
-        tied = [item for item, _ in ties.tied_to(GrpcChannel)]
-        self._services = {item.name: item for item in tied if item.kind in _SERVED}
+    def __init__(self, mapping: ChannelMapping, listeners: Listeners, roster: Roster) -> None:
+        mapped = [item for item, _ in mapping.mapped_to(GrpcChannel)]
+        self._services = {item.name: item for item in mapped if item.kind in _SERVED}
         self._heard = frozenset(identifier for identifier, _ in listeners.of(GrpcChannel))
         self._roster = roster
         self._servers: dict[str, Program] = {}
@@ -127,7 +127,7 @@ class Exchange:
         """A program is there: what it serves that nobody serves yet is asked of it from now on."""
         for name in sorted(program.serves):
             if name not in self._services:
-                self._roster.refuse(program, f"'{name}' is no service or action of the model that is tied to grpc")
+                self._roster.refuse(program, f"'{name}' is no service or action of the model that is mapped to grpc")
             elif name in self._servers:
                 self._roster.refuse(program, f"'{name}' is served by {self._servers[name].name} already")
             else:

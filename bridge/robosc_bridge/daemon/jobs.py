@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from robosc.execution.runtime.settings import Settings
 from robosc.supervisor import Supervisor
-from robosc_bridge.configuration.ties import Ties
+from robosc_bridge.configuration.channel_mapping import ChannelMapping
 
 
 @dataclass(frozen=True)
@@ -13,7 +13,7 @@ class Job:
 
     Attributes:
         supervisor: Supervisor that is executed.
-        ties: Channels that its communications are tied to.
+        mapping: Channels that its communications are mapped to.
         settings: Settings of the executor.
         needs_scanner: True if a LiDAR must be there before it starts.
         starts_itself: True if it starts as soon as the devices are there; else it stays in standby.
@@ -23,7 +23,7 @@ class Job:
     """
 
     supervisor: Supervisor
-    ties: Ties
+    mapping: ChannelMapping
     settings: Settings
     needs_scanner: bool
     starts_itself: bool

@@ -90,17 +90,17 @@ class Daemon:
         self._clock = clock
         feed = feed or Feed()
         self._inbox: Queue[Item] = queue.SimpleQueue() if inbox is None else inbox
-        asking = Asking(job.supervisor.model, job.ties, is_layer=job.is_layer)
+        asking = Asking(job.supervisor.model, job.mapping, is_layer=job.is_layer)
         self._from_programs = ProgramInbox(lambda: self._inbox.put(_Woken()), asking.look)
         self._orders = Orders()
         self._readiness = Readiness(needs_scanner=job.needs_scanner, needs_camera=job.needs_camera)
         self._conductor = conductor = Conductor(job, safety, self._readiness, self._orders, clock)
-        listeners, roster = Listeners(job.ties), Roster()
-        exchange = Exchange(job.ties, listeners, roster)
+        listeners, roster = Listeners(job.mapping), Roster()
+        exchange = Exchange(job.mapping, listeners, roster)
         self._switch = StopSwitch(emergency_stop, listeners, conductor.operator_stop, conductor.operator_resume)
         self._motion = Motion(rotate, self._command)
         self._robot = Robot(
-            job.ties,
+            job.mapping,
             listeners,
             self._motion,
             self._switch,

@@ -5,7 +5,7 @@ from concurrent.futures import Future
 from typing import Protocol
 
 from robosc.supervisor import Supervisor
-from robosc_bridge.configuration.ties import Ties
+from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.programs import FromProgram
 from robosc_bridge.daemon.states import Command, Order
@@ -29,7 +29,7 @@ class Operations:
 
     Args:
         supervisor: Supervisor that is executed.
-        ties: Channels that its communications are tied to.
+        mapping: Channels that its communications are mapped to.
         is_layer: True if the supervisor is a supervision layer.
         feed: Feed that the daemon shows.
         post: Function that tells the loop something.
@@ -38,7 +38,7 @@ class Operations:
     Attributes:
         supervisor: Supervisor that is executed.
         model: Its model.
-        ties: Channels that its communications are tied to.
+        mapping: Channels that its communications are mapped to.
         is_layer: True if the supervisor is a supervision layer.
         feed: Feed that the daemon shows.
     """
@@ -46,7 +46,7 @@ class Operations:
     def __init__(
         self,
         supervisor: Supervisor,
-        ties: Ties,
+        mapping: ChannelMapping,
         feed: Feed,
         post: Inbox,
         operator_seen: Callable[[], None],
@@ -55,7 +55,7 @@ class Operations:
     ) -> None:
         self.supervisor = supervisor
         self.model = supervisor.model
-        self.ties = ties
+        self.mapping = mapping
         self.is_layer = is_layer
         self.feed = feed
         self._post = post

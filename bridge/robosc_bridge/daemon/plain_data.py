@@ -15,7 +15,7 @@ from robosc.expressions import (
     Type,
 )
 from robosc.model.structure import Model
-from robosc_bridge.configuration.shapes import Array, Fields, Leaf, OneOf, Shape, Way, misfits, shape_text
+from robosc_bridge.configuration.shapes import Array, Direction, Fields, Leaf, OneOf, Shape, mismatches, shape_text
 
 _WORDS: dict[type, str] = {
     BooleanType: "true or false",
@@ -134,7 +134,7 @@ def accepted(model: Model, type_: Type | None, shape: Shape) -> Shape:
         shape: Shape of the channel.
     """
     if isinstance(shape, OneOf) and type_ is not None:
-        return OneOf(tuple(item for item in shape.shapes if not misfits(model, type_, item, Way.TO_ROBOT)))
+        return OneOf(tuple(item for item in shape.shapes if not mismatches(model, type_, item, Direction.TO_ROBOT)))
     return shape
 
 

@@ -1,6 +1,6 @@
 """Items that programs and operators beyond a remote face send to the loop, and items that the loop sends to them.
 
-A program is whatever is connected: it may answer services and actions of the model that are tied to `grpc`, take and
+A program is whatever is connected: it may answer services and actions of the model that are mapped to `grpc`, take and
 give messages there, and, where the supervisor is a supervision layer, be the existing controller or operator whose
 requests the layer lets through or holds back. Data is plain: None, booleans, numbers, texts, lists, and dicts with
 texts as keys. Whatever a program sends is untrusted: what makes no sense is answered with `Refused` and does nothing.
@@ -30,7 +30,7 @@ class _Weighed:
 
 @dataclass(frozen=True)
 class MessageSent(_Weighed):
-    """The model sent a message on an identifier that is tied to `grpc`; every program is told."""
+    """The model sent a message on an identifier that is mapped to `grpc`; every program is told."""
 
     name: str
     identifier: str
@@ -151,7 +151,7 @@ class Program:
     Attributes:
         name: Name of the program, for the log.
         tell: Function that the loop's thread calls with each thing the program is told; neither waits nor raises.
-        serves: Names of the model's services and actions, tied to `grpc`, that it answers.
+        serves: Names of the model's services and actions, mapped to `grpc`, that it answers.
         may_request: True if it may be the caller of a supervision layer.
     """
 
@@ -180,7 +180,7 @@ class Detached:
 
 @dataclass(frozen=True)
 class Told:
-    """A message for the model, on an identifier of an outgoing message that is tied to `grpc`."""
+    """A message for the model, on an identifier of an outgoing message that is mapped to `grpc`."""
 
     program: Program
     identifier: str

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from robosc_bridge.configuration import channels
-from robosc_bridge.configuration.ties import Ties
+from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.daemon.exchange import Exchange
 from robosc_bridge.daemon.motion import Motion
 from robosc_bridge.daemon.readings import battery_data, imu_data, odometry_data, scan_data, shaped
@@ -30,7 +30,7 @@ class Robot:
     """The executor's middleware.
 
     Args:
-        ties: Channel that each communication of the model is tied to.
+        mapping: Channel that each communication of the model is mapped to.
         listeners: Identifiers that each kind of channel reports to.
         motion: Motion of the wheels.
         switch: The operator's stop.
@@ -42,7 +42,7 @@ class Robot:
 
     def __init__(
         self,
-        ties: Ties,
+        mapping: ChannelMapping,
         listeners: Listeners,
         motion: Motion,
         switch: StopSwitch,
@@ -51,14 +51,14 @@ class Robot:
         service_timeout_s: float | None,
         clock: Callable[[], float],
     ) -> None:
-        self._channels = ties.channels
+        self._channels = mapping.channels
         self._listeners = listeners
         self._motion = motion
         self._switch = switch
         self._exchange = exchange
         self._clock = clock
-        self._by_name = {item.name: item for item in ties.communications}
-        self._by_identifier = {item.identifier: item for item in reversed(ties.communications)}
+        self._by_name = {item.name: item for item in mapping.communications}
+        self._by_identifier = {item.identifier: item for item in reversed(mapping.communications)}
         self._owed: deque[Callable[[Supervised], None]] = deque()
         self._turns = Turns(motion, listeners, self._owed.append, on_failed_turn, service_timeout_s, clock)
         self._buttons: Mapping[str, bool] = {}

@@ -3,36 +3,36 @@
 from collections.abc import Callable
 
 from robosc.execution.runtime.settings import Settings
+from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import FaultChannel, LineChannel, LineLostChannel
-from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.reports import Report
 from robosc_bridge.daemon.workers import Worker
 from robosc_bridge.skills.settings import LineSettings
 
 
-def needs_camera(ties: Ties) -> bool:
-    """Return True if a communication is tied to what the camera shows, or to its faults.
+def needs_camera(mapping: ChannelMapping) -> bool:
+    """Return True if a communication is mapped to what the camera shows, or to its faults.
 
     A fault of `any` device alone needs no camera.
     """
-    faults = (tied for _, tied in ties.tied_to(FaultChannel))
+    faults = (mapped for _, mapped in mapping.mapped_to(FaultChannel))
     return bool(
-        ties.tied_to(LineChannel)
-        or ties.tied_to(LineLostChannel)
-        or any(isinstance(tied, FaultChannel) and tied.device == "camera" for tied in faults)
+        mapping.mapped_to(LineChannel)
+        or mapping.mapped_to(LineLostChannel)
+        or any(isinstance(mapped, FaultChannel) and mapped.device == "camera" for mapped in faults)
     )
 
 
-def sight_problems(line: LineSettings, ties: Ties, settings: Settings) -> list[str]:
+def sight_problems(line: LineSettings, mapping: ChannelMapping, settings: Settings) -> list[str]:
     """Return the problems with how the line is to be seen; nobody may follow a line whose loss nobody reports."""
     found = []
-    if needs_camera(ties) and line.camera == "simulated":
+    if needs_camera(mapping) and line.camera == "simulated":
         found.append("skills.line.camera: tell where the simulator serves its pictures, as simulated:PATH")
-    if not ties.tied_to(LineLostChannel):
+    if not mapping.mapped_to(LineLostChannel):
         found += [
-            f"'{item.name}' ('{item.identifier}') is tied to 'line', and nothing tells when the line is lost: tie a "
+            f"'{item.name}' ('{item.identifier}') is mapped to 'line', and nothing tells when the line is lost: map a "
             f"message to 'line_lost', or set execution.max_age_s for '{item.identifier}'"
-            for item, _ in ties.tied_to(LineChannel)
+            for item, _ in mapping.mapped_to(LineChannel)
             if item.max_age is None and item.identifier not in settings.max_age_s
         ]
     return found

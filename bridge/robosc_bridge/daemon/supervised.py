@@ -3,8 +3,8 @@
 from typing import Any, Protocol
 
 from robosc.model.structure import CommunicationKind
+from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import Channel
-from robosc_bridge.configuration.ties import Ties
 
 
 class Supervised(Protocol):
@@ -33,14 +33,14 @@ class Listeners:
     """Identifiers that each kind of channel reports to; each identifier once.
 
     Args:
-        ties: Channel that each communication is tied to.
+        mapping: Channel that each communication is mapped to.
     """
 
-    def __init__(self, ties: Ties) -> None:
+    def __init__(self, mapping: ChannelMapping) -> None:
         self._channels: dict[str, Channel] = {}
-        for item in ties.communications:
+        for item in mapping.communications:
             if item.kind is CommunicationKind.OUTGOING_MESSAGE:
-                self._channels.setdefault(item.identifier, ties.channels[item.name])
+                self._channels.setdefault(item.identifier, mapping.channels[item.name])
         self._found: dict[type, tuple[tuple[str, Any], ...]] = {}
 
     def of[Kind: Channel](self, kind: type[Kind]) -> tuple[tuple[str, Kind], ...]:

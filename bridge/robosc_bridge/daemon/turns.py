@@ -75,7 +75,7 @@ class Turns:
 
         Args:
             asked: Communication that asked for it.
-            channel: Channel that the communication is tied to.
+            channel: Channel that the communication is mapped to.
             number: Number of the call or goal; None: a message asked for it.
             message: Message with the angle.
         """

@@ -7,7 +7,7 @@ from typing import Any, get_type_hints
 
 import msgspec
 
-from robosc_bridge.drivers import Driver
+from robosc_bridge.driver_registry import Driver
 from robosc_bridge.errors import BridgeError
 
 _SAID_ELSEWHERE = ("path", "robot")

@@ -41,7 +41,7 @@ class Setting(Recorded):
         seed: Seed of what the scene leaves to chance.
         speed: Speed of the world, as a multiple of the clock's.
         lidar: LiDAR of the robot. LDS-01 measures up to 3.5 m, LDS-02 up to 8 m.
-        channels: Channels that the communications of the model are tied to, as lines of the configuration.
+        channels: Channels that the communications of the model are mapped to, as lines of the configuration.
         skills: Further lines of its section `skills`, by skill.
     """
 

@@ -11,8 +11,8 @@ from typing import Any
 
 from robosc.expressions import ObjectType
 from robosc.model.structure import Communication, CommunicationKind, Model
+from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import DriveChannel
-from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.programs import Attached, Detached, FromProgram, Program, Requested, ToProgram
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 
@@ -68,10 +68,10 @@ def from_manual_control(told: Any, fastest: Velocity) -> Velocity:
     return Velocity(told.x / _FULL * fastest.linear_m_s, -told.r / _FULL * fastest.angular_rad_s + 0.0)
 
 
-def drive_message(ties: Ties) -> Communication | None:
-    """The message to the robot that is tied to the drive; of several, the first of the model."""
+def drive_message(mapping: ChannelMapping) -> Communication | None:
+    """The message to the robot that is mapped to the drive; of several, the first of the model."""
     return next(
-        (item for item, _ in ties.tied_to(DriveChannel) if item.kind is CommunicationKind.INCOMING_MESSAGE), None
+        (item for item, _ in mapping.mapped_to(DriveChannel) if item.kind is CommunicationKind.INCOMING_MESSAGE), None
     )
 
 
@@ -100,7 +100,7 @@ class Driving:
 
     Args:
         model: Model that the layer is for.
-        message: Its message that is tied to the drive.
+        message: Its message that is mapped to the drive.
         tell: The daemon's inbox.
         heed: Function that takes the reports of the layer; from the loop's thread, neither waits nor raises.
     """

@@ -75,7 +75,7 @@ class Session:
         self._texts = Texts()
         self._stream = Stream(operations, settings, now_s)
         self._asking = Asking(operations, self._stream, self._answer_in_words)
-        message = drive_message(operations.ties) if operations.is_layer else None
+        message = drive_message(operations.mapping) if operations.is_layer else None
         self._told: deque[ToProgram] = deque(maxlen=16)
         self._driving = Driving(operations.model, message, operations.tell, self._told.append) if message else None
         self._knows_old = False
@@ -293,7 +293,7 @@ class Session:
         if not self._may_change(heard):
             why = _NOT_SIGNED
         elif self._driving is None:
-            why = "Set-points are for a supervision layer whose drive is tied; this supervisor drives by itself."
+            why = "Set-points are for a supervision layer whose drive is mapped; this supervisor drives by itself."
         elif snapshot is None or not self._stream.is_running or self._stream.is_stale(self._now_s):
             why = "The robot is not armed: set-points are not heeded."
         elif is_held(snapshot):

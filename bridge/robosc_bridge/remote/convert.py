@@ -88,10 +88,10 @@ def definition(operations: Operations) -> pb.GetDefinitionResponse:
                 component=item.component,
                 kind=_KINDS[item.kind],
                 identifier=text_of(item.identifier),
-                channel=channel_name(operations.ties.channels[item.name]),
+                channel=channel_name(operations.mapping.channels[item.name]),
                 fields=_fields(model, item),
             )
-            for item in operations.ties.communications
+            for item in operations.mapping.communications
         ],
         definition=json.dumps(topic.definition, separators=(",", ":")),
         transitions=[
@@ -234,14 +234,14 @@ def program_of(hello: pb.Hello, name: str, tell: Callable[[programs.ToProgram], 
         raise RequestError("a program has a name of 1 to 100 printable characters")
     served = {
         item.name
-        for item in operations.ties.communications
+        for item in operations.mapping.communications
         if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
-        and channel_name(operations.ties.channels[item.name]) == "grpc"
+        and channel_name(operations.mapping.channels[item.name]) == "grpc"
     }
     for wanted in hello.serves:
         if wanted not in served:
             shown = wanted[:40] if wanted.isprintable() else "?"
-            raise RequestError(f"'{shown}' is no service or action of the model that is tied to 'grpc'")
+            raise RequestError(f"'{shown}' is no service or action of the model that is mapped to 'grpc'")
     may_request = hello.is_operator and operations.is_layer
     return programs.Program(name, tell, frozenset(hello.serves), may_request)
 

@@ -146,7 +146,7 @@ class BridgeClient:
         for item in definition.communications:
             if item.kind == incoming and item.channel == "drive":
                 return DriveTopic(item.identifier, "twist" in item.fields)
-        raise RefusedError(f"no communication of {definition.robot} is tied to 'drive'")
+        raise RefusedError(f"no communication of {definition.robot} is mapped to 'drive'")
 
     def watch(self, *, with_scans: bool, rate_hz: float) -> Iterator[pb.WatchResponse]:
         """Yield what the bridge is doing and what happens, until the bridge or the caller ends it."""

@@ -142,7 +142,7 @@ def robot_of(
         supervisor: Supervisor with its model.
         source: Kind of source from which it comes.
         version: Version of the program that reports it.
-        channels: Channel that each communication is tied to; None: not known.
+        channels: Channel that each communication is mapped to; None: not known.
         can_command: True if it can be stopped and commanded.
         log: The log that is replayed.
         scene: Scene for the map.

@@ -26,7 +26,7 @@ class Talk:
         component: Component that declares it.
         kind: `incoming message`, `outgoing message`, `service` or `action`.
         identifier: Its topic, service or action.
-        channel: Channel that it is tied to in a bridge; empty: nothing is known of that.
+        channel: Channel that it is mapped to in a bridge; empty: nothing is known of that.
     """
 
     name: str

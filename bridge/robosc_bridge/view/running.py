@@ -31,7 +31,7 @@ class RunningBridge:
 
     def __init__(self, operations: Operations, scene: Mapping[str, Any] | None = None) -> None:
         self._operations = operations
-        channels = {name: channel_name(item) for name, item in operations.ties.channels.items()}
+        channels = {name: channel_name(item) for name, item in operations.mapping.channels.items()}
         self.robot: Robot = robot_of(
             operations.supervisor,
             SourceKind.BRIDGE,

@@ -20,7 +20,7 @@ from pathlib import Path
 from robosc.execution.runtime.event_log import NullLog
 from robosc.execution.runtime.executor import Executor
 from robosc.model.structure import Deployment
-from robosc_bridge.configuration import load, tie
+from robosc_bridge.configuration import load, map_channels
 from robosc_bridge.daemon.assembly import Machine, assemble
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.states import Command, State
@@ -121,8 +121,8 @@ def main() -> int:
     watchers, count = (int(sys.argv[place]) if len(sys.argv) > place else 0 for place in (5, 6))
     loaded = load(configuration_file)
     supervisor = obtain(Source(model, Deployment.CONTROLLER, None, None), lambda text: None)
-    ties = tie(supervisor.model, loaded.configuration, loaded.document)
-    machine = assemble(loaded.configuration, ties, supervisor, NullLog(), starts_itself=True)
+    mapping = map_channels(supervisor.model, loaded.configuration, loaded.document)
+    machine = assemble(loaded.configuration, mapping, supervisor, NullLog(), starts_itself=True)
     noted_s = _watch_decisions(machine)
     # As soon as the devices are there it would start.
     machine.daemon.post(Command.STANDBY)

@@ -28,7 +28,7 @@ from figures import text_table  # noqa: E402  # found through the path above
 from robosc.execution.runtime.event_log import NullLog  # noqa: E402
 from robosc.execution.runtime.executor import Executor  # noqa: E402
 from robosc.model.structure import Deployment  # noqa: E402
-from robosc_bridge.configuration import parse, tie  # noqa: E402
+from robosc_bridge.configuration import map_channels, parse  # noqa: E402
 from robosc_bridge.daemon.assembly import Machine, assemble  # noqa: E402
 from robosc_bridge.daemon.states import State  # noqa: E402
 from robosc_bridge.daemon.supervisors import Source, obtain  # noqa: E402
@@ -167,8 +167,8 @@ execution: {{period_s: {CASES[base]}, every: event}}
 channels:{WANDERER_CHANNELS}"""
         loaded = parse(configuration.encode(), "virtual.yaml")
         supervisor = obtain(Source(WANDERER, Deployment.CONTROLLER, None, None), lambda text: None)
-        ties = tie(supervisor.model, loaded.configuration, loaded.document)
-        machine = assemble(loaded.configuration, ties, supervisor, NullLog(), starts_itself=True, host=host)
+        mapping = map_channels(supervisor.model, loaded.configuration, loaded.document)
+        machine = assemble(loaded.configuration, mapping, supervisor, NullLog(), starts_itself=True, host=host)
         watch = Watch(machine, host, CASES[base])
         # Its place is known at any time, only its distance has to be summed up.
         start_s, place_m, driven_m = host.monotonic(), robot.world.pose[:2], 0.0

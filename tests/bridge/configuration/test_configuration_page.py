@@ -7,7 +7,7 @@ import pytest
 
 from robosc.language import load_bundle
 from robosc.model import check
-from robosc_bridge.configuration import parse, reference, tie
+from robosc_bridge.configuration import map_channels, parse, reference
 from robosc_bridge.configuration.document import MAXIMUM_BYTES, MAXIMUM_DEPTH, MAXIMUM_ENTRIES, MAXIMUM_SCALAR
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -40,8 +40,8 @@ def test_the_examples_can_be_tied(model: str, text: str) -> None:
     checked = check(load_bundle(DOCS / model)).model
     assert checked is not None
     loaded = parse(text.encode(), "page.yaml")
-    ties = tie(checked, loaded.configuration, loaded.document)
-    assert ties.settings(loaded.configuration.execution).release_identifiers == ("/cmd_vel",)
+    mapping = map_channels(checked, loaded.configuration, loaded.document)
+    assert mapping.settings(loaded.configuration.execution).release_identifiers == ("/cmd_vel",)
 
 
 def test_the_limits_are_those_of_the_reader() -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from robosc.language import load_bundle
 from robosc.model import check
 from robosc.model.structure import Model
-from robosc_bridge.configuration import Configuration, ConfigurationError, init, parse, tie
+from robosc_bridge.configuration import Configuration, ConfigurationError, init, map_channels, parse
 from robosc_bridge.configuration import template as template_module
 from robosc_bridge.configuration.document import parse_document
 from robosc_bridge.configuration.structure import TurtleBot
@@ -61,7 +61,7 @@ def test_what_is_plain_is_tied(
     assert (found.robot, found.drive.driver) == (robot, drive)
     assert found.scanner is not None
     assert found.scanner.driver == scanner
-    assert tie(model, found, loaded.document).channels.keys() == {item.name for item in model.communications}
+    assert map_channels(model, found, loaded.document).channels.keys() == {item.name for item in model.communications}
 
 
 @pytest.mark.parametrize("name", OPEN)
@@ -90,8 +90,8 @@ def test_filled_in_it_can_be_tied() -> None:
         for before, line in itertools.pairwise(["", *text.splitlines()])
     ]
     loaded = parse("\n".join(lines).encode(), "c.yaml")
-    ties = tie(model, loaded.configuration, loaded.document)
-    assert {type(channel).__name__ for channel in ties.channels.values()} == {"GrpcChannel", "ButtonChannel"}
+    mapping = map_channels(model, loaded.configuration, loaded.document)
+    assert {type(channel).__name__ for channel in mapping.channels.values()} == {"GrpcChannel", "ButtonChannel"}
 
 
 def test_a_drive_without_buttons_has_none_tied() -> None:
@@ -177,7 +177,7 @@ def test_what_is_plain(identifier: str, declaration: str, expected: str | None) 
 def test_a_model_that_says_nothing_has_nothing_to_tie() -> None:
     model = model_of("robot R { component C { behaviour { initial marked state s { } } } }")
     loaded = parse(init("burger", "opencr", "lds02", model).encode(), "c.yaml")
-    assert tie(model, loaded.configuration).channels == {}
+    assert map_channels(model, loaded.configuration).channels == {}
 
 
 @given(st.text(st.characters(exclude_categories=["Cs"]), max_size=10))

@@ -8,7 +8,7 @@ import pytest
 
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
-from robosc_bridge.configuration import parse, tie
+from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.daemon.assembly import AssemblyError, check_settings, safety_limits
 from robosc_bridge.daemon.states import State
 from robosc_bridge.errors import BridgeError
@@ -31,7 +31,7 @@ def supervisor() -> Supervisor:
     [
         (
             ("{channel: fault}", "{channel: grpc}"),
-            "tied to 'grpc', which needs 'remote.grpc_address': 'lost' ('/lost')",
+            "mapped to 'grpc', which needs 'remote.grpc_address': 'lost' ('/lost')",
         ),
         (
             ("skills:", "safety: {operator_link_timeout_s: 1}\nskills:"),
@@ -45,7 +45,7 @@ def test_what_needs_a_remote_face_is_refused_without_one(
 ) -> None:
     configuration = parse(CONFIGURATION.replace(*change).encode(), "test.yaml").configuration
     with pytest.raises(AssemblyError) as raised:
-        check_settings(configuration, tie(supervisor.model, configuration), Deployment.CONTROLLER)
+        check_settings(configuration, map_channels(supervisor.model, configuration), Deployment.CONTROLLER)
     assert why in str(raised.value)
 
 
@@ -53,12 +53,12 @@ def test_what_needs_a_remote_face_is_refused_without_one(
 def test_a_layer_releases_what_drives(chosen: str, supervisor: Supervisor) -> None:
     text = CONFIGURATION.replace("execution: {", f"execution: {{release_identifiers: {chosen}, ")
     configuration = parse(f"{text}\nremote: {{grpc_address: '127.0.0.1:0'}}\n".encode(), "test.yaml").configuration
-    ties = tie(supervisor.model, configuration)
+    mapping = map_channels(supervisor.model, configuration)
     with pytest.raises(AssemblyError) as raised:
-        check_settings(configuration, ties, Deployment.LAYER)
+        check_settings(configuration, mapping, Deployment.LAYER)
     assert str(raised.value) == "execution.release_identifiers must name '/cmd_vel' in a supervision layer"
     # A controller knows what it has asked for.
-    assert check_settings(configuration, ties, Deployment.CONTROLLER)
+    assert check_settings(configuration, mapping, Deployment.CONTROLLER)
 
 
 def test_the_loop_may_be_late_as_long_as_is_said() -> None:
@@ -97,7 +97,7 @@ def test_a_face_that_may_not_listen_so_is_refused_before_anything_is_made(
 ) -> None:
     configuration = parse(f"{CONFIGURATION}\nremote: {remote}\n".encode(), "test.yaml").configuration
     with pytest.raises(AssemblyError) as raised:
-        check_settings(configuration, tie(supervisor.model, configuration), supervisor.deployment)
+        check_settings(configuration, map_channels(supervisor.model, configuration), supervisor.deployment)
     assert why in str(raised.value)
 
 
@@ -119,7 +119,7 @@ def test_a_scanner_that_cannot_be_so_is_refused(scanner: str, why: str, supervis
     text = re.sub(r"^scanner: .*$", f"scanner: {{driver: {scanner}}}", CONFIGURATION, flags=re.MULTILINE)
     configuration = parse(text.encode(), "test.yaml").configuration
     with pytest.raises(AssemblyError) as raised:
-        check_settings(configuration, tie(supervisor.model, configuration), supervisor.deployment)
+        check_settings(configuration, map_channels(supervisor.model, configuration), supervisor.deployment)
     assert why in str(raised.value)
 
 
@@ -164,7 +164,7 @@ def test_what_cannot_be_used_is_refused_without_a_start(
         text, why = text.replace(name, path), why.replace(name, path)
     configuration = parse(text.encode(), "test.yaml").configuration
     with pytest.raises(BridgeError) as raised:
-        check_settings(configuration, tie(supervisor.model, configuration), Deployment.CONTROLLER)
+        check_settings(configuration, map_channels(supervisor.model, configuration), Deployment.CONTROLLER)
     assert why in str(raised.value)
     assert "\n" not in str(raised.value)
 

@@ -257,8 +257,8 @@ def test_what_is_served_already_is_not_served_by_another() -> None:
     second = Connected(scene, "second", ("ask", "fetch", "note", "nothing"))
     assert sorted(why(second.turn())) == [
         "'ask' is served by first already",
-        "'note' is no service or action of the model that is tied to grpc",
-        "'nothing' is no service or action of the model that is tied to grpc",
+        "'note' is no service or action of the model that is mapped to grpc",
+        "'nothing' is no service or action of the model that is mapped to grpc",
     ]
     first.leave()
     third = Connected(scene, "third", ("ask",))

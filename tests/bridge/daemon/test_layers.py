@@ -345,7 +345,7 @@ WRONG = [
     (Requested, ("/cmd_vel", {"linear": 1}), "'linear' must be {x: number"),
     (Requested, ("/cmd_vel", 1), "must be "),
     (Requested, ("/cmd_vel", {"linear": {"w": 1}}), "there is no field 'linear.w'; there is x, y, z"),
-    (Requested, ("/cmd_vel", {"linear": {"y": 0.1}}), "'linear.y' must be 0: 'drive' does not go by it"),
+    (Requested, ("/cmd_vel", {"linear": {"y": 0.1}}), "'linear.y' must be 0: 'drive' does not use it"),
     (Requested, ("/cmd_vel", {"twist": FORWARD}), "there is no field 'twist'"),
     (Requested, ("/cmd_vel", {"linear": {"x": 1 << 80}}), "a number of more than 64 bits"),
     (Requested, ("/spin", 1.5), "'spin': the data must be a whole number"),

@@ -8,9 +8,9 @@ from robosc.certification import make_supervisor
 from robosc.execution.runtime.clock import ManualClock
 from robosc.execution.runtime.event_log import MemoryLog
 from robosc.model.structure import Deployment
-from robosc_bridge.configuration import parse, tie
+from robosc_bridge.configuration import map_channels, parse
+from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.structure import Configuration
-from robosc_bridge.configuration.ties import Ties
 from robosc_bridge.daemon.assembly import AssemblyError, assemble, check_settings
 from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.loop import Daemon
@@ -56,13 +56,13 @@ LIMITS = SafetyLimits(linear_m_s=0.2, angular_rad_s=2.0, wheel_m_s=0.2, separati
 MADE = make_supervisor(bundle_of(MODEL))
 
 
-def tied(more: str = "", **channels: str) -> tuple[Configuration, Ties]:
+def mapped(more: str = "", **channels: str) -> tuple[Configuration, ChannelMapping]:
     """All communications as `ALL` says, but for those that are named here."""
     chosen = ALL | {f"/{name}": channel for name, channel in channels.items()}
     lines = "".join(f"  {name}: {channel}\n" for name, channel in chosen.items())
     assert MADE.supervisor is not None, MADE.reason
     configuration = parse(f"{DEVICES}{more}channels:\n{lines}".encode(), "test.yaml").configuration
-    return configuration, tie(MADE.supervisor.model, configuration)
+    return configuration, map_channels(MADE.supervisor.model, configuration)
 
 
 def test_a_warning_is_logged_when_it_begins(caplog: pytest.LogCaptureFixture) -> None:
@@ -84,11 +84,11 @@ class Scene:
     """A daemon, and devices that a test plays."""
 
     def __init__(self) -> None:
-        configuration, ties = tied()
+        configuration, mapping = mapped()
         assert MADE.supervisor is not None
         clock = ManualClock(now_s=50.0)
         self.log = MemoryLog()
-        job = Job(MADE.supervisor, ties, ties.settings(configuration.execution), False, True, needs_camera=True)
+        job = Job(MADE.supervisor, mapping, mapping.settings(configuration.execution), False, True, needs_camera=True)
         skills = configuration.skills
         stop = EmergencyStop(skills.emergency_stop)
         self.daemon = Daemon(job, SafetyLayer(LIMITS), Rotate(skills.rotate), stop, clock, self.log)
@@ -167,26 +167,26 @@ def test_a_lost_camera_is_no_lost_drive_base() -> None:
     ],
 )
 def test_a_camera_is_opened_only_for_whom_it_is_for(channels: dict[str, str], is_needed: bool) -> None:
-    configuration, ties = tied(**channels)
-    assert needs_camera(ties) is is_needed
+    configuration, mapping = mapped(**channels)
+    assert needs_camera(mapping) is is_needed
     assert MADE.supervisor is not None
-    machine = assemble(configuration, ties, MADE.supervisor, MemoryLog(), starts_itself=True)
+    machine = assemble(configuration, mapping, MADE.supervisor, MemoryLog(), starts_itself=True)
     assert (machine.camera is not None) is is_needed
 
 
-def check(configuration: Configuration, ties: Ties) -> None:
-    check_settings(configuration, ties, Deployment.CONTROLLER)
+def check(configuration: Configuration, mapping: ChannelMapping) -> None:
+    check_settings(configuration, mapping, Deployment.CONTROLLER)
 
 
 def test_a_line_that_nobody_tells_is_lost_is_refused() -> None:
-    with pytest.raises(AssemblyError, match=r"'correction' \('/line'\) is tied to 'line', and nothing tells when"):
-        check(*tied(lost="{channel: none}"))
-    check(*tied("execution: {max_age_s: {/line: 0.5}}\n", lost="{channel: none}"))
-    check(*tied())
+    with pytest.raises(AssemblyError, match=r"'correction' \('/line'\) is mapped to 'line', and nothing tells when"):
+        check(*mapped(lost="{channel: none}"))
+    check(*mapped("execution: {max_age_s: {/line: 0.5}}\n", lost="{channel: none}"))
+    check(*mapped())
 
 
 def test_a_simulator_without_a_place_is_refused() -> None:
     with pytest.raises(AssemblyError, match="as simulated:PATH"):
-        check(*tied("skills: {line: {camera: simulated}}\n"))
-    check(*tied("skills: {line: {camera: 'simulated:/tmp/x'}}\n"))
-    check(*tied("skills: {line: {camera: simulated}}\n", line="{channel: none}", **NONE))
+        check(*mapped("skills: {line: {camera: simulated}}\n"))
+    check(*mapped("skills: {line: {camera: 'simulated:/tmp/x'}}\n"))
+    check(*mapped("skills: {line: {camera: simulated}}\n", line="{channel: none}", **NONE))

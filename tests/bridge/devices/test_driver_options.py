@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from robosc_bridge.devices.options import DriverOptionError, checked_options, option_types
-from robosc_bridge.drivers import Driver, Kind, find_driver
+from robosc_bridge.driver_registry import Driver, Kind, find_driver
 
 PAGE = (Path(__file__).parents[3] / "docs" / "bridge-drivers.md").read_text(encoding="utf-8")
 BUILT_IN = [

@@ -241,7 +241,7 @@ def test_scans_come_as_the_motor_turns(name: str) -> None:
     with scene(name) as seen:
         seen.lidar.open()
         times_s = [scan.time_s for scan in seen.scans(3.0)]
-        turn_s = 1 / seen.robot.scanner.nominal_hz
+        revolution_s = 1 / seen.robot.scanner.nominal_hz
         steps_s = [after_s - before_s for before_s, after_s in itertools.pairwise(times_s)]
-        assert len(times_s) == pytest.approx(3.0 / turn_s, abs=2)
-        assert steps_s == pytest.approx([turn_s] * len(steps_s), abs=0.01)
+        assert len(times_s) == pytest.approx(3.0 / revolution_s, abs=2)
+        assert steps_s == pytest.approx([revolution_s] * len(steps_s), abs=0.01)

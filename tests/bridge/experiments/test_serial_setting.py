@@ -7,7 +7,7 @@ import pytest
 from robosc.language import load_bundle
 from robosc.model import check
 from robosc.model.structure import Deployment
-from robosc_bridge.configuration import parse, tie
+from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.daemon.assembly import check_settings
 from robosc_bridge.experiments import line, maze
 from robosc_bridge.experiments.maze import run_maze
@@ -36,8 +36,8 @@ def test_the_configuration_is_one_that_the_bridge_takes(name: str, speed: float,
     loaded = parse(text.encode(), "bridge.yaml")
     model = check(load_bundle(scenario.MODEL)).model
     assert model is not None
-    ties = tie(model, loaded.configuration, loaded.document)
-    check_settings(loaded.configuration, ties, deployment)
+    mapping = map_channels(model, loaded.configuration, loaded.document)
+    check_settings(loaded.configuration, mapping, deployment)
 
 
 def test_a_scene_without_a_goal_is_no_maze(tmp_path: Path) -> None:

@@ -164,7 +164,7 @@ def test_a_stick() -> None:
 
 def test_a_twist_has_the_shape_of_the_message() -> None:
     operations = PlayedDaemon().operations
-    message = drive_message(operations.ties)
+    message = drive_message(operations.mapping)
     assert message is not None
     twist = {"linear": {"x": 0.1, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": -0.5}}
     assert drive_data(operations.model, message, Velocity(0.1, -0.5)) == twist
@@ -173,6 +173,6 @@ def test_a_twist_has_the_shape_of_the_message() -> None:
     )
     stamped = stamped.replace("with { linear: { x: 0.1 } }", "with { twist: { linear: { x: 0.1 } } }")
     operations = PlayedDaemon(model=stamped).operations
-    message = drive_message(operations.ties)
+    message = drive_message(operations.mapping)
     assert message is not None
     assert drive_data(operations.model, message, Velocity(0.1, -0.5)) == {"twist": twist}

@@ -100,7 +100,7 @@ def test_set_points_that_are_not_heeded_are_told_once(is_layer: bool, values: di
 def test_a_layer_whose_drive_is_not_tied_is_not_driven() -> None:
     talk = Talk(PlayedDaemon(is_layer=True, configuration=CONFIGURATION.replace("channel: drive", "channel: log")))
     talk.daemon.show(state=State.RUNNING)
-    assert any("whose drive is tied" in text for text in joined_texts(talk.say(_target(talk.station, 0.1))))
+    assert any("whose drive is mapped" in text for text in joined_texts(talk.say(_target(talk.station, 0.1))))
     assert talk.daemon.told == []
 
 

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from robosc_bridge.drivers import facts_of
+from robosc_bridge.driver_registry import features_of
 from robosc_bridge.safety import LATCHING, SCAN_TIMEOUTS_S, TORQUE_OFF, Caution, Reason
 from support.safety import LIMITS
 
@@ -41,7 +41,7 @@ def test_its_numbers_are_the_defaults() -> None:
         assert f"more than {time_s} s" in ROWS[reason.name][0]
     for scanner, time_s in SCAN_TIMEOUTS_S.items():
         assert f"{time_s} s ({scanner[:3].upper()}-{scanner[3:]})" in ROWS["SCAN_STALE"][0]
-    rover = facts_of("mavlink-rover")
+    rover = features_of("mavlink-rover")
     assert rover is not None
     told_s = f"within {LIMITS.torque_on_s:g} s ({rover.torque_on_s:g} s of a MAVLink rover)"
     assert told_s in ROWS["TORQUE_LOST"][0]

@@ -27,14 +27,14 @@ class Scan:
             enough, minus infinity where something is too near (REP 117, ros.org/reps/rep-0117.html).
         nearest_m: Shortest distance that can be measured.
         farthest_m: Longest distance that can be measured.
-        turn_s: World time from scan to scan.
+        revolution_s: World time from scan to scan.
     """
 
     stamp_s: float
     ranges_m: npt.NDArray[np.float32]
     nearest_m: float
     farthest_m: float
-    turn_s: float
+    revolution_s: float
 
 
 @dataclass(frozen=True)

@@ -242,7 +242,7 @@ class Ros1Face:
                     "kind": "scan",
                     "frame": SCANNER,
                     "count": len(reading.ranges_m),
-                    "turn_s": reading.turn_s,
+                    "turn_s": reading.revolution_s,
                     "nearest_m": reading.nearest_m,
                     "farthest_m": reading.farthest_m,
                 }

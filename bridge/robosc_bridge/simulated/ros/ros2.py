@@ -180,7 +180,7 @@ def _scan(message: Any, reading: Scan) -> Any:
     count = len(reading.ranges_m)
     message.angle_increment = math.tau / count
     message.angle_max = math.tau * (count - 1) / count
-    message.scan_time = reading.turn_s
+    message.scan_time = reading.revolution_s
     message.range_min, message.range_max = reading.nearest_m, reading.farthest_m
     message.ranges = array("f", reading.ranges_m.tobytes())
     return message

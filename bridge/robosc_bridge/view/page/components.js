@@ -53,8 +53,8 @@ class Card {
     const list = make("ul", { class: "communications" });
     for (const item of communications) {
       const place = SERVED.has(item.kind) ? make("span", { class: "place", "data-place": "" }) : null;
-      const tied = [item.identifier, item.channel && `channel ${item.channel}`].filter(Boolean).join(", ");
-      const line = make("li", { title: tied || null },
+      const mapped = [item.identifier, item.channel && `channel ${item.channel}`].filter(Boolean).join(", ");
+      const line = make("li", { title: mapped || null },
         make("span", { class: "what" }, item.kind), " ", quoted(item.name), ...(place ? [" ", place] : []));
       if (place) this.places.set(item.name, place);
       list.append(line);

@@ -2,7 +2,7 @@
 
 Built-in drivers are listed here; an installed distribution adds its own through the entry-point group
 `robosc_bridge.devices` (name = driver, value = `module:attribute` of a `Driver`), a program through `register`. A
-configuration is checked against the facts without any device's code: so this module imports none, and `make` of a
+configuration is checked against the features without any device's code: so this module imports none, and `make` of a
 plug-in had better import what it needs when it is called.
 """
 
@@ -31,7 +31,7 @@ PANEL = ("button_1", "button_2", "bumper_1", "bumper_2")
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
+class DriverFeatures:
     """Features of a device, beside those that all of its kind have.
 
     Attributes:
@@ -39,7 +39,7 @@ class Facts:
         has_imu: True if its readings report accelerations and turn rates.
         needs_turtlebot3: True if its argument `robot` is a `devices.robots.Robot`, whose motors or board it drives;
             else it is a `devices.robots.Body`, and the robot may be any.
-        turn_s: Time that a turn of a range scanner takes, in seconds; None: that is not known.
+        revolution_s: Time that a turn of a range scanner takes, in seconds; None: that is not known.
         torque_on_s: Time within which motors that are told to hold do so and report it, in seconds; None: as the
             safety layer has it.
     """
@@ -47,7 +47,7 @@ class Facts:
     buttons: tuple[str, ...] = ()
     has_imu: bool = False
     needs_turtlebot3: bool = False
-    turn_s: float | None = None
+    revolution_s: float | None = None
     torque_on_s: float | None = None
 
     @property
@@ -66,14 +66,14 @@ class Driver:
         description: One line for a person.
         make: Function that makes one, without opening anything. Its arguments are `path`, of a drive base `robot`,
             and the options of the configuration, which are the driver's own.
-        facts: Features of the device; None: it does not say, and whatever a configuration ties is taken to be there.
+        features: Features of the device; None: it does not say, and whatever a configuration maps is taken to be there.
     """
 
     kind: Kind
     name: str
     description: str
     make: Callable[..., Any]
-    facts: Facts | None = None
+    features: DriverFeatures | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,48 +82,48 @@ class DriverInfo:
 
     name: str
     description: str
-    facts: Facts | None = None
+    features: DriverFeatures | None = None
 
 
 class UnknownDriverError(BridgeError, LookupError):
     """There is no driver of that kind and name, or it cannot be used here."""
 
 
-# Description, place (`module:callable`) and facts of the built-in drivers: listing them imports none.
-_BUILT_IN: dict[Kind, dict[str, tuple[str, str, Facts | None]]] = {
+# Description, place (`module:callable`) and features of the built-in drivers: listing them imports none.
+_BUILT_IN: dict[Kind, dict[str, tuple[str, str, DriverFeatures | None]]] = {
     Kind.DRIVE_BASE: {
         "dynamixel": (
             "two Dynamixel X wheels (XL430-W250, XM430-W210) on a U2D2 or another half-duplex adapter",
             "robosc_bridge.devices.dynamixel:DynamixelBase",
-            Facts(needs_turtlebot3=True),
+            DriverFeatures(needs_turtlebot3=True),
         ),
         "mavlink-rover": (
             "a MAVLink rover: ArduPilot Rover, driven in its mode GUIDED over a serial line, UDP or TCP",
             "robosc_bridge.devices.mavlink_drivers:make_rover",
             # Its mode and its arming show in a heartbeat each; there is one a second, of which two may be lost.
-            Facts(has_imu=True, torque_on_s=8.0),
+            DriverFeatures(has_imu=True, torque_on_s=8.0),
         ),
         "opencr": (
             "a stock TurtleBot3: its OpenCR board with the ROS 2 firmware",
             "robosc_bridge.devices.opencr:OpenCrBase",
-            Facts(PANEL, has_imu=True, needs_turtlebot3=True),
+            DriverFeatures(PANEL, has_imu=True, needs_turtlebot3=True),
         ),
     },
     Kind.RANGE_SCANNER: {
         "lds01": (
             "the LiDAR LDS-01 (HLS-LFCD2): 0.12 to 3.5 m, 5 turns a second",
             "robosc_bridge.devices.lidar:make_lds01",
-            Facts(turn_s=0.2),
+            DriverFeatures(revolution_s=0.2),
         ),
         "lds02": (
             "the LiDAR LDS-02 (LD08): 0.16 to 8 m, 6 turns a second",
             "robosc_bridge.devices.lidar:make_lds02",
-            Facts(turn_s=1 / 6),
+            DriverFeatures(revolution_s=1 / 6),
         ),
         "lds03": (
             "the LiDAR LDS-03 (COIN-D4): 0.05 to 12 m, 10 turns a second",
             "robosc_bridge.devices.lidar:make_lds03",
-            Facts(turn_s=0.1),
+            DriverFeatures(revolution_s=0.1),
         ),
         "mavlink-rover": (
             "the obstacles that a MAVLink rover tells of, also on the line of its drive base",
@@ -150,16 +150,16 @@ def available_drivers(kind: Kind) -> tuple[DriverInfo, ...]:
         except UnknownDriverError:
             continue
         if driver.kind is kind:
-            infos[entry.name] = DriverInfo(entry.name, driver.description, driver.facts)
-    for name, (description, _, facts) in _BUILT_IN[kind].items():
-        infos[name] = DriverInfo(name, description, facts)
+            infos[entry.name] = DriverInfo(entry.name, driver.description, driver.features)
+    for name, (description, _, features) in _BUILT_IN[kind].items():
+        infos[name] = DriverInfo(name, description, features)
     for (of, name), driver in _registered.items():
         if of is kind:
-            infos[name] = DriverInfo(name, driver.description, driver.facts)
+            infos[name] = DriverInfo(name, driver.description, driver.features)
     return tuple(infos[name] for name in sorted(infos))
 
 
-def facts_of(name: str, kind: Kind = Kind.DRIVE_BASE) -> Facts | None:
+def features_of(name: str, kind: Kind = Kind.DRIVE_BASE) -> DriverFeatures | None:
     """Return the features of a device; None: its driver does not say, or there is none of that name.
 
     A missing driver is reported elsewhere.
@@ -167,7 +167,7 @@ def facts_of(name: str, kind: Kind = Kind.DRIVE_BASE) -> Facts | None:
     if (kind, name) not in _registered and name in _BUILT_IN[kind]:
         return _BUILT_IN[kind][name][2]
     try:
-        return find_driver(kind, name).facts
+        return find_driver(kind, name).features
     except UnknownDriverError:
         return None
 
@@ -181,9 +181,9 @@ def find_driver(kind: Kind, name: str) -> Driver:
     if (kind, name) in _registered:
         return _registered[kind, name]
     if name in _BUILT_IN[kind]:
-        description, place, facts = _BUILT_IN[kind][name]
+        description, place, features = _BUILT_IN[kind][name]
         module, _, attribute = place.partition(":")
-        return Driver(kind, name, description, getattr(importlib.import_module(module), attribute), facts)
+        return Driver(kind, name, description, getattr(importlib.import_module(module), attribute), features)
     for entry in entry_points(group=ENTRY_POINT_GROUP, name=name):
         driver = _plug_in(name, entry.load)
         if driver.kind is kind:
@@ -200,5 +200,5 @@ def _plug_in(name: str, load: Callable[[], object]) -> Driver:
     except Exception as error:
         raise UnknownDriverError(f"the plug-in of driver '{name}' cannot be imported: {error}") from error
     if not isinstance(loaded, Driver):
-        raise UnknownDriverError(f"the plug-in of driver '{name}' is not a robosc_bridge.drivers.Driver")
+        raise UnknownDriverError(f"the plug-in of driver '{name}' is not a robosc_bridge.driver_registry.Driver")
     return loaded

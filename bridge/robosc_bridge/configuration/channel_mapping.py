@@ -1,4 +1,4 @@
-"""Ties of a model's communications to channels, checked as a whole before anything starts."""
+"""Mapping of a model's communications to channels, checked as a whole before anything starts."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -22,14 +22,14 @@ from robosc_bridge.configuration.channels import (
 )
 from robosc_bridge.configuration.document import Document
 from robosc_bridge.configuration.problems import ConfigurationError, Path, Problem, hint
-from robosc_bridge.configuration.shapes import Shape, Way, misfits
+from robosc_bridge.configuration.shapes import Direction, Shape, mismatches
 from robosc_bridge.configuration.structure import TURTLEBOTS, Body, Configuration, Execution
-from robosc_bridge.drivers import facts_of
+from robosc_bridge.driver_registry import features_of
 
 
 @dataclass(frozen=True, slots=True)
-class Ties:
-    """Channel that each communication of a model is tied to.
+class ChannelMapping:
+    """Channel that each communication of a model is mapped to.
 
     Attributes:
         channels: Channels by name of communication, for all communications of the model, in its order.
@@ -39,28 +39,28 @@ class Ties:
     channels: Mapping[str, Channel]
     communications: tuple[Communication, ...]
 
-    def tied_to(self, channel: type[Channel]) -> tuple[tuple[Communication, Channel], ...]:
-        """The communications that are tied to channels of a kind, in the order of the model."""
+    def mapped_to(self, channel: type[Channel]) -> tuple[tuple[Communication, Channel], ...]:
+        """The communications that are mapped to channels of a kind, in the order of the model."""
         found = ((item, self.channels[item.name]) for item in self.communications)
-        return tuple((item, tied) for item, tied in found if isinstance(tied, channel))
+        return tuple((item, mapped) for item, mapped in found if isinstance(mapped, channel))
 
     def settings(self, execution: Execution) -> Settings:
-        """Settings of the executor; what is tied to the drive keeps acting until it is released, unless told else."""
+        """Settings of the executor; what is mapped to the drive keeps acting until it is released, unless told else."""
         given = msgspec.structs.asdict(execution)
         if execution.release_identifiers is None:
-            acting = (item.identifier for item, _ in self.tied_to(DriveChannel))
+            acting = (item.identifier for item, _ in self.mapped_to(DriveChannel))
             given["release_identifiers"] = tuple(dict.fromkeys(acting))
         return settings_from(given)
 
     def never_released(self, settings: Settings) -> tuple[str, ...]:
-        """Identifiers tied to the drive whose last message acts until another one comes, whoever has sent it."""
+        """Identifiers mapped to the drive whose last message acts until another one comes, whoever has sent it."""
         released = settings.release_identifiers or ()
-        driven = dict.fromkeys(item.identifier for item, _ in self.tied_to(DriveChannel))
+        driven = dict.fromkeys(item.identifier for item, _ in self.mapped_to(DriveChannel))
         return tuple(identifier for identifier in driven if identifier not in released)
 
 
-def tie(model: Model, configuration: Configuration, document: Document | None = None) -> Ties:
-    """Tie every communication of a model.
+def map_channels(model: Model, configuration: Configuration, document: Document | None = None) -> ChannelMapping:
+    """Map every communication of a model.
 
     Args:
         model: A checked model.
@@ -68,43 +68,43 @@ def tie(model: Model, configuration: Configuration, document: Document | None = 
         document: Document that the configuration was read from, for the lines in messages.
 
     Raises:
-        ConfigurationError: A communication is not tied, or twice, or to a channel that cannot serve it or that the
-            robot does not have; or something is tied that the model does not have. Lists all of it.
+        ConfigurationError: A communication is not mapped, or twice, or to a channel that cannot serve it or that the
+            robot does not have; or something is mapped that the model does not have. Lists all of it.
     """
-    found = _Tying(model, configuration)
+    found = _MappingChecks(model, configuration)
     problems = [
         Problem(message, path, None if document is None else document.line(path)) for path, message in found.problems()
     ]
     if problems:
         raise ConfigurationError("configuration" if document is None else document.name, problems)
-    return Ties(found.channels, model.communications)
+    return ChannelMapping(found.channels, model.communications)
 
 
-def why_not(model: Model, communication: Communication, channel: type[Channel]) -> tuple[str, ...]:
-    """Return the reasons why a communication cannot be tied to channels of a kind; empty: it can."""
+def unsuitable_because(model: Model, communication: Communication, channel: type[Channel]) -> tuple[str, ...]:
+    """Return the reasons why a communication cannot be mapped to channels of a kind; empty: it can."""
     info = CHANNELS[channel]
     use = info.uses.get(communication.kind)
     if use is None:
         kinds = " or ".join(f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}" for kind in info.uses)
         return (f"it is for {kinds}",)
-    parts: tuple[tuple[str, Type | None, Shape, Way], ...] = (
-        ("request", communication.request, use.request, Way.TO_ROBOT),
-        ("response", communication.response, use.response, Way.TO_MODEL),
-        ("feedback", communication.feedback, use.feedback, Way.TO_MODEL),
+    parts: tuple[tuple[str, Type | None, Shape, Direction], ...] = (
+        ("request", communication.request, use.request, Direction.TO_ROBOT),
+        ("response", communication.response, use.response, Direction.TO_MODEL),
+        ("feedback", communication.feedback, use.feedback, Direction.TO_MODEL),
     )
     is_message = communication.kind in (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSAGE)
     found = [
         reason if is_message else f"{name}: {reason}"
-        for name, type_, shape, way in parts
+        for name, type_, shape, direction in parts
         if type_ is not None
-        for reason in misfits(model, type_, shape, way)
+        for reason in mismatches(model, type_, shape, direction)
     ]
-    return (*found, *_unheeded(model, communication, info))
+    return (*found, *_ignored_parts(model, communication, info))
 
 
-def _unheeded(model: Model, communication: Communication, info: ChannelInfo) -> Iterator[str]:
-    """Parts that the model gives and the channel does not go by."""
-    if info.heeded:
+def _ignored_parts(model: Model, communication: Communication, info: ChannelInfo) -> Iterator[str]:
+    """Parts that the model gives and the channel does not use."""
+    if info.used_parts:
         given = (
             path
             for provide in model.provides_for(communication.name)
@@ -112,8 +112,8 @@ def _unheeded(model: Model, communication: Communication, info: ChannelInfo) -> 
             if not (isinstance(value, Constant) and value.value == 0)
         )
         for path in dict.fromkeys(given):
-            if path not in info.heeded:
-                yield f"the model gives '{path}', which it does not go by; it goes by {', '.join(sorted(info.heeded))}"
+            if path not in info.used_parts:
+                yield f"the model gives '{path}', which it does not use; it uses {', '.join(sorted(info.used_parts))}"
 
 
 def _parts(value: ProvidedValue, path: tuple[str, ...]) -> Iterator[tuple[str, Expression]]:
@@ -124,11 +124,11 @@ def _parts(value: ProvidedValue, path: tuple[str, ...]) -> Iterator[tuple[str, E
         yield ".".join(path), value
 
 
-class _Tying:
+class _MappingChecks:
     def __init__(self, model: Model, configuration: Configuration) -> None:
         self._model = model
         self._configuration = configuration
-        self._facts = facts_of(configuration.drive.driver)
+        self._features = features_of(configuration.drive.driver)
         self.channels: dict[str, Channel] = {}
 
     def problems(self) -> list[tuple[Path, str]]:
@@ -142,7 +142,7 @@ class _Tying:
             for item in meant:
                 by_communication[item.name].append(key)
         for item in self._model.communications:
-            found.extend(self._tied(item, by_communication[item.name]))
+            found.extend(self._mapped(item, by_communication[item.name]))
         found.extend(self._divided())
         found.extend(self._missing_devices())
         found.extend(self._unknown_names())
@@ -157,16 +157,16 @@ class _Tying:
     def _known(self) -> Iterable[str]:
         return {item.identifier for item in self._model.communications}
 
-    def _tied(self, item: Communication, keys: list[str]) -> Iterator[tuple[Path, str]]:
+    def _mapped(self, item: Communication, keys: list[str]) -> Iterator[tuple[Path, str]]:
         text = f"{item.kind} '{item.name}' ('{item.identifier}')"
         if not keys:
-            yield ("channels",), f"{text} is tied to nothing"
+            yield ("channels",), f"{text} is not mapped to a channel"
             return
         for key in keys[1:]:
-            yield ("channels", key), f"{text} is tied here again; it is by '{keys[0]}' already"
+            yield ("channels", key), f"{text} is mapped here again; it is by '{keys[0]}' already"
         channel = self.channels[item.name] = self._configuration.channels[keys[0]]
-        for reason in why_not(self._model, item, type(channel)):
-            yield ("channels", keys[0]), f"{text} cannot be tied to '{channel_name(channel)}': {reason}"
+        for reason in unsuitable_because(self._model, item, type(channel)):
+            yield ("channels", keys[0]), f"{text} cannot be mapped to '{channel_name(channel)}': {reason}"
 
     def _divided(self) -> Iterator[tuple[Path, str]]:
         """Messages that are told on one identifier reach all who listen there: one channel only."""
@@ -180,8 +180,8 @@ class _Tying:
 
     def _missing_devices(self) -> Iterator[tuple[Path, str]]:
         configuration = self._configuration
-        driver, facts = configuration.drive.driver, self._facts
-        if facts is not None and facts.needs_turtlebot3 and isinstance(configuration.robot, Body):
+        driver, features = configuration.drive.driver, self._features
+        if features is not None and features.needs_turtlebot3 and isinstance(configuration.robot, Body):
             yield ("robot",), f"the drive '{driver}' is that of a TurtleBot3; it must be one of {', '.join(TURTLEBOTS)}"
         for key, channel in configuration.channels.items():
             path = ("channels", key)
@@ -189,9 +189,9 @@ class _Tying:
             if is_scanner or (isinstance(channel, FaultChannel) and channel.device == "scanner"):
                 if configuration.scanner is None:
                     yield path, "there is no scanner: the section 'scanner' is missing"
-            elif isinstance(channel, ImuChannel) and facts is not None and not facts.has_imu:
+            elif isinstance(channel, ImuChannel) and features is not None and not features.has_imu:
                 yield path, f"the drive '{driver}' measures no accelerations and turn rates"
-            elif isinstance(channel, BumperChannel) and facts is not None and not facts.has_bumpers:
+            elif isinstance(channel, BumperChannel) and features is not None and not features.has_bumpers:
                 yield path, f"the drive '{driver}' has no bumpers"
             elif isinstance(channel, ButtonChannel):
                 yield from self._missing_buttons((*path, "name"), (channel.name,))
@@ -202,8 +202,8 @@ class _Tying:
     def _missing_buttons(self, path: Path, names: Iterable[str]) -> Iterator[tuple[Path, str]]:
         driver = self._configuration.drive.driver
         for name in names:
-            if self._facts is not None and name not in self._facts.buttons:
-                yield path, f"the drive '{driver}' has no button '{name}'; {hint(name, self._facts.buttons)}"
+            if self._features is not None and name not in self._features.buttons:
+                yield path, f"the drive '{driver}' has no button '{name}'; {hint(name, self._features.buttons)}"
 
     def _unknown_names(self) -> Iterator[tuple[Path, str]]:
         """Settings of the executor that name what the model does not have."""

@@ -3,7 +3,7 @@
 from typing import Any, cast
 
 from robosc_bridge.devices.interface import DriveBase, RangeScanner
-from robosc_bridge.drivers import Kind, find_driver
+from robosc_bridge.driver_registry import Kind, find_driver
 
 
 def make_drive_base(name: str, **arguments: Any) -> DriveBase:

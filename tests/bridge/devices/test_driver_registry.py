@@ -8,17 +8,17 @@ from typing import Any
 
 import pytest
 
-from robosc_bridge import drivers
-from robosc_bridge.devices.registry import make_drive_base, make_range_scanner
-from robosc_bridge.drivers import (
+from robosc_bridge import driver_registry
+from robosc_bridge.devices.factory import make_drive_base, make_range_scanner
+from robosc_bridge.driver_registry import (
     PANEL,
     Driver,
+    DriverFeatures,
     DriverInfo,
-    Facts,
     Kind,
     UnknownDriverError,
     available_drivers,
-    facts_of,
+    features_of,
     register,
 )
 
@@ -38,7 +38,7 @@ def _arguments(made: object) -> dict[str, object]:
 
 @pytest.fixture(autouse=True)
 def _nothing_registered(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(drivers, "_registered", {})
+    monkeypatch.setattr(driver_registry, "_registered", {})
     yield
 
 
@@ -76,12 +76,12 @@ def _entry(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
         found = importlib.metadata.EntryPoint("plug", value, group)
         return importlib.metadata.EntryPoints([found]).select(**wanted)
 
-    monkeypatch.setattr(drivers, "entry_points", entry_points)
+    monkeypatch.setattr(driver_registry, "entry_points", entry_points)
 
 
 def test_a_plug_in_is_found_by_its_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(drivers, "PLUG_IN", PLUG_IN, raising=False)
-    _entry(monkeypatch, "robosc_bridge.drivers:PLUG_IN")
+    monkeypatch.setattr(driver_registry, "PLUG_IN", PLUG_IN, raising=False)
+    _entry(monkeypatch, "robosc_bridge.driver_registry:PLUG_IN")
     assert DriverInfo("plug", "a scanner") in available_drivers(Kind.RANGE_SCANNER)
     assert DriverInfo("plug", "a scanner") not in available_drivers(Kind.DRIVE_BASE)
     assert _arguments(make_range_scanner("plug", path="x")) == {"path": "x"}
@@ -90,23 +90,26 @@ def test_a_plug_in_is_found_by_its_entry_point(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_what_a_drive_base_has_is_declared_by_its_driver(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert facts_of("opencr") == Facts(PANEL, has_imu=True, needs_turtlebot3=True)
-    assert facts_of("dynamixel") == Facts(needs_turtlebot3=True)
-    assert facts_of("mavlink-rover") == Facts(has_imu=True, torque_on_s=8.0)
-    assert facts_of("plug") is None
+    assert features_of("opencr") == DriverFeatures(PANEL, has_imu=True, needs_turtlebot3=True)
+    assert features_of("dynamixel") == DriverFeatures(needs_turtlebot3=True)
+    assert features_of("mavlink-rover") == DriverFeatures(has_imu=True, torque_on_s=8.0)
+    assert features_of("plug") is None
     # A plug-in declares its own, or none.
-    facts = Facts(("button_9",))
-    monkeypatch.setattr(drivers, "PLUG_IN", Driver(Kind.DRIVE_BASE, "plug", "a cart", _Made, facts), raising=False)
-    _entry(monkeypatch, "robosc_bridge.drivers:PLUG_IN")
-    assert facts_of("plug") == facts
-    assert DriverInfo("plug", "a cart", facts) in available_drivers(Kind.DRIVE_BASE)
+    features = DriverFeatures(("button_9",))
+    monkeypatch.setattr(
+        driver_registry, "PLUG_IN", Driver(Kind.DRIVE_BASE, "plug", "a cart", _Made, features), raising=False
+    )
+    _entry(monkeypatch, "robosc_bridge.driver_registry:PLUG_IN")
+    assert features_of("plug") == features
+    assert DriverInfo("plug", "a cart", features) in available_drivers(Kind.DRIVE_BASE)
     register(Driver(Kind.DRIVE_BASE, "opencr", "mine", _Made))
-    assert facts_of("opencr") is None
+    assert features_of("opencr") is None
 
 
-def test_facts_are_known_without_the_code_of_a_device() -> None:
+def test_features_are_known_without_the_code_of_a_device() -> None:
     code = (
-        "import sys; from robosc_bridge.drivers import Kind, available_drivers, facts_of; facts_of('opencr'); "
+        "import sys; from robosc_bridge.driver_registry import Kind, available_drivers, features_of; "
+        "features_of('opencr'); "
         "[available_drivers(kind) for kind in Kind]; sys.exit(any('devices' in name for name in sys.modules))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

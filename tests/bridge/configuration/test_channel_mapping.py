@@ -3,8 +3,8 @@ import pytest
 from robosc.language import load_bundle
 from robosc.model import check
 from robosc.model.structure import Model
-from robosc_bridge import drivers
-from robosc_bridge.configuration import ConfigurationError, Ties, parse, tie, why_not
+from robosc_bridge import driver_registry
+from robosc_bridge.configuration import ChannelMapping, ConfigurationError, map_channels, parse, unsuitable_because
 from robosc_bridge.configuration import channels as kinds
 from support.models import EXAMPLES, bundle_of
 
@@ -30,14 +30,14 @@ def example(name: str) -> Model:
     return model
 
 
-def tied(model: Model, text: str, head: str = HEAD) -> Ties:
+def mapped(model: Model, text: str, head: str = HEAD) -> ChannelMapping:
     loaded = parse((head + text).encode(), "c.yaml")
-    return tie(model, loaded.configuration, loaded.document)
+    return map_channels(model, loaded.configuration, loaded.document)
 
 
 def errors_of(model: Model, text: str, head: str = HEAD) -> list[str]:
     with pytest.raises(ConfigurationError) as caught:
-        tied(model, text, head)
+        mapped(model, text, head)
     return str(caught.value).splitlines()
 
 
@@ -77,19 +77,19 @@ def with_message(kind: str, type_: str, provide: str = "") -> Model:
 
 
 def test_the_maze_solver_is_tied() -> None:
-    ties = tied(example("maze_solver/maze_solver"), MAZE)
-    assert ties.channels["rotate_right"] == kinds.RotateChannel(unit="degrees", direction="right")
-    assert [item.name for item, _ in ties.tied_to(kinds.ScannerChannel)] == [
+    mapping = mapped(example("maze_solver/maze_solver"), MAZE)
+    assert mapping.channels["rotate_right"] == kinds.RotateChannel(unit="degrees", direction="right")
+    assert [item.name for item, _ in mapping.mapped_to(kinds.ScannerChannel)] == [
         "scan_front",
         "scan_right",
         "scan_back_right",
     ]
-    assert list(ties.channels) == [item.name for item in ties.communications]
+    assert list(mapping.channels) == [item.name for item in mapping.communications]
 
 
 def test_all_that_is_missing_is_one_error() -> None:
     assert errors_of(example("maze_solver/maze_solver"), "channels:\n  /cmd_vel: {channel: drive}\n") == [
-        f"c.yaml:4: channels: {text} is tied to nothing"
+        f"c.yaml:4: channels: {text} is not mapped to a channel"
         for text in (
             "outgoing message 'scan_front' ('/scan')",
             "outgoing message 'scan_right' ('/scan')",
@@ -109,7 +109,7 @@ def test_what_the_model_does_not_have_is_told() -> None:
 def test_without_a_file_there_are_no_lines() -> None:
     loaded = parse(HEAD.encode(), "c.yaml")
     with pytest.raises(ConfigurationError, match=r"^configuration: channels: outgoing message 'scan_front'"):
-        tie(example("maze_solver/maze_solver"), loaded.configuration)
+        map_channels(example("maze_solver/maze_solver"), loaded.configuration)
 
 
 def test_identifiers_are_told_on_one_line_whatever_is_in_them() -> None:
@@ -121,13 +121,13 @@ def test_identifiers_are_told_on_one_line_whatever_is_in_them() -> None:
 
 def test_names_of_communications_may_stand_for_their_identifiers() -> None:
     model = with_message("incoming", "Twist")
-    assert tied(model, "channels: {m: {channel: drive}}").channels == {"m": kinds.DriveChannel()}
+    assert mapped(model, "channels: {m: {channel: drive}}").channels == {"m": kinds.DriveChannel()}
 
 
 def test_a_second_tie_is_told() -> None:
     model = with_message("incoming", "Twist")
     (line,) = errors_of(model, "channels:\n  /m: {channel: drive}\n  m: {channel: log}\n")
-    assert line == "c.yaml:6: channels.m: incoming message 'm' ('/m') is tied here again; it is by '/m' already"
+    assert line == "c.yaml:6: channels.m: incoming message 'm' ('/m') is mapped here again; it is by '/m' already"
 
 
 def test_messages_told_on_one_identifier_need_one_channel() -> None:
@@ -194,10 +194,12 @@ def test_messages_told_on_one_identifier_need_one_channel() -> None:
 def test_data_and_direction_must_fit(direction: str, type_: str, channel: str, reason: str | None) -> None:
     model, text = with_message(direction, type_), f"channels:\n  /m: {{channel: {channel}}}\n"
     if reason is None:
-        assert tied(model, text).channels.keys() == {"m"}
+        assert mapped(model, text).channels.keys() == {"m"}
         return
     (first, *_) = errors_of(model, text)
-    assert first.startswith(f"c.yaml:5: channels[\"/m\"]: {direction} message 'm' ('/m') cannot be tied to '{channel}'")
+    assert first.startswith(
+        f"c.yaml:5: channels[\"/m\"]: {direction} message 'm' ('/m') cannot be mapped to '{channel}'"
+    )
     assert reason in first
 
 
@@ -213,9 +215,9 @@ def test_data_and_direction_must_fit(direction: str, type_: str, channel: str, r
 )
 def test_velocities_that_the_wheels_cannot_do_are_told(provide: str, parts: list[str]) -> None:
     model = with_message("incoming", "Twist", provide)
-    reasons = why_not(model, model.communications[0], kinds.DriveChannel)
+    reasons = unsuitable_because(model, model.communications[0], kinds.DriveChannel)
     assert [reason.split("'")[1] for reason in reasons if not reason.startswith("the model gives 'linear.z'")] == parts
-    assert all("does not go by; it goes by angular.z, linear.x" in reason for reason in reasons)
+    assert all("does not use; it uses angular.z, linear.x" in reason for reason in reasons)
 
 
 CALLS = """robot R {{
@@ -255,7 +257,7 @@ CALLS = """robot R {{
 def test_services_and_actions_are_tied_to_skills(declaration: str, channel: str, reason: str | None) -> None:
     model, text = model_of(CALLS.format(declaration=declaration)), f"channels: {{m: {{channel: {channel}}}}}"
     if reason is None:
-        tied(model, text)
+        mapped(model, text)
     else:
         (line,) = errors_of(model, text)
         assert reason in line
@@ -271,11 +273,11 @@ def test_a_robot_of_ones_own_is_not_for_the_drives_of_a_turtlebot3() -> None:
         assert line == f"c.yaml:1: robot: {problem}"
     for driver in ("mavlink-rover", "of_a_plug_in"):
         head = f"{own}drive: {{driver: {driver}, port: /dev/ttyUSB1}}\n"
-        assert tied(model, "channels: {/m: {channel: none}}", head).channels.keys() == {"m"}
+        assert mapped(model, "channels: {/m: {channel: none}}", head).channels.keys() == {"m"}
 
 
 def test_devices_that_are_not_there_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(drivers, "_registered", {})
+    monkeypatch.setattr(driver_registry, "_registered", {})
     model = with_message("outgoing", "none")
     head = "robot: burger\ndrive: {driver: dynamixel, port: /dev/ttyUSB1}\n"
 
@@ -295,15 +297,19 @@ def test_devices_that_are_not_there_are_told(monkeypatch: pytest.MonkeyPatch) ->
     (line,) = errors_of(model, "channels: {/m: {channel: button, name: buton_1}}")
     assert line.endswith("the drive 'opencr' has no button 'buton_1'; did you mean 'button_1'?")
     # What a plug-in declares counts, and where it declares nothing, all may be there.
-    drivers.register(drivers.Driver(drivers.Kind.DRIVE_BASE, "cart", "a cart", object, drivers.Facts(("button_7",))))
+    driver_registry.register(
+        driver_registry.Driver(
+            driver_registry.Kind.DRIVE_BASE, "cart", "a cart", object, driver_registry.DriverFeatures(("button_7",))
+        )
+    )
     cart = head.replace("dynamixel", "cart")
-    assert tied(model, "channels: {/m: {channel: button, name: button_7}}", cart).channels.keys() == {"m"}
+    assert mapped(model, "channels: {/m: {channel: button, name: button_7}}", cart).channels.keys() == {"m"}
     for channel in ("{channel: button, name: button_1}", "{channel: bumper}", "{channel: imu}"):
         (line,) = errors_of(model, f"channels: {{/m: {channel}}}", cart)
         assert "the drive 'cart' " in line
     plug_in = head.replace("dynamixel", "of_a_plug_in")
     for channel in ("{channel: button, name: any}", "{channel: bumper}", "{channel: imu}"):
-        assert tied(model, f"channels: {{/m: {channel}}}", plug_in).channels.keys() == {"m"}
+        assert mapped(model, f"channels: {{/m: {channel}}}", plug_in).channels.keys() == {"m"}
 
 
 def test_settings_name_what_the_model_has() -> None:
@@ -328,10 +334,10 @@ def test_settings_name_what_the_model_has() -> None:
 def test_the_executor_releases_what_drives() -> None:
     model, text = with_message("incoming", "Twist"), "channels: {/m: {channel: drive}}\n"
     loaded = parse((HEAD + text).encode(), "c.yaml")
-    ties = tie(model, loaded.configuration)
-    settings = ties.settings(loaded.configuration.execution)
+    mapping = map_channels(model, loaded.configuration)
+    settings = mapping.settings(loaded.configuration.execution)
     assert settings.release_identifiers == ("/m",)
     assert settings.period_s == 0.02
     chosen = parse((HEAD + text + "execution: {release_identifiers: [], seed: 5}\n").encode(), "c.yaml")
-    settings = ties.settings(chosen.configuration.execution)
+    settings = mapping.settings(chosen.configuration.execution)
     assert (settings.release_identifiers, settings.seed) == ((), 5)

@@ -24,16 +24,16 @@ from robosc_bridge.configuration import init, load, map_channels, schema
 from robosc_bridge.configuration.structure import TURTLEBOTS
 from robosc_bridge.configuration.template import DriveDriver, ScannerDriver
 from robosc_bridge.daemon.assembly import assemble, check_settings, safety_limits
-from robosc_bridge.daemon.faces import make_faces
+from robosc_bridge.daemon.endpoints import make_endpoints
 from robosc_bridge.daemon.keyboard import Keyboard
 from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.supervisors import (
     MODEL_SUFFIX,
     NoSupervisorError,
     Source,
+    cache_folder,
     credentials_of,
     deployment_of,
-    kept_folder,
     obtain,
     trusted_keys,
 )
@@ -85,7 +85,9 @@ def _parser() -> argparse.ArgumentParser:
         "--allow-livelock", action="store_true", help="execute it even if its silent steps can go on for ever"
     )
     run.add_argument(
-        "--standby", action="store_true", help="wait for an operator to start it; needs a remote face (section remote)"
+        "--standby",
+        action="store_true",
+        help="wait for an operator to start it; needs a remote endpoint (section remote)",
     )
     run.add_argument(
         "--view",
@@ -213,8 +215,8 @@ def _run(arguments: argparse.Namespace) -> int:
     deployment = arguments.deployment or deployment_of(arguments.model)
     trusted = trusted_keys(configuration.supervisor.trusted_keys)
     credentials = credentials_of(configuration.supervisor)
-    kept = None if server is None else kept_folder(arguments.keep, configuration.supervisor)
-    source = Source(arguments.model, deployment, server, kept, trusted, credentials, arguments.allow_livelock)
+    cache_path = None if server is None else cache_folder(arguments.keep, configuration.supervisor)
+    source = Source(arguments.model, deployment, server, cache_path, trusted, credentials, arguments.allow_livelock)
     supervisor = obtain(source, tell)
     mapping = map_channels(supervisor.model, configuration, loaded.document)
     log: EventLog = NullLog()
@@ -222,13 +224,13 @@ def _run(arguments: argparse.Namespace) -> int:
         log = open_event_log(configuration.log.folder, supervisor.model.name, time.time())
     try:
         machine = assemble(configuration, mapping, supervisor, log, deployment, starts_itself=not arguments.standby)
-        faces = make_faces(configuration, machine.operations, safety_limits(configuration))
+        endpoints = make_endpoints(configuration, machine.operations, safety_limits(configuration))
         for number in _SIGNALS:
             signal.signal(number, lambda *_: machine.quit())
         with Keyboard(lambda key: machine.daemon.post(Key(key))) as keyboard:
             if not keyboard.is_there:
                 tell("there is no terminal: no key stops the robot")
-            have_ended = machine.run(faces)
+            have_ended = machine.run(endpoints)
     finally:
         log.close()
     return OK if have_ended and not machine.daemon.problem else FAULT

@@ -1,4 +1,4 @@
-"""A daemon that a test plays for its remote faces, and a ground station of pymavlink's own making."""
+"""A daemon that a test plays for its remote endpoints, and a ground station of pymavlink's own making."""
 
 import math
 import threading

@@ -15,7 +15,7 @@ from robosc.expressions.evaluate import evaluate
 from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
 
-Told = tuple[Any, ...]
+MessageReceived = tuple[Any, ...]
 Holds = tuple[bool, ...]
 
 
@@ -106,7 +106,7 @@ class LayerTwin:
         self.system = InterpretedSystem(supervisor)
         self.settings = settings
         self.now = 0.0
-        self.told: list[Told] = []
+        self.told: list[MessageReceived] = []
         self.events: list[str] = []
         self.unexpected = 0
         self.calls: list[TwinCall] = []

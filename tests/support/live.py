@@ -1,4 +1,4 @@
-"""A robot that lives without devices: an executed model that changes by itself, as remote faces see a daemon.
+"""A robot that lives without devices: an executed model that changes by itself, as remote endpoints see a daemon.
 
 `python -m support.live` (with `tests` on the path) serves its live view, for whoever works on the page.
 """
@@ -27,7 +27,7 @@ from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import Command, Order, State
 from robosc_bridge.devices.interface import BINS, DriveReading, Pose, RawScan, Scan, Velocity
 from robosc_bridge.safety import Caution, Reason
-from robosc_bridge.view import ViewFace, ViewSettings
+from robosc_bridge.view import ViewEndpoint, ViewSettings
 from support.models import model_of
 from support.random_supervisors import CERTIFICATE
 
@@ -219,14 +219,14 @@ def _is_requested(kind: CommunicationKind) -> bool:
 
 
 @contextlib.contextmanager
-def viewed(robot: LiveRobot, address: str = "127.0.0.1:0") -> Iterator[ViewFace]:
+def viewed(robot: LiveRobot, address: str = "127.0.0.1:0") -> Iterator[ViewEndpoint]:
     """The live view of a robot."""
-    face = ViewFace(robot.operations, ViewSettings(address))
-    face.start()
+    endpoint = ViewEndpoint(robot.operations, ViewSettings(address))
+    endpoint.start()
     try:
-        yield face
+        yield endpoint
     finally:
-        face.stop()
+        endpoint.stop()
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -244,8 +244,8 @@ def main(argv: list[str] | None = None) -> int:
     else:
         supervisor = supervisor_without_synthesis(large_model(arguments.components))
     robot = LiveRobot(supervisor)
-    with viewed(robot, arguments.address) as face:
-        sys.stdout.write(f"{face.url}\n")
+    with viewed(robot, arguments.address) as endpoint:
+        sys.stdout.write(f"{endpoint.url}\n")
         sys.stdout.flush()
         while True:
             time.sleep(1.0 / arguments.rate)

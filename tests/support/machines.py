@@ -1,4 +1,4 @@
-"""Machines that a bridge is assembled on, and a face that records what is done with it."""
+"""Machines that a bridge is assembled on, and an endpoint that records what is done with it."""
 
 import sys
 
@@ -29,10 +29,10 @@ def machine(supervisor: Supervisor, text: str, *, starts_itself: bool = True, ho
     return assemble(configuration, mapping, supervisor, NullLog(), starts_itself=starts_itself, host=host)
 
 
-class RecordedFace:
-    """A remote face that notes when it is started and stopped."""
+class RecordedEndpoint:
+    """A remote endpoint that notes when it is started and stopped."""
 
-    name = "recorded face"
+    name = "recorded endpoint"
     is_alive = True
 
     def __init__(self, made: Machine, problem: str = "") -> None:

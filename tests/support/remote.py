@@ -1,4 +1,4 @@
-"""A daemon as remote faces see it, in the hands of a test, and callers of a face."""
+"""A daemon as remote endpoints see it, in the hands of a test, and callers of an endpoint."""
 
 import queue
 import threading
@@ -23,7 +23,7 @@ from robosc_bridge.daemon.programs import FromProgram, Program
 from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import Command, Order, State
 from robosc_bridge.devices.interface import BINS, DriveReading, MotorFault, Pose, RawScan, Scan, Velocity
-from robosc_bridge.remote import RemoteFace, RemoteSettings, serve
+from robosc_bridge.remote import RemoteEndpoint, RemoteSettings, serve
 from robosc_bridge.safety import Caution, Reason
 from support.models import bundle_of
 from support.random_supervisors import CERTIFICATE
@@ -113,7 +113,7 @@ def scan(first_m: float) -> Scan:
 
 
 class FakeDaemon:
-    """Daemon that a face talks to.
+    """Daemon that an endpoint talks to.
 
     A thread takes what is posted and shows a new snapshot, as the loop does in each turn.
 
@@ -198,13 +198,13 @@ class FakeDaemon:
 
 
 @contextmanager
-def served(daemon: FakeDaemon, settings: RemoteSettings | None = None) -> Iterator[RemoteFace]:
-    """A face of a daemon, on a port of its own choice."""
-    face = serve(daemon.operations, settings or RemoteSettings("127.0.0.1:0"))
+def served(daemon: FakeDaemon, settings: RemoteSettings | None = None) -> Iterator[RemoteEndpoint]:
+    """An endpoint of a daemon, on a port of its own choice."""
+    endpoint = serve(daemon.operations, settings or RemoteSettings("127.0.0.1:0"))
     try:
-        yield face
+        yield endpoint
     finally:
-        face.stop()
+        endpoint.stop()
 
 
 @contextmanager

@@ -70,8 +70,8 @@ class Terminal:
 @contextmanager
 def driving(daemon: FakeDaemon) -> Iterator[Terminal]:
     """The command, ready for keys, with a daemon to drive."""
-    with served(daemon) as face:
-        terminal = Terminal(face.address)
+    with served(daemon) as endpoint:
+        terminal = Terminal(endpoint.address)
         try:
             wait_until(lambda: "w/s or up/down" in terminal.seen)
             yield terminal
@@ -81,5 +81,5 @@ def driving(daemon: FakeDaemon) -> Iterator[Terminal]:
 
 def wishes(daemon: FakeDaemon) -> list[tuple[str, float, float]]:
     """The velocities that the operator has asked for: on which topic, ahead, to the left."""
-    found = daemon.of(programs.Requested)
+    found = daemon.of(programs.MessageRequested)
     return [(item.identifier, item.data["linear"]["x"], item.data["angular"]["z"]) for item in found]

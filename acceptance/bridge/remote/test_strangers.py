@@ -10,7 +10,7 @@ import grpc
 import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 
-from robosc_bridge.remote import RemoteFace
+from robosc_bridge.remote import RemoteEndpoint
 from support.remote import FakeDaemon, served
 from support.waiting import PATIENCE_S
 
@@ -22,14 +22,14 @@ def daemon() -> Any:
 
 
 @pytest.fixture
-def face(daemon: FakeDaemon) -> Any:
+def endpoint(daemon: FakeDaemon) -> Any:
     with served(daemon) as made:
         yield made
 
 
 @pytest.mark.real_time
 def test_streams_without_an_end_do_not_keep_it_from_ending(
-    daemon: FakeDaemon, face: RemoteFace, caplog: pytest.LogCaptureFixture
+    daemon: FakeDaemon, endpoint: RemoteEndpoint, caplog: pytest.LogCaptureFixture
 ) -> None:
     forever = threading.Event()
 
@@ -38,14 +38,14 @@ def test_streams_without_an_end_do_not_keep_it_from_ending(
         yield from ()
 
     channel: Any
-    with grpc.insecure_channel(face.address) as channel:
+    with grpc.insecure_channel(endpoint.address) as channel:
         reflect = channel.stream_stream("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo")
         attach = channel.stream_stream("/robosc_api.v1.BridgeService/Attach")
         calls = [reflect(nothing()) for _ in range(20)] + [attach(nothing()) for _ in range(5)]
         # What comes after them on the same connection is answered after them.
         health_pb2_grpc.HealthStub(channel).Check(health_pb2.HealthCheckRequest(), timeout=PATIENCE_S)
         begin_s = time.monotonic()
-        face.stop()
+        endpoint.stop()
         assert time.monotonic() - begin_s < 4.0
         forever.set()
         # The last ones on a busy machine are ended by gRPC itself.

@@ -1,4 +1,4 @@
-"""`robosc-bridge run` with a remote face on a simulated TurtleBot3, commanded from a terminal: all as programs."""
+"""`robosc-bridge run` with a remote endpoint on a simulated TurtleBot3, commanded from a terminal: all as programs."""
 
 import json
 import re
@@ -92,11 +92,11 @@ class Running:
             self.written += line
 
     def address(self) -> str:
-        """Return the address that its face listens on."""
+        """Return the address that its endpoint listens on."""
 
         def look() -> re.Match[str] | None:
             assert self.process.poll() is None, self.written
-            return re.search(r"the remote face listens on (\S+)\n", self.written)
+            return re.search(r"the remote endpoint listens on (\S+)\n", self.written)
 
         return wait_until(look, limit_s=START_LIMIT_S)[1]
 

@@ -30,7 +30,7 @@ ANSWER_BEGINS = "(words) => document.querySelector('#stop-answer').textContent.s
 
 
 def configured(folder: Path, robot: SimulatedTurtleBot3) -> Path:
-    """A configuration as `init` writes it, with the ports of a simulated robot, a remote face and a log."""
+    """A configuration as `init` writes it, with the ports of a simulated robot, a remote endpoint and a log."""
     line = [sys.executable, "-m", "robosc_bridge.main", "init", "--model", str(MODEL)]
     line += ["--drive", "opencr", "--scanner", "lds01"]
     text = subprocess.run(line, capture_output=True, text=True, check=True).stdout
@@ -78,8 +78,8 @@ class Bridge:
 
     @property
     def address(self) -> str:
-        """Address of its remote face."""
-        return self.said(r"the remote face listens on (\S+)\n")
+        """Address of its remote endpoint."""
+        return self.said(r"the remote endpoint listens on (\S+)\n")
 
     @property
     def url(self) -> str:

@@ -35,7 +35,7 @@ def state_of(robot: LiveRobot) -> str:
 def test_the_page_equals_a_robot_that_lives(browser: Browser, name: str) -> None:
     is_large = name == "sixty components"
     robot = LiveRobot(supervisor_without_synthesis(large_model(60)) if is_large else example_supervisor(name))
-    with viewed(robot) as face, visit(browser, face.url) as seen:
+    with viewed(robot) as endpoint, visit(browser, endpoint.url) as seen:
         shows(seen, state_of(robot))
         taken: list[str] = []
         for _ in range(5):
@@ -50,13 +50,13 @@ def test_the_page_equals_a_robot_that_lives(browser: Browser, name: str) -> None
 def test_a_stop_reaches_the_robot_and_commands_follow(browser: Browser) -> None:
     robot = LiveRobot(example_supervisor("maze_solver/maze_solver"))
     answer = "(words) => document.querySelector('#stop-answer').textContent.startsWith(words)"
-    with viewed(robot) as face, visit(browser, f"http://{face.address}/") as seen:
+    with viewed(robot) as endpoint, visit(browser, f"http://{endpoint.address}/") as seen:
         seen.wait("() => !document.querySelector('#stop').hidden")
         seen.page.keyboard.press("Escape")
         seen.wait(answer, "STOP was heard")
         assert [order.command for order in robot.orders] == [Command.STOP]
         seen.wait("() => document.querySelector('#causes').textContent.includes('An operator has stopped the robot.')")
-        seen.page.goto(face.url)
+        seen.page.goto(endpoint.url)
         for command in (Command.RESUME, Command.STANDBY, Command.START, Command.RESET):
             seen.page.get_by_role("button", name=command.capitalize(), exact=True).click()
             seen.wait(answer, f"{command}: done.")

@@ -109,7 +109,7 @@ class FaultChannel(_Channel, frozen=True, tag="fault"):
 
 
 class GrpcChannel(_Channel, frozen=True, tag="grpc"):
-    """A program on the other side of the remote face gives, takes or answers it."""
+    """A program on the other side of the remote endpoint gives, takes or answers it."""
 
 
 class LogChannel(_Channel, frozen=True, tag="log"):

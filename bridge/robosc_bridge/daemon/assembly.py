@@ -17,14 +17,14 @@ from robosc_api.security import SecurityError, check_listening
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import GrpcChannel
 from robosc_bridge.configuration.structure import Configuration, Scanner
+from robosc_bridge.daemon.camera_setup import camera_problems, camera_worker, needs_camera
 from robosc_bridge.daemon.device_thread import DeviceThread
-from robosc_bridge.daemon.faces import Face, Living, is_remote, is_startable
+from robosc_bridge.daemon.endpoints import Endpoint, LivenessMonitor, is_remote, is_startable
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.files import file_problems
 from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.operations import Operations
-from robosc_bridge.daemon.sight import camera_worker, needs_camera, sight_problems
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
 from robosc_bridge.devices.factory import make_drive_base, make_range_scanner
@@ -51,7 +51,7 @@ LONGEST_PERIOD_S = 0.9
 """The safety layer waits for the loop for two seconds at most, and for two periods at least (`safety.overrun_s`)."""
 
 SWITCH_S = 0.0005
-"""After how long a thread that computes lets others have their turn. With Python's own 5 ms, a remote face that is busy
+"""After how long a thread that computes lets others run. With Python's own 5 ms, a remote endpoint that is busy
 would hold up a stop three times: the scanner's thread, the loop, and the drive base's thread follow one another."""
 
 # Longer than anything that a device's thread does at once, such as calibrating a gyroscope.
@@ -114,7 +114,7 @@ def check_settings(configuration: Configuration, mapping: ChannelMapping, deploy
         GroundSettingsError: The ground station cannot be reached as configured.
         UnknownDriverError: There is no such driver.
     """
-    _require_faces(configuration, mapping)
+    _require_endpoints(configuration, mapping)
     if deployment is Deployment.LAYER and not is_remote(configuration):
         raise AssemblyError("a supervision layer needs 'remote.grpc_address' or 'remote.mavlink_url' for who asks it")
     limits = safety_limits(configuration)
@@ -125,7 +125,7 @@ def check_settings(configuration: Configuration, mapping: ChannelMapping, deploy
     settings = mapping.settings(configuration.execution)
     problems = [
         *file_problems(configuration, fastest),
-        *sight_problems(configuration.skills.line, mapping, settings),
+        *camera_problems(configuration.skills.line, mapping, settings),
         *_scan_problems(configuration),
     ]
     if problems:
@@ -202,8 +202,8 @@ class Machine:
         drive: The drive base's thread.
         scanner: The LiDAR's thread; None: there is none.
         camera: The camera's thread; None: nothing is mapped to what it shows.
-        operations: The daemon as remote faces see it.
-        living: Threads and faces that must not end by themselves.
+        operations: The daemon as remote endpoints see it.
+        liveness: Threads and endpoints that must not end by themselves.
     """
 
     daemon: Daemon
@@ -211,25 +211,25 @@ class Machine:
     scanner: DeviceThread | None
     camera: DeviceThread | None
     operations: Operations
-    living: Living
+    liveness: LivenessMonitor
 
-    def run(self, faces: Sequence[Face] = ()) -> bool:
-        """Start the remote faces and the threads, run the loop to its end, and stop them.
+    def run(self, endpoints: Sequence[Endpoint] = ()) -> bool:
+        """Start the remote endpoints and the threads, run the loop to its end, and stop them.
 
         Returns:
             Whether all threads gave back their devices in time.
 
         Raises:
-            BridgeError: A face cannot be started; no device was opened then.
+            BridgeError: An endpoint cannot be started; no device was opened then.
         """
         threads = [thread for thread in (self.drive, self.scanner, self.camera) if thread]
         with contextlib.ExitStack() as stack:
             stack.callback(sys.setswitchinterval, sys.getswitchinterval())
             sys.setswitchinterval(SWITCH_S)
-            for face in faces:
-                stack.callback(face.stop)
-                face.start()
-                self.living.watch(face)
+            for endpoint in endpoints:
+                stack.callback(endpoint.stop)
+                endpoint.start()
+                self.liveness.watch(endpoint)
             for thread in threads:
                 thread.start()
             try:
@@ -244,17 +244,17 @@ class Machine:
         self.daemon.post(Command.QUIT)
 
 
-def _require_faces(configuration: Configuration, mapping: ChannelMapping) -> None:
-    """Require a remote face that may listen at its address, for everything that is reached from elsewhere."""
+def _require_endpoints(configuration: Configuration, mapping: ChannelMapping) -> None:
+    """Require a remote endpoint that may listen at its address, for everything that is reached from elsewhere."""
     needing = [f"'{item.name}' ('{item.identifier}')" for item, _ in mapping.mapped_to(GrpcChannel)]
     if needing and configuration.remote.grpc_address is None:
         raise AssemblyError(f"mapped to 'grpc', which needs 'remote.grpc_address': {', '.join(needing)}")
     if configuration.safety.operator_link_timeout_s is not None and not is_remote(configuration):
         raise AssemblyError("'safety.operator_link_timeout_s' needs 'remote.grpc_address' or 'remote.mavlink_url'")
-    face = settings_of(configuration)
-    if face is not None:
+    endpoint = settings_of(configuration)
+    if endpoint is not None:
         try:
-            check_listening(face.address, face.security)
+            check_listening(endpoint.address, endpoint.security)
         except (SecurityError, ValueError) as error:
             raise AssemblyError(f"remote: {error}") from error
     page = view_settings(configuration)
@@ -345,9 +345,9 @@ def assemble(
     if job.needs_camera:
         camera = DeviceThread(camera_worker(configuration.skills.line, daemon.post, host.monotonic), host)
     threads = [thread for thread in (drive, scanner, camera) if thread]
-    living = Living(threads)
-    daemon.connect(drive.hurry, worker.reset, living.are_alive)
+    liveness = LivenessMonitor(threads)
+    daemon.connect(drive.hurry, worker.reset, liveness.are_alive)
     operations = Operations(
         supervisor, mapping, feed, daemon.post, lambda: safety.operator_seen(host.monotonic()), is_layer=is_layer
     )
-    return Machine(daemon, drive, scanner, camera, operations, living)
+    return Machine(daemon, drive, scanner, camera, operations, liveness)

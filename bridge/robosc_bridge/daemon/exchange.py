@@ -11,6 +11,7 @@ from typing import Any
 from robosc.model.structure import Communication, CommunicationKind
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import GrpcChannel
+from robosc_bridge.daemon.clients import Clients
 from robosc_bridge.daemon.programs import (
     CallFailed,
     CallMade,
@@ -19,12 +20,11 @@ from robosc_bridge.daemon.programs import (
     GoalAccepted,
     GoalEnded,
     GoalMade,
+    MessageReceived,
     MessageSent,
     Program,
     Replied,
-    Told,
 )
-from robosc_bridge.daemon.roster import Roster
 from robosc_bridge.daemon.supervised import Listeners, Supervised
 
 _log = logging.getLogger(__name__)
@@ -63,14 +63,14 @@ class Exchange:
     Args:
         mapping: Channel that each communication is mapped to.
         listeners: Identifiers that each kind of channel reports to.
-        roster: Connected programs.
+        clients: Connected programs.
     """
 
-    def __init__(self, mapping: ChannelMapping, listeners: Listeners, roster: Roster) -> None:
+    def __init__(self, mapping: ChannelMapping, listeners: Listeners, clients: Clients) -> None:
         mapped = [item for item, _ in mapping.mapped_to(GrpcChannel)]
         self._services = {item.name: item for item in mapped if item.kind in _SERVED}
         self._heard = frozenset(identifier for identifier, _ in listeners.of(GrpcChannel))
-        self._roster = roster
+        self._clients = clients
         self._servers: dict[str, Program] = {}
         self._open: dict[int, _Open] = {}
         self._next_number = 1
@@ -85,7 +85,7 @@ class Exchange:
 
     def send(self, communication: Communication, data: Any) -> None:
         """The model sends a message."""
-        self._roster.tell_all(MessageSent(communication.name, communication.identifier, data))
+        self._clients.tell_all(MessageSent(communication.name, communication.identifier, data))
 
     def call(self, communication: Communication, number: int, data: Any) -> str:
         """The model calls a service; why nobody is asked."""
@@ -112,14 +112,14 @@ class Exchange:
         self._open = {own: item for own, item in self._open.items() if item.name != name}
         own, self._next_number = self._next_number, self._next_number + 1
         self._open[own] = _Open(program, name, number, is_goal)
-        self._roster.tell(program, GoalMade(name, own, data) if is_goal else CallMade(name, own, data))
+        self._clients.tell(program, GoalMade(name, own, data) if is_goal else CallMade(name, own, data))
         return ""
 
     def _cancel(self, own: int) -> None:
         item = self._open[own]
         if not item.is_cancelled:
             item.is_cancelled = True
-            self._roster.tell(item.program, CancelMade(item.name, own))
+            self._clients.tell(item.program, CancelMade(item.name, own))
 
     # The programs' side.
 
@@ -127,9 +127,9 @@ class Exchange:
         """A program is there: what it serves that nobody serves yet is asked of it from now on."""
         for name in sorted(program.serves):
             if name not in self._services:
-                self._roster.refuse(program, f"'{name}' is no service or action of the model that is mapped to grpc")
+                self._clients.refuse(program, f"'{name}' is no service or action of the model that is mapped to grpc")
             elif name in self._servers:
-                self._roster.refuse(program, f"'{name}' is served by {self._servers[name].name} already")
+                self._clients.refuse(program, f"'{name}' is served by {self._servers[name].name} already")
             else:
                 self._servers[name] = program
 
@@ -145,10 +145,10 @@ class Exchange:
             elif executor is not None:
                 executor.on_call_failed(item.number, why)
 
-    def hear(self, item: Told, executor: Supervised | None) -> None:
+    def hear(self, item: MessageReceived, executor: Supervised | None) -> None:
         """A program tells the model something; while nothing is executed, nobody listens."""
         if item.identifier not in self._heard:
-            self._roster.refuse(item.program, f"the model hears nothing on '{item.identifier:.255}' from programs")
+            self._clients.refuse(item.program, f"the model hears nothing on '{item.identifier:.255}' from programs")
         elif executor is not None:
             executor.receive(item.identifier, item.data)
 
@@ -158,7 +158,7 @@ class Exchange:
         is_goal = not isinstance(item, Replied | CallFailed)
         if executor is None or asked is None or asked.program is not item.program or asked.is_goal is not is_goal:
             what = "goal" if is_goal else "call"
-            self._roster.refuse(item.program, f"{item.number} is no {what} that this program is asked for now")
+            self._clients.refuse(item.program, f"{item.number} is no {what} that this program is asked for now")
             return
         number = asked.number
         match item:
@@ -167,7 +167,7 @@ class Exchange:
             case FeedbackGiven(data=data):
                 executor.on_feedback(number, data)
             case GoalEnded(outcome=outcome) if outcome not in OUTCOMES:
-                self._roster.refuse(item.program, f"a goal ends as one of {', '.join(OUTCOMES)}")
+                self._clients.refuse(item.program, f"a goal ends as one of {', '.join(OUTCOMES)}")
             case GoalEnded(outcome=outcome, data=data):
                 del self._open[item.number]
                 executor.on_goal_ended(number, outcome, data)

@@ -36,9 +36,9 @@ def file_problems(configuration: Configuration, fastest: Velocity) -> list[str]:
 
 def _looks(configuration: Configuration, fastest: Velocity) -> Iterator[tuple[str, Callable[[], object]]]:
     """Yield each section with the function that reads its files."""
-    face = settings_of(configuration)
-    if face is not None:
-        security = face.security
+    endpoint = settings_of(configuration)
+    if endpoint is not None:
+        security = endpoint.security
         yield "remote", lambda: check_files(security)
     ground = ground_settings(configuration, fastest)
     if ground is not None and ground.signing is not None:

@@ -1,6 +1,6 @@
 """The loop: executes the supervisor at its period, between what devices tell and what the safety layer lets through.
 
-One thread runs it and calls the executor; the devices' threads, remote faces and signal handlers only put something
+One thread runs it and calls the executor; the devices' threads, remote endpoints and signal handlers only put something
 into its inbox.
 """
 
@@ -12,22 +12,22 @@ from typing import assert_never
 
 from robosc.execution.runtime.clock import Clock
 from robosc.execution.runtime.event_log import EventLog
-from robosc_bridge.daemon.asking import Asking
-from robosc_bridge.daemon.conductor import OVER, Conductor
+from robosc_bridge.daemon.clients import Clients
 from robosc_bridge.daemon.exchange import Exchange
 from robosc_bridge.daemon.execution import Execution
 from robosc_bridge.daemon.feed import Feed, WatchedLog
 from robosc_bridge.daemon.jobs import Job
+from robosc_bridge.daemon.lifecycle import OVER, Lifecycle
 from robosc_bridge.daemon.motion import Motion
 from robosc_bridge.daemon.orders import HALTS, Orders, answer, unanswered
+from robosc_bridge.daemon.program_dispatcher import ProgramDispatcher
 from robosc_bridge.daemon.program_inbox import ProgramInbox
 from robosc_bridge.daemon.programs import FromProgram
-from robosc_bridge.daemon.programs_side import ProgramsSide
 from robosc_bridge.daemon.readiness import Readiness
 from robosc_bridge.daemon.reports import DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice, Sighting
+from robosc_bridge.daemon.request_checker import RequestChecker
 from robosc_bridge.daemon.requesters import Requesters
 from robosc_bridge.daemon.robot import Robot
-from robosc_bridge.daemon.roster import Roster
 from robosc_bridge.daemon.snapshots import Snapshots
 from robosc_bridge.daemon.states import Command, Order, State
 from robosc_bridge.daemon.stop_switch import StopSwitch
@@ -90,14 +90,14 @@ class Daemon:
         self._clock = clock
         feed = feed or Feed()
         self._inbox: Queue[Item] = queue.SimpleQueue() if inbox is None else inbox
-        asking = Asking(job.supervisor.model, job.mapping, is_layer=job.is_layer)
-        self._from_programs = ProgramInbox(lambda: self._inbox.put(_Woken()), asking.look)
+        checker = RequestChecker(job.supervisor.model, job.mapping, is_layer=job.is_layer)
+        self._from_programs = ProgramInbox(lambda: self._inbox.put(_Woken()), checker.check)
         self._orders = Orders()
         self._readiness = Readiness(needs_scanner=job.needs_scanner, needs_camera=job.needs_camera)
-        self._conductor = conductor = Conductor(job, safety, self._readiness, self._orders, clock)
-        listeners, roster = Listeners(job.mapping), Roster()
-        exchange = Exchange(job.mapping, listeners, roster)
-        self._switch = StopSwitch(emergency_stop, listeners, conductor.operator_stop, conductor.operator_resume)
+        self._lifecycle = lifecycle = Lifecycle(job, safety, self._readiness, self._orders, clock)
+        listeners, clients = Listeners(job.mapping), Clients()
+        exchange = Exchange(job.mapping, listeners, clients)
+        self._switch = StopSwitch(emergency_stop, listeners, lifecycle.operator_stop, lifecycle.operator_resume)
         self._motion = Motion(rotate, self._command)
         self._robot = Robot(
             job.mapping,
@@ -105,21 +105,21 @@ class Daemon:
             self._motion,
             self._switch,
             exchange,
-            conductor.turn_failed,
+            lifecycle.turn_failed,
             job.settings.service_timeout_s,
             clock.monotonic,
         )
         requesters = Requesters(
-            asking,
-            roster,
+            checker,
+            clients,
             self._robot.abandon,
             job.settings.command_timeout_s,
             clock.monotonic,
         )
         self._execution = Execution(job, self._robot, requesters, clock, WatchedLog(log, feed))
-        self._programs = ProgramsSide(roster, exchange, requesters, self._execution, self._robot)
+        self._programs = ProgramDispatcher(clients, exchange, requesters, self._execution, self._robot)
         self._snapshots = Snapshots(feed, self._execution, self._readiness, clock)
-        conductor.lead(self._execution, self._robot, self._motion, self._switch, self._snapshots.note)
+        lifecycle.attach(self._execution, self._robot, self._motion, self._switch, self._snapshots.note)
         self._wish = Velocity()
         # Taken out of the inbox, and not taken up to its end.
         self._in_hand: tuple[Item, ...] = ()
@@ -128,12 +128,12 @@ class Daemon:
     @property
     def state(self) -> State:
         """State of the daemon."""
-        return self._conductor.state
+        return self._lifecycle.state
 
     @property
     def problem(self) -> str:
         """The fault that has stopped it; empty: none."""
-        return self._conductor.problem
+        return self._lifecycle.problem
 
     @property
     def overruns(self) -> int:
@@ -145,7 +145,7 @@ class Daemon:
     ) -> None:
         """Tell how the drive base's thread is told to hurry and to reset its motors, and whether all threads live."""
         self._hurry = hurry
-        self._conductor.connect(hurry, reset_drive, are_alive)
+        self._lifecycle.connect(hurry, reset_drive, are_alive)
 
     def post(self, item: Report | Key | Command | Order | FromProgram) -> None:
         """Tell the loop something; from any thread or signal handler, never waits."""
@@ -174,7 +174,7 @@ class Daemon:
                 else:
                     self.turn(item)
         finally:
-            self._conductor.state = State.OVER
+            self._lifecycle.state = State.OVER
             self._close()
 
     def _pause_s(self) -> float:
@@ -209,13 +209,13 @@ class Daemon:
         now_s = self._clock.monotonic()
         if now_s >= self._execution.due_s:
             self._execution.decide(now_s, is_running=self.state is State.RUNNING)
-        self._conductor.look(now_s)
+        self._lifecycle.poll(now_s)
         executor = self._execution.executor
         if self.state is State.RUNNING and executor is not None:
             # In a safe stop nothing moves, whatever identifiers are released.
             self._motion.pause(bool(executor.reasons), now_s)
             self._motion.refresh(now_s)
-        self._snapshots.look(self.state, self.problem, self._conductor.notice)
+        self._snapshots.poll(self.state, self.problem, self._lifecycle.notice)
         if self.state is State.OVER:
             self._close()
 
@@ -247,20 +247,20 @@ class Daemon:
                 if executor is not None:
                     self._robot.saw_line(item, executor)
             case DeviceUp(device):
-                self._conductor.device_came(device)
+                self._lifecycle.device_up(device)
             case DeviceDown():
-                self._conductor.device_went(item)
+                self._lifecycle.device_down(item)
             case SafetyNotice():
-                self._conductor.heed(item)
+                self._lifecycle.safety_changed(item)
             case ResetDone(problem):
-                self._conductor.reset_done(problem)
+                self._lifecycle.reset_done(problem)
             case Key(key):
                 self._switch.saw_key(key, executor)
                 if executor is not None:
                     self._robot.saw_key(key, executor)
             case Order():
                 self._in_hand = (item,)
-                self._conductor.obey(item)
+                self._lifecycle.execute(item)
                 self._in_hand = ()
             case _Woken():
                 pass  # What they have sent is taken up in any turn.

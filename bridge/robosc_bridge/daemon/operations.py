@@ -1,4 +1,4 @@
-"""Operations that a remote face may perform on the daemon, from any thread, without waiting for it."""
+"""Operations that a remote endpoint may perform on the daemon, from any thread, without waiting for it."""
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
@@ -25,7 +25,7 @@ class Inbox(Protocol):
 
 
 class Operations:
-    """The daemon as remote faces see it.
+    """The daemon as remote endpoints see it.
 
     Args:
         supervisor: Supervisor that is executed.

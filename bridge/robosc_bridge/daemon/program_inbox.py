@@ -10,9 +10,9 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from robosc_bridge.daemon.asking import UnfitError
 from robosc_bridge.daemon.plain_data import weight_bytes, why_not_plain
 from robosc_bridge.daemon.programs import Attached, Detached, FromProgram, Program
+from robosc_bridge.daemon.request_checker import InvalidRequestError
 
 MAXIMUM_WAITING = 200
 """Maximum number of waiting messages of one program."""
@@ -69,12 +69,12 @@ class _Waiting:
 
 
 class ProgramInbox:
-    """Inbox that is filled by the faces' threads and emptied by the loop's.
+    """Inbox that is filled by the endpoints' threads and emptied by the loop's.
 
     Args:
         wake: Function that is called when something waits where nothing did.
-        look: Function that returns what the loop gets of what was sent; raises `UnfitError` if it makes no sense.
-            Called from any thread.
+        look: Function that returns what the loop gets of what was sent; raises `InvalidRequestError` if it makes no
+            sense. Called from any thread.
     """
 
     def __init__(self, wake: Callable[[], None], look: Callable[[FromProgram], FromProgram]) -> None:
@@ -109,7 +109,7 @@ class ProgramInbox:
             return Unreadable(item.program, why), 0
         try:
             looked = self._look(item)
-        except UnfitError as error:
+        except InvalidRequestError as error:
             return Unreadable(item.program, str(error)), 0
         return looked, weight_bytes(getattr(looked, "data", None))
 

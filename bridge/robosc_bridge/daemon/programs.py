@@ -1,4 +1,4 @@
-"""Items that programs and operators beyond a remote face send to the loop, and items that the loop sends to them.
+"""Items that programs and operators beyond a remote endpoint send to the loop, and items that the loop sends to them.
 
 A program is whatever is connected: it may answer services and actions of the model that are mapped to `grpc`, take and
 give messages there, and, where the supervisor is a supervision layer, be the existing controller or operator whose
@@ -179,7 +179,7 @@ class Detached:
 
 
 @dataclass(frozen=True)
-class Told:
+class MessageReceived:
     """A message for the model, on an identifier of an outgoing message that is mapped to `grpc`."""
 
     program: Program
@@ -233,7 +233,7 @@ class GoalEnded:
 
 
 @dataclass(frozen=True)
-class Requested:
+class MessageRequested:
     """As the caller of a layer: a message for the robot."""
 
     program: Program
@@ -242,7 +242,7 @@ class Requested:
 
 
 @dataclass(frozen=True)
-class Called:
+class CallRequested:
     """As the caller of a layer: a call of a service, with an id of the program's own."""
 
     program: Program
@@ -252,7 +252,7 @@ class Called:
 
 
 @dataclass(frozen=True)
-class GoalSent:
+class GoalRequested:
     """As the caller of a layer: a goal of an action, with an id of the program's own."""
 
     program: Program
@@ -262,7 +262,7 @@ class GoalSent:
 
 
 @dataclass(frozen=True)
-class CancelWanted:
+class CancelRequested:
     """As the caller of a layer: a goal of its own is to end."""
 
     program: Program
@@ -273,14 +273,14 @@ class CancelWanted:
 FromProgram = (
     Attached
     | Detached
-    | Told
+    | MessageReceived
     | Replied
     | CallFailed
     | GoalAccepted
     | FeedbackGiven
     | GoalEnded
-    | Requested
-    | Called
-    | GoalSent
-    | CancelWanted
+    | MessageRequested
+    | CallRequested
+    | GoalRequested
+    | CancelRequested
 )

@@ -35,13 +35,13 @@ class Readiness:
         """True if the motors hold, as far as anybody can tell."""
         return self.is_drive_there and self.reading is not None and self.reading.is_torque_on
 
-    def came(self, device: Device) -> bool:
+    def device_up(self, device: Device) -> bool:
         """A device works; whether that is new."""
         was_there = self.devices.get(device, False)
         self.devices = {**self.devices, device: True}
         return not was_there
 
-    def went(self, device: Device) -> bool:
+    def device_down(self, device: Device) -> bool:
         """A device does not work; whether that is new."""
         was_there = self.devices.get(device, False)
         self.devices = {**self.devices, device: False}

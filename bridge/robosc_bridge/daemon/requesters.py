@@ -14,22 +14,22 @@ from typing import Any
 
 from robosc.execution.runtime.layer import Layer
 from robosc.model.structure import CommunicationKind
-from robosc_bridge.daemon.asking import Asked, Asking
+from robosc_bridge.daemon.clients import Clients
 from robosc_bridge.daemon.programs import (
     Answered,
     Blocked,
-    Called,
-    CancelWanted,
+    CallRequested,
+    CancelRequested,
     FeedbackPassed,
     GoalOver,
     GoalRejected,
-    GoalSent,
+    GoalRequested,
     GoalTaken,
+    MessageRequested,
     PassedOn,
     Program,
-    Requested,
 )
-from robosc_bridge.daemon.roster import Roster
+from robosc_bridge.daemon.request_checker import ProgramRequest, RequestChecker
 
 _log = logging.getLogger(__name__)
 
@@ -55,8 +55,8 @@ class Requesters:
     """Requests of programs to a supervision layer, and the answers that the programs get.
 
     Args:
-        asking: Requests that programs may make.
-        roster: Connected programs.
+        checker: Requests that programs may make.
+        clients: Connected programs.
         abandon: Function that ends a turn that a communication asked for, with the reason.
         command_timeout_s: Time without a message of a program after which its last one on an identifier is released,
             in seconds; 0: never.
@@ -65,14 +65,14 @@ class Requesters:
 
     def __init__(
         self,
-        asking: Asking,
-        roster: Roster,
+        checker: RequestChecker,
+        clients: Clients,
         abandon: Callable[[str, str], None],
         command_timeout_s: float,
         clock: Callable[[], float],
     ) -> None:
-        self._asking = asking
-        self._roster = roster
+        self._checker = checker
+        self._clients = clients
         self._abandon = abandon
         self._timeout_s = command_timeout_s or math.inf
         self._clock = clock
@@ -86,9 +86,9 @@ class Requesters:
     def forget(self) -> None:
         """A run is over, or a new one begins: what is still awaited of the one before never comes."""
         for (program, call_id), _ in self._calls.items():
-            self._roster.tell(program, Answered(call_id, None, is_default=True))
+            self._clients.tell(program, Answered(call_id, None, is_default=True))
         for (program, goal_id), _ in self._goals.items():
-            self._roster.tell(program, GoalOver(goal_id, "aborted", None))
+            self._clients.tell(program, GoalOver(goal_id, "aborted", None))
         self._senders.clear()
         self._calls.clear()
         self._goals.clear()
@@ -110,7 +110,7 @@ class Requesters:
             if sender.program is program:
                 del self._senders[identifier]
                 layer.on_silent(identifier)
-                for item in self._asking.messages[identifier]:
+                for item in self._checker.messages[identifier]:
                     self._abandon(item.name, reason)
         for (owner, goal_id), action in tuple(self._goals.items()):
             if owner is program:
@@ -128,12 +128,12 @@ class Requesters:
 
     # What programs ask for.
 
-    def take(self, item: Asked, layer: Layer | None) -> None:
+    def take(self, item: ProgramRequest, layer: Layer | None) -> None:
         """A program asks for something."""
         program = item.program
         why = self._why_refused(item)
         if why:
-            self._roster.refuse(program, why)
+            self._clients.refuse(program, why)
         elif layer is None:
             self._hold_back(item)
         else:
@@ -141,43 +141,43 @@ class Requesters:
             self._pass(item, layer)
             self._asker = None
 
-    def _pass(self, item: Asked, layer: Layer) -> None:
+    def _pass(self, item: ProgramRequest, layer: Layer) -> None:
         match item:
-            case Requested(program=program, identifier=identifier, data=data):
+            case MessageRequested(program=program, identifier=identifier, data=data):
                 now_s, sender = self._clock(), self._senders.get(identifier)
                 layer.on_request(identifier, data)
                 if not self._was_blocked:
                     self._senders[identifier] = _Sender(program, now_s)
                 elif sender is not None and sender.program is program:
                     sender.heard_s = now_s
-            case Called(program=program, service=service, call_id=call_id, data=data):
+            case CallRequested(program=program, service=service, call_id=call_id, data=data):
                 self._calls[program, call_id] = service
                 layer.on_call(service, (program, call_id), data)
-            case GoalSent(program=program, action=action, goal_id=goal_id, data=data):
+            case GoalRequested(program=program, action=action, goal_id=goal_id, data=data):
                 self._goals[program, goal_id] = action
                 layer.on_goal(action, (program, goal_id), data)
-            case CancelWanted(program=program, action=action, goal_id=goal_id):
+            case CancelRequested(program=program, action=action, goal_id=goal_id):
                 layer.on_cancel(action, (program, goal_id))
 
-    def _hold_back(self, item: Asked) -> None:
+    def _hold_back(self, item: ProgramRequest) -> None:
         """Nothing is executed: everything is held back."""
         match item:
-            case Requested(program=program, identifier=identifier):
-                self._roster.tell(program, Blocked(identifier))
-            case Called(program=program, service=service, call_id=call_id):
-                self._roster.tell(program, Answered(call_id, None, is_default=True))
-                self._roster.tell(program, Blocked(self._asking.identifier(CommunicationKind.SERVICE, service)))
-            case GoalSent(program=program, action=action, goal_id=goal_id):
-                self._roster.tell(program, GoalRejected(goal_id))
-                self._roster.tell(program, Blocked(self._asking.identifier(CommunicationKind.ACTION, action)))
+            case MessageRequested(program=program, identifier=identifier):
+                self._clients.tell(program, Blocked(identifier))
+            case CallRequested(program=program, service=service, call_id=call_id):
+                self._clients.tell(program, Answered(call_id, None, is_default=True))
+                self._clients.tell(program, Blocked(self._checker.identifier(CommunicationKind.SERVICE, service)))
+            case GoalRequested(program=program, action=action, goal_id=goal_id):
+                self._clients.tell(program, GoalRejected(goal_id))
+                self._clients.tell(program, Blocked(self._checker.identifier(CommunicationKind.ACTION, action)))
 
-    def _why_refused(self, item: Asked) -> str:
+    def _why_refused(self, item: ProgramRequest) -> str:
         """Return the reason why a program's request makes no sense now, one sentence; empty: it does."""
         match item:
-            case Called(program=program, call_id=own_id) | GoalSent(program=program, goal_id=own_id):
+            case CallRequested(program=program, call_id=own_id) | GoalRequested(program=program, goal_id=own_id):
                 own = program, own_id
                 return f"the id '{own_id}' is in use" if own in self._calls or own in self._goals else ""
-            case CancelWanted(program=program, action=action, goal_id=goal_id):
+            case CancelRequested(program=program, action=action, goal_id=goal_id):
                 is_own = self._goals.get((program, goal_id)) == action
                 return "" if is_own else f"'{goal_id:.255}' is no goal of '{action:.255}' that is under way"
         return ""
@@ -186,38 +186,38 @@ class Requesters:
 
     def pass_on(self, identifier: str, message: Any) -> None:
         """A message of the robot, after the supervisor has seen it."""
-        self._roster.tell_all(PassedOn(identifier, message))
+        self._clients.tell_all(PassedOn(identifier, message))
 
     def blocked(self, identifier: str) -> None:
         """A request on an identifier was held back."""
         self._was_blocked = True
         if self._asker is not None:
-            self._roster.tell(self._asker, Blocked(identifier))
+            self._clients.tell(self._asker, Blocked(identifier))
 
     def answer(self, communication: str, call_id: _Id, data: Any) -> None:
         """The service's reply to a call."""
         self._calls.pop(call_id, None)
-        self._roster.tell(call_id[0], Answered(call_id[1], data, is_default=False))
+        self._clients.tell(call_id[0], Answered(call_id[1], data, is_default=False))
 
     def answer_default(self, communication: str, call_id: _Id) -> None:
         """A default reply to a call that was held back or has failed."""
         self._calls.pop(call_id, None)
-        self._roster.tell(call_id[0], Answered(call_id[1], None, is_default=True))
+        self._clients.tell(call_id[0], Answered(call_id[1], None, is_default=True))
 
     def accept_goal(self, communication: str, goal_id: _Id) -> None:
         """A goal is let through."""
-        self._roster.tell(goal_id[0], GoalTaken(goal_id[1]))
+        self._clients.tell(goal_id[0], GoalTaken(goal_id[1]))
 
     def reject_goal(self, communication: str, goal_id: _Id) -> None:
         """A goal is held back."""
         self._goals.pop(goal_id, None)
-        self._roster.tell(goal_id[0], GoalRejected(goal_id[1]))
+        self._clients.tell(goal_id[0], GoalRejected(goal_id[1]))
 
     def pass_feedback(self, communication: str, goal_id: _Id, data: Any) -> None:
         """Feedback of a goal."""
-        self._roster.tell(goal_id[0], FeedbackPassed(goal_id[1], data))
+        self._clients.tell(goal_id[0], FeedbackPassed(goal_id[1], data))
 
     def end_goal(self, communication: str, goal_id: _Id, outcome: str, data: Any) -> None:
         """An accepted goal has ended for its caller."""
         self._goals.pop(goal_id, None)
-        self._roster.tell(goal_id[0], GoalOver(goal_id[1], outcome, data))
+        self._clients.tell(goal_id[0], GoalOver(goal_id[1], outcome, data))

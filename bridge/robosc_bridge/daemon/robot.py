@@ -11,9 +11,9 @@ from typing import Any
 
 from robosc_bridge.configuration import channels
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
+from robosc_bridge.daemon.channel_data import battery_data, imu_data, odometry_data, scan_data, shaped
 from robosc_bridge.daemon.exchange import Exchange
 from robosc_bridge.daemon.motion import Motion
-from robosc_bridge.daemon.readings import battery_data, imu_data, odometry_data, scan_data, shaped
 from robosc_bridge.daemon.reports import Device, Sighting
 from robosc_bridge.daemon.stop_switch import StopSwitch
 from robosc_bridge.daemon.supervised import Listeners, Supervised
@@ -34,7 +34,7 @@ class Robot:
         listeners: Identifiers that each kind of channel reports to.
         motion: Motion of the wheels.
         switch: The operator's stop.
-        exchange: Exchange with programs on the other side of a remote face.
+        exchange: Exchange with programs on the other side of a remote endpoint.
         on_failed_turn: Called with the reason when a turn has failed of which the model hears nothing.
         service_timeout_s: Time after which the executor takes a call for failed, in seconds; None: never.
         clock: Clock that returns the time, in seconds.
@@ -219,10 +219,10 @@ class Robot:
 
     def settle(self, executor: Supervised) -> None:
         """Tell the executor what has become of its requests."""
-        self._turns.look()
+        self._turns.poll()
         while self._owed:
             self._owed.popleft()(executor)
-            self._turns.look()
+            self._turns.poll()
 
     def report_turn(self, executor: Supervised) -> None:
         """Tell how far a turn is that an action asked for."""

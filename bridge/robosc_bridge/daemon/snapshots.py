@@ -13,7 +13,7 @@ INTERVAL_S = 0.05
 """Time between snapshots that differ in measurements alone."""
 
 
-class Shown(Protocol):
+class ExecutionState(Protocol):
     """The supervisor at work, as it is shown."""
 
     overruns: int
@@ -46,7 +46,7 @@ class Snapshots:
         clock: The time.
     """
 
-    def __init__(self, feed: Feed, execution: Shown, readiness: Readiness, clock: Clock) -> None:
+    def __init__(self, feed: Feed, execution: ExecutionState, readiness: Readiness, clock: Clock) -> None:
         self._feed = feed
         self._execution = execution
         self._readiness = readiness
@@ -64,7 +64,7 @@ class Snapshots:
         if self._feed.is_watched:
             self._feed.tell({"time": self._clock.wall(), "kind": kind, "what": what})
 
-    def look(self, state: State, problem: str, notice: SafetyNotice) -> None:
+    def poll(self, state: State, problem: str, notice: SafetyNotice) -> None:
         """Show what is so at the end of a turn, if it is news or measurements have not been shown for a while."""
         stops, changes = self._execution.stops, self._execution.changes
         if changes != self._changes:

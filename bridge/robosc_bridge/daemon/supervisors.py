@@ -34,7 +34,7 @@ from robosc.supervisor.codec import MAXIMUM_BYTES
 from robosc.verification import DEFAULT_STATES, Limits
 from robosc_api.security import Credentials
 from robosc_bridge.configuration.structure import SupervisorSource
-from robosc_bridge.daemon.kept import is_kept, keep, state_folder
+from robosc_bridge.daemon.supervisor_cache import is_cached, state_folder, store
 from robosc_bridge.errors import BridgeError
 from robosc_client import Client, ClientError, ServerUnavailableError, SynthesisOptions, SynthesisStatus
 
@@ -56,7 +56,7 @@ class Source:
         file: The model (`.rscd`), or a supervisor (`.rsup`); that has its signature or its model's text beside it.
         deployment: Deployment that the supervisor is to have.
         server: HOST:PORT of a synthesis server that makes it of the model; None: it is made here.
-        kept: Folder for what a server made last; None: nothing is kept.
+        cache: Folder for what a server made last; None: nothing is kept.
         trusted: Keys whose signatures of supervisor files are believed.
         credentials: Credentials for reaching the server; None: without TLS, certificate and token.
         allow_livelock: True if silent steps may go on for ever.
@@ -65,7 +65,7 @@ class Source:
     file: Path
     deployment: Deployment
     server: str | None = None
-    kept: Path | None = None
+    cache: Path | None = None
     trusted: tuple[PublicKey, ...] = ()
     credentials: Credentials | None = None
     allow_livelock: bool = False
@@ -102,7 +102,7 @@ def credentials_of(chosen: SupervisorSource) -> Credentials:
     )
 
 
-def kept_folder(argument: Path | None, chosen: SupervisorSource) -> Path | None:
+def cache_folder(argument: Path | None, chosen: SupervisorSource) -> Path | None:
     """Return the folder for what a server made last.
 
     As the command line says, else the configuration, else below the home.
@@ -304,22 +304,22 @@ def _checked(data: bytes, place: str, bundle: Bundle, source: Source, tell: Call
 
 def _served(bundle: Bundle, server: str, source: Source, tell: Callable[[str], None]) -> Supervisor:
     """Return the supervisor that the server makes, or else the one that it made last."""
-    kept = source.kept / f"{bundle.digest}-{source.deployment}{SUPERVISOR_SUFFIX}" if source.kept else None
+    cache = source.cache / f"{bundle.digest}-{source.deployment}{SUPERVISOR_SUFFIX}" if source.cache else None
     tell(f"{bundle.main.name}: synthesis at {server}")
     try:
         with Client(server, source.credentials) as client:
             options = SynthesisOptions(deployment=source.deployment, allow_livelock=source.allow_livelock)
             answer = client.synthesize(bundle, options, deadline_s=_SERVER_LIMIT_S)
     except (ServerUnavailableError, TimeoutError) as error:
-        if kept is None or not is_kept(kept):
+        if cache is None or not is_cached(cache):
             raise NoSupervisorError(f"{error}, and none is kept of an earlier start") from error
         tell(f"{error}: what it made last is taken")
-        return _checked(_bytes(kept), str(kept), bundle, source, tell)
+        return _checked(_bytes(cache), str(cache), bundle, source, tell)
     except ClientError as error:
         raise NoSupervisorError(str(error)) from error
     if answer.status is not SynthesisStatus.SUPERVISOR:
         raise NoSupervisorError(f"{server}: {answer.reason or answer.diagnostics[0]}")
     supervisor = _checked(answer.supervisor, server, bundle, source, tell)
-    if kept is not None:
-        keep(kept, answer.supervisor)
+    if cache is not None:
+        store(cache, answer.supervisor)
     return supervisor

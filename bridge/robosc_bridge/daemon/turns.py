@@ -90,7 +90,7 @@ class Turns:
         """End a turn that is under way: it has failed; `is_own`: because the model asked for another motion."""
         if self._turn is not None:
             self._motion.stop(self._clock(), reason)
-            self.look(is_own=is_own)
+            self.poll(is_own=is_own)
 
     def cancel(self, communication: str, number: int) -> None:
         """End a turn that an action asked for."""
@@ -100,7 +100,7 @@ class Turns:
             self._motion.stop(self._clock(), "it was cancelled")
             self._owe(lambda executor: executor.on_goal_ended(number, "cancelled"))
 
-    def look(self, *, is_own: bool = False) -> None:
+    def poll(self, *, is_own: bool = False) -> None:
         """Check whether a turn has ended; if so, whoever asked for it is told later."""
         turn = self._turn
         if turn is not None and self._motion.is_turning and self._clock() >= turn.end_s:

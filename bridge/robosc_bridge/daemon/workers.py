@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from robosc_bridge.daemon.backoff import Backoff
-from robosc_bridge.daemon.frame_watch import FrameWatch
+from robosc_bridge.daemon.frame_errors import FrameErrorMonitor
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
 from robosc_bridge.devices.interface import DriveBase, DriveReading, MotorFault, RangeScanner, Scan, Velocity
 from robosc_bridge.errors import BridgeError, DeviceSilentError
@@ -276,7 +276,7 @@ class ScannerWorker:
         self._is_turning = False
         self._heard_s = self._restart_at_s = 0.0
         self._restarts = 0
-        self._frames = FrameWatch(scanner.counters, bad_frames_share)
+        self._frames = FrameErrorMonitor(scanner.counters, bad_frames_share)
 
     def step(self, now_s: float) -> float:
         """Open it, or listen for a turn."""
@@ -320,7 +320,7 @@ class ScannerWorker:
         self._restart_at_s = self._clock() + self._restart_after_s
 
     def _look_at_frames(self) -> None:
-        found = self._frames.look(self._clock())
+        found = self._frames.poll(self._clock())
         if found is not None:
             self._gate.saw_noise(found.is_noisy)
             _log.warning("scanner: %s", found.text)

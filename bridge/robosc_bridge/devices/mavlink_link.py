@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from robosc_bridge.devices.mavlink_state import Told, VehicleState
+from robosc_bridge.devices.mavlink_state import Timestamped, VehicleState
 from robosc_bridge.errors import LineBusyError, LineError, LineLostError
 from robosc_bridge.host import Host, NetworkPort
 from robosc_bridge.protocol.framing import FrameCounts
@@ -85,7 +85,7 @@ class VehicleLink:
         )
         self._decoder = Decoder(self._codec, vehicle_message)
         self._state = VehicleState(settings.system)
-        self._obstacles: deque[Told[Obstacle]] = deque(maxlen=_KEPT_OBSTACLES)
+        self._obstacles: deque[Timestamped[Obstacle]] = deque(maxlen=_KEPT_OBSTACLES)
         self._lost: LineError | None = None
         self._is_closing = False
         self._changed = host.condition()
@@ -128,7 +128,7 @@ class VehicleLink:
             self._check()
             return found
 
-    def take_obstacles(self, limit_s: float, is_woken: Callable[[], bool]) -> list[Told[Obstacle]]:
+    def take_obstacles(self, limit_s: float, is_woken: Callable[[], bool]) -> list[Timestamped[Obstacle]]:
         """Return the reports of obstacles since they were taken last; wait for the first.
 
         Raises:
@@ -232,7 +232,7 @@ class VehicleLink:
             self._line.answer_sender()
         # A companion computer of the vehicle may be what sees.
         if isinstance(message.content, (ObstacleRing, SectorDistance)) and message.system == self._state.system:
-            self._obstacles.append(Told(time_s, message.content))
+            self._obstacles.append(Timestamped(time_s, message.content))
 
 
 _links: dict[str, VehicleLink] = {}

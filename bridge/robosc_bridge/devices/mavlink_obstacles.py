@@ -9,7 +9,7 @@ import threading
 
 from robosc_bridge.devices.interface import RawScan, Scan, ScannerCounters
 from robosc_bridge.devices.mavlink_link import BAUD, LinkSettings, Obstacle, VehicleLink, acquire, release
-from robosc_bridge.devices.mavlink_state import Told, VehicleState
+from robosc_bridge.devices.mavlink_state import Timestamped, VehicleState
 from robosc_bridge.errors import LineLostError
 from robosc_bridge.host import Host
 from robosc_bridge.protocol.mavlink_messages import ObstacleRing, SectorDistance, Telemetry
@@ -57,7 +57,7 @@ class MavlinkObstacles:
         self._woken = threading.Event()
         self._is_requested = False
         self._ring_s = -math.inf
-        self._sensors: dict[int, Told[Sector]] = {}
+        self._sensors: dict[int, Timestamped[Sector]] = {}
         self._told: set[int] = set()
 
     def open(self) -> None:
@@ -134,7 +134,7 @@ class MavlinkObstacles:
         self.counters.bad_frames = counts.bad_frames
         self.counters.skipped_bytes = counts.skipped_bytes
 
-    def _after(self, told: Told[Obstacle], state: VehicleState) -> Scan | None:
+    def _after(self, told: Timestamped[Obstacle], state: VehicleState) -> Scan | None:
         """The scan that this completes."""
         if isinstance(told.content, ObstacleRing):
             attitude = state.attitude
@@ -151,7 +151,7 @@ class MavlinkObstacles:
         sector = sensor_sector(content)
         if sector is None or time_s - self._ring_s <= STALE_AFTER_S:
             return None
-        self._sensors[content.orientation] = Told(time_s, sector)
+        self._sensors[content.orientation] = Timestamped(time_s, sector)
         is_full = content.orientation in self._told
         if is_full:
             self._told.clear()

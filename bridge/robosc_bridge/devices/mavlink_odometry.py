@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 from robosc_bridge.devices.interface import Pose, Velocity
-from robosc_bridge.devices.mavlink_state import Told, VehicleState
+from robosc_bridge.devices.mavlink_state import Timestamped, VehicleState
 from robosc_bridge.protocol.mavlink_messages import Motion
 
 _NO_LONGER_S = 0.5
@@ -16,7 +16,7 @@ _NO_LONGER_S = 0.5
 _NO_ODOMETRY = -1
 
 
-def estimate(state: VehicleState) -> Told[Motion] | None:
+def estimate(state: VehicleState) -> Timestamped[Motion] | None:
     """The newest estimate, and when the older of its parts came; None: there is none yet.
 
     Place and attitude stand in where ODOMETRY does not come, or comes no longer.
@@ -27,7 +27,7 @@ def estimate(state: VehicleState) -> Told[Motion] | None:
     return state.motion
 
 
-def _of_place_and_attitude(state: VehicleState) -> Told[Motion] | None:
+def _of_place_and_attitude(state: VehicleState) -> Timestamped[Motion] | None:
     if state.position is None or state.attitude is None:
         return None
     place, attitude = state.position.content, state.attitude.content
@@ -40,7 +40,7 @@ def _of_place_and_attitude(state: VehicleState) -> Told[Motion] | None:
         attitude.turn_rad_s,
         _NO_ODOMETRY,
     )
-    return Told(min(state.position.time_s, state.attitude.time_s), motion)
+    return Timestamped(min(state.position.time_s, state.attitude.time_s), motion)
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from robosc_bridge.devices.interface import STANDSTILL, DriveLimits, DriveReadin
 from robosc_bridge.devices.kinematics import wheel_speeds, within_limits
 from robosc_bridge.devices.mavlink_link import BAUD, LinkSettings, VehicleLink, acquire, release
 from robosc_bridge.devices.mavlink_odometry import VehicleOdometry, estimate
-from robosc_bridge.devices.mavlink_state import Told, VehicleState
+from robosc_bridge.devices.mavlink_state import Timestamped, VehicleState
 from robosc_bridge.devices.robots import Body
 from robosc_bridge.errors import (
     BridgeError,
@@ -273,7 +273,7 @@ class MavlinkRover:
             raise DeviceSilentError(f"{self._path}: no heartbeat of the rover for {HEARTBEAT_LIMIT_S:g} s")
         return told.content
 
-    def _fresh(self, state: VehicleState) -> Told[Motion] | None:
+    def _fresh(self, state: VehicleState) -> Timestamped[Motion] | None:
         told = estimate(state)
         is_fresh = told is not None and self._host.monotonic() - told.time_s <= self._motion_limit_s
         return told if is_fresh else None
@@ -393,7 +393,7 @@ class MavlinkRover:
         boot_ms = int((self._target_s - self._began_s) * 1000) % 2**32
         link.send(velocity_target(state.system, state.component, boot_ms, target.linear_m_s, target.angular_rad_s))
 
-    def _reading(self, state: VehicleState, told: Told[Motion], is_obeying: bool) -> DriveReading:
+    def _reading(self, state: VehicleState, told: Timestamped[Motion], is_obeying: bool) -> DriveReading:
         if told.content is not self._odometry.last:
             self._odometry = self._odometry.advanced(told.content)
         velocity = self._odometry.velocity

@@ -25,7 +25,7 @@ _AUTOPILOT = 1  # Component.
 
 
 @dataclass(frozen=True, slots=True)
-class Told[Content]:
+class Timestamped[Content]:
     """Something that was reported.
 
     Attributes:
@@ -59,15 +59,15 @@ class VehicleState:
 
     system: int | None = None
     component: int | None = None
-    heartbeat: Told[Heartbeat] | None = None
+    heartbeat: Timestamped[Heartbeat] | None = None
     stranger: Heartbeat | None = None
-    attitude: Told[Attitude] | None = None
-    position: Told[LocalPosition] | None = None
-    motion: Told[Motion] | None = None
+    attitude: Timestamped[Attitude] | None = None
+    position: Timestamped[LocalPosition] | None = None
+    motion: Timestamped[Motion] | None = None
     battery: BatteryState | None = None
     pack: BatteryState | None = None
-    answers: Mapping[int, Told[Answer]] = field(default_factory=dict)
-    texts: tuple[Told[Text], ...] = ()
+    answers: Mapping[int, Timestamped[Answer]] = field(default_factory=dict)
+    texts: tuple[Timestamped[Text], ...] = ()
     boot_s: float = 0.0
     restarts: int = 0
     _chunks: tuple[Text, ...] = ()
@@ -90,19 +90,19 @@ class VehicleState:
             return self
         match message.content:
             case Heartbeat() as heartbeat:
-                return replace(self, heartbeat=Told(time_s, heartbeat))
+                return replace(self, heartbeat=Timestamped(time_s, heartbeat))
             case Attitude() as attitude:
-                return replace(self._at(attitude.boot_s), attitude=Told(time_s, attitude))
+                return replace(self._at(attitude.boot_s), attitude=Timestamped(time_s, attitude))
             case LocalPosition() as position:
-                return replace(self._at(position.boot_s), position=Told(time_s, position))
+                return replace(self._at(position.boot_s), position=Timestamped(time_s, position))
             case Motion() as motion:
-                return replace(self, motion=Told(time_s, motion))
+                return replace(self, motion=Timestamped(time_s, motion))
             case BatteryState(is_main=True) as battery:
                 return replace(self, battery=battery)
             case BatteryState() as battery:
                 return replace(self, pack=battery)
             case Answer() as answer if _is_for(answer, own):
-                return replace(self, answers={**self.answers, answer.command: Told(time_s, answer)})
+                return replace(self, answers={**self.answers, answer.command: Timestamped(time_s, answer)})
             case Text() as text:
                 return self._after_text(text, time_s)
         return self
@@ -110,7 +110,9 @@ class VehicleState:
     def _after_new_heartbeat(self, message: Message, heartbeat: Heartbeat, time_s: float) -> "VehicleState":
         is_rover = heartbeat.kind == GROUND_ROVER and heartbeat.autopilot == ARDUPILOT
         if is_rover and self.component is None and self.system in (None, message.system):
-            return replace(self, system=message.system, component=message.component, heartbeat=Told(time_s, heartbeat))
+            return replace(
+                self, system=message.system, component=message.component, heartbeat=Timestamped(time_s, heartbeat)
+            )
         if message.component == _AUTOPILOT and heartbeat.kind not in GROUND_STATIONS:
             return replace(self, stranger=heartbeat)
         return self
@@ -128,7 +130,7 @@ class VehicleState:
             if not text.is_last:
                 return replace(self, _chunks=chunks)
             text = replace(text, data=b"".join(chunk.data for chunk in chunks))
-        return replace(self, texts=(*self.texts, Told(time_s, text))[-_KEPT_TEXTS:], _chunks=())
+        return replace(self, texts=(*self.texts, Timestamped(time_s, text))[-_KEPT_TEXTS:], _chunks=())
 
 
 def _is_for(answer: Answer, own: tuple[int, int]) -> bool:

@@ -159,7 +159,7 @@ class _Play:
             self._follower.require()
             now = latest(self._rig.setting.motion)
             self._say(
-                f"{what}: x {now.x_m:+.2f} m  y {now.y_m:+.2f} m  {self._events.look()} events  "
+                f"{what}: x {now.x_m:+.2f} m  y {now.y_m:+.2f} m  {self._events.poll()} events  "
                 f"{now.world_s:.1f} s of the world in {time.monotonic() - self._begin_s:.1f} s"
             )
             yield now

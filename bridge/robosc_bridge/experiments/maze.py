@@ -67,7 +67,7 @@ def _until_out(rig: Rig, say: Say) -> None:
         now = latest(rig.setting.motion)
         passed_s = time.monotonic() - begin_s
         say(
-            f"x {now.x_m:+.2f} m  y {now.y_m:+.2f} m  {events.look():5} events  "
+            f"x {now.x_m:+.2f} m  y {now.y_m:+.2f} m  {events.poll():5} events  "
             f"{now.world_s:6.1f} s of the world in {passed_s:4.1f} s"
         )
         if now.world_s > WORLD_LIMIT_S or passed_s > LIMIT_S:

@@ -396,7 +396,7 @@ class _Watch:
             if not found:
                 return 0
             self._events = LineCount(found[0])
-        return self._events.look()
+        return self._events.poll()
 
     def drive(self, what: str) -> None:
         """Wait until it has driven some way."""

@@ -193,7 +193,7 @@ def running(setting: Setting) -> Iterator[Rig]:
                 is_preferred=True,
             )
         )
-        address = bridge.wait_for(r"the remote face listens on (\S+:\d+)$", _SYNTHESIS_LIMIT_S)[1]
+        address = bridge.wait_for(r"the remote endpoint listens on (\S+:\d+)$", _SYNTHESIS_LIMIT_S)[1]
         bridge.wait_for(r" running$", _BRIDGE_LIMIT_S)
         rig = Rig(setting, simulator, bridge, address, (bridge.cpu_s, simulator.cpu_s))
         _wait_for_supervisor(client)

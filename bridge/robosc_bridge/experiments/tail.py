@@ -63,7 +63,7 @@ class LineCount:
         self._read = 0
         self._count = 0
 
-    def look(self) -> int:
+    def poll(self) -> int:
         """Return the number of lines by now."""
         with contextlib.suppress(OSError), self._path.open("rb") as file:
             file.seek(self._read)

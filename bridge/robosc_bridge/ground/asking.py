@@ -78,7 +78,7 @@ def acknowledgement(asked: Asked, result: Result) -> Make:
     return lambda codec: codec.command_ack_encode(asked.number, int(result), 0, 0, system, component)
 
 
-class Asking:
+class CommandHandler:
     """Commands and their answers.
 
     Args:
@@ -146,7 +146,7 @@ class Asking:
                     self._say(Severity.WARNING, why, asked.sender)
                 return [acknowledgement(asked, result)]
 
-    def look(self, now_s: float) -> list[Make]:
+    def poll(self, now_s: float) -> list[Make]:
         """The answers that have come."""
         found = []
         for key, pending in list(self._pending.items()):

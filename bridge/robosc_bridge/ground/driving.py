@@ -13,7 +13,7 @@ from robosc.expressions import ObjectType
 from robosc.model.structure import Communication, CommunicationKind, Model
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import DriveChannel
-from robosc_bridge.daemon.programs import Attached, Detached, FromProgram, Program, Requested, ToProgram
+from robosc_bridge.daemon.programs import Attached, Detached, FromProgram, MessageRequested, Program, ToProgram
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 
 SILENCE_S = 0.5
@@ -102,7 +102,7 @@ class Driving:
         model: Model that the layer is for.
         message: Its message that is mapped to the drive.
         tell: The daemon's inbox.
-        heed: Function that takes the reports of the layer; from the loop's thread, neither waits nor raises.
+        notify: Function that takes the reports of the layer; from the loop's thread, neither waits nor raises.
     """
 
     def __init__(
@@ -110,23 +110,23 @@ class Driving:
         model: Model,
         message: Communication,
         tell: Callable[[FromProgram], None],
-        heed: Callable[[ToProgram], None],
+        notify: Callable[[ToProgram], None],
     ) -> None:
         self._model = model
         self._message = message
         self._tell = tell
-        self._heed = heed
+        self._notify = notify
         self._drive: _Drive | None = None
 
     def take(self, now_s: float, velocity: Velocity) -> None:
         """A set-point came."""
         if self._drive is None:
-            self._drive = _Drive(Program("MAVLink", self._heed, may_request=True), now_s, velocity)
+            self._drive = _Drive(Program("MAVLink", self._notify, may_request=True), now_s, velocity)
             self._tell(Attached(self._drive.program))
         self._drive.last_s, self._drive.velocity = now_s, velocity
         self._request(self._drive, velocity)
 
-    def look(self, now_s: float) -> bool:
+    def poll(self, now_s: float) -> bool:
         """End driving that has fallen silent; whether it has just ended while the robot was to move."""
         drive = self._drive
         if drive is None or now_s - drive.last_s < SILENCE_S:
@@ -146,4 +146,4 @@ class Driving:
 
     def _request(self, drive: _Drive, velocity: Velocity) -> None:
         data = drive_data(self._model, self._message, velocity)
-        self._tell(Requested(drive.program, self._message.identifier, data))
+        self._tell(MessageRequested(drive.program, self._message.identifier, data))

@@ -13,7 +13,7 @@ from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.programs import Refused, ToProgram
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.ground import requests
-from robosc_bridge.ground.asking import LOOP_HANGS, Asked, Asking
+from robosc_bridge.ground.asking import LOOP_HANGS, Asked, CommandHandler
 from robosc_bridge.ground.commands import Change, Meaning, Refusal, Stop
 from robosc_bridge.ground.driving import Driving, Unusable, drive_message, from_manual_control, from_position_target
 from robosc_bridge.ground.heard import OLD, STOPPING, Heard, asked_in, heard_of, wanted_by
@@ -74,7 +74,7 @@ class Session:
         self._decoder = Decoder(self._codec, heard_of, OLD)
         self._texts = Texts()
         self._stream = Stream(operations, settings, now_s)
-        self._asking = Asking(operations, self._stream, self._answer_in_words)
+        self._asking = CommandHandler(operations, self._stream, self._answer_in_words)
         message = drive_message(operations.mapping) if operations.is_layer else None
         self._told: deque[ToProgram] = deque(maxlen=16)
         self._driving = Driving(operations.model, message, operations.tell, self._told.append) if message else None
@@ -111,7 +111,7 @@ class Session:
         for heard in self._decoder.take_datagram(data) if is_datagram else self._fed(data):
             self._count(heard)
             replies += self._take(heard)
-        replies += self._asking.look(now_s)
+        replies += self._asking.poll(now_s)
         self._stream.bad_packets = self._decoder.counts.bad_frames
         # The reason of an answer comes before it.
         urgent = (*self._texts.take(now_s), *replies, *self._stream.pulse(now_s))
@@ -186,7 +186,7 @@ class Session:
         update = self._subscription.take()
         before = self._stream.snapshot
         holding = []
-        if self._stream.look(update.snapshot, now_s) and update.snapshot is not None:
+        if self._stream.poll(update.snapshot, now_s) and update.snapshot is not None:
             for severity, text in happened(before, update.snapshot):
                 self._texts.say(now_s, severity, text, again_s=0.0)
         for entry in update.entries:
@@ -204,7 +204,7 @@ class Session:
             if isinstance(told, Refused):
                 self._texts.say(now_s, Severity.WARNING, told.why)
         if self._driving is not None:
-            self._end_driving(self._driving.look(now_s))
+            self._end_driving(self._driving.poll(now_s))
         if self._station_s is not None and now_s - self._station_s > STATION_LIMIT_S:
             self._station_s = None
             self._texts.say(now_s, Severity.WARNING, "The ground station is lost.", again_s=0.0)

@@ -76,7 +76,7 @@ class Stream:
         self._began_s = self._fresh_s = self._pulse_s = now_s
         self._told: dict[str, tuple[values.Number, float]] = {}
 
-    def look(self, snapshot: Snapshot | None, now_s: float) -> bool:
+    def poll(self, snapshot: Snapshot | None, now_s: float) -> bool:
         """See the latest snapshot; whether it is a new one."""
         is_new = snapshot is not None and (self.snapshot is None or snapshot.number != self.snapshot.number)
         if is_new:

@@ -1,8 +1,8 @@
-"""The remote face: the bridge as a gRPC service, for whoever watches, commands or is a program of the model.
+"""The remote endpoint: the bridge as a gRPC service, for whoever watches, commands or is a program of the model.
 
 It runs in a thread of its own and sees the daemon only through its `Operations`; the control loop never waits for it.
 """
 
-from robosc_bridge.remote.face import RemoteError, RemoteFace, RemoteSettings, serve, settings_of
+from robosc_bridge.remote.endpoint import RemoteEndpoint, RemoteError, RemoteSettings, serve, settings_of
 
-__all__ = ["RemoteError", "RemoteFace", "RemoteSettings", "serve", "settings_of"]
+__all__ = ["RemoteEndpoint", "RemoteError", "RemoteSettings", "serve", "settings_of"]

@@ -24,13 +24,13 @@ class Places:
         self._most = most
         self._is_full = False
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """Count; a system without these tables tells nothing."""
         taken = sum(map(self._taken, _TABLES))
         if taken >= self._most and not self._is_full:
             self._is_full = True
             _log.error(
-                "all %d connections of the remote face are taken: callers are turned away, also those who want to stop "
+                "all %d connections of the remote endpoint are taken: callers are refused, also those who want to stop "
                 "the robot; keys and signals stop it all the same",
                 self._most,
             )

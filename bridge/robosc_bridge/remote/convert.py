@@ -1,6 +1,6 @@
 """Protobuf messages for what the daemon shows and tells, and back.
 
-This is the one module of the face with generated names.
+This is the one module of the endpoint with generated names.
 """
 
 import json
@@ -281,16 +281,16 @@ def _goal_end(program: programs.Program, end: pb.GoalEnd) -> programs.GoalEnded:
 
 
 _READERS: dict[str, Callable[[programs.Program, Any], programs.FromProgram]] = {
-    "give": lambda program, it: programs.Told(program, _text(it.identifier), _data(it)),
+    "give": lambda program, it: programs.MessageReceived(program, _text(it.identifier), _data(it)),
     "reply": lambda program, it: programs.Replied(program, it.number, _data(it)),
     "call_failure": lambda program, it: programs.CallFailed(program, it.number, _text(it.reason)),
     "goal_acceptance": lambda program, it: programs.GoalAccepted(program, it.number),
     "feedback": lambda program, it: programs.FeedbackGiven(program, it.number, _data(it)),
     "goal_end": _goal_end,
-    "request": lambda program, it: programs.Requested(program, _text(it.identifier), _data(it)),
-    "call": lambda program, it: programs.Called(program, _text(it.name), _text(it.id), _data(it)),
-    "goal": lambda program, it: programs.GoalSent(program, _text(it.name), _text(it.id), _data(it)),
-    "cancel": lambda program, it: programs.CancelWanted(program, _text(it.name), _text(it.id)),
+    "request": lambda program, it: programs.MessageRequested(program, _text(it.identifier), _data(it)),
+    "call": lambda program, it: programs.CallRequested(program, _text(it.name), _text(it.id), _data(it)),
+    "goal": lambda program, it: programs.GoalRequested(program, _text(it.name), _text(it.id), _data(it)),
+    "cancel": lambda program, it: programs.CancelRequested(program, _text(it.name), _text(it.id)),
 }
 
 

@@ -62,7 +62,7 @@ Context = grpc.aio.ServicerContext[Any, Any]
 
 
 class BridgeService(convert.BridgeServiceServicer):
-    """The bridge for whoever is connected; lives in the face's event loop.
+    """The bridge for whoever is connected; lives in the endpoint's event loop.
 
     Args:
         operations: The daemon.
@@ -133,7 +133,7 @@ class BridgeService(convert.BridgeServiceServicer):
         future = self._operations.order(command, by)
 
         def answer(_: Any) -> None:
-            with contextlib.suppress(RuntimeError):  # The face is closed.
+            with contextlib.suppress(RuntimeError):  # The endpoint is closed.
                 loop.call_soon_threadsafe(answered.set)
 
         # Not `wrap_future`: a caller that goes away would cancel the future under the loop's hands.

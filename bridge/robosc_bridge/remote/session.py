@@ -160,7 +160,7 @@ class Session:
                 self._waiting_bytes += weight
         if not self._is_called:
             self._is_called = True
-            with contextlib.suppress(RuntimeError):  # The face is closed.
+            with contextlib.suppress(RuntimeError):  # The endpoint is closed.
                 self._loop.call_soon_threadsafe(self._called)
 
     def _called(self) -> None:

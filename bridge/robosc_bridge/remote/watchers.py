@@ -69,7 +69,7 @@ class Watcher:
 
 
 class Watchers:
-    """All watchers; lives in the face's event loop.
+    """All watchers; lives in the endpoint's event loop.
 
     Args:
         feed: Feed that the daemon shows.
@@ -106,7 +106,7 @@ class Watchers:
         """From the control loop's thread: let `_hand_out` be called soon, once."""
         if not self._is_called:
             self._is_called = True
-            with contextlib.suppress(RuntimeError):  # The face is closed.
+            with contextlib.suppress(RuntimeError):  # The endpoint is closed.
                 self._loop.call_soon_threadsafe(self._hand_out)
 
     def _hand_out(self) -> None:

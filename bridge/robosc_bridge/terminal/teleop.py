@@ -183,7 +183,7 @@ def _drive(terminal: Terminal, client: BridgeClient, operator: Operator, topic: 
             # What is wished goes out with the key, not with the next period.
             next_s, zeros_left = now_s, _ZEROS
             _obey(client, key, teller, resuming)
-        resuming.look()
+        resuming.poll()
         now_s = terminal.monotonic()
         if now_s < next_s:
             continue
@@ -228,7 +228,7 @@ class _Resuming:
         if self._running is None or not self._running.is_alive():
             self._running = self._terminal.start(self._ask)
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """Check that the bridge could be asked.
 
         Raises:

@@ -10,19 +10,19 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from robosc_bridge.view.face import ViewFace
+    from robosc_bridge.view.endpoint import ViewEndpoint
     from robosc_bridge.view.settings import ADDRESS, ViewSettings, settings_of
     from robosc_bridge.view.sources import ViewError
 
 _HOMES = {
     "ADDRESS": "settings",
     "ViewError": "sources",
-    "ViewFace": "face",
+    "ViewEndpoint": "endpoint",
     "ViewSettings": "settings",
     "settings_of": "settings",
 }
 
-__all__ = ["ADDRESS", "ViewError", "ViewFace", "ViewSettings", "settings_of"]
+__all__ = ["ADDRESS", "ViewEndpoint", "ViewError", "ViewSettings", "settings_of"]
 
 
 def __getattr__(name: str) -> Any:

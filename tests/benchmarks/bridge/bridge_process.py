@@ -3,7 +3,7 @@
 Usage: bridge_process.py MODEL CONFIGURATION STANDBY_S RUNNING_S [WATCHERS [PAGES]]
 
 Watchers take everything that the bridge shows, as soon as there is something new, and put the measurements of each
-snapshot into JSON as a remote face would. Pages of the live view are open in processes of their own; what a browser
+snapshot into JSON as a remote endpoint would. Pages of the live view are open in processes of their own; what a browser
 does with what it is told is no part of them. Without any there is no live view.
 
 Prints one JSON document: by how much each decision was late, overruns, and how much of a processor the process took.
@@ -25,7 +25,7 @@ from robosc_bridge.daemon.assembly import Machine, assemble
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.daemon.supervisors import Source, obtain
-from robosc_bridge.view import ViewFace, ViewSettings
+from robosc_bridge.view import ViewEndpoint, ViewSettings
 
 LIMIT_S = 60.0
 SETTLE_S = 1.0
@@ -81,7 +81,7 @@ class _Pages:
 
     def __init__(self, machine: Machine, count: int) -> None:
         self.messages: list[int] = []
-        self._face = ViewFace(machine.operations, ViewSettings("127.0.0.1:0")) if count else None
+        self._face = ViewEndpoint(machine.operations, ViewSettings("127.0.0.1:0")) if count else None
         self._open: list[subprocess.Popen[str]] = []
         if self._face is not None:
             self._face.start()
@@ -128,7 +128,7 @@ def main() -> int:
     machine.daemon.post(Command.STANDBY)
     loop = threading.Thread(target=machine.run)
     loop.start()
-    faces = [_Watcher(machine.operations.feed) for _ in range(watchers)]
+    endpoints = [_Watcher(machine.operations.feed) for _ in range(watchers)]
     pages = _Pages(machine, count)
     try:
         _await(machine, State.STANDBY)
@@ -144,14 +144,14 @@ def main() -> int:
         pages.close()
         machine.quit()
         loop.join()
-        for face in faces:
-            face.close()
+        for endpoint in endpoints:
+            endpoint.close()
     found = {
         "late_s": late_s,
         "overruns": overruns,
         "standby": in_standby,
         "running": running,
-        "snapshots": [face.snapshots for face in faces],
+        "snapshots": [endpoint.snapshots for endpoint in endpoints],
         "messages": pages.messages,
         "problem": machine.daemon.problem,
     }

@@ -84,7 +84,7 @@ def _measured(robot: LiveRobot, events: int, rate_hz: float) -> tuple[list[float
     happened_s: dict[int, float] = {}
     changes: list[tuple[float, int, str]] = []
     names = [item.name for item in robot.supervisor.model.components]
-    with running_browser() as browser, viewed(robot) as face, visit(browser, face.url) as seen:
+    with running_browser() as browser, viewed(robot) as endpoint, visit(browser, endpoint.url) as seen:
         seen.wait("() => document.querySelectorAll('.state.is-active').length > 0")
         seen.page.evaluate(WATCH)
         begin_s = time.monotonic()

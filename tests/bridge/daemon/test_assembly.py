@@ -18,7 +18,7 @@ from robosc_bridge.simulated.mavlink_packets import Encoder
 from support.certificates import Authority
 from support.daemons import CONFIGURATION
 from support.driven import driven
-from support.machines import RecordedFace, controller, machine
+from support.machines import RecordedEndpoint, controller, machine
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def test_nobody_waits_in_standby_for_somebody_who_cannot_come(supervisor: Superv
 
 def test_a_face_that_cannot_start_opens_no_device_and_stops_the_others(supervisor: Supervisor, tmp_path: Path) -> None:
     made = machine(supervisor, CONFIGURATION.replace("/dev/base", str(tmp_path / "none")))
-    first, second = RecordedFace(made), RecordedFace(made, "the address is in use")
+    first, second = RecordedEndpoint(made), RecordedEndpoint(made, "the address is in use")
     with pytest.raises(BridgeError, match="the address is in use"):
         made.run([first, second])
     assert first.told == ["start False", "stop False None"]
@@ -202,15 +202,15 @@ def test_faces_are_started_before_the_devices_and_stopped_after_them(supervisor:
     with VirtualHost() as host, SimulatedTurtleBot3("burger", "opencr", "lds01", clock=host) as robot:
         text = CONFIGURATION.replace("/dev/base", str(robot.base_path)).replace("/dev/scanner", str(robot.scanner_path))
         made = machine(supervisor, text, host=host)
-        face = RecordedFace(made)
+        endpoint = RecordedEndpoint(made)
         before_s = sys.getswitchinterval()
-        assert made.run([face])
-    # While it runs, a busy face must not hold up the other threads; afterwards that is nobody's business.
-    assert face.switch_s < 0.001 < before_s == sys.getswitchinterval()
-    assert face.told == ["start False", f"stop False {State.OVER}"]
+        assert made.run([endpoint])
+    # While it runs, a busy endpoint must not hold up the other threads; afterwards that is nobody's business.
+    assert endpoint.switch_s < 0.001 < before_s == sys.getswitchinterval()
+    assert endpoint.told == ["start False", f"stop False {State.OVER}"]
 
 
-class MortalFace(RecordedFace):
+class MortalEndpoint(RecordedEndpoint):
     """One that ends by itself as soon as the robot runs."""
 
     @property
@@ -225,8 +225,8 @@ def test_the_robot_stops_when_a_face_ends_by_itself(supervisor: Supervisor, capl
     with VirtualHost() as host, SimulatedTurtleBot3("burger", "opencr", "lds01", clock=host) as robot:
         text = CONFIGURATION.replace("/dev/base", str(robot.base_path)).replace("/dev/scanner", str(robot.scanner_path))
         made = machine(supervisor, text, host=host)
-        face = MortalFace(made)
-        made.run([face])
+        endpoint = MortalEndpoint(made)
+        made.run([endpoint])
     assert "has ended" in made.daemon.problem
-    assert caplog.text.count("the recorded face has ended by itself: the robot stops") == 1
-    assert face.told == ["start", f"stop False {State.OVER}"]
+    assert caplog.text.count("the recorded endpoint has ended by itself: the robot stops") == 1
+    assert endpoint.told == ["start", f"stop False {State.OVER}"]

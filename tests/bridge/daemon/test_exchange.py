@@ -17,11 +17,11 @@ from robosc_bridge.daemon.programs import (
     GoalAccepted,
     GoalEnded,
     GoalMade,
+    MessageReceived,
+    MessageRequested,
     MessageSent,
     Refused,
     Replied,
-    Requested,
-    Told,
 )
 from robosc_bridge.daemon.states import Command, State
 from support.daemons import Connected, Scene
@@ -104,7 +104,7 @@ def why(told: list[Any]) -> list[str]:
 def test_messages_go_both_ways_and_every_program_is_told() -> None:
     scene = helped()
     first, second = Connected(scene, "first"), Connected(scene, "second")
-    first.say(Told, "/go", 1)
+    first.say(MessageReceived, "/go", 1)
     scene.live(0.05, 2.0)
     assert variable(scene, "wanted") == 1
     assert first.of(MessageSent)[0] == second.of(MessageSent)[0] == MessageSent("note", "/note", "here")
@@ -114,12 +114,14 @@ def test_messages_go_both_ways_and_every_program_is_told() -> None:
 def test_a_message_where_the_model_hears_nothing_is_refused(identifier: str) -> None:
     scene = helped()
     program = Connected(scene, "a program")
-    assert why(program.say(Told, identifier, 1)) == [f"the model hears nothing on '{identifier[:255]}' from programs"]
+    assert why(program.say(MessageReceived, identifier, 1)) == [
+        f"the model hears nothing on '{identifier[:255]}' from programs"
+    ]
 
 
 def called(scene: Scene) -> tuple[Connected, CallMade]:
     server = Connected(scene, "server", ("ask", "fetch"))
-    server.say(Told, "/go", 2)
+    server.say(MessageReceived, "/go", 2)
     scene.live(0.05, 2.0)
     (call,) = server.of(CallMade)
     return server, call
@@ -147,7 +149,7 @@ def test_a_call_that_fails_is_an_error() -> None:
 def test_a_call_that_nobody_serves_fails_at_once() -> None:
     scene = helped()
     program = Connected(scene, "a program", ("fetch",))
-    program.say(Told, "/go", 2)
+    program.say(MessageReceived, "/go", 2)
     scene.live(0.05, 2.0)
     assert state(scene) == "failed"
     assert program.of(CallMade) == []
@@ -161,7 +163,7 @@ def test_an_answer_that_comes_after_the_time_for_it_means_nothing() -> None:
     server.say(Replied, call.number, True)
     assert state(scene) == "failed"
     # Asked again: the old number is none any more.
-    server.say(Told, "/go", 2)
+    server.say(MessageReceived, "/go", 2)
     scene.live(0.1, 2.0)
     (again,) = server.of(CallMade)
     assert again.number != call.number
@@ -175,7 +177,7 @@ def test_a_server_that_never_answers_makes_nothing_grow() -> None:
     server, _ = called(scene)
     for _ in range(5):
         scene.live(1.2, 2.0)
-        server.say(Told, "/go", 2)
+        server.say(MessageReceived, "/go", 2)
         scene.live(0.1, 2.0)
     assert len(server.of(CallMade)) == 1
     assert len(scene.daemon._programs._exchange._open) == 1
@@ -192,7 +194,7 @@ def test_only_who_is_asked_may_answer(make: Any) -> None:
 
 def fetching(scene: Scene) -> tuple[Connected, GoalMade]:
     server = Connected(scene, "server", ("ask", "fetch"))
-    server.say(Told, "/go", 3)
+    server.say(MessageReceived, "/go", 3)
     scene.live(0.05, 2.0)
     (goal,) = server.of(GoalMade)
     return server, goal
@@ -233,7 +235,7 @@ def test_a_goal_whose_requirement_turns_false_is_cancelled() -> None:
     scene = helped()
     server, goal = fetching(scene)
     server.say(GoalAccepted, goal.number)
-    server.say(Told, "/go", 0)
+    server.say(MessageReceived, "/go", 0)
     assert server.of(CancelMade) == [CancelMade("fetch", goal.number)]
     server.say(GoalEnded, goal.number, "cancelled", None)
     assert scene.daemon.state is State.RUNNING
@@ -247,7 +249,7 @@ def test_what_a_program_was_asked_for_fails_when_it_is_gone(start: Any) -> None:
     assert state(scene) == "failed"
     # What it sends afterwards is nobody's.
     server.say(Replied, asked.number, True)
-    server.say(Told, "/go", 0)
+    server.say(MessageReceived, "/go", 0)
     assert (len(server.told), variable(scene, "wanted")) == (0, 2 if start is called else 3)
 
 
@@ -276,7 +278,7 @@ def test_a_run_that_ends_takes_its_numbers_with_it() -> None:
     assert len(why(server.say(GoalAccepted, goal.number))) == 1
     scene.daemon.post(Command.START)
     scene.live(0.1, 2.0)
-    server.say(Told, "/go", 3)
+    server.say(MessageReceived, "/go", 3)
     scene.live(0.1, 2.0)
     (again,) = server.of(GoalMade)
     assert again.number != goal.number
@@ -288,14 +290,14 @@ def test_in_standby_nobody_listens_and_nothing_is_late() -> None:
     scene = Scene(text=CONFIGURATION, model=MODEL, starts_itself=False)
     scene.up()
     program = Connected(scene, "a program", ("ask",))
-    assert program.say(Told, "/go", 1) == []
+    assert program.say(MessageReceived, "/go", 1) == []
     assert len(why(program.say(Replied, 1, True))) == 1
 
 
 def test_a_controller_lets_nobody_ask() -> None:
     scene = helped()
     program = Connected(scene, "a program")
-    assert why(program.say(Requested, "/note", "x")) == [
+    assert why(program.say(MessageRequested, "/note", "x")) == [
         "the supervisor is a controller: it lets nobody ask for anything"
     ]
 
@@ -309,10 +311,10 @@ def test_a_program_that_raises_harms_nobody() -> None:
     other = Connected(scene, "another", ("fetch",))
     hostile_program = Connected(scene, "hostile", ("ask",))
     object.__setattr__(hostile_program.program, "tell", hostile)
-    other.say(Told, "/go", 1)
+    other.say(MessageReceived, "/go", 1)
     scene.live(0.1, 2.0)
     assert other.of(MessageSent)
-    other.say(Told, "/go", 2)
+    other.say(MessageReceived, "/go", 2)
     scene.live(0.1, 2.0)
     assert scene.daemon.state is State.RUNNING
 
@@ -339,7 +341,7 @@ for _ in range(100):
 def test_data_that_is_not_plain_or_too_large_is_refused(data: Any, reason: str) -> None:
     scene = helped()
     program = Connected(scene, "a program")
-    assert why(program.say(Told, "/go", data)) == [reason]
+    assert why(program.say(MessageReceived, "/go", data)) == [reason]
     assert variable(scene, "wanted") == 0
 
 
@@ -353,8 +355,8 @@ PLAIN = st.recursive(
 )
 NUMBERS = st.integers(-1, 5) | st.just(OTHER_NUMBER)
 SAYINGS = st.one_of(
-    st.tuples(st.just(Told), st.sampled_from(["/go", "/note", "/ask", "/x"]), PLAIN),
-    st.tuples(st.just(Told), st.just("/go"), st.integers(0, 4)),
+    st.tuples(st.just(MessageReceived), st.sampled_from(["/go", "/note", "/ask", "/x"]), PLAIN),
+    st.tuples(st.just(MessageReceived), st.just("/go"), st.integers(0, 4)),
     st.tuples(st.just(Replied), NUMBERS, PLAIN),
     st.tuples(st.just(CallFailed), NUMBERS, st.text(max_size=5)),
     st.tuples(st.just(GoalAccepted), NUMBERS),
@@ -384,8 +386,8 @@ def test_who_sends_too_much_loses_it_and_is_told_and_others_are_not_held_up() ->
     loud, quiet = Connected(scene, "loud"), Connected(scene, "quiet")
     scene.daemon.turn()
     for _ in range(MAXIMUM_WAITING + 30):
-        scene.daemon.post(Told(loud.program, "/go", 4))
-    quiet.say(Told, "/go", 5)
+        scene.daemon.post(MessageReceived(loud.program, "/go", 4))
+    quiet.say(MessageReceived, "/go", 5)
     # Taken up in the first turn, though hundreds came before it.
     assert variable(scene, "wanted") in (4, 5)
     heard = [entry["data"] for entry in scene.log.entries if entry.get("event") == "go.response"]
@@ -395,16 +397,16 @@ def test_who_sends_too_much_loses_it_and_is_told_and_others_are_not_held_up() ->
         scene.daemon.turn()
     assert why(loud.told) == ["this program sends too much at once: 30 of it were not looked at"]
     assert why(quiet.told) == []
-    loud.say(Told, "/go", 7)
+    loud.say(MessageReceived, "/go", 7)
     assert variable(scene, "wanted") == 7
 
 
 def test_a_number_that_is_none_reaches_no_model() -> None:
     scene = helped()
     program = Connected(scene, "a program")
-    program.say(Told, "/go", math.nan)
-    program.say(Told, "/go", True)
-    program.say(Told, "/go", "3")
+    program.say(MessageReceived, "/go", math.nan)
+    program.say(MessageReceived, "/go", True)
+    program.say(MessageReceived, "/go", "3")
     assert (variable(scene, "wanted"), scene.daemon.state) == (0, State.RUNNING)
 
 

@@ -11,11 +11,11 @@ from robosc.model.structure import Deployment
 from robosc_bridge.daemon.programs import (
     Answered,
     Blocked,
-    Called,
     CallFailed,
     CallMade,
+    CallRequested,
     CancelMade,
-    CancelWanted,
+    CancelRequested,
     FeedbackGiven,
     FeedbackPassed,
     FromProgram,
@@ -24,14 +24,14 @@ from robosc_bridge.daemon.programs import (
     GoalMade,
     GoalOver,
     GoalRejected,
-    GoalSent,
+    GoalRequested,
     GoalTaken,
+    MessageReceived,
+    MessageRequested,
     MessageSent,
     PassedOn,
     Program,
     Replied,
-    Requested,
-    Told,
 )
 from robosc_bridge.daemon.states import State
 from support.daemons import Connected, Scene, supervisor_of
@@ -154,21 +154,21 @@ class Twins:
         calls, goals = self.calls[::-1], self.goals[::-1]
         match kind:
             case "way":
-                self.both(Told(server, "/way", arguments[0]), twin.receive, "/way", arguments[0])
+                self.both(MessageReceived(server, "/way", arguments[0]), twin.receive, "/way", arguments[0])
             case "move":
                 message = {"linear": {"x": arguments[0]}}
-                self.both(Requested(caller, "/cmd_vel", message), twin.on_request, "/cmd_vel", message)
+                self.both(MessageRequested(caller, "/cmd_vel", message), twin.on_request, "/cmd_vel", message)
             case "call":
                 self.asked += 1
                 own = str(self.asked)
-                self.both(Called(caller, "think", own, "?"), twin.on_call, "think", (caller, own), "?")
+                self.both(CallRequested(caller, "think", own, "?"), twin.on_call, "think", (caller, own), "?")
             case "goal":
                 self.asked += 1
                 own = str(self.asked)
-                self.both(GoalSent(caller, "face", own, 1.5), twin.on_goal, "face", (caller, own), 1.5)
+                self.both(GoalRequested(caller, "face", own, 1.5), twin.on_goal, "face", (caller, own), 1.5)
             case "cancel":
                 own = str(arguments[0])
-                self.both(CancelWanted(caller, "face", own), twin.on_cancel, "face", (caller, own))
+                self.both(CancelRequested(caller, "face", own), twin.on_cancel, "face", (caller, own))
             case "reply" if arguments[0] < len(calls):
                 number, other = calls[arguments[0]]
                 self.both(Replied(server, number, True), twin.on_reply, other, True)

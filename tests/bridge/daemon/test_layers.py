@@ -8,27 +8,27 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robosc_bridge.daemon import asking
+from robosc_bridge.daemon import request_checker
 from robosc_bridge.daemon.programs import (
     Answered,
     Attached,
     Blocked,
-    Called,
     CallMade,
-    CancelWanted,
+    CallRequested,
+    CancelRequested,
     Detached,
     FeedbackPassed,
     FromProgram,
     GoalOver,
     GoalRejected,
-    GoalSent,
+    GoalRequested,
     GoalTaken,
+    MessageReceived,
+    MessageRequested,
     PassedOn,
     Program,
     Refused,
     Replied,
-    Requested,
-    Told,
 )
 from robosc_bridge.daemon.reports import Device, DeviceDown
 from robosc_bridge.daemon.states import Command, State
@@ -120,16 +120,16 @@ def test_what_is_allowed_moves_the_wheels_and_what_is_not_is_told_to_who_asked(
     scene: Scene, program: Connected
 ) -> None:
     other = Connected(scene, "another")
-    assert without_sensors(program.say(Requested, "/cmd_vel", FORWARD)) == []
+    assert without_sensors(program.say(MessageRequested, "/cmd_vel", FORWARD)) == []
     scene.live(0.3, 2.0)
     assert scene.out == Velocity(0.1, 0.0)
     scene.live(0.1, 0.3)
     # Let go by the supervisor: an obstacle.
     assert scene.out == STANDSTILL
     other.told.clear()
-    assert without_sensors(program.say(Requested, "/cmd_vel", FORWARD)) == [Blocked("/cmd_vel")]
+    assert without_sensors(program.say(MessageRequested, "/cmd_vel", FORWARD)) == [Blocked("/cmd_vel")]
     assert without_sensors(other.told) == []
-    assert without_sensors(program.say(Requested, "/cmd_vel", ZERO)) == []
+    assert without_sensors(program.say(MessageRequested, "/cmd_vel", ZERO)) == []
 
 
 def test_what_was_asked_for_during_an_operators_stop_does_not_move_it_afterwards() -> None:
@@ -139,12 +139,12 @@ def test_what_was_asked_for_during_an_operators_stop_does_not_move_it_afterwards
     program = Connected(scene, "an operator")
     scene.daemon.post(Command.STOP)
     scene.live(0.1, 2.0)
-    program.say(Requested, "/cmd_vel", FORWARD)
+    program.say(MessageRequested, "/cmd_vel", FORWARD)
     scene.live(0.3, 2.0)
     scene.daemon.post(Command.RESUME)
     scene.live(0.5, 2.0)
     assert scene.out == STANDSTILL
-    program.say(Requested, "/cmd_vel", FORWARD)
+    program.say(MessageRequested, "/cmd_vel", FORWARD)
     scene.live(0.5, 2.0)
     assert scene.out.linear_m_s == 0.1
 
@@ -152,7 +152,7 @@ def test_what_was_asked_for_during_an_operators_stop_does_not_move_it_afterwards
 def test_sensors_are_passed_on_after_the_supervisor_has_seen_them(scene: Scene, program: Connected) -> None:
     silent = Connected(scene, "a viewer", may_request=False)
     silent.turn()
-    program.say(Told, "/mood", "fine")
+    program.say(MessageReceived, "/mood", "fine")
     scene.scan(0.3)
     program.turn()
     assert program.of(PassedOn) == silent.of(PassedOn)[-1:]
@@ -164,14 +164,14 @@ def test_sensors_are_passed_on_after_the_supervisor_has_seen_them(scene: Scene, 
 def test_a_caller_that_falls_silent_is_released_though_the_loop_repeats_what_it_wanted(
     scene: Scene, program: Connected
 ) -> None:
-    program.say(Requested, "/cmd_vel", FORWARD)
+    program.say(MessageRequested, "/cmd_vel", FORWARD)
     scene.live(0.3, 2.0)
     assert scene.out.linear_m_s == 0.1
     scene.live(0.2, 2.0)
     assert scene.out == STANDSTILL
     # What is repeated goes on.
     for _ in range(10):
-        program.say(Requested, "/cmd_vel", FORWARD)
+        program.say(MessageRequested, "/cmd_vel", FORWARD)
         scene.live(0.2, 2.0)
         assert scene.out.linear_m_s == 0.1
 
@@ -183,28 +183,28 @@ def test_a_silent_caller_is_released_whatever_is_held_back_from_others(data: Any
     never = "    requirement run needs Eyes.stopped\n    requirement {spin"
     scene = driven(MODEL.replace(walk, run + walk).replace("    requirement {spin", never))
     program, other = Connected(scene, "an operator"), Connected(scene, "another")
-    program.say(Requested, "/cmd_vel", FORWARD)
+    program.say(MessageRequested, "/cmd_vel", FORWARD)
     scene.live(0.1, 2.0)
     for _ in range(3):
-        assert Blocked("/cmd_vel") in other.say(Requested, "/cmd_vel", data)
+        assert Blocked("/cmd_vel") in other.say(MessageRequested, "/cmd_vel", data)
         scene.live(0.1, 2.0)
         assert scene.out.linear_m_s == 0.1
-    assert Blocked("/cmd_vel") in other.say(Requested, "/cmd_vel", data)
+    assert Blocked("/cmd_vel") in other.say(MessageRequested, "/cmd_vel", data)
     scene.live(0.14, 2.0)
     assert scene.out == STANDSTILL
     # Its own are signs of its life, whether they go through or not.
-    program.say(Requested, "/cmd_vel", FORWARD)
+    program.say(MessageRequested, "/cmd_vel", FORWARD)
     for _ in range(8):
         scene.live(0.2, 2.0)
         assert scene.out.linear_m_s == 0.1
-        assert Blocked("/cmd_vel") in program.say(Requested, "/cmd_vel", data)
+        assert Blocked("/cmd_vel") in program.say(MessageRequested, "/cmd_vel", data)
 
 
 def test_whose_message_went_through_last_is_who_keeps_it_acting(scene: Scene, program: Connected) -> None:
     other = Connected(scene, "another")
-    program.say(Requested, "/cmd_vel", FORWARD)
+    program.say(MessageRequested, "/cmd_vel", FORWARD)
     scene.live(0.3, 2.0)
-    other.say(Requested, "/cmd_vel", {"linear": {"x": 0.05}})
+    other.say(MessageRequested, "/cmd_vel", {"linear": {"x": 0.05}})
     scene.live(0.3, 2.0)
     assert scene.out.linear_m_s == 0.05
     program.leave()
@@ -216,7 +216,7 @@ def test_whose_message_went_through_last_is_who_keeps_it_acting(scene: Scene, pr
 
 def test_a_caller_that_leaves_stands_still_at_once(scene: Scene, program: Connected) -> None:
     other = Connected(scene, "another")
-    program.say(Requested, "/cmd_vel", FORWARD)
+    program.say(MessageRequested, "/cmd_vel", FORWARD)
     scene.live(0.3, 2.0)
     other.leave()
     scene.exchange()
@@ -230,9 +230,9 @@ def test_a_caller_that_leaves_stands_still_at_once(scene: Scene, program: Connec
 
 def test_a_turn_that_was_asked_for_ends_with_who_asked(scene: Scene, program: Connected) -> None:
     for make, arguments in (
-        (Requested, ("/spin", 90)),
-        (Called, ("turn", "1", {"angle": 90.0})),
-        (GoalSent, ("face", "1", {"angle": 90.0})),
+        (MessageRequested, ("/spin", 90)),
+        (CallRequested, ("turn", "1", {"angle": 90.0})),
+        (GoalRequested, ("face", "1", {"angle": 90.0})),
     ):
         caller = Connected(scene, "a caller")
         caller.say(make, *arguments)
@@ -246,7 +246,7 @@ def test_a_turn_that_was_asked_for_ends_with_who_asked(scene: Scene, program: Co
 
 
 def test_a_call_is_answered(scene: Scene, program: Connected) -> None:
-    program.say(Called, "turn", "a", {"angle": 20})
+    program.say(CallRequested, "turn", "a", {"angle": 20})
     scene.live(3.0, 2.0)
     assert program.of(Answered) == [Answered("a", {"success": True, "message": ""}, is_default=False)]
     assert abs(math.degrees(scene.heading_rad) - 20) < 3
@@ -255,14 +255,14 @@ def test_a_call_is_answered(scene: Scene, program: Connected) -> None:
 def test_a_call_that_is_held_back_is_answered_by_default_at_once(scene: Scene, program: Connected) -> None:
     scene.daemon.post(Command.STOP)
     scene.live(0.1, 2.0)
-    assert without_sensors(program.say(Called, "turn", "a", {"angle": 20})) == [
+    assert without_sensors(program.say(CallRequested, "turn", "a", {"angle": 20})) == [
         Answered("a", None, is_default=True),
         Blocked("/turn"),
     ]
 
 
 def test_a_goal_is_taken_told_of_and_ends(scene: Scene, program: Connected) -> None:
-    assert without_sensors(program.say(GoalSent, "face", "g", {"angle": 20}))[0] == GoalTaken("g")
+    assert without_sensors(program.say(GoalRequested, "face", "g", {"angle": 20}))[0] == GoalTaken("g")
     scene.live(3.0, 2.0)
     assert program.of(FeedbackPassed)[0].goal_id == "g"
     assert program.of(GoalOver) == [GoalOver("g", "succeeded", {"success": True, "message": ""})]
@@ -270,52 +270,52 @@ def test_a_goal_is_taken_told_of_and_ends(scene: Scene, program: Connected) -> N
 
 def test_a_goal_is_cancelled_by_who_asked_and_nobody_else(scene: Scene, program: Connected) -> None:
     other = Connected(scene, "another")
-    program.say(GoalSent, "face", "g", {"angle": 90})
+    program.say(GoalRequested, "face", "g", {"angle": 90})
     scene.live(0.3, 2.0)
-    assert refused(other.say(CancelWanted, "face", "g")) == ["'g' is no goal of 'face' that is under way"]
+    assert refused(other.say(CancelRequested, "face", "g")) == ["'g' is no goal of 'face' that is under way"]
     # One id means another goal with another program: held back, as the first is under way.
-    assert without_sensors(other.say(GoalSent, "face", "g", {"angle": 5})) == [GoalRejected("g"), Blocked("/face")]
+    assert without_sensors(other.say(GoalRequested, "face", "g", {"angle": 5})) == [GoalRejected("g"), Blocked("/face")]
     assert scene.out.angular_rad_s > 0.0
-    assert without_sensors(program.say(CancelWanted, "face", "g")) == [GoalOver("g", "cancelled", None)]
+    assert without_sensors(program.say(CancelRequested, "face", "g")) == [GoalOver("g", "cancelled", None)]
     scene.exchange()
     assert scene.out == STANDSTILL
-    assert refused(program.say(CancelWanted, "face", "g")) == ["'g' is no goal of 'face' that is under way"]
+    assert refused(program.say(CancelRequested, "face", "g")) == ["'g' is no goal of 'face' that is under way"]
 
 
 def test_an_id_that_is_in_use_is_refused_and_free_again_afterwards(scene: Scene, program: Connected) -> None:
-    program.say(GoalSent, "face", "g", {"angle": 90})
-    assert refused(program.say(GoalSent, "face", "g", {"angle": 90})) == ["the id 'g' is in use"]
-    assert refused(program.say(Called, "turn", "g", {"angle": 90})) == ["the id 'g' is in use"]
-    program.say(CancelWanted, "face", "g")
-    assert without_sensors(program.say(GoalSent, "face", "g", {"angle": 90})) == [GoalTaken("g")]
+    program.say(GoalRequested, "face", "g", {"angle": 90})
+    assert refused(program.say(GoalRequested, "face", "g", {"angle": 90})) == ["the id 'g' is in use"]
+    assert refused(program.say(CallRequested, "turn", "g", {"angle": 90})) == ["the id 'g' is in use"]
+    program.say(CancelRequested, "face", "g")
+    assert without_sensors(program.say(GoalRequested, "face", "g", {"angle": 90})) == [GoalTaken("g")]
 
 
 def test_an_operators_stop_ends_a_goal_and_holds_everything_back(scene: Scene, program: Connected) -> None:
-    program.say(GoalSent, "face", "g", {"angle": 90})
+    program.say(GoalRequested, "face", "g", {"angle": 90})
     scene.live(0.3, 2.0)
     scene.daemon.post(Command.STOP)
     scene.live(0.1, 2.0)
     assert scene.out == STANDSTILL
     assert [item.outcome for item in program.of(GoalOver)] == ["aborted"]
-    assert without_sensors(program.say(Requested, "/cmd_vel", FORWARD)) == [Blocked("/cmd_vel")]
+    assert without_sensors(program.say(MessageRequested, "/cmd_vel", FORWARD)) == [Blocked("/cmd_vel")]
 
 
 def test_in_standby_everything_is_held_back_and_what_was_awaited_is_answered(scene: Scene, program: Connected) -> None:
     server = Connected(scene, "a server", ("think",))
     server.turn()
-    program.say(Called, "think", "t", "about it")
-    program.say(GoalSent, "face", "g", {"angle": 90})
+    program.say(CallRequested, "think", "t", "about it")
+    program.say(GoalRequested, "face", "g", {"angle": 90})
     scene.daemon.post(Command.STANDBY)
     scene.live(0.3, 2.0)
     assert scene.daemon.state is State.STANDBY
     assert program.of(Answered) == [Answered("t", None, is_default=True)]
     assert [item.outcome for item in program.of(GoalOver)] == ["aborted"]
-    assert program.say(Requested, "/cmd_vel", FORWARD) == [Blocked("/cmd_vel")]
-    assert program.say(Called, "turn", "a", None) == [Answered("a", None, is_default=True), Blocked("/turn")]
-    assert program.say(GoalSent, "face", "g", None) == [GoalRejected("g"), Blocked("/face")]
+    assert program.say(MessageRequested, "/cmd_vel", FORWARD) == [Blocked("/cmd_vel")]
+    assert program.say(CallRequested, "turn", "a", None) == [Answered("a", None, is_default=True), Blocked("/turn")]
+    assert program.say(GoalRequested, "face", "g", None) == [GoalRejected("g"), Blocked("/face")]
     scene.daemon.post(Command.START)
     scene.live(0.3, 2.0)
-    program.say(Requested, "/cmd_vel", FORWARD)
+    program.say(MessageRequested, "/cmd_vel", FORWARD)
     scene.live(0.3, 2.0)
     assert scene.out.linear_m_s == 0.1
 
@@ -324,7 +324,7 @@ def test_a_service_of_a_program_answers_another_programs_call(scene: Scene, prog
     server = Connected(scene, "a server", ("think",))
     server.turn()
     server.told.clear()
-    program.say(Called, "think", "t", "about it")
+    program.say(CallRequested, "think", "t", "about it")
     (call,) = server.of(CallMade)
     assert call.data == "about it"
     server.say(Replied, call.number, "done")
@@ -333,36 +333,36 @@ def test_a_service_of_a_program_answers_another_programs_call(scene: Scene, prog
 
 def test_a_viewer_may_not_ask(scene: Scene) -> None:
     viewer = Connected(scene, "a viewer", may_request=False)
-    assert refused(viewer.say(Requested, "/cmd_vel", FORWARD)) == ["this program may not ask for anything"]
+    assert refused(viewer.say(MessageRequested, "/cmd_vel", FORWARD)) == ["this program may not ask for anything"]
     scene.live(0.2, 2.0)
     assert scene.out == STANDSTILL
 
 
 WRONG = [
-    (Requested, ("/cmd_vel", {"linear": {"x": "fast"}}), "'walk': 'linear.x' must be number"),
-    (Requested, ("/cmd_vel", {"linear": {"x": True}}), "'walk': 'linear.x' must be number"),
-    (Requested, ("/cmd_vel", {"linear": {"x": [1]}}), "'linear.x' must be number"),
-    (Requested, ("/cmd_vel", {"linear": 1}), "'linear' must be {x: number"),
-    (Requested, ("/cmd_vel", 1), "must be "),
-    (Requested, ("/cmd_vel", {"linear": {"w": 1}}), "there is no field 'linear.w'; there is x, y, z"),
-    (Requested, ("/cmd_vel", {"linear": {"y": 0.1}}), "'linear.y' must be 0: 'drive' does not use it"),
-    (Requested, ("/cmd_vel", {"twist": FORWARD}), "there is no field 'twist'"),
-    (Requested, ("/cmd_vel", {"linear": {"x": 1 << 80}}), "a number of more than 64 bits"),
-    (Requested, ("/spin", 1.5), "'spin': the data must be a whole number"),
-    (Requested, ("/spin", {"data": 90}), "'spin': the data must be number"),
-    (Requested, ("/spin", 36_001), "beyond a hundred turns"),
-    (Requested, ("/spin", -36_001), "beyond a hundred turns"),
-    (Requested, ("/scan", {}), "no message to the robot on '/scan'"),
-    (Requested, ("/nowhere", {}), "no message to the robot on '/nowhere'"),
-    (Called, ("turn", "", {}), "an id has 1 to 255 characters"),
-    (Called, ("turn", "x" * 256, {}), "an id has 1 to 255 characters"),
-    (Called, ("face", "1", {}), "the model has no service 'face'"),
-    (Called, ("turn", "1", {"angle": "wide"}), "'angle' must be number"),
-    (Called, ("turn", "1", {"data": 90}), "there is no field 'data'; there is angle"),
-    (Called, ("think", "1", 5), "'think': the data must be a text"),
-    (GoalSent, ("turn", "1", {}), "the model has no action 'turn'"),
-    (GoalSent, ("face", "1", {"angle": 1e9}), "beyond a hundred turns"),
-    (CancelWanted, ("face", "1"), "'1' is no goal of 'face' that is under way"),
+    (MessageRequested, ("/cmd_vel", {"linear": {"x": "fast"}}), "'walk': 'linear.x' must be number"),
+    (MessageRequested, ("/cmd_vel", {"linear": {"x": True}}), "'walk': 'linear.x' must be number"),
+    (MessageRequested, ("/cmd_vel", {"linear": {"x": [1]}}), "'linear.x' must be number"),
+    (MessageRequested, ("/cmd_vel", {"linear": 1}), "'linear' must be {x: number"),
+    (MessageRequested, ("/cmd_vel", 1), "must be "),
+    (MessageRequested, ("/cmd_vel", {"linear": {"w": 1}}), "there is no field 'linear.w'; there is x, y, z"),
+    (MessageRequested, ("/cmd_vel", {"linear": {"y": 0.1}}), "'linear.y' must be 0: 'drive' does not use it"),
+    (MessageRequested, ("/cmd_vel", {"twist": FORWARD}), "there is no field 'twist'"),
+    (MessageRequested, ("/cmd_vel", {"linear": {"x": 1 << 80}}), "a number of more than 64 bits"),
+    (MessageRequested, ("/spin", 1.5), "'spin': the data must be a whole number"),
+    (MessageRequested, ("/spin", {"data": 90}), "'spin': the data must be number"),
+    (MessageRequested, ("/spin", 36_001), "beyond a hundred turns"),
+    (MessageRequested, ("/spin", -36_001), "beyond a hundred turns"),
+    (MessageRequested, ("/scan", {}), "no message to the robot on '/scan'"),
+    (MessageRequested, ("/nowhere", {}), "no message to the robot on '/nowhere'"),
+    (CallRequested, ("turn", "", {}), "an id has 1 to 255 characters"),
+    (CallRequested, ("turn", "x" * 256, {}), "an id has 1 to 255 characters"),
+    (CallRequested, ("face", "1", {}), "the model has no service 'face'"),
+    (CallRequested, ("turn", "1", {"angle": "wide"}), "'angle' must be number"),
+    (CallRequested, ("turn", "1", {"data": 90}), "there is no field 'data'; there is angle"),
+    (CallRequested, ("think", "1", 5), "'think': the data must be a text"),
+    (GoalRequested, ("turn", "1", {}), "the model has no action 'turn'"),
+    (GoalRequested, ("face", "1", {"angle": 1e9}), "beyond a hundred turns"),
+    (CancelRequested, ("face", "1"), "'1' is no goal of 'face' that is under way"),
 ]
 
 
@@ -381,9 +381,9 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing(
 @pytest.mark.parametrize(
     ("make", "arguments"),
     [
-        (Requested, ("/cmd_vel", {"linear": {"x": "N"}})),
-        (Called, ("turn", "1", {"angle": "N"})),
-        (GoalSent, ("face", "1", {"angle": "N"})),
+        (MessageRequested, ("/cmd_vel", {"linear": {"x": "N"}})),
+        (CallRequested, ("turn", "1", {"angle": "N"})),
+        (GoalRequested, ("face", "1", {"angle": "N"})),
     ],
 )
 def test_what_is_not_finite_is_held_back(
@@ -407,14 +407,14 @@ def test_what_is_left_out_is_zero_for_model_and_wheels_alike() -> None:
     # Not to walk, for which there is no way, but to halt.
     nothing: list[Any] = [None, {}, {"linear": None}, {"linear": {}}, {"angular": {"z": 0}}]
     for data in nothing:
-        assert without_sensors(program.say(Requested, "/cmd_vel", data)) == []
-    assert without_sensors(program.say(Requested, "/cmd_vel", {"linear": {"x": 0.001}})) == [Blocked("/cmd_vel")]
+        assert without_sensors(program.say(MessageRequested, "/cmd_vel", data)) == []
+    assert without_sensors(program.say(MessageRequested, "/cmd_vel", {"linear": {"x": 0.001}})) == [Blocked("/cmd_vel")]
 
 
 def test_who_sends_too_much_is_stopped(scene: Scene, program: Connected) -> None:
-    program.say(Requested, "/cmd_vel", FORWARD)
+    program.say(MessageRequested, "/cmd_vel", FORWARD)
     for _ in range(300):
-        scene.daemon.post(Requested(program.program, "/cmd_vel", FORWARD))
+        scene.daemon.post(MessageRequested(program.program, "/cmd_vel", FORWARD))
     for _ in range(10):
         program.turn()
         scene.exchange()
@@ -423,7 +423,11 @@ def test_who_sends_too_much_is_stopped(scene: Scene, program: Connected) -> None
 
 @pytest.mark.parametrize(
     ("make", "arguments"),
-    [(GoalSent, ("face", "g", {"angle": 340})), (Called, ("turn", "c", {"angle": 340})), (Requested, ("/spin", 340))],
+    [
+        (GoalRequested, ("face", "g", {"angle": 340})),
+        (CallRequested, ("turn", "c", {"angle": 340})),
+        (MessageRequested, ("/spin", 340)),
+    ],
 )
 def test_what_who_sends_too_much_has_asked_for_ends(
     make: Any, arguments: tuple[Any, ...], scene: Scene, program: Connected
@@ -432,19 +436,19 @@ def test_what_who_sends_too_much_has_asked_for_ends(
     scene.live(0.3, 2.0)
     assert scene.out.angular_rad_s > 0.0
     for _ in range(260):
-        scene.daemon.post(Requested(program.program, "/nowhere", None))
+        scene.daemon.post(MessageRequested(program.program, "/nowhere", None))
     # It may have been this one that is lost.
-    scene.daemon.post(CancelWanted(program.program, "face", "g"))
+    scene.daemon.post(CancelRequested(program.program, "face", "g"))
     program.told.clear()
     scene.live(0.3, 2.0)
     assert scene.out == STANDSTILL
     assert any("too much at once" in why for why in refused(program.told))
-    if make is GoalSent:
+    if make is GoalRequested:
         assert program.of(GoalOver) == [GoalOver("g", "cancelled", None)]
-    if make is Called:
+    if make is CallRequested:
         assert program.of(Answered) == [Answered("c", None, is_default=True)]
     # It may go on.
-    program.say(Requested, "/cmd_vel", FORWARD)
+    program.say(MessageRequested, "/cmd_vel", FORWARD)
     scene.live(0.3, 2.0)
     assert scene.out.linear_m_s == 0.1
 
@@ -463,9 +467,9 @@ def test_what_is_costly_to_take_up_is_spread_over_turns(scene: Scene) -> None:
     other = Connected(scene, "another")
     other.turn()
     for _ in range(50):
-        scene.daemon.post(Requested(slow, "/cmd_vel", {"linear": {"x": math.nan}}))
+        scene.daemon.post(MessageRequested(slow, "/cmd_vel", {"linear": {"x": math.nan}}))
     # Its first is taken up in the first turn, and so is that of the other one.
-    assert Blocked("/cmd_vel") in other.say(Requested, "/cmd_vel", {"linear": {"x": math.nan}})
+    assert Blocked("/cmd_vel") in other.say(MessageRequested, "/cmd_vel", {"linear": {"x": math.nan}})
     for turns in range(1, 20):
         assert len(taken) <= 2 * turns
         scene.daemon.turn()
@@ -488,12 +492,12 @@ def test_data_is_looked_through_in_the_thread_of_who_sends_it(
         return noted
 
     for name in ("why_not_shaped", "why_not_typed", "completed", "_leaves"):
-        monkeypatch.setattr(asking, name, noting(getattr(asking, name)))
+        monkeypatch.setattr(request_checker, name, noting(getattr(request_checker, name)))
     program.turn()
     items: list[FromProgram] = [
-        Requested(program.program, "/cmd_vel", FORWARD),
-        Called(program.program, "turn", "1", {"angle": 20}),
-        GoalSent(program.program, "face", "g", {"angle": "wide"}),
+        MessageRequested(program.program, "/cmd_vel", FORWARD),
+        CallRequested(program.program, "turn", "1", {"angle": 20}),
+        GoalRequested(program.program, "face", "g", {"angle": "wide"}),
     ]
 
     def send() -> None:
@@ -513,7 +517,7 @@ def test_data_is_looked_through_in_the_thread_of_who_sends_it(
 
 
 def test_a_lost_drive_base_ends_a_layers_run(scene: Scene, program: Connected) -> None:
-    program.say(GoalSent, "face", "g", {"angle": 90})
+    program.say(GoalRequested, "face", "g", {"angle": 90})
     scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))
     program.turn()
     assert [item.outcome for item in program.of(GoalOver)] == ["aborted"]
@@ -523,14 +527,14 @@ def test_a_lost_drive_base_ends_a_layers_run(scene: Scene, program: Connected) -
 
 
 EVERYTHING = [
-    (Requested, ("/cmd_vel", FORWARD)),
-    (Requested, ("/cmd_vel", ZERO)),
-    (Requested, ("/spin", 40)),
-    (Called, ("turn", "1", {"angle": 40})),
-    (Called, ("think", "2", "?")),
-    (GoalSent, ("face", "3", {"angle": 40})),
-    (CancelWanted, ("face", "3")),
-    (Told, ("/mood", "x")),
+    (MessageRequested, ("/cmd_vel", FORWARD)),
+    (MessageRequested, ("/cmd_vel", ZERO)),
+    (MessageRequested, ("/spin", 40)),
+    (CallRequested, ("turn", "1", {"angle": 40})),
+    (CallRequested, ("think", "2", "?")),
+    (GoalRequested, ("face", "3", {"angle": 40})),
+    (CancelRequested, ("face", "3")),
+    (MessageReceived, ("/mood", "x")),
 ]
 
 
@@ -570,7 +574,7 @@ def test_programs_may_come_and_go_in_the_middle_of_everything(steps: list[tuple[
     assert (scene.out, scene.daemon.state) == (STANDSTILL, State.RUNNING)
     # Whoever comes finds everything free.
     late = come()
-    late.say(GoalSent, "face", "1", {"angle": 10})
+    late.say(GoalRequested, "face", "1", {"angle": 10})
     assert GoalTaken("1") in late.told
     scene.live(3.0, 2.0)
     assert [item.outcome for item in late.of(GoalOver)] == ["succeeded"]

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from robosc_bridge.daemon.conductor import STOP_LIMIT_S
+from robosc_bridge.daemon.lifecycle import STOP_LIMIT_S
 from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, SafetyNotice
 from robosc_bridge.daemon.states import Command, State
@@ -140,7 +140,7 @@ def test_a_thread_that_has_ended_is_a_fault(scene: Scene) -> None:
     scene.up()
     scene.is_alive = False
     scene.live(0.1, 2.0)
-    assert scene.daemon.problem == "a thread of a device or a remote face has ended"
+    assert scene.daemon.problem == "a thread of a device or a remote endpoint has ended"
 
 
 def test_a_velocity_from_before_an_operators_stop_does_not_move_the_robot_afterwards(scene: Scene) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from robosc_bridge.daemon.conductor import RESET_LIMIT_S, STOP_LIMIT_S
+from robosc_bridge.daemon.lifecycle import RESET_LIMIT_S, STOP_LIMIT_S
 from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, ResetDone
 from robosc_bridge.daemon.states import Command, Order, State

@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 
 from robosc_bridge.daemon import program_inbox
-from robosc_bridge.daemon.asking import UnfitError
 from robosc_bridge.daemon.plain_data import weight_bytes
 from robosc_bridge.daemon.program_inbox import (
     MAXIMUM_WAITING,
@@ -17,7 +16,8 @@ from robosc_bridge.daemon.program_inbox import (
     ProgramInbox,
     Unreadable,
 )
-from robosc_bridge.daemon.programs import Detached, FromProgram, Program, Told
+from robosc_bridge.daemon.programs import Detached, FromProgram, MessageReceived, Program
+from robosc_bridge.daemon.request_checker import InvalidRequestError
 
 
 def program(name: str = "a program") -> Program:
@@ -60,7 +60,7 @@ def test_the_memory_of_what_waits_is_bounded(data: Any, monkeypatch: pytest.Monk
     tracemalloc.start()
     try:
         for _ in range(20):
-            box.put(Told(sender, "/mood", data()))
+            box.put(MessageReceived(sender, "/mood", data()))
         # With what is no data of theirs.
         assert tracemalloc.get_traced_memory()[0] < 1.3 * limit + 50_000
     finally:
@@ -69,8 +69,8 @@ def test_the_memory_of_what_waits_is_bounded(data: Any, monkeypatch: pytest.Monk
     assert 1 <= len(kept) < 20
     assert last == Overflowed(sender, lost=20 - len(kept))
     # There is room again.
-    box.put(Told(sender, "/mood", data()))
-    assert isinstance(box.take(), Told)
+    box.put(MessageReceived(sender, "/mood", data()))
+    assert isinstance(box.take(), MessageReceived)
 
 
 def test_data_weighs_what_it_takes() -> None:
@@ -85,10 +85,10 @@ def test_data_weighs_what_it_takes() -> None:
 
 def test_one_message_waits_whatever_its_size() -> None:
     box, sender = inbox(), program()
-    large = Told(sender, "/mood", ["x" * 60_000] * 50)
+    large = MessageReceived(sender, "/mood", ["x" * 60_000] * 50)
     assert weight_bytes(large.data) > MAXIMUM_WAITING_BYTES
     box.put(large)
-    box.put(Told(sender, "/mood", None))
+    box.put(MessageReceived(sender, "/mood", None))
     assert taken(box) == [large, Overflowed(sender)]
 
 
@@ -96,23 +96,23 @@ def test_after_something_is_lost_nothing_is_kept_before_that_is_told() -> None:
     # Else a motion could come after the word that all has ended, and the stop that follows it be lost.
     box, sender, other = inbox(), program(), program("another")
     for number in range(MAXIMUM_WAITING + 1):
-        box.put(Told(sender, "/mood", number))
+        box.put(MessageReceived(sender, "/mood", number))
     for _ in range(5):
         box.take()
-    box.put(Told(sender, "/mood", "go"))
-    box.put(Told(other, "/mood", "fine"))
+    box.put(MessageReceived(sender, "/mood", "go"))
+    box.put(MessageReceived(other, "/mood", "fine"))
     box.put(Detached(sender))
-    found = [item for item in taken(box) if not (isinstance(item, Told) and item.program is sender)]
-    assert found == [Told(other, "/mood", "fine"), Overflowed(sender, lost=2), Detached(sender)]
-    box.put(Told(sender, "/mood", "go"))
-    assert taken(box) == [Told(sender, "/mood", "go")]
+    found = [item for item in taken(box) if not (isinstance(item, MessageReceived) and item.program is sender)]
+    assert found == [MessageReceived(other, "/mood", "fine"), Overflowed(sender, lost=2), Detached(sender)]
+    box.put(MessageReceived(sender, "/mood", "go"))
+    assert taken(box) == [MessageReceived(sender, "/mood", "go")]
 
 
 def test_what_makes_no_sense_takes_no_room() -> None:
     def look(item: FromProgram) -> FromProgram:
-        raise UnfitError("no")
+        raise InvalidRequestError("no")
 
     box, sender = ProgramInbox(lambda: None, look), program()
     for _ in range(MAXIMUM_WAITING):
-        box.put(Told(sender, "/mood", numbers(2000)))
+        box.put(MessageReceived(sender, "/mood", numbers(2000)))
     assert taken(box) == [Unreadable(sender, "no")] * MAXIMUM_WAITING

@@ -20,8 +20,8 @@ from robosc_bridge.configuration.structure import SupervisorSource
 from robosc_bridge.daemon.supervisors import (
     NoSupervisorError,
     Source,
+    cache_folder,
     credentials_of,
-    kept_folder,
     obtain,
     trusted_keys,
 )
@@ -407,18 +407,18 @@ def test_the_folder_is_that_of_the_command_line_the_configuration_or_the_user(
     monkeypatch.setenv("XDG_STATE_HOME", str(state))
     monkeypatch.setenv("HOME", str(tmp_path))
     chosen = SupervisorSource(keep=str(configured))
-    assert kept_folder(given, chosen) == given
-    assert kept_folder(None, chosen) == configured
-    assert kept_folder(None, SupervisorSource()) == state / "robosc-bridge"
+    assert cache_folder(given, chosen) == given
+    assert cache_folder(None, chosen) == configured
+    assert cache_folder(None, SupervisorSource()) == state / "robosc-bridge"
     for nothing in ("", "relative/state"):
         monkeypatch.setenv("XDG_STATE_HOME", nothing)
-        assert kept_folder(None, SupervisorSource()) == tmp_path / ".local/state/robosc-bridge"
+        assert cache_folder(None, SupervisorSource()) == tmp_path / ".local/state/robosc-bridge"
 
     def homeless() -> Path:
         raise RuntimeError
 
     monkeypatch.setattr(Path, "home", homeless)
-    assert kept_folder(None, SupervisorSource()) is None
+    assert cache_folder(None, SupervisorSource()) is None
     assert "there is no home" in caplog.text
 
 

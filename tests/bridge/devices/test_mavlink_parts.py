@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from robosc_bridge.devices.interface import Pose, Velocity
 from robosc_bridge.devices.mavlink_odometry import VehicleOdometry, estimate
-from robosc_bridge.devices.mavlink_state import Told, VehicleState
+from robosc_bridge.devices.mavlink_state import Timestamped, VehicleState
 from robosc_bridge.protocol.mavlink_messages import (
     Answer,
     Attitude,
@@ -92,7 +92,7 @@ def test_an_estimate_is_as_old_as_its_older_part() -> None:
     motion = Motion(1.0, 2.0, 0.0, 0.0, 0.0)
     place = LocalPosition(1.0, 2.0, 3.0, 0.1, 0.4)
     both = _after(None, motion, place, state=state)
-    assert estimate(both) == Told(1.0, motion)
+    assert estimate(both) == Timestamped(1.0, motion)
     # It comes no longer; the other estimate is another frame.
     later = _after(None, None, None, Attitude(2.0, 0.0, 0.0), place, state=both)
     found = estimate(later)

@@ -80,9 +80,9 @@ def test_the_latest_sample_is_the_last_whole_one(tmp_path: Path) -> None:
 def test_lines_are_counted_as_they_come(tmp_path: Path) -> None:
     file = tmp_path / "log"
     count = LineCount(file)
-    assert count.look() == 0
+    assert count.poll() == 0
     file.write_text("a\nb\nc")
-    assert count.look() == 2
+    assert count.poll() == 2
     with file.open("a") as stream:
         stream.write("\nd\n")
-    assert count.look() == 4
+    assert count.poll() == 4

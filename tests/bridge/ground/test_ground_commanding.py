@@ -102,7 +102,7 @@ def test_a_flood_of_stops_is_answered_each_and_ordered_seldom(talk: Talk) -> Non
 
 @pytest.mark.parametrize(("number", "parameters"), [(400, (0.0,)), (193, (0.0,)), (185, (1.0,)), (176, (1.0, 4.0))])
 def test_every_stop_that_is_accepted_is_ordered(talk: Talk, number: int, parameters: tuple[float, ...]) -> None:
-    # Another face may have resumed or started in between, which this one has not seen.
+    # Another endpoint may have resumed or started in between, which this one has not seen.
     for count in range(1, 4):
         assert talk.results(number, *parameters) == [0]
         assert len(talk.daemon.orders) == count

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from robosc_bridge.daemon.programs import Attached, Detached, Refused, Requested
+from robosc_bridge.daemon.programs import Attached, Detached, MessageRequested, Refused
 from robosc_bridge.daemon.states import State
 from robosc_bridge.safety import Reason
 from support.ground import CONFIGURATION, PlayedDaemon, Station, joined_texts
@@ -25,7 +25,7 @@ def _requested(talk: Talk) -> list[tuple[float, float]]:
     return [
         (item.data["linear"]["x"], item.data["angular"]["z"])
         for item in talk.daemon.told
-        if isinstance(item, Requested)
+        if isinstance(item, MessageRequested)
     ]
 
 
@@ -35,7 +35,7 @@ def test_a_layer_is_asked_for_motion() -> None:
     attached, requested = talk.daemon.told
     assert isinstance(attached, Attached)
     assert attached.program.may_request
-    assert isinstance(requested, Requested)
+    assert isinstance(requested, MessageRequested)
     assert (requested.program, requested.identifier) == (attached.program, "/cmd_vel")
     assert _requested(talk) == [(0.125, -0.5)]
     stick = talk.station.codec.manual_control_encode(1, 500, 0, 0, -250, 0)

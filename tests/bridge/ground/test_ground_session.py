@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from robosc_bridge.daemon.programs import Requested
+from robosc_bridge.daemon.programs import MessageRequested
 from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.ground.settings import GroundSettings
@@ -305,5 +305,5 @@ def test_any_contents_of_any_message_are_survived(number: int, payload: bytes, i
     talk.session.step(talk.now_s, packet)
     talk.session.overheard(talk.now_s, packet)
     for item in talk.daemon.told:
-        if isinstance(item, Requested):
+        if isinstance(item, MessageRequested):
             assert all(map(math.isfinite, (item.data["linear"]["x"], item.data["angular"]["z"])))

@@ -16,8 +16,8 @@ import pytest
 
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.daemon import programs
-from robosc_bridge.remote import RemoteFace, RemoteSettings, service, session
-from robosc_bridge.remote import face as face_module
+from robosc_bridge.remote import RemoteEndpoint, RemoteSettings, service, session
+from robosc_bridge.remote import endpoint as endpoint_module
 from robosc_bridge.remote.data import MAXIMUM_DEPTH, value_of
 from robosc_bridge.remote.pace import FLOOD_S, MESSAGES_A_S, FloodError, OperatorPace
 from support.remote import Attachment, FakeDaemon, connected, served
@@ -31,14 +31,14 @@ def daemon() -> Any:
 
 
 @pytest.fixture
-def face(daemon: FakeDaemon) -> Any:
+def endpoint(daemon: FakeDaemon) -> Any:
     with served(daemon, RemoteSettings("127.0.0.1:0", operator_timeout_s=2.5)) as made:
         yield made
 
 
 @pytest.fixture
-def stub(face: RemoteFace) -> Any:
-    with connected(face.address) as made:
+def stub(endpoint: RemoteEndpoint) -> Any:
+    with connected(endpoint.address) as made:
         yield made
 
 
@@ -63,7 +63,7 @@ class TestHello:
 
     @pytest.mark.parametrize(("is_layer", "is_operator"), [(True, True), (True, False), (False, True)])
     def test_only_an_operator_before_a_layer_may_request(self, is_layer: bool, is_operator: bool) -> None:
-        with FakeDaemon(is_layer=is_layer) as daemon, served(daemon) as face, connected(face.address) as stub:
+        with FakeDaemon(is_layer=is_layer) as daemon, served(daemon) as endpoint, connected(endpoint.address) as stub:
             program = attached(stub, is_operator=is_operator)
             assert daemon.program().may_request is (is_layer and is_operator)
             program.end()
@@ -119,8 +119,8 @@ class TestHello:
 
 DATA = value_of({"x": 3})
 SAID = [
-    ({"give": pb.Message(identifier="/order", data=DATA)}, programs.Told, ("/order", {"x": 3})),
-    ({"give": pb.Message(identifier="/order")}, programs.Told, ("/order", None)),
+    ({"give": pb.Message(identifier="/order", data=DATA)}, programs.MessageReceived, ("/order", {"x": 3})),
+    ({"give": pb.Message(identifier="/order")}, programs.MessageReceived, ("/order", None)),
     ({"reply": pb.NumberedData(number=7, data=DATA)}, programs.Replied, (7, {"x": 3})),
     ({"call_failure": pb.CallFailure(number=7, reason="no")}, programs.CallFailed, (7, "no")),
     ({"goal_acceptance": pb.GoalNumber(number=2**64 - 1)}, programs.GoalAccepted, (2**64 - 1,)),
@@ -135,10 +135,10 @@ SAID = [
         programs.GoalEnded,
         (7, "rejected", None),
     ),
-    ({"request": pb.Message(identifier="/cmd_vel", data=DATA)}, programs.Requested, ("/cmd_vel", {"x": 3})),
-    ({"call": pb.OwnRequest(name="open", id="a", data=DATA)}, programs.Called, ("open", "a", {"x": 3})),
-    ({"goal": pb.OwnRequest(name="carry", id="b")}, programs.GoalSent, ("carry", "b", None)),
-    ({"cancel": pb.OwnCancel(name="carry", id="b")}, programs.CancelWanted, ("carry", "b")),
+    ({"request": pb.Message(identifier="/cmd_vel", data=DATA)}, programs.MessageRequested, ("/cmd_vel", {"x": 3})),
+    ({"call": pb.OwnRequest(name="open", id="a", data=DATA)}, programs.CallRequested, ("open", "a", {"x": 3})),
+    ({"goal": pb.OwnRequest(name="carry", id="b")}, programs.GoalRequested, ("carry", "b", None)),
+    ({"cancel": pb.OwnCancel(name="carry", id="b")}, programs.CancelRequested, ("carry", "b")),
 ]
 
 HEARD = [
@@ -183,7 +183,7 @@ class TestTalk:
     def test_not_a_number_goes_through_both_ways(self, daemon: FakeDaemon, stub: Any) -> None:
         program = attached(stub, is_operator=True)
         program.send(request=pb.Message(identifier="/cmd_vel", data=value_of([math.nan, math.inf])))
-        data = wait_until(lambda: daemon.of(programs.Requested))[0].data
+        data = wait_until(lambda: daemon.of(programs.MessageRequested))[0].data
         assert math.isnan(data[0])
         assert data[1] == math.inf
         daemon.program().tell(programs.PassedOn("/scan", [math.nan]))
@@ -194,8 +194,8 @@ class TestTalk:
         program = attached(stub)
         for number in range(500):
             program.send(give=pb.Message(identifier="/order", data=value_of(number)))
-        wait_until(lambda: len(daemon.of(programs.Told)) == 500)
-        assert [item.data for item in daemon.of(programs.Told)] == list(range(500))
+        wait_until(lambda: len(daemon.of(programs.MessageReceived)) == 500)
+        assert [item.data for item in daemon.of(programs.MessageReceived)] == list(range(500))
         for number in range(500):
             daemon.program().tell(programs.MessageSent("show", "/show", number))
         heard = [program.receive().message_sent.data.number_value for _ in range(500)]
@@ -211,7 +211,7 @@ class TestOperator:
         wait_until(lambda: daemon.seen == 2)
         program.send(request=pb.Message(identifier="/cmd_vel"))
         wait_until(lambda: daemon.seen == 3)
-        assert wait_until(lambda: daemon.of(programs.Requested))
+        assert wait_until(lambda: daemon.of(programs.MessageRequested))
         program.end()
 
     def test_one_that_sends_as_fast_as_it_can_is_ended(
@@ -239,7 +239,7 @@ class TestOperator:
         program = attached(stub)
         program.send(keep_alive=pb.KeepAlive())
         program.send(give=pb.Message(identifier="/order"))
-        wait_until(lambda: daemon.of(programs.Told))
+        wait_until(lambda: daemon.of(programs.MessageReceived))
         assert daemon.seen == 0
         program.end()
 
@@ -313,10 +313,12 @@ class TestHostilePrograms:
         program.send(**message)
         assert why in program.receive().refused.why
         program.send(give=pb.Message(identifier="/order"))
-        assert len(wait_until(lambda: daemon.of(programs.Told))) == 1
+        assert len(wait_until(lambda: daemon.of(programs.MessageReceived))) == 1
         program.end()
 
-    def test_nesting_beyond_what_protobuf_reads_ends_the_stream(self, daemon: FakeDaemon, face: RemoteFace) -> None:
+    def test_nesting_beyond_what_protobuf_reads_ends_the_stream(
+        self, daemon: FakeDaemon, endpoint: RemoteEndpoint
+    ) -> None:
         hello = pb.AttachRequest(hello=pb.Hello(name="arm")).SerializeToString()
         data = b""
         for _ in range(500):
@@ -324,16 +326,16 @@ class TestHostilePrograms:
             data = part(6, part(1, data))
         messages = [hello, part(3, part(2, data))]
         channel: Any
-        with grpc.insecure_channel(face.address) as channel:
+        with grpc.insecure_channel(endpoint.address) as channel:
             call = channel.stream_stream("/robosc_api.v1.BridgeService/Attach")(iter(messages), timeout=PATIENCE_S)
             with pytest.raises(grpc.RpcError) as caught:
                 list(call)
         assert caught.value.code() is grpc.StatusCode.INVALID_ARGUMENT
         assert wait_until(lambda: daemon.of(programs.Detached))
-        assert not daemon.of(programs.Told)
+        assert not daemon.of(programs.MessageReceived)
 
-    def test_a_program_that_vanishes_is_gone_for_the_loop(self, daemon: FakeDaemon, face: RemoteFace) -> None:
-        with connected(face.address) as stub:
+    def test_a_program_that_vanishes_is_gone_for_the_loop(self, daemon: FakeDaemon, endpoint: RemoteEndpoint) -> None:
+        with connected(endpoint.address) as stub:
             attached(stub, serves=["open"])
             daemon.program()
         # Its connection is closed, without a word.
@@ -344,19 +346,19 @@ class TestHostilePrograms:
     def test_a_program_that_hangs_with_its_whole_machine_is_taken_for_gone(
         self, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        assert face_module.PING_S + face_module.PING_LIMIT_S <= 8.0
-        monkeypatch.setattr(face_module, "PING_S", 0.05)
+        assert endpoint_module.PING_S + endpoint_module.PING_LIMIT_S <= 8.0
+        monkeypatch.setattr(endpoint_module, "PING_S", 0.05)
         # One that is slow is taken for gone as well as one that hangs.
-        monkeypatch.setattr(face_module, "PING_LIMIT_S", 0.5)
+        monkeypatch.setattr(endpoint_module, "PING_LIMIT_S", 0.5)
         text = (
             "import sys; from support.remote import *\n"
             "with connected(sys.argv[1]) as stub:\n"
             "    program = Attachment(stub, name='far away')\n"
             "    program.receive(); program.receive()\n"
         )
-        with served(daemon) as face:
+        with served(daemon) as endpoint:
             environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-            process = subprocess.Popen([sys.executable, "-c", text, face.address], env=environment)
+            process = subprocess.Popen([sys.executable, "-c", text, endpoint.address], env=environment)
             try:
                 daemon.program()
                 process.send_signal(signal.SIGSTOP)
@@ -378,7 +380,7 @@ class TestHostilePrograms:
         stub.Stop(pb.StopRequest(), timeout=PATIENCE_S)
         assert daemon.orders
         daemon.turns = True
-        wait_until(lambda: len(daemon.of(programs.Told)) == 5000)
+        wait_until(lambda: len(daemon.of(programs.MessageReceived)) == 5000)
         program.end()
 
     @pytest.mark.parametrize("size", [200, 20_000])
@@ -435,13 +437,13 @@ class TestHostilePrograms:
         time.sleep(0.2)
         assert daemon.waiting <= 3
         daemon.turns = True
-        wait_until(lambda: len(daemon.of(programs.Told)) == 12)
+        wait_until(lambda: len(daemon.of(programs.MessageReceived)) == 12)
         program.end()
 
     def test_the_end_of_the_bridge_is_told(self, daemon: FakeDaemon) -> None:
-        with served(daemon) as face, connected(face.address) as stub:
+        with served(daemon) as endpoint, connected(endpoint.address) as stub:
             program = attached(stub)
-            face.stop()
+            endpoint.stop()
             assert program.failure() == (grpc.StatusCode.UNAVAILABLE, "the bridge ends")
             assert wait_until(lambda: daemon.of(programs.Detached))
             program.end()

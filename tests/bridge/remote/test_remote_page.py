@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from robosc_api.v1 import bridge_pb2
-from robosc_bridge.remote import data, face, pace, service, session, watchers
+from robosc_bridge.remote import data, endpoint, pace, service, session, watchers
 from robosc_bridge.remote.convert import MAXIMUM_TEXT
 from robosc_bridge.terminal import teleop
 from robosc_bridge.terminal.commands import ADDRESS, NAMES
@@ -15,16 +15,16 @@ PAGE = (DOCS / "bridge-remote.md").read_text(encoding="utf-8")
 
 def test_the_limits() -> None:
     streams = f"| {service.MAXIMUM_WATCHERS}; {service.MAXIMUM_PROGRAMS}; {service.MAXIMUM_COMMANDS} |"
-    connections = f"| {face.MAXIMUM_CONNECTIONS}; {face._HANDSHAKE_LIMIT_S:g} s; {face.IDLE_S:g} s |"
-    calls = f"| {face.MAXIMUM_CALLS}; {face.REQUEST_LIMIT_S:g} s |"
-    reflection = f"of a reflection stream | {face.REFLECTION_IDLE_S:g} s |"
-    message = f"| {face.MAXIMUM_REQUEST_BYTES // 1024} KiB; {face.MAXIMUM_METADATA_BYTES // 1024} KiB |"
+    connections = f"| {endpoint.MAXIMUM_CONNECTIONS}; {endpoint._HANDSHAKE_LIMIT_S:g} s; {endpoint.IDLE_S:g} s |"
+    calls = f"| {endpoint.MAXIMUM_CALLS}; {endpoint.REQUEST_LIMIT_S:g} s |"
+    reflection = f"of a reflection stream | {endpoint.REFLECTION_IDLE_S:g} s |"
+    message = f"| {endpoint.MAXIMUM_REQUEST_BYTES // 1024} KiB; {endpoint.MAXIMUM_METADATA_BYTES // 1024} KiB |"
     values = f"| {data.MAXIMUM_DEPTH} and {data.MAXIMUM_VALUES:,}; {data.MAXIMUM_NAME} |"
     events = f"| {watchers.MAXIMUM_EVENTS}, or {watchers.MAXIMUM_BYTES // 2**20} MiB |"
     megabytes = session.MAXIMUM_WAITING_BYTES // 1_000_000
     waiting = f"wait for a program | {session.MAXIMUM_WAITING}, or {megabytes} MB of data |"
     turn = f"next snapshot | {session.MESSAGES_A_TURN}, or {session.BYTES_A_TURN // 1024} KiB |"
-    silence = f"| {face.PING_S + face.PING_LIMIT_S:g} s with a ping"
+    silence = f"| {endpoint.PING_S + endpoint.PING_LIMIT_S:g} s with a ping"
     operator = f"in a second | {pace.MESSAGES_A_S} | no sign of life; after {pace.FLOOD_S} such"
     limits = (operator, streams, connections, calls, reflection, message, values, events, waiting, turn, silence)
     for text in (*limits, f"| {MAXIMUM_TEXT} characters"):

@@ -28,8 +28,8 @@ def authority(tmp_path_factory: pytest.TempPathFactory) -> Authority:
 
 @contextmanager
 def bridge(security: ServerSecurity, host: str = "127.0.0.1") -> Iterator[tuple[FakeDaemon, str]]:
-    with FakeDaemon() as daemon, served(daemon, RemoteSettings(f"{host}:0", security)) as face:
-        yield daemon, face.address.replace("0.0.0.0", "127.0.0.1")
+    with FakeDaemon() as daemon, served(daemon, RemoteSettings(f"{host}:0", security)) as endpoint:
+        yield daemon, endpoint.address.replace("0.0.0.0", "127.0.0.1")
 
 
 def outcome(stub: Any, call: str) -> str:
@@ -130,7 +130,7 @@ class _Away(Guard):
 
 
 def test_without_tokens_other_machines_may_watch_and_stop(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robosc_bridge.remote.face.Guard", _Away)
+    monkeypatch.setattr("robosc_bridge.remote.endpoint.Guard", _Away)
     with bridge(ServerSecurity()) as (daemon, address):
         denied = "PERMISSION_DENIED"
         assert outcomes(address) == {**ALL, "Command": denied, "Attach": denied}

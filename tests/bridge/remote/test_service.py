@@ -15,9 +15,9 @@ from robosc.targets.ros.state_topic import state_topic
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.configuration import parse
 from robosc_bridge.daemon.states import Command, State
-from robosc_bridge.remote import RemoteError, RemoteFace, RemoteSettings, serve, service, settings_of
-from robosc_bridge.remote import face as face_module
-from robosc_bridge.remote.face import MAXIMUM_CONNECTIONS, MAXIMUM_REQUEST_BYTES
+from robosc_bridge.remote import RemoteEndpoint, RemoteError, RemoteSettings, serve, service, settings_of
+from robosc_bridge.remote import endpoint as endpoint_module
+from robosc_bridge.remote.endpoint import MAXIMUM_CONNECTIONS, MAXIMUM_REQUEST_BYTES
 from robosc_bridge.remote.watchers import MAXIMUM_EVENTS
 from support.remote import READING, FakeDaemon, connected, model, scan, served
 from support.waiting import PATIENCE_S, wait_until
@@ -30,14 +30,14 @@ def daemon() -> Any:
 
 
 @pytest.fixture
-def face(daemon: FakeDaemon) -> Any:
+def endpoint(daemon: FakeDaemon) -> Any:
     with served(daemon) as made:
         yield made
 
 
 @pytest.fixture
-def stub(face: RemoteFace) -> Any:
-    with connected(face.address) as made:
+def stub(endpoint: RemoteEndpoint) -> Any:
+    with connected(endpoint.address) as made:
         yield made
 
 
@@ -83,7 +83,7 @@ class TestDefinition:
 
     @pytest.mark.parametrize("is_layer", [True, False])
     def test_the_deployment_is_told(self, is_layer: bool) -> None:
-        with FakeDaemon(is_layer=is_layer) as daemon, served(daemon) as face, connected(face.address) as stub:
+        with FakeDaemon(is_layer=is_layer) as daemon, served(daemon) as endpoint, connected(endpoint.address) as stub:
             assert stub.GetDefinition(pb.GetDefinitionRequest(), timeout=PATIENCE_S).is_layer is is_layer
 
 
@@ -221,10 +221,10 @@ class TestStop:
         daemon.turns = True
 
     def test_it_wins_while_all_watchers_hang_and_all_programs_are_there(
-        self, daemon: FakeDaemon, face: RemoteFace
+        self, daemon: FakeDaemon, endpoint: RemoteEndpoint
     ) -> None:
         entry = {"time": 1.0, "kind": "event", "event": "x" * 20_000}
-        channels = [connected(face.address) for _ in range(4)]
+        channels = [connected(endpoint.address) for _ in range(4)]
         stubs = [channel.__enter__() for channel in channels]
         calls = []
         try:
@@ -242,7 +242,7 @@ class TestStop:
             code, details = failure(stubs[0].Watch(pb.WatchRequest()))
             assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
             assert details == "there are 100 watchers already"
-            with connected(face.address) as stub:
+            with connected(endpoint.address) as stub:
                 stub.Stop(pb.StopRequest(), timeout=PATIENCE_S)
             assert daemon.commands() == [Command.STOP]
         finally:
@@ -254,19 +254,19 @@ class TestStop:
     def test_callers_that_say_nothing_do_not_keep_it_out_for_long(
         self, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        assert face_module._HANDSHAKE_LIMIT_S <= 3.0
-        monkeypatch.setattr(face_module, "_HANDSHAKE_LIMIT_S", 0.2)
-        with served(daemon) as face:
-            self._crowd(face)
+        assert endpoint_module._HANDSHAKE_LIMIT_S <= 3.0
+        monkeypatch.setattr(endpoint_module, "_HANDSHAKE_LIMIT_S", 0.2)
+        with served(daemon) as endpoint:
+            self._crowd(endpoint)
         assert daemon.commands()[-1] is Command.STOP
 
-    def _crowd(self, face: RemoteFace) -> None:
-        host, _, port = face.address.rpartition(":")
+    def _crowd(self, endpoint: RemoteEndpoint) -> None:
+        host, _, port = endpoint.address.rpartition(":")
         silent = [socket.create_connection((host, int(port))) for _ in range(MAXIMUM_CONNECTIONS + 20)]
 
         def stopped() -> bool:
             try:
-                with connected(face.address) as stub:
+                with connected(endpoint.address) as stub:
                     stub.Stop(pb.StopRequest(), timeout=1.0)
             except grpc.RpcError:
                 return False
@@ -399,11 +399,11 @@ class TestWatch:
         call.cancel()
 
     def test_the_end_of_the_bridge_is_told_with_the_last_state(self, daemon: FakeDaemon) -> None:
-        with served(daemon) as face, connected(face.address) as stub:
+        with served(daemon) as endpoint, connected(endpoint.address) as stub:
             call = stub.Watch(pb.WatchRequest(maximum_rate_hz=0.1), timeout=PATIENCE_S)
             next(call)
             daemon.show(state=State.OVER)
-            face.stop()
+            endpoint.stop()
             responses = []
             with pytest.raises(grpc.RpcError) as caught:
                 for response in call:
@@ -415,74 +415,74 @@ class TestWatch:
 
 class TestHostileCallers:
     @pytest.mark.parametrize("method", ["GetStatus", "Command", "Stop", "GetDefinition"])
-    def test_bytes_that_are_no_message(self, method: str, daemon: FakeDaemon, face: RemoteFace) -> None:
+    def test_bytes_that_are_no_message(self, method: str, daemon: FakeDaemon, endpoint: RemoteEndpoint) -> None:
         channel: Any
-        with grpc.insecure_channel(face.address) as channel:
+        with grpc.insecure_channel(endpoint.address) as channel:
             call = channel.unary_unary(f"/robosc_api.v1.BridgeService/{method}")
             code, details = failure(lambda: call(b"\xff", timeout=PATIENCE_S))
         assert code is grpc.StatusCode.INVALID_ARGUMENT
         assert details == "the request is not a valid message of this service"
         assert daemon.orders == []
 
-    def test_bytes_that_are_no_message_in_streams(self, face: RemoteFace) -> None:
+    def test_bytes_that_are_no_message_in_streams(self, endpoint: RemoteEndpoint) -> None:
         channel: Any
-        with grpc.insecure_channel(face.address) as channel:
+        with grpc.insecure_channel(endpoint.address) as channel:
             watch = channel.unary_stream("/robosc_api.v1.BridgeService/Watch")(b"\xff", timeout=PATIENCE_S)
             assert failure(watch)[0] is grpc.StatusCode.INVALID_ARGUMENT
             attach = channel.stream_stream("/robosc_api.v1.BridgeService/Attach")(iter([b"\xff"]), timeout=PATIENCE_S)
             assert failure(attach)[0] is grpc.StatusCode.INVALID_ARGUMENT
 
-    def test_a_message_that_is_too_large(self, stub: Any, face: RemoteFace) -> None:
+    def test_a_message_that_is_too_large(self, stub: Any, endpoint: RemoteEndpoint) -> None:
         channel: Any
-        with grpc.insecure_channel(face.address) as channel:
+        with grpc.insecure_channel(endpoint.address) as channel:
             call = channel.unary_unary("/robosc_api.v1.BridgeService/GetStatus")
             code, _ = failure(lambda: call(b"\x00" * (MAXIMUM_REQUEST_BYTES + 1), timeout=PATIENCE_S))
         assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
         assert status(stub).HasField("snapshot")
 
-    def test_what_is_no_http(self, face: RemoteFace, stub: Any) -> None:
-        host, _, port = face.address.rpartition(":")
+    def test_what_is_no_http(self, endpoint: RemoteEndpoint, stub: Any) -> None:
+        host, _, port = endpoint.address.rpartition(":")
         with socket.create_connection((host, int(port))) as line:
             line.sendall(b"GET / HTTP/1.1\r\n\r\n" + bytes(range(256)) * 100)
         assert status(stub).HasField("snapshot")
 
 
-class TestFace:
-    def test_health(self, face: RemoteFace) -> None:
-        with grpc.insecure_channel(face.address) as channel:
+class TestEndpoint:
+    def test_health(self, endpoint: RemoteEndpoint) -> None:
+        with grpc.insecure_channel(endpoint.address) as channel:
             for name in ("", "robosc_api.v1.BridgeService"):
                 request = health_pb2.HealthCheckRequest(service=name)
                 answer = health_pb2_grpc.HealthStub(channel).Check(request, timeout=PATIENCE_S)
                 assert answer.status == health_pb2.HealthCheckResponse.SERVING
 
-    def test_an_address_in_use_is_told(self, daemon: FakeDaemon, face: RemoteFace) -> None:
+    def test_an_address_in_use_is_told(self, daemon: FakeDaemon, endpoint: RemoteEndpoint) -> None:
         with pytest.raises(RemoteError, match="cannot listen on 127"):
-            serve(daemon.operations, RemoteSettings(face.address))
+            serve(daemon.operations, RemoteSettings(endpoint.address))
 
     def test_beyond_this_machine_only_with_tls(self, daemon: FakeDaemon) -> None:
         with pytest.raises(RemoteError, match="is reachable from other machines"):
             serve(daemon.operations, RemoteSettings("0.0.0.0:0"))
 
     def test_it_ends_and_gives_its_port_back(self, daemon: FakeDaemon) -> None:
-        face = serve(daemon.operations, RemoteSettings("127.0.0.1:0"))
-        face.stop()
-        face.stop()
-        assert not [thread for thread in threading.enumerate() if thread.name == "remote face"]
-        again = serve(daemon.operations, RemoteSettings(face.address))
-        assert again.address == face.address
+        endpoint = serve(daemon.operations, RemoteSettings("127.0.0.1:0"))
+        endpoint.stop()
+        endpoint.stop()
+        assert not [thread for thread in threading.enumerate() if thread.name == "remote endpoint"]
+        again = serve(daemon.operations, RemoteSettings(endpoint.address))
+        assert again.address == endpoint.address
         again.stop()
 
     def test_its_death_is_seen(self, daemon: FakeDaemon) -> None:
-        face = RemoteFace(daemon.operations, RemoteSettings("127.0.0.1:0"))
-        assert not face.is_alive
-        face.start()
+        endpoint = RemoteEndpoint(daemon.operations, RemoteSettings("127.0.0.1:0"))
+        assert not endpoint.is_alive
+        endpoint.start()
         try:
-            assert face.is_alive
-            assert face._loop is not None
-            face._loop.call_soon_threadsafe(face._loop.stop)
-            wait_until(lambda: not face.is_alive)
+            assert endpoint.is_alive
+            assert endpoint._loop is not None
+            endpoint._loop.call_soon_threadsafe(endpoint._loop.stop)
+            wait_until(lambda: not endpoint.is_alive)
         finally:
-            face.stop()
+            endpoint.stop()
 
     def test_the_configuration_says_where_and_how(self) -> None:
         text = """

@@ -1,4 +1,4 @@
-"""Tests of commands that a person types, against a face on a real socket; as programs where the process matters."""
+"""Tests of commands that a person types, against an endpoint on a real socket, or as programs."""
 
 import json
 import math
@@ -38,8 +38,8 @@ def daemon() -> Any:
 
 @pytest.fixture
 def address(daemon: FakeDaemon) -> Any:
-    with served(daemon) as face:
-        yield face.address
+    with served(daemon) as endpoint:
+        yield endpoint.address
 
 
 def bridge(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
@@ -119,18 +119,18 @@ class TestSecurity:
         tokens.write_text(made.err.splitlines()[-1])
         tokens.chmod(0o600)
         security = ServerSecurity(certificate=certificate, key=key, tokens=tokens)
-        with FakeDaemon() as daemon, served(daemon, RemoteSettings("127.0.0.1:0", security)) as face:
-            given = ["--address", face.address, "--ca", str(authority.file), "--token-file", str(token)]
+        with FakeDaemon() as daemon, served(daemon, RemoteSettings("127.0.0.1:0", security)) as endpoint:
+            given = ["--address", endpoint.address, "--ca", str(authority.file), "--token-file", str(token)]
             assert main(["status", *given]) == 0
             assert main(["stop", *given]) == 0
             capsys.readouterr()
             assert main(["start", *given]) == 1
             assert "scope does not include 'operate'" in capsys.readouterr().err
-            assert main(["status", "--address", face.address, "--ca", str(authority.file)]) == 1
+            assert main(["status", "--address", endpoint.address, "--ca", str(authority.file)]) == 1
             assert "a valid token is needed" in capsys.readouterr().err
-            assert main(["status", "--address", face.address]) == 2
+            assert main(["status", "--address", endpoint.address]) == 2
             done = bridge(
-                "stop", ROBOSC_BRIDGE=face.address, ROBOSC_CA=str(authority.file), ROBOSC_TOKEN_FILE=str(token)
+                "stop", ROBOSC_BRIDGE=endpoint.address, ROBOSC_CA=str(authority.file), ROBOSC_TOKEN_FILE=str(token)
             )
             assert done.returncode == 0, done.stderr
             assert daemon.commands() == [Command.STOP, Command.STOP]
@@ -242,10 +242,10 @@ class TestWatch:
             assert found["lost_events"] == "0"
 
     def test_the_end_of_the_bridge_is_told(self, daemon: FakeDaemon) -> None:
-        with served(daemon) as face, watching("--address", face.address) as process:
+        with served(daemon) as endpoint, watching("--address", endpoint.address) as process:
             assert process.stdout is not None
             process.stdout.readline()
-            face.stop()
+            endpoint.stop()
             _, errors = process.communicate(timeout=PATIENCE_S)
             assert process.returncode == 2
             assert errors.endswith(": the bridge ends\n")

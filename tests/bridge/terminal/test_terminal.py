@@ -33,11 +33,11 @@ def test_a_signal_ends_it_in_order(number: int, daemon: FakeDaemon) -> None:
 
 
 def test_the_end_of_the_bridge_is_told(daemon: FakeDaemon) -> None:
-    with served(daemon) as face:
-        terminal = Terminal(face.address)
+    with served(daemon) as endpoint:
+        terminal = Terminal(endpoint.address)
         try:
             wait_until(lambda: "w/s or up/down" in terminal.seen)
-            face.stop()
+            endpoint.stop()
             assert terminal.process.wait(PATIENCE_S) == 2
             wait_until(lambda: "the bridge ends" in terminal.seen)
         finally:
@@ -45,8 +45,8 @@ def test_the_end_of_the_bridge_is_told(daemon: FakeDaemon) -> None:
 
 
 def test_a_controller_is_not_driven() -> None:
-    with FakeDaemon() as daemon, served(daemon) as face:
-        terminal = Terminal(face.address)
+    with FakeDaemon() as daemon, served(daemon) as endpoint:
+        terminal = Terminal(endpoint.address)
         try:
             assert terminal.process.wait(PATIENCE_S) == 1
             wait_until(lambda: "the supervisor of Porter is a controller and drives by itself" in terminal.seen)
@@ -55,8 +55,8 @@ def test_a_controller_is_not_driven() -> None:
 
 
 def test_without_a_terminal_it_is_wrong_use(daemon: FakeDaemon) -> None:
-    with served(daemon) as face:
-        command = [sys.executable, "-m", "robosc_bridge.command", "teleop", "--address", face.address]
+    with served(daemon) as endpoint:
+        command = [sys.executable, "-m", "robosc_bridge.command", "teleop", "--address", endpoint.address]
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
         assert (done.returncode, done.stderr) == (2, "robosc-bridge: keys are typed in a terminal, and there is none\n")
     assert not daemon.told

@@ -13,7 +13,7 @@ import pytest
 
 from robosc_api.security import ServerSecurity
 from robosc_bridge.daemon.states import Command
-from robosc_bridge.view import ViewError, ViewFace, ViewSettings
+from robosc_bridge.view import ViewEndpoint, ViewError, ViewSettings
 from robosc_bridge.view import hub as hub_module
 from robosc_bridge.view import server as server_module
 from robosc_bridge.view.access import Access
@@ -32,7 +32,7 @@ def robot() -> LiveRobot:
 
 
 @pytest.fixture
-def face(robot: LiveRobot) -> Iterator[ViewFace]:
+def endpoint(robot: LiveRobot) -> Iterator[ViewEndpoint]:
     with viewed(robot) as found:
         yield found
 
@@ -63,19 +63,19 @@ def refused_status(url: str, **headers: str) -> int:
     return asyncio.run(ask())
 
 
-def test_the_token_stands_only_in_the_page_that_was_opened_with_it(face: ViewFace) -> None:
-    token = token_of(face.url)
-    status, text, headers = got(face.url, f"/?token={token}")
+def test_the_token_stands_only_in_the_page_that_was_opened_with_it(endpoint: ViewEndpoint) -> None:
+    token = token_of(endpoint.url)
+    status, text, headers = got(endpoint.url, f"/?token={token}")
     assert status == 200
     assert TOKEN_PLACE.replace('""', f'"{token}"') in text
     assert {name: headers[name] for name in answer_headers()} == answer_headers()
     assert "no-store" in headers["Cache-Control"]
-    status, text, _ = got(face.url, "/")
+    status, text, _ = got(endpoint.url, "/")
     assert status == 200
     assert token not in text
     assert TOKEN_PLACE in text
     for wrong in ("x", token[:-1], f"{token}&token={token}", "%00", "x" * 3000):
-        status, text, headers = got(face.url, f"/?token={wrong}")
+        status, text, headers = got(endpoint.url, f"/?token={wrong}")
         assert status == 403
         assert token not in text
         assert headers["Referrer-Policy"] == "no-referrer"
@@ -87,40 +87,40 @@ def test_each_start_has_another_token(robot: LiveRobot) -> None:
         assert len(token_of(one.url)) >= 43
 
 
-def test_only_the_files_of_the_page_are_served(face: ViewFace) -> None:
+def test_only_the_files_of_the_page_are_served(endpoint: ViewEndpoint) -> None:
     for name, (kind, data) in read_page().assets.items():
-        status, text, headers = got(face.url, f"/page/{name}")
+        status, text, headers = got(endpoint.url, f"/page/{name}")
         assert (status, text) == (200, data.decode())
         assert headers["Content-Type"].startswith(kind)
         assert headers["X-Content-Type-Options"] == "nosniff"
     paths = ["/page/index.html", "/page/../server.py", "/page/..%2fserver.py", "/page/%2e%2e/server.py", "/page/", "/x"]
     for path in [*paths, "/page/main.js%00", "//etc/passwd", "/stream/"]:
-        assert got(face.url, path)[0] == 404, path
+        assert got(endpoint.url, path)[0] == 404, path
     assert FOLDER.is_dir()
 
 
 @pytest.mark.parametrize(
     "host", ["evil.example", "evil.example:{port}", "127.0.0.1", "localhost:1", "[::1", "", "1.2.3.4:{port}"]
 )
-def test_another_name_is_not_answered(face: ViewFace, host: str) -> None:
-    port = face.address.rpartition(":")[2]
-    status, text, _ = got(face.url, "/", Host=host.format(port=port))
+def test_another_name_is_not_answered(endpoint: ViewEndpoint, host: str) -> None:
+    port = endpoint.address.rpartition(":")[2]
+    status, text, _ = got(endpoint.url, "/", Host=host.format(port=port))
     assert status in (400, 421), host
     assert TOKEN_PLACE not in text
-    assert refused_status(face.url, Host=host.format(port=port)) in (400, 421, 403)
+    assert refused_status(endpoint.url, Host=host.format(port=port)) in (400, 421, 403)
 
 
-def test_names_of_this_machine_are_answered(face: ViewFace) -> None:
-    port = face.address.rpartition(":")[2]
+def test_names_of_this_machine_are_answered(endpoint: ViewEndpoint) -> None:
+    port = endpoint.address.rpartition(":")[2]
     for name in ("localhost", "127.0.0.1", "LOCALHOST", "[::1]"):
-        assert got(face.url, "/", Host=f"{name}:{port}")[0] == 200
+        assert got(endpoint.url, "/", Host=f"{name}:{port}")[0] == 200
 
 
-def test_a_stream_is_for_pages_of_this_server(face: ViewFace) -> None:
-    base = face.url.partition("/?")[0]
-    assert refused_status(face.url) == 101
+def test_a_stream_is_for_pages_of_this_server(endpoint: ViewEndpoint) -> None:
+    base = endpoint.url.partition("/?")[0]
+    assert refused_status(endpoint.url) == 101
     for origin in ("http://evil.example", "null", base.replace("http", "https"), f"{base}0", f"{base}/", ""):
-        assert refused_status(face.url, Origin=origin) == 403, origin
+        assert refused_status(endpoint.url, Origin=origin) == 403, origin
 
 
 def test_a_server_beyond_this_machine_takes_numbers_and_its_own_names() -> None:
@@ -137,9 +137,9 @@ def test_a_server_beyond_this_machine_takes_numbers_and_its_own_names() -> None:
 
 
 @pytest.mark.parametrize("token", [None, "", "x", 7, ["x"], "é" * 43, "x" * 10**3])
-def test_a_command_needs_the_token_and_a_stop_none(face: ViewFace, robot: LiveRobot, token: object) -> None:
+def test_a_command_needs_the_token_and_a_stop_none(endpoint: ViewEndpoint, robot: LiveRobot, token: object) -> None:
     async def look() -> None:
-        async with opened(face.url) as page:
+        async with opened(endpoint.url) as page:
             await page.send(type="command", command="standby", token=token)
             told = await page.told("refused")
             assert told["what"] == "standby"
@@ -151,14 +151,14 @@ def test_a_command_needs_the_token_and_a_stop_none(face: ViewFace, robot: LiveRo
     assert [order.command for order in robot.orders] == [Command.STOP]
 
 
-def test_with_the_token_the_robot_is_commanded(face: ViewFace, robot: LiveRobot) -> None:
+def test_with_the_token_the_robot_is_commanded(endpoint: ViewEndpoint, robot: LiveRobot) -> None:
     async def look() -> None:
-        async with opened(face.url) as page:
+        async with opened(endpoint.url) as page:
             for command in ("standby", "start", "resume", "reset"):
-                await page.send(type="command", command=command, token=token_of(face.url))
+                await page.send(type="command", command=command, token=token_of(endpoint.url))
                 assert (await page.told("done"))["what"] == command
             robot.refusal = "the motors are hot"
-            await page.send(type="command", command="start", token=token_of(face.url))
+            await page.send(type="command", command="start", token=token_of(endpoint.url))
             assert (await page.told("refused"))["why"] == "the motors are hot"
 
     asyncio.run(look())
@@ -166,12 +166,12 @@ def test_with_the_token_the_robot_is_commanded(face: ViewFace, robot: LiveRobot)
     assert all("127.0.0.1" in order.by for order in robot.orders)
 
 
-def test_a_command_is_taken_back_when_its_page_leaves(face: ViewFace, robot: LiveRobot) -> None:
+def test_a_command_is_taken_back_when_its_page_leaves(endpoint: ViewEndpoint, robot: LiveRobot) -> None:
     robot.refusal = None  # Nobody answers.
 
     async def look() -> None:
-        async with opened(face.url) as page:
-            await page.send(type="command", command="resume", token=token_of(face.url))
+        async with opened(endpoint.url) as page:
+            await page.send(type="command", command="resume", token=token_of(endpoint.url))
             while not robot.orders:
                 await asyncio.sleep(0.002)
         while len(robot.orders) < 2:
@@ -201,12 +201,12 @@ WRONG: list[Any] = [
 
 
 def test_what_makes_no_sense_is_refused_and_nothing_more(
-    face: ViewFace, robot: LiveRobot, monkeypatch: pytest.MonkeyPatch
+    endpoint: ViewEndpoint, robot: LiveRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(hub_module, "SIGN_OF_LIFE_S", 0.02)
 
     async def look() -> None:
-        async with opened(face.url) as page:
+        async with opened(endpoint.url) as page:
             for text in WRONG:
                 await page.socket.send_str(text)
                 told = await page.told("refused")
@@ -218,13 +218,13 @@ def test_what_makes_no_sense_is_refused_and_nothing_more(
 
 
 def test_large_binary_and_too_many_requests_end_the_stream(
-    face: ViewFace, robot: LiveRobot, monkeypatch: pytest.MonkeyPatch
+    endpoint: ViewEndpoint, robot: LiveRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # However slowly they come: what is allowed after a burst is none of this test.
     monkeypatch.setattr(server_module, "REQUESTS_A_S", 0.0)
 
     async def code(*sent: Any) -> int | None:
-        async with opened(face.url) as page:
+        async with opened(endpoint.url) as page:
             for item in sent:
                 await (page.socket.send_bytes(item) if isinstance(item, bytes) else page.socket.send_str(item))
             while True:
@@ -241,9 +241,9 @@ def test_large_binary_and_too_many_requests_end_the_stream(
     assert {order.command for order in robot.orders} == {Command.STOP}
 
 
-def test_a_stop_of_a_page_that_closes_at_once_counts(face: ViewFace, robot: LiveRobot) -> None:
+def test_a_stop_of_a_page_that_closes_at_once_counts(endpoint: ViewEndpoint, robot: LiveRobot) -> None:
     async def look() -> None:
-        async with opened(face.url) as page:
+        async with opened(endpoint.url) as page:
             await page.send(type="stop")
         while not robot.orders:
             await asyncio.sleep(0.002)
@@ -252,13 +252,13 @@ def test_a_stop_of_a_page_that_closes_at_once_counts(face: ViewFace, robot: Live
 
 
 def test_there_is_a_limit_of_pages_and_of_connections(
-    face: ViewFace, robot: LiveRobot, monkeypatch: pytest.MonkeyPatch
+    endpoint: ViewEndpoint, robot: LiveRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def pages() -> None:
         monkeypatch.setattr(server_module, "MAXIMUM_VIEWERS", 3)
-        async with opened(face.url), opened(face.url), opened(face.url):
+        async with opened(endpoint.url), opened(endpoint.url), opened(endpoint.url):
             with pytest.raises(aiohttp.WSServerHandshakeError) as error:
-                async with opened(face.url):
+                async with opened(endpoint.url):
                     pass
             assert error.value.status == 503
         # A place is free again once the server has seen that a page has left, which is a moment later.
@@ -266,7 +266,7 @@ def test_there_is_a_limit_of_pages_and_of_connections(
             page = None
             while page is None:
                 try:
-                    page = await stack.enter_async_context(opened(face.url))
+                    page = await stack.enter_async_context(opened(endpoint.url))
                 except aiohttp.WSServerHandshakeError as error:
                     assert error.status == 503
                     await asyncio.sleep(0.005)
@@ -274,24 +274,24 @@ def test_there_is_a_limit_of_pages_and_of_connections(
 
     asyncio.run(pages())
     assert MAXIMUM_VIEWERS > 3
-    runner = face._server._runner
+    runner = endpoint._server._runner
     assert runner is not None
     # While those of the pages still end, they would take the places of the next two.
     wait_until(lambda: runner.server is not None and not runner.server.connections)
     monkeypatch.setattr(server_module, "MAXIMUM_CONNECTIONS", 2)
-    host, _, port = face.address.rpartition(":")
+    host, _, port = endpoint.address.rpartition(":")
     with (
         socket.create_connection((host, int(port))),
         socket.create_connection((host, int(port))),
         pytest.raises(aiohttp.ClientError),
     ):
-        got(face.url, "/")
+        got(endpoint.url, "/")
 
 
 def test_who_asks_for_nothing_is_cut_off(robot: LiveRobot, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server_module, "REQUEST_LIMIT_S", 0.3)
-    with viewed(robot) as face:
-        host, _, port = face.address.rpartition(":")
+    with viewed(robot) as endpoint:
+        host, _, port = endpoint.address.rpartition(":")
         for sent in (b"", b"GET / HTTP/1.1\r\nHost: 127.0"):
             with socket.create_connection((host, int(port))) as silent:
                 silent.settimeout(20)
@@ -304,11 +304,11 @@ def test_with_tls(robot: LiveRobot, tmp_path: Path) -> None:
     authority = Authority(tmp_path)
     certificate, key = authority.sign("localhost")
     settings = ViewSettings("127.0.0.1:0", ServerSecurity(certificate=certificate, key=key))
-    face = ViewFace(robot.operations, settings)
-    face.start()
+    endpoint = ViewEndpoint(robot.operations, settings)
+    endpoint.start()
     try:
-        assert face.url.startswith("https://")
-        port = int(face.address.rpartition(":")[2])
+        assert endpoint.url.startswith("https://")
+        port = int(endpoint.address.rpartition(":")[2])
         context = ssl.create_default_context(cafile=str(authority.file))
         with (
             socket.create_connection(("127.0.0.1", port)) as plain,
@@ -317,27 +317,27 @@ def test_with_tls(robot: LiveRobot, tmp_path: Path) -> None:
             secure.sendall(f"GET / HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n".encode())
             assert secure.recv(20).startswith(b"HTTP/1.1 200")
     finally:
-        face.stop()
+        endpoint.stop()
 
 
 def test_where_it_must_not_or_cannot_listen(robot: LiveRobot, tmp_path: Path) -> None:
     def why(settings: ViewSettings) -> str:
-        face = ViewFace(robot.operations, settings)
+        endpoint = ViewEndpoint(robot.operations, settings)
         with pytest.raises(ViewError) as error:
-            face.start()
-        assert not face.is_alive
-        face.stop()
+            endpoint.start()
+        assert not endpoint.is_alive
+        endpoint.stop()
         return str(error.value)
 
     assert "can be reached from other machines" in why(ViewSettings("0.0.0.0:0"))
     assert "HOST:PORT" in why(ViewSettings("nonsense"))
     missing = ServerSecurity(certificate=tmp_path / "none.pem", key=tmp_path / "none.key")
     assert "none.pem" in why(ViewSettings("127.0.0.1:0", missing))
-    with viewed(robot) as face:
-        assert "in use" in why(ViewSettings(face.address))
+    with viewed(robot) as endpoint:
+        assert "in use" in why(ViewSettings(endpoint.address))
     insecure = ServerSecurity(insecure_beyond_loopback=True)
-    face = ViewFace(robot.operations, ViewSettings("0.0.0.0:0", insecure))
-    face.start()
-    face.stop()
-    face.stop()
-    assert not face.is_alive
+    endpoint = ViewEndpoint(robot.operations, ViewSettings("0.0.0.0:0", insecure))
+    endpoint.start()
+    endpoint.stop()
+    endpoint.stop()
+    assert not endpoint.is_alive

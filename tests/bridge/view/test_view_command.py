@@ -15,7 +15,7 @@ from robosc.cli.output import CommandError
 from robosc.execution.runtime.event_log import json_line
 from robosc_api.security import add_client_arguments
 from robosc_bridge.configuration import parse
-from robosc_bridge.daemon.faces import is_remote, is_startable
+from robosc_bridge.daemon.endpoints import is_remote, is_startable
 from robosc_bridge.view import ADDRESS, command, settings_of
 from support.hostile_models import products
 from support.live import LiveRobot, large_model, supervisor_without_synthesis

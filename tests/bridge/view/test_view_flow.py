@@ -89,16 +89,16 @@ def test_every_event_comes_once_and_in_its_order() -> None:
             await page.until(is_final(robot))
             check_whole(page, robot, taken)
 
-    with viewed(robot) as face:
-        asyncio.run(look(face.url))
+    with viewed(robot) as endpoint:
+        asyncio.run(look(endpoint.url))
 
 
 def test_the_same_over_grpc() -> None:
     robot = large_robot()
-    face = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
+    endpoint = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
 
     async def look() -> None:
-        async with remotely_viewed(face.address) as server, opened(server.url) as page:
+        async with remotely_viewed(endpoint.address) as server, opened(server.url) as page:
             assert (await page.next())["type"] == "definition"
             await page.told("update")
             taken = await lived(page, robot, EVENTS)
@@ -108,7 +108,7 @@ def test_the_same_over_grpc() -> None:
     try:
         asyncio.run(look())
     finally:
-        face.stop()
+        endpoint.stop()
 
 
 def test_the_lit_transitions_lead_from_state_to_state() -> None:
@@ -136,8 +136,8 @@ def test_the_lit_transitions_lead_from_state_to_state() -> None:
             assert lit >= 40
             assert states == {name: part["state"] for name, part in robot.system.state().items()}
 
-    with viewed(robot) as face:
-        asyncio.run(look(face.url))
+    with viewed(robot) as endpoint:
+        asyncio.run(look(endpoint.url))
 
 
 def test_who_does_not_read_loses_entries_is_told_how_many_and_is_heard_all_the_same(
@@ -177,8 +177,8 @@ def test_who_does_not_read_loses_entries_is_told_how_many_and_is_heard_all_the_s
             # The latest state is never lost.
             await page.until(lambda message: "OPERATOR_STOP" in json.dumps(message.get("reasons")))
 
-    with viewed(robot) as face:
-        asyncio.run(look(face.url))
+    with viewed(robot) as endpoint:
+        asyncio.run(look(endpoint.url))
 
 
 def test_a_reader_that_is_gone_without_a_word_holds_up_nobody() -> None:
@@ -193,5 +193,5 @@ def test_a_reader_that_is_gone_without_a_word_holds_up_nobody() -> None:
                 await page.told("update")
                 await lived(page, robot, 20)
 
-    with viewed(robot) as face:
-        asyncio.run(look(face.url))
+    with viewed(robot) as endpoint:
+        asyncio.run(look(endpoint.url))

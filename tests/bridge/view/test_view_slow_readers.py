@@ -18,9 +18,9 @@ from typing import Any
 import aiohttp
 import pytest
 
-from robosc_bridge.daemon import served_face
+from robosc_bridge.daemon import served_endpoint
 from robosc_bridge.daemon.states import Command
-from robosc_bridge.view import ViewFace
+from robosc_bridge.view import ViewEndpoint
 from robosc_bridge.view import server as server_module
 from robosc_bridge.view.server import BURST
 from support.held_time import HeldLoop
@@ -43,21 +43,21 @@ def loop() -> HeldLoop:
 
 
 @pytest.fixture
-def face(robot: LiveRobot, loop: HeldLoop, monkeypatch: pytest.MonkeyPatch) -> Iterator[ViewFace]:
+def endpoint(robot: LiveRobot, loop: HeldLoop, monkeypatch: pytest.MonkeyPatch) -> Iterator[ViewEndpoint]:
     def run(work: Coroutine[Any, Any, None]) -> None:
         with asyncio.Runner(loop_factory=lambda: loop) as runner:
             runner.run(work)
 
-    monkeypatch.setattr(served_face, "asyncio", SimpleNamespace(**{**vars(asyncio), "run": run}))
+    monkeypatch.setattr(served_endpoint, "asyncio", SimpleNamespace(**{**vars(asyncio), "run": run}))
     monkeypatch.setattr(server_module, "MAXIMUM_CONNECTIONS", PLACES)
     with viewed(robot) as found:
         yield found
 
 
 @contextlib.contextmanager
-def connected(face: ViewFace) -> Iterator[socket.socket]:
+def connected(endpoint: ViewEndpoint) -> Iterator[socket.socket]:
     """A connection with next to no room for what is sent to it."""
-    host, _, port = face.address.rpartition(":")
+    host, _, port = endpoint.address.rpartition(":")
     with socket.socket() as reader:
         reader.settimeout(LIMIT_S)
         reader.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -66,14 +66,14 @@ def connected(face: ViewFace) -> Iterator[socket.socket]:
 
 
 @contextlib.contextmanager
-def slow(face: ViewFace) -> Iterator[socket.socket]:
+def slow(endpoint: ViewEndpoint) -> Iterator[socket.socket]:
     """A page that has taken the head of the answer, and nothing of what followed."""
-    with connected(face) as reader:
+    with connected(endpoint) as reader:
         key = base64.b64encode(os.urandom(16)).decode()
         lines = (
             "GET /stream HTTP/1.1",
-            f"Host: {face.address}",
-            f"Origin: http://{face.address}",
+            f"Host: {endpoint.address}",
+            f"Origin: http://{endpoint.address}",
             "Upgrade: websocket",
             "Connection: Upgrade",
             "Sec-WebSocket-Version: 13",
@@ -93,22 +93,22 @@ def frame(**request: str) -> bytes:
     return bytes([0x81, 0x80 | len(data)]) + mask + bytes(byte ^ mask[i % 4] for i, byte in enumerate(data))
 
 
-def fill(face: ViewFace, robot: LiveRobot, pages: int, pass_by: Callable[[float], None]) -> None:
+def fill(endpoint: ViewEndpoint, robot: LiveRobot, pages: int, pass_by: Callable[[float], None]) -> None:
     """Tell more than the buffers on the way hold: until the server has something for each that nobody takes."""
     note = {"time": time.time(), "kind": "device", "what": "x" * 280}
     end_s = time.monotonic() + LIMIT_S
-    while sum(item.get_write_buffer_size() > 0 for item in tuple(face._server._sockets.values())) < pages:
+    while sum(item.get_write_buffer_size() > 0 for item in tuple(endpoint._server._sockets.values())) < pages:
         assert time.monotonic() < end_s
         for _ in range(50):
             robot.feed.tell(note)
         pass_by(server_module.BATCH_S)
 
 
-def see_a_place(face: ViewFace, loop: HeldLoop) -> None:
+def see_a_place(endpoint: ViewEndpoint, loop: HeldLoop) -> None:
     """A page can be opened again."""
 
     async def look() -> None:
-        async with opened(face.url) as page:
+        async with opened(endpoint.url) as page:
             told = asyncio.create_task(page.told("update"))
             while not told.done():
                 await asyncio.to_thread(loop.advance, server_module.BATCH_S)
@@ -117,12 +117,12 @@ def see_a_place(face: ViewFace, loop: HeldLoop) -> None:
     asyncio.run(look())
 
 
-def check_full(face: ViewFace) -> None:
+def check_full(endpoint: ViewEndpoint) -> None:
     """No page can be opened."""
 
     async def look() -> None:
         with pytest.raises(aiohttp.ClientError):
-            async with opened(face.url):
+            async with opened(endpoint.url):
                 pass
 
     asyncio.run(look())
@@ -147,51 +147,55 @@ def trickling(reader: socket.socket) -> Iterator[None]:
         thread.join()
 
 
-def check_cut_off(face: ViewFace, loop: HeldLoop) -> None:
+def check_cut_off(endpoint: ViewEndpoint, loop: HeldLoop) -> None:
     """A page that does not answer keeps its place for one and a half of the time after which it is asked."""
     # It is counted in whole seconds.
     loop.advance(BEGIN_S + 1.5 * server_module.PING_S - 2.0 - loop.time())
-    assert len(face._server._sockets) == PLACES
-    check_full(face)
+    assert len(endpoint._server._sockets) == PLACES
+    check_full(endpoint)
     loop.advance(4.0)
-    assert not face._server._sockets
-    see_a_place(face, loop)
+    assert not endpoint._server._sockets
+    see_a_place(endpoint, loop)
 
 
-def test_those_who_take_nothing_give_their_places_back(face: ViewFace, robot: LiveRobot, loop: HeldLoop) -> None:
+def test_those_who_take_nothing_give_their_places_back(
+    endpoint: ViewEndpoint, robot: LiveRobot, loop: HeldLoop
+) -> None:
     with contextlib.ExitStack() as stack:
         for _ in range(PLACES):
-            stack.enter_context(slow(face))
-        fill(face, robot, PLACES, loop.advance)
-        check_cut_off(face, loop)
+            stack.enter_context(slow(endpoint))
+        fill(endpoint, robot, PLACES, loop.advance)
+        check_cut_off(endpoint, loop)
 
 
-def test_those_who_take_a_byte_now_and_then_do_so_too(face: ViewFace, robot: LiveRobot, loop: HeldLoop) -> None:
+def test_those_who_take_a_byte_now_and_then_do_so_too(endpoint: ViewEndpoint, robot: LiveRobot, loop: HeldLoop) -> None:
     with contextlib.ExitStack() as stack:
-        readers = [stack.enter_context(slow(face)) for _ in range(PLACES)]
-        fill(face, robot, PLACES, loop.advance)
+        readers = [stack.enter_context(slow(endpoint)) for _ in range(PLACES)]
+        fill(endpoint, robot, PLACES, loop.advance)
         for reader in readers:
             stack.enter_context(trickling(reader))
-        check_cut_off(face, loop)
+        check_cut_off(endpoint, loop)
 
 
-def test_those_who_ask_too_much_and_take_nothing_do_so_too(face: ViewFace, robot: LiveRobot, loop: HeldLoop) -> None:
+def test_those_who_ask_too_much_and_take_nothing_do_so_too(
+    endpoint: ViewEndpoint, robot: LiveRobot, loop: HeldLoop
+) -> None:
     with contextlib.ExitStack() as stack:
-        readers = [stack.enter_context(slow(face)) for _ in range(PLACES)]
-        fill(face, robot, PLACES, loop.advance)
-        check_full(face)
+        readers = [stack.enter_context(slow(endpoint)) for _ in range(PLACES)]
+        fill(endpoint, robot, PLACES, loop.advance)
+        check_full(endpoint)
         begin_s = loop.time()
         for reader in readers:
             reader.sendall(frame(type="pause") * 3 * BURST)
-        while face._server._sockets:
+        while endpoint._server._sockets:
             loop.advance(0.01)
         assert loop.time() - begin_s < server_module.PING_S / 2
-        see_a_place(face, loop)
+        see_a_place(endpoint, loop)
 
 
-def test_those_who_take_nothing_are_heard(face: ViewFace, robot: LiveRobot, loop: HeldLoop) -> None:
-    with slow(face) as reader:
-        fill(face, robot, 1, loop.advance)
+def test_those_who_take_nothing_are_heard(endpoint: ViewEndpoint, robot: LiveRobot, loop: HeldLoop) -> None:
+    with slow(endpoint) as reader:
+        fill(endpoint, robot, 1, loop.advance)
         reader.sendall(frame(type="stop"))
         assert eventually(lambda: bool(robot.orders))
         assert [order.command for order in robot.orders] == [Command.STOP]
@@ -201,7 +205,7 @@ def test_those_who_take_nothing_are_heard(face: ViewFace, robot: LiveRobot, loop
 def test_the_server_ends_beside_those_who_take_nothing(robot: LiveRobot, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server_module, "_CLOSE_LIMIT_S", 0.1)
     monkeypatch.setattr(server_module, "BATCH_S", 0.001)
-    with viewed(robot) as face, slow(face):
-        fill(face, robot, 1, time.sleep)
-        face.stop()
-        assert not face.is_alive
+    with viewed(robot) as endpoint, slow(endpoint):
+        fill(endpoint, robot, 1, time.sleep)
+        endpoint.stop()
+        assert not endpoint.is_alive

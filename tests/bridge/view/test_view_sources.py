@@ -32,19 +32,19 @@ def test_a_bridge_that_ends_is_told_and_found_again(robot: LiveRobot, monkeypatc
     monkeypatch.setattr(hub_module, "LONGEST_PAUSE_S", 0.3)
 
     async def look() -> None:
-        face = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
+        endpoint = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
         try:
-            async with remotely_viewed(face.address) as server, opened(server.url) as page:
+            async with remotely_viewed(endpoint.address) as server, opened(server.url) as page:
                 await page.told("definition")
                 await page.told("update")
-                await asyncio.to_thread(face.stop)
+                await asyncio.to_thread(endpoint.stop)
                 assert (await page.told("gone"))["why"]
                 await page.send(type="stop")
                 assert "bridge" in (await page.told("refused"))["why"]
                 # Who comes now is told so, too.
                 async with opened(server.url) as late:
                     assert (await late.next())["type"] == "gone"
-                again = serve(robot.operations, RemoteSettings(face.address))
+                again = serve(robot.operations, RemoteSettings(endpoint.address))
                 try:
                     await page.told("definition")
                     await page.told("update")
@@ -53,7 +53,7 @@ def test_a_bridge_that_ends_is_told_and_found_again(robot: LiveRobot, monkeypatc
                 finally:
                     await asyncio.to_thread(again.stop)
         finally:
-            face.stop()
+            endpoint.stop()
 
     asyncio.run(look())
 
@@ -76,10 +76,10 @@ def test_a_robot_that_is_there_again_is_not_told_as_lost() -> None:
 
 
 def test_a_bridge_elsewhere_is_commanded(robot: LiveRobot) -> None:
-    face = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
+    endpoint = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
 
     async def look() -> None:
-        async with remotely_viewed(face.address) as server, opened(server.url) as page:
+        async with remotely_viewed(endpoint.address) as server, opened(server.url) as page:
             await page.told("definition")
             await page.send(type="stop")
             assert (await page.told("done"))["what"] == "stop"
@@ -95,7 +95,7 @@ def test_a_bridge_elsewhere_is_commanded(robot: LiveRobot) -> None:
     try:
         asyncio.run(look())
     finally:
-        face.stop()
+        endpoint.stop()
     assert [order.command for order in robot.orders] == [Command.STOP, Command.RESUME, Command.START]
 
 
@@ -138,8 +138,8 @@ def test_at_rest_there_is_a_sign_of_life_and_nothing_is_executed(
             assert (second["state"], second["components"], second["enabled"]) == ("standby", {}, [])
             assert {tuple(item["why"]) for item in second["disabled"]} == {(NOT_EXECUTED,)}
 
-    with viewed(robot) as face:
-        asyncio.run(look(face.url))
+    with viewed(robot) as endpoint:
+        asyncio.run(look(endpoint.url))
 
 
 def test_the_feed_is_asked_only_while_somebody_looks(robot: LiveRobot) -> None:

@@ -87,11 +87,11 @@ def robot() -> LiveRobot:
 
 @pytest.fixture
 def address(robot: LiveRobot) -> Iterator[str]:
-    face = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
+    endpoint = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
     try:
-        yield face.address
+        yield endpoint.address
     finally:
-        face.stop()
+        endpoint.stop()
 
 
 def asking() -> int:

@@ -173,7 +173,7 @@ def _environment(folder: Path) -> dict[str, str]:
     return found
 
 
-class Ros1Face:
+class Ros1Node:
     """The node, as the twin sees it.
 
     Args:
@@ -277,9 +277,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args([word for word in given if ":=" not in word])
 
     @contextlib.contextmanager
-    def face(robot: RosRobot, pacer: Pacer, ended: threading.Event) -> Any:
+    def node(robot: RosRobot, pacer: Pacer, ended: threading.Event) -> Any:
         with RospySide(options.python, names=names) as side:
-            yield Ros1Face(
+            yield Ros1Node(
                 robot,
                 pacer,
                 side,
@@ -288,7 +288,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 should_end=ended.is_set,
             )
 
-    return serve(options, face)
+    return serve(options, node)
 
 
 def _parser() -> argparse.ArgumentParser:

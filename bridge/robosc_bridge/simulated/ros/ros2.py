@@ -32,7 +32,7 @@ NODE = "turtlebot3_twin"
 ROS_ARGUMENTS = "--ros-args"
 
 
-class Ros2Face:
+class Ros2Node:
     """The node; use it as a context manager.
 
     Args:
@@ -218,7 +218,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(ours)
     return serve(
         options,
-        lambda robot, pacer, ended: Ros2Face(robot, pacer, is_stamped=options.stamped, arguments=theirs),
+        lambda robot, pacer, ended: Ros2Node(robot, pacer, is_stamped=options.stamped, arguments=theirs),
     )
 
 

@@ -49,7 +49,7 @@ class ServingError(Exception):
     """The twin cannot be served any longer; one sentence."""
 
 
-class Face(Protocol):
+class RosNode(Protocol):
     """The robot's node."""
 
     def publish(self, reading: Reading) -> None:
@@ -107,11 +107,11 @@ class Pacer:
         return (world_s - self._time.world_s()) / self._time.factor - (self._monotonic() - self._then_s)
 
 
-MakeFace = Callable[[RosRobot, Pacer, threading.Event], AbstractContextManager[Face]]
+MakeNode = Callable[[RosRobot, Pacer, threading.Event], AbstractContextManager[RosNode]]
 """Opens the node of a robot; the event tells that it is to end."""
 
 
-def serve(options: argparse.Namespace, make_face: MakeFace) -> int:
+def serve(options: argparse.Namespace, make_face: MakeNode) -> int:
     """Serve a twin until it is interrupted.
 
     Args:
@@ -136,31 +136,31 @@ def serve(options: argparse.Namespace, make_face: MakeFace) -> int:
             if options.motion is not None:
                 stream = stack.enter_context(contextlib.closing(Output(options.motion, mishaps.tell)))
                 stack.enter_context(contextlib.closing(MotionRecorder(robot.world, stream)))
-            face = stack.enter_context(make_face(robot, pacer, ended))
+            node = stack.enter_context(make_face(robot, pacer, ended))
             print(READY, flush=True)
             threading.Thread(target=_listen, args=(robot,), name="commands", daemon=True).start()
-            run(robot, pacer, face, lambda: ended.is_set() or mishaps.has_crashed)
+            run(robot, pacer, node, lambda: ended.is_set() or mishaps.has_crashed)
     except (MissingRosError, ServingError, OSError, ValueError) as error:
         print(f"the robot cannot be simulated: {error}", file=sys.stderr)
         return 1
     return mishaps.status
 
 
-def run(robot: RosRobot, pacer: Pacer, face: Face, should_end: Callable[[], bool]) -> None:
+def run(robot: RosRobot, pacer: Pacer, node: RosNode, should_end: Callable[[], bool]) -> None:
     """Let the world go on and show it.
 
     Args:
         robot: Robot in the world.
         pacer: Pacer of its time.
-        face: Its node.
+        node: Its node.
         should_end: Function that returns True to end.
     """
     pacer.begin()
     while not should_end():
         pacer.catch_up()
         for reading in robot.live():
-            face.publish(reading)
-        face.attend(min(max(pacer.until_s(robot.due_s), 0.0), _TICK_S))
+            node.publish(reading)
+        node.attend(min(max(pacer.until_s(robot.due_s), 0.0), _TICK_S))
 
 
 def make_robot(options: argparse.Namespace) -> tuple[RosRobot, Pacer]:

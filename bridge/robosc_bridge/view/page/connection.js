@@ -20,7 +20,7 @@ export class Connection {
     this.waitMs = FIRST_WAIT_MS;
     this.timer = null;
     this.socket = null;
-    setInterval(() => this.look(), LOOK_EVERY_MS);
+    setInterval(() => this.poll(), LOOK_EVERY_MS);
     window.addEventListener("online", () => this.hurry());
     document.addEventListener("visibilitychange", () => document.hidden || this.hurry());
     this.open();

@@ -23,7 +23,7 @@ def needs_camera(mapping: ChannelMapping) -> bool:
     )
 
 
-def sight_problems(line: LineSettings, mapping: ChannelMapping, settings: Settings) -> list[str]:
+def camera_problems(line: LineSettings, mapping: ChannelMapping, settings: Settings) -> list[str]:
     """Return the problems with how the line is to be seen; nobody may follow a line whose loss nobody reports."""
     found = []
     if needs_camera(mapping) and line.camera == "simulated":

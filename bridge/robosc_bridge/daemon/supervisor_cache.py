@@ -26,7 +26,7 @@ def state_folder(environment: Mapping[str, str] = os.environ) -> Path | None:
         return None
 
 
-def is_kept(file: Path) -> bool:
+def is_cached(file: Path) -> bool:
     """Return True if there is such a file, as far as this user may know."""
     try:
         return file.is_file()
@@ -34,7 +34,7 @@ def is_kept(file: Path) -> bool:
         return False
 
 
-def keep(file: Path, data: bytes) -> None:
+def store(file: Path, data: bytes) -> None:
     """Replace a file at once, or warn that it cannot be: the start does not depend on it.
 
     Whoever reads it finds the old or the new one, also after a power cut.

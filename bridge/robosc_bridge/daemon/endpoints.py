@@ -1,4 +1,4 @@
-"""Access to the daemon from elsewhere: its remote faces, as the program starts and stops them."""
+"""Access to the daemon from elsewhere: its remote endpoints, as the program starts and stops them."""
 
 import logging
 from collections.abc import Sequence
@@ -9,15 +9,15 @@ from robosc_bridge.daemon.device_thread import DeviceThread
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.devices.interface import Velocity
 from robosc_bridge.ground import GroundLink, ground_settings
-from robosc_bridge.remote import RemoteFace, settings_of
+from robosc_bridge.remote import RemoteEndpoint, settings_of
 from robosc_bridge.safety import SafetyLimits
-from robosc_bridge.view import ViewFace
+from robosc_bridge.view import ViewEndpoint
 from robosc_bridge.view import settings_of as view_settings
 
 _log = logging.getLogger(__name__)
 
 
-class Face(Protocol):
+class Endpoint(Protocol):
     """Serves operators or ground stations, in threads of its own."""
 
     @property
@@ -26,7 +26,7 @@ class Face(Protocol):
 
     @property
     def is_alive(self) -> bool:
-        """True if the face serves: from `start` until `stop`, unless it has failed."""
+        """True if the endpoint serves: from `start` until `stop`, unless it has failed."""
 
     def start(self) -> None:
         """Begin to serve; nothing moves yet.
@@ -39,8 +39,8 @@ class Face(Protocol):
         """End what is under way and every thread within some seconds; never raises, may be called again."""
 
 
-class Living:
-    """Threads and faces that must not end by themselves while the robot runs.
+class LivenessMonitor:
+    """Threads and endpoints that must not end by themselves while the robot runs.
 
     Args:
         threads: Threads of devices; reporting what becomes of them is up to the drivers.
@@ -48,16 +48,16 @@ class Living:
 
     def __init__(self, threads: Sequence[DeviceThread]) -> None:
         self._threads = tuple(threads)
-        self._faces: tuple[Face, ...] = ()
+        self._endpoints: tuple[Endpoint, ...] = ()
         self._told: set[str] = set()
 
-    def watch(self, face: Face) -> None:
+    def watch(self, endpoint: Endpoint) -> None:
         """From now on this one, too: who cannot be reached cannot be told to stop."""
-        self._faces = (*self._faces, face)
+        self._endpoints = (*self._endpoints, endpoint)
 
     def are_alive(self) -> bool:
-        """Return True if none has ended; report each face that has, once."""
-        ended = [face.name for face in self._faces if not face.is_alive]
+        """Return True if none has ended; report each endpoint that has, once."""
+        ended = [endpoint.name for endpoint in self._endpoints if not endpoint.is_alive]
         for name in ended:
             if name not in self._told:
                 self._told.add(name)
@@ -66,29 +66,29 @@ class Living:
 
 
 def is_remote(configuration: Configuration) -> bool:
-    """Return True if a remote face is configured, by which programs and operators reach the robot all the time."""
+    """Return True if a remote endpoint is configured, by which programs and operators reach the robot all the time."""
     return configuration.remote.grpc_address is not None or configuration.remote.mavlink_url is not None
 
 
 def is_startable(configuration: Configuration) -> bool:
-    """Return True if somebody can start the robot through a face, and start it again."""
+    """Return True if somebody can start the robot through an endpoint, and start it again."""
     return is_remote(configuration) or configuration.view.address is not None
 
 
-def make_faces(configuration: Configuration, operations: Operations, limits: SafetyLimits) -> tuple[Face, ...]:
-    """The remote faces that are configured, not started yet.
+def make_endpoints(configuration: Configuration, operations: Operations, limits: SafetyLimits) -> tuple[Endpoint, ...]:
+    """The remote endpoints that are configured, not started yet.
 
     Raises:
         BridgeError: One cannot be made as it is configured.
     """
-    faces: list[Face] = []
+    endpoints: list[Endpoint] = []
     remote = settings_of(configuration)
     if remote is not None:
-        faces.append(RemoteFace(operations, remote))
+        endpoints.append(RemoteEndpoint(operations, remote))
     ground = ground_settings(configuration, Velocity(limits.linear_m_s, limits.angular_rad_s))
     if ground is not None:
-        faces.append(GroundLink(operations, ground))
+        endpoints.append(GroundLink(operations, ground))
     page = view_settings(configuration)
     if page is not None:
-        faces.append(ViewFace(operations, page))
-    return tuple(faces)
+        endpoints.append(ViewEndpoint(operations, page))
+    return tuple(endpoints)

@@ -3,15 +3,15 @@
 import logging
 
 from robosc_bridge.daemon.operations import Operations
-from robosc_bridge.daemon.served_face import ServedFace
+from robosc_bridge.daemon.served_endpoint import ServedEndpoint
 from robosc_bridge.view.settings import ViewSettings
 from robosc_bridge.view.sources import ViewError
 
 _log = logging.getLogger(__name__)
 
 
-class ViewFace(ServedFace):
-    """The live view of a bridge; a `Face` of the daemon.
+class ViewEndpoint(ServedEndpoint):
+    """The live view of a bridge; a `Endpoint` of the daemon.
 
     Args:
         operations: The daemon.

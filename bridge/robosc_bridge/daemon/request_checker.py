@@ -14,22 +14,22 @@ from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import CHANNELS, Channel, RotateChannel, channel_name
 from robosc_bridge.configuration.shapes import Shape
 from robosc_bridge.daemon.plain_data import accepted, completed, is_number, why_not_shaped, why_not_typed
-from robosc_bridge.daemon.programs import Called, CancelWanted, FromProgram, GoalSent, Requested
+from robosc_bridge.daemon.programs import CallRequested, CancelRequested, FromProgram, GoalRequested, MessageRequested
 from robosc_bridge.daemon.wheel_messages import angle_of
 from robosc_bridge.skills.rotate import MAXIMUM_ANGLE_RAD
 
 MAXIMUM_ID = 255
 """Characters of an id of a program's own."""
 
-Asked = Requested | Called | GoalSent | CancelWanted
+ProgramRequest = MessageRequested | CallRequested | GoalRequested | CancelRequested
 """Request of a program."""
 
 
-class UnfitError(ValueError):
+class InvalidRequestError(ValueError):
     """Request of a program that makes no sense; the message is one sentence."""
 
 
-class Asking:
+class RequestChecker:
     """Requests that programs may make; used by all threads.
 
     Args:
@@ -62,41 +62,41 @@ class Asking:
         """Return the identifier of a service or action that the model has."""
         return self._others[kind, name].identifier
 
-    def look(self, item: FromProgram) -> FromProgram:
+    def check(self, item: FromProgram) -> FromProgram:
         """Return an item of a program as the layer receives it: data that is left out is zero, false or empty.
 
         Raises:
-            UnfitError: The item asks for something that makes no sense, whatever the layer does.
+            InvalidRequestError: The item asks for something that makes no sense, whatever the layer does.
         """
-        if not isinstance(item, Asked):
+        if not isinstance(item, ProgramRequest):
             return item
         if not self._is_layer:
-            raise UnfitError("the supervisor is a controller: it lets nobody ask for anything")
+            raise InvalidRequestError("the supervisor is a controller: it lets nobody ask for anything")
         if not item.program.may_request:
-            raise UnfitError("this program may not ask for anything")
+            raise InvalidRequestError("this program may not ask for anything")
         match item:
-            case Requested(identifier=identifier, data=data):
+            case MessageRequested(identifier=identifier, data=data):
                 meant = self.messages.get(identifier)
                 if meant is None:
-                    raise UnfitError(f"the model has no message to the robot on '{identifier:.255}'")
+                    raise InvalidRequestError(f"the model has no message to the robot on '{identifier:.255}'")
                 # Which of them it is, the layer finds out: it must fit any.
                 for message in meant:
                     self._require_fit(message, data)
                 for message in meant:
                     data = completed(self._model, message.request, data)
                 return replace(item, data=data)
-            case Called(service=service, call_id=call_id, data=data):
+            case CallRequested(service=service, call_id=call_id, data=data):
                 return replace(item, data=self._started(CommunicationKind.SERVICE, service, call_id, data))
-            case GoalSent(action=action, goal_id=goal_id, data=data):
+            case GoalRequested(action=action, goal_id=goal_id, data=data):
                 return replace(item, data=self._started(CommunicationKind.ACTION, action, goal_id, data))
         return item
 
     def _started(self, kind: CommunicationKind, name: str, own_id: str, data: Any) -> Any:
         asked = self._others.get((kind, name))
         if asked is None:
-            raise UnfitError(f"the model has no {kind} '{name:.255}'")
+            raise InvalidRequestError(f"the model has no {kind} '{name:.255}'")
         if not 1 <= len(own_id) <= MAXIMUM_ID:
-            raise UnfitError(f"an id has 1 to {MAXIMUM_ID} characters")
+            raise InvalidRequestError(f"an id has 1 to {MAXIMUM_ID} characters")
         self._require_fit(asked, data)
         return completed(self._model, asked.request, data)
 
@@ -104,17 +104,17 @@ class Asking:
         """Do nothing if data is what the channel and the model take.
 
         Raises:
-            UnfitError: It is not.
+            InvalidRequestError: It is not.
         """
         channel = self._channels[communication.name]
         heeded = CHANNELS[type(channel)].used_parts
         why = why_not_shaped(self._shapes[communication.name], data)
         why = why or why_not_typed(self._model, communication.request, data)
         if why:
-            raise UnfitError(f"'{communication.name}': {why}")
+            raise InvalidRequestError(f"'{communication.name}': {why}")
         for path, value in _leaves(data, "") if heeded else ():
             if path not in heeded and value:
-                raise UnfitError(
+                raise InvalidRequestError(
                     f"'{communication.name}': '{path}' must be 0: '{channel_name(channel)}' does not use it"
                 )
         _require_turn(communication, channel, data)
@@ -126,7 +126,9 @@ def _require_turn(communication: Communication, channel: Channel, data: Any) -> 
         angle = angle_of(data)
         rad = math.radians(angle) if channel.unit == "degrees" else angle
         if math.isfinite(rad) and abs(rad) > MAXIMUM_ANGLE_RAD:
-            raise UnfitError(f"'{communication.name}': an angle of {angle:g} {channel.unit} is beyond a hundred turns")
+            raise InvalidRequestError(
+                f"'{communication.name}': an angle of {angle:g} {channel.unit} is beyond a hundred turns"
+            )
 
 
 def _leaves(data: Any, path: str) -> Iterator[tuple[str, float]]:

@@ -1,4 +1,4 @@
-"""A face that serves from an event loop in a thread of its own: nothing in it can hold up the control loop."""
+"""An endpoint that serves from an event loop in a thread of its own: nothing in it can hold up the control loop."""
 
 import asyncio
 import logging
@@ -12,8 +12,8 @@ _log = logging.getLogger(__name__)
 _START_LIMIT_S, _STOP_LIMIT_S = 20.0, 5.0
 
 
-class ServedFace(ABC):
-    """`Face` of the daemon; its subclass defines how it serves.
+class ServedEndpoint(ABC):
+    """`Endpoint` of the daemon; its subclass defines how it serves.
 
     Args:
         name: Name of the thread, and for the log.
@@ -45,7 +45,7 @@ class ServedFace(ABC):
 
     @property
     def is_alive(self) -> bool:
-        """True if the face serves."""
+        """True if the endpoint serves."""
         return self._thread.is_alive() and self._failure is None
 
     def start(self) -> None:

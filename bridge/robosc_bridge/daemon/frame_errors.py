@@ -11,7 +11,7 @@ _SOUND_SHARE = 0.5
 
 
 @dataclass(frozen=True)
-class FrameNews:
+class FrameErrorReport:
     """News that the line of a scanner has become noisy, or is sound again.
 
     Attributes:
@@ -23,7 +23,7 @@ class FrameNews:
     text: str
 
 
-class FrameWatch:
+class FrameErrorMonitor:
     """Says when too many frames are damaged, and when no longer: at half of that share, so that it does not flutter.
 
     Args:
@@ -38,7 +38,7 @@ class FrameWatch:
         self._begin_s: float | None = None
         self._frames = self._bad = 0
 
-    def look(self, now_s: float) -> FrameNews | None:
+    def poll(self, now_s: float) -> FrameErrorReport | None:
         """Return the change of the frames up to now; None: nothing has changed."""
         if self._begin_s is None:
             self._begin(now_s)
@@ -57,7 +57,7 @@ class FrameWatch:
             return None
         self._is_noisy = is_noisy
         what = "many frames are damaged" if is_noisy else "its frames are sound again"
-        return FrameNews(is_noisy, f"{what}: {bad} of {frames} in {time_s:.1f} s ({share:.1%})")
+        return FrameErrorReport(is_noisy, f"{what}: {bad} of {frames} in {time_s:.1f} s ({share:.1%})")
 
     def _begin(self, now_s: float) -> None:
         self._begin_s = now_s

@@ -7,7 +7,7 @@ from robosc_bridge.daemon.programs import Program, Refused, ToProgram
 _log = logging.getLogger(__name__)
 
 
-class Roster:
+class Clients:
     """Connected programs, in the order in which they came; used by the loop's thread."""
 
     def __init__(self) -> None:

@@ -34,7 +34,7 @@ OVER = "the bridge has ended"
 _ORDINARY = frozenset({Reason.STANDBY, Reason.TORQUE_AWAITED, Reason.COMMAND_SILENT})
 
 
-class Conductor:
+class Lifecycle:
     """The state of the bridge; used by the loop's thread.
 
     Args:
@@ -67,7 +67,7 @@ class Conductor:
         self._reset_drive: Callable[[], None] = lambda: None
         self._are_alive: Callable[[], bool] = lambda: True
 
-    def lead(
+    def attach(
         self, execution: Execution, robot: Robot, motion: Motion, switch: StopSwitch, note: Callable[[str, str], None]
     ) -> None:
         """Set the parts that it brings to work and to rest, and the function that notes what watchers want to see."""
@@ -92,19 +92,19 @@ class Conductor:
 
     # Devices and the safety layer.
 
-    def device_came(self, device: Device) -> None:
+    def device_up(self, device: Device) -> None:
         """A device works."""
         _log.info("the %s is there", device)
-        is_news = self._readiness.came(device)
+        is_news = self._readiness.device_up(device)
         executor = self._execution.executor
         if is_news:
             self._note("device", f"the {device} is there")
         if executor is not None and is_news:
             self._robot.saw_device(device, f"the {device} is back", executor, is_lost=False)
 
-    def device_went(self, report: DeviceDown) -> None:
+    def device_down(self, report: DeviceDown) -> None:
         """A device does not work."""
-        is_news = self._readiness.went(report.device)
+        is_news = self._readiness.device_down(report.device)
         if report.is_first:
             _log.error("%s: %s", report.device, report.problem)
             self._note("device", f"{report.device}: {report.problem}")
@@ -117,7 +117,7 @@ class Conductor:
             self._is_drive_lost = not self.problem
             self._fault(f"the drive base is lost: {report.problem}")
 
-    def heed(self, notice: SafetyNotice) -> None:
+    def safety_changed(self, notice: SafetyNotice) -> None:
         """Tell a person why nothing moves; what only a person can end ends the run."""
         known, self._latches.notice = self.notice.warnings, notice
         for warning in notice.warnings:
@@ -133,7 +133,7 @@ class Conductor:
 
     # Commands.
 
-    def obey(self, order: Order) -> None:
+    def execute(self, order: Order) -> None:
         """Do what is ordered, or answer why not."""
         self._orders.arrived(order)
         command = order.command
@@ -206,7 +206,7 @@ class Conductor:
         return (
             ""
             if self._are_alive()
-            else "a thread of a device or a remote face has ended; the bridge must be started anew"
+            else "a thread of a device or a remote endpoint has ended; the bridge must be started anew"
         )
 
     def _order_standby(self, order: Order) -> None:
@@ -296,10 +296,10 @@ class Conductor:
         self._end(problem, State.FAULT if self._stays_after_fault else State.OVER)
         self.problem = f"{self.problem}; {problem}" if self.problem else problem
 
-    def look(self, now_s: float) -> None:
+    def poll(self, now_s: float) -> None:
         """At the end of a turn: whether the state becomes another."""
         if self.state is State.RUNNING and not self._are_alive():
-            self._fault("a thread of a device or a remote face has ended")
+            self._fault("a thread of a device or a remote endpoint has ended")
         if self._failed_turn and self.state is State.RUNNING:
             self._fault(f"a turn has failed, and no message of the model tells it so: {self._failed_turn}")
         self._failed_turn = ""

@@ -1,4 +1,4 @@
-"""The server of the remote face, in a thread of its own."""
+"""The server of the remote endpoint, in a thread of its own."""
 
 import asyncio
 import contextlib
@@ -20,7 +20,7 @@ from robosc_api.request_timeouts import REFLECTION_METHODS, RequestTimeouts
 from robosc_api.security import Guard, SecurityError, ServerSecurity, TokenFile, add_port
 from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.daemon.operations import Operations
-from robosc_bridge.daemon.served_face import ServedFace
+from robosc_bridge.daemon.served_endpoint import ServedEndpoint
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.remote import convert
 from robosc_bridge.remote.condition import Condition
@@ -56,12 +56,12 @@ _LOOK_S = 1.0
 
 
 class RemoteError(BridgeError):
-    """The remote face cannot listen as it is told to."""
+    """The remote endpoint cannot listen as it is told to."""
 
 
 @dataclass(frozen=True, slots=True)
 class RemoteSettings:
-    """Settings for listening of the face.
+    """Settings for listening of the endpoint.
 
     Attributes:
         address: `HOST:PORT`; port 0 picks a free one.
@@ -75,7 +75,7 @@ class RemoteSettings:
 
 
 def settings_of(configuration: Configuration) -> RemoteSettings | None:
-    """Return the settings of a configuration; None: there is to be no such face."""
+    """Return the settings of a configuration; None: there is to be no such endpoint."""
     remote = configuration.remote
     if remote.grpc_address is None:
         return None
@@ -93,7 +93,7 @@ def _path(text: str | None) -> Path | None:
     return None if text is None else Path(text)
 
 
-class RemoteFace(ServedFace):
+class RemoteEndpoint(ServedEndpoint):
     """A server in a thread of its own; `serve` makes one that listens.
 
     Args:
@@ -102,7 +102,7 @@ class RemoteFace(ServedFace):
     """
 
     def __init__(self, operations: Operations, settings: RemoteSettings) -> None:
-        super().__init__("remote face", "remote", RemoteError, (SecurityError, ValueError, OSError))
+        super().__init__("remote endpoint", "remote", RemoteError, (SecurityError, ValueError, OSError))
         self._operations = operations
         self._settings = settings
 
@@ -113,7 +113,7 @@ class RemoteFace(ServedFace):
             RemoteError: It cannot.
         """
         super().start()
-        _log.info("the remote face listens on %s", self.address)
+        _log.info("the remote endpoint listens on %s", self.address)
 
     async def _serve(self) -> None:
         settings = self._settings
@@ -139,7 +139,7 @@ class RemoteFace(ServedFace):
         places = Places(int(self.address.rpartition(":")[2]), MAXIMUM_CONNECTIONS)
         try:
             while not self._end.is_set():
-                places.look()
+                places.poll()
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(_LOOK_S):
                         await self._end.wait()
@@ -172,8 +172,8 @@ def _options() -> list[tuple[str, int]]:
     ]
 
 
-def serve(operations: Operations, settings: RemoteSettings) -> RemoteFace:
-    """Return a face that listens.
+def serve(operations: Operations, settings: RemoteSettings) -> RemoteEndpoint:
+    """Return an endpoint that listens.
 
     Args:
         operations: The daemon.
@@ -182,6 +182,6 @@ def serve(operations: Operations, settings: RemoteSettings) -> RemoteFace:
     Raises:
         RemoteError: It cannot.
     """
-    face = RemoteFace(operations, settings)
-    face.start()
-    return face
+    endpoint = RemoteEndpoint(operations, settings)
+    endpoint.start()
+    return endpoint

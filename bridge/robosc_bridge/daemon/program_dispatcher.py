@@ -2,34 +2,34 @@
 
 from typing import assert_never
 
+from robosc_bridge.daemon.clients import Clients
 from robosc_bridge.daemon.exchange import Exchange
 from robosc_bridge.daemon.execution import Execution
 from robosc_bridge.daemon.program_inbox import Arrived, Overflowed, Unreadable
 from robosc_bridge.daemon.programs import (
     Attached,
-    Called,
     CallFailed,
-    CancelWanted,
+    CallRequested,
+    CancelRequested,
     Detached,
     FeedbackGiven,
     GoalAccepted,
     GoalEnded,
-    GoalSent,
+    GoalRequested,
+    MessageReceived,
+    MessageRequested,
     Program,
     Replied,
-    Requested,
-    Told,
 )
 from robosc_bridge.daemon.requesters import Requesters
 from robosc_bridge.daemon.robot import Robot
-from robosc_bridge.daemon.roster import Roster
 
 
-class ProgramsSide:
+class ProgramDispatcher:
     """Takes up what programs send, in the loop's thread.
 
     Args:
-        roster: Programs that are there.
+        clients: Programs that are there.
         exchange: The model's other side.
         requesters: The caller's side of a layer.
         execution: The supervisor at work.
@@ -38,13 +38,13 @@ class ProgramsSide:
 
     def __init__(
         self,
-        roster: Roster,
+        clients: Clients,
         exchange: Exchange,
         requesters: Requesters,
         execution: Execution,
         robot: Robot,
     ) -> None:
-        self._roster = roster
+        self._clients = clients
         self._exchange = exchange
         self._requesters = requesters
         self._execution = execution
@@ -55,17 +55,17 @@ class ProgramsSide:
         program = item.program
         if isinstance(item, Attached):
             self._attach(program)
-        elif program in self._roster:
+        elif program in self._clients:
             # What comes from others is too late: they are gone.
             self._take(item)
         if self._execution.executor is not None:
             self._robot.settle(self._execution.executor)
 
     def _attach(self, program: Program) -> None:
-        if program in self._roster:
-            self._roster.refuse(program, "this program is there already")
+        if program in self._clients:
+            self._clients.refuse(program, "this program is there already")
             return
-        self._roster.add(program)
+        self._clients.add(program)
         self._exchange.attach(program)
 
     def _take(self, item: Arrived) -> None:
@@ -74,20 +74,20 @@ class ProgramsSide:
             case Attached():
                 pass
             case Detached():
-                self._roster.remove(program)
+                self._clients.remove(program)
                 self._exchange.detach(program, executor)
                 self._requesters.detach(program, layer)
             case Unreadable(why=why):
-                self._roster.refuse(program, why)
+                self._clients.refuse(program, why)
             case Overflowed(lost=lost):
-                self._roster.refuse(program, f"this program sends too much at once: {lost} of it were not looked at")
+                self._clients.refuse(program, f"this program sends too much at once: {lost} of it were not looked at")
                 if layer is not None:
                     self._requesters.overflow(program, layer)
-            case Told():
+            case MessageReceived():
                 self._exchange.hear(item, executor)
             case Replied() | CallFailed() | GoalAccepted() | FeedbackGiven() | GoalEnded():
                 self._exchange.take(item, executor)
-            case Requested() | Called() | GoalSent() | CancelWanted():
+            case MessageRequested() | CallRequested() | GoalRequested() | CancelRequested():
                 self._requesters.take(item, layer)
             case _:
                 assert_never(item)

@@ -36,10 +36,10 @@ class DriverFeatures:
 
     Attributes:
         buttons: Names in its readings; those of bumpers are `bumper_1` (in front) and `bumper_2` (behind).
-        has_imu: True if its readings report accelerations and turn rates.
+        has_imu: True if its readings report accelerations and yaw rates.
         needs_turtlebot3: True if its argument `robot` is a `devices.robots.Robot`, whose motors or board it drives;
             else it is a `devices.robots.Body`, and the robot may be any.
-        revolution_s: Time that a turn of a range scanner takes, in seconds; None: that is not known.
+        revolution_s: Time that a revolution of a range scanner takes, in seconds; None: that is not known.
         torque_on_s: Time within which motors that are told to hold do so and report it, in seconds; None: as the
             safety layer has it.
     """
@@ -111,17 +111,17 @@ _BUILT_IN: dict[Kind, dict[str, tuple[str, str, DriverFeatures | None]]] = {
     },
     Kind.RANGE_SCANNER: {
         "lds01": (
-            "the LiDAR LDS-01 (HLS-LFCD2): 0.12 to 3.5 m, 5 turns a second",
+            "the LiDAR LDS-01 (HLS-LFCD2): 0.12 to 3.5 m, 5 revolutions a second",
             "robosc_bridge.devices.lidar:make_lds01",
             DriverFeatures(revolution_s=0.2),
         ),
         "lds02": (
-            "the LiDAR LDS-02 (LD08): 0.16 to 8 m, 6 turns a second",
+            "the LiDAR LDS-02 (LD08): 0.16 to 8 m, 6 revolutions a second",
             "robosc_bridge.devices.lidar:make_lds02",
             DriverFeatures(revolution_s=1 / 6),
         ),
         "lds03": (
-            "the LiDAR LDS-03 (COIN-D4): 0.05 to 12 m, 10 turns a second",
+            "the LiDAR LDS-03 (COIN-D4): 0.05 to 12 m, 10 revolutions a second",
             "robosc_bridge.devices.lidar:make_lds03",
             DriverFeatures(revolution_s=0.1),
         ),

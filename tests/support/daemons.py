@@ -166,7 +166,7 @@ class Scene:
             if distance_m is not None and number % 10 == 0:
                 self.scan(distance_m)
             self.exchange()
-            self.daemon.turn()
+            self.daemon.cycle()
             self.clock.advance(PERIOD_S)
 
     def up(self, distance_m: float = 2.0) -> None:
@@ -200,12 +200,12 @@ class Connected:
     def say(self, make: Callable[..., FromProgram], *arguments: Any) -> list[ToProgram]:
         """Tell the daemon something: what the program is told in the same turn."""
         self.scene.daemon.post(make(self.program, *arguments))
-        return self.turn()
+        return self.cycle()
 
-    def turn(self) -> list[ToProgram]:
+    def cycle(self) -> list[ToProgram]:
         """Run a turn of the loop, and return the messages to the program."""
         self.told.clear()
-        self.scene.daemon.turn()
+        self.scene.daemon.cycle()
         return list(self.told)
 
     def of[Kind](self, kind: type[Kind]) -> list[Kind]:
@@ -215,4 +215,4 @@ class Connected:
     def leave(self) -> None:
         """The connection ends."""
         self.scene.daemon.post(Detached(self.program))
-        self.scene.daemon.turn()
+        self.scene.daemon.cycle()

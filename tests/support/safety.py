@@ -61,7 +61,7 @@ class Bench:
         """Make the reports of the other threads at this time."""
         facts: dict[str, Callable[[float], None]] = {
             "scan": lambda now_s: self.layer.saw_scan(now_s, self.ranges_m),
-            "loop": self.layer.loop_turned,
+            "loop": self.layer.loop_cycled,
             "operator": self.layer.operator_seen,
         }
         for name, tell in facts.items():

@@ -113,7 +113,7 @@ class SteppedTwin:
     @property
     def is_standing(self) -> bool:
         """True if its wheels stand still."""
-        return abs(self.world.speed_m_s) < STILL_M_S and abs(self.world.turn_rad_s) < STILL_RAD_S
+        return abs(self.world.speed_m_s) < STILL_M_S and abs(self.world.yaw_rate_rad_s) < STILL_RAD_S
 
     @property
     def place(self) -> tuple[float, float]:
@@ -171,7 +171,7 @@ class SteppedTwin:
         self._steps += 1
         while self._waiting:
             self._waiting.popleft()()
-        self._turn_on()
+        self._rotate()
         if self._steps % round(SCAN_S / _STEP_S) == 0:
             self._scan()
         if self._steps % round(PERIOD_S / _STEP_S) == 0:
@@ -204,7 +204,7 @@ class SteppedTwin:
         else:
             self.executor.receive("/line/correction", seen.correction_rad_s)
 
-    def _turn_on(self) -> None:
+    def _rotate(self) -> None:
         if self._turn is None:
             return
         remaining_rad = self._turn.update(self.world.pose[2])
@@ -231,9 +231,9 @@ class SteppedTwin:
         self._drive(*steered(distance_m, aside_rad, 0.2, 1.0))
         self.executor.on_feedback(number, {"distance_remaining": distance_m, "number_of_recoveries": 0})
 
-    def _drive(self, ahead_m_s: float, turn_rad_s: float) -> None:
+    def _drive(self, ahead_m_s: float, yaw_rate_rad_s: float) -> None:
         body = self.world.body
-        aside_m_s = turn_rad_s * body.wheel_separation_m / 2
+        aside_m_s = yaw_rate_rad_s * body.wheel_separation_m / 2
         self.world.left.goal_rad_s = (ahead_m_s - aside_m_s) / body.wheel_radius_m
         self.world.right.goal_rad_s = (ahead_m_s + aside_m_s) / body.wheel_radius_m
 

@@ -15,7 +15,7 @@ from robosc_bridge.protocol.dynamixel import MAX_DEVICE, PacketHandler, status_o
 from robosc_bridge.protocol.framing import FrameDecoder
 from robosc_bridge.protocol.mavlink import Codec, Decoder
 from robosc_bridge.protocol.mavlink_messages import vehicle_message
-from robosc_bridge.protocol.turns import Points, TurnBuilder, nearest_by_degree
+from robosc_bridge.protocol.revolutions import Points, RevolutionBuilder, nearest_by_degree
 from support import peer
 from support.lidar_frames import lds01_frame, lds02_frame, lds03_frame
 
@@ -69,11 +69,13 @@ def _lidar(
     points: Callable[[Any], Points],
     data: bytes,
 ) -> None:
-    decoder, builder = make(), TurnBuilder()
+    decoder, builder = make(), RevolutionBuilder()
     for frame in _fed(decoder, data, longest):
-        turn = builder.add(points(frame))
-        if turn is not None:
-            _require(len(nearest_by_degree(turn.angles_deg, turn.ranges_m)) == 360, "a turn has not 360 bins")
+        revolution = builder.add(points(frame))
+        if revolution is not None:
+            _require(
+                len(nearest_by_degree(revolution.angles_deg, revolution.ranges_m)) == 360, "a turn has not 360 bins"
+            )
     whole = make().feed(data[1:])
     _require(len(whole) == decoder.counts.frames, "how the bytes are cut changes what is found")
     _goes_on(decoder, make(), [nth(number) for number in range(_FRAMES)])

@@ -190,7 +190,7 @@ class _MappingChecks:
                 if configuration.scanner is None:
                     yield path, "there is no scanner: the section 'scanner' is missing"
             elif isinstance(channel, ImuChannel) and features is not None and not features.has_imu:
-                yield path, f"the drive '{driver}' measures no accelerations and turn rates"
+                yield path, f"the drive '{driver}' measures no accelerations and yaw rates"
             elif isinstance(channel, BumperChannel) and features is not None and not features.has_bumpers:
                 yield path, f"the drive '{driver}' has no bumpers"
             elif isinstance(channel, ButtonChannel):

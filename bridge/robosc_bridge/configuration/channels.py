@@ -27,11 +27,11 @@ class DriveChannel(_Channel, frozen=True, tag="drive"):
 
 
 class StopChannel(_Channel, frozen=True, tag="stop"):
-    """Stops the wheels and ends a turn that is under way."""
+    """Stops the wheels and ends a rotation that is under way."""
 
 
 class RotateChannel(_Channel, frozen=True, tag="rotate"):
-    """Turns by an angle (skill `rotate`). As an action it tells what remains, in the same unit."""
+    """Rotates by an angle (skill `rotate`). As an action it tells what remains, in the same unit."""
 
     unit: Annotated[Literal["degrees", "radians"], Meta(description="Unit of the angle.")] = "degrees"
     direction: Annotated[
@@ -40,13 +40,13 @@ class RotateChannel(_Channel, frozen=True, tag="rotate"):
 
 
 class RotatedChannel(_Channel, frozen=True, tag="rotated"):
-    """A turn that a message asked for has ended."""
+    """A rotation that a message asked for has ended."""
 
     outcome: Annotated[Literal["done", "failed", "any"], Meta(description="Ends that are reported.")] = "done"
 
 
 class ScannerChannel(_Channel, frozen=True, tag="scanner"):
-    """A turn of the LiDAR: 360 ranges in metres, one a degree, counter-clockwise from the front; unknown is NaN."""
+    """A revolution of the LiDAR: 360 ranges in metres, one a degree, counter-clockwise from the front; NaN: unknown."""
 
 
 class OdometryChannel(_Channel, frozen=True, tag="odometry"):
@@ -54,7 +54,7 @@ class OdometryChannel(_Channel, frozen=True, tag="odometry"):
 
 
 class ImuChannel(_Channel, frozen=True, tag="imu"):
-    """Turn rates in rad/s, accelerations in m/s² and orientation, of a drive that measures them."""
+    """Yaw rates in rad/s, accelerations in m/s² and orientation, of a drive that measures them."""
 
 
 class BatteryChannel(_Channel, frozen=True, tag="battery"):

@@ -35,7 +35,7 @@ class Body(_Section, frozen=True):
         float, Meta(gt=0, le=5, description="Between its left and its right wheels, in metres.")
     ]
     linear_m_s: Annotated[float, Meta(gt=0, le=5, description="Fastest forward and backward, in m/s.")]
-    angular_rad_s: Annotated[float, Meta(gt=0, le=20, description="Fastest turn, in rad/s.")]
+    angular_rad_s: Annotated[float, Meta(gt=0, le=20, description="Fastest rotation, in rad/s.")]
 
 
 class Drive(_Section, frozen=True):
@@ -108,19 +108,19 @@ class Safety(_Section, frozen=True):
     ] = None
     angular_rad_s: Annotated[
         Annotated[float, Meta(gt=0, le=20)] | None,
-        Meta(description="Fastest turn, in rad/s; null: what the drive can do."),
+        Meta(description="Fastest rotation, in rad/s; null: what the drive can do."),
     ] = None
     linear_acceleration_m_s2: Annotated[
         float, Meta(gt=0, le=50, description="Largest change of speed, in m/s²; stopping for safety ignores it.")
     ] = 1.0
     angular_acceleration_rad_s2: Annotated[
-        float, Meta(gt=0, le=200, description="Largest change of the turn rate, in rad/s²; the same holds.")
+        float, Meta(gt=0, le=200, description="Largest change of the yaw rate, in rad/s²; the same holds.")
     ] = 6.0
     command_timeout_s: Annotated[
         float, Meta(ge=0.02, le=10, description="Seconds without a command after which the wheels stop.")
     ] = 0.5
     scan_timeout_s: Annotated[
-        float, Meta(ge=0.05, le=10, description="Seconds without a full turn of the LiDAR after which they stop.")
+        float, Meta(ge=0.05, le=10, description="Seconds without a full revolution of the LiDAR after which they stop.")
     ] = 0.6
     min_valid_share: Annotated[
         float,
@@ -145,7 +145,7 @@ class Safety(_Section, frozen=True):
         Meta(
             ge=0.005,
             le=10,
-            description="Seconds without a turn of the supervisor's loop after which the wheels stop; at least twice "
+            description="Seconds without a cycle of the supervisor's loop after which the wheels stop; at least twice "
             "`execution.period_s`.",
         ),
     ] = 0.1

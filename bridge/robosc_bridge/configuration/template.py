@@ -29,7 +29,7 @@ PORTS: dict[str, str] = {
 """Usual port of each device; the LiDAR's adapter is the first of its kind."""
 
 SCAN_TIMEOUTS_S: dict[str, float] = {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
-"""Three turns of each LiDAR."""
+"""Three revolutions of each LiDAR."""
 
 _WIDTH = 110
 _IN, _OUT = CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSAGE

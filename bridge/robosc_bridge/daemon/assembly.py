@@ -45,7 +45,7 @@ EXCHANGE_S = 0.02
 """Time between exchanges with the drive base: what OpenCR refreshes its registers at."""
 
 RESTART_S = 3.0
-"""After so long without a full turn a LiDAR's motor is restarted, as its official driver does."""
+"""After so long without a full revolution a LiDAR's motor is restarted, as its official driver does."""
 
 LONGEST_PERIOD_S = 0.9
 """The safety layer waits for the loop for two seconds at most, and for two periods at least (`safety.overrun_s`)."""
@@ -143,13 +143,13 @@ def check_settings(configuration: Configuration, mapping: ChannelMapping, deploy
 
 
 def _scan_problems(configuration: Configuration) -> list[str]:
-    """A time within which no turn can be complete would stop the robot for ever."""
+    """A time within which no revolution can be complete would stop the robot for ever."""
     scanner, timeout_s = configuration.scanner, configuration.safety.scan_timeout_s
     features = None if scanner is None else features_of(scanner.driver, Kind.RANGE_SCANNER)
     if features is None or features.revolution_s is None or timeout_s > features.revolution_s:
         return []
     return [
-        f"safety.scan_timeout_s: a turn of the LiDAR takes {features.revolution_s:g} s, so it must be longer than that"
+        f"safety.scan_timeout_s: a revolution of the LiDAR takes {features.revolution_s:g} s; the time must be longer"
     ]
 
 
@@ -317,7 +317,7 @@ def assemble(
         is_layer=is_layer,
     )
     rotate = configuration.skills.rotate
-    # A turn has a time limit, which goes by its speed.
+    # A rotation has a time limit, which goes by its speed.
     speed_rad_s = min(rotate.speed_rad_s, limits.angular_rad_s)
     slowest_rad_s = min(rotate.slowest_rad_s, speed_rad_s)
     rotate = msgspec.structs.replace(rotate, speed_rad_s=speed_rad_s, slowest_rad_s=slowest_rad_s)

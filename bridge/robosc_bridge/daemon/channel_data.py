@@ -20,7 +20,7 @@ def scan_data(scan: Scan) -> dict[str, Any]:
         "angle_min": 0.0,
         "angle_max": math.tau - _STEP_RAD,
         "angle_increment": _STEP_RAD,
-        "scan_time": 1.0 / scan.turns_per_s if scan.turns_per_s > 0.0 else math.nan,
+        "scan_time": 1.0 / scan.revolutions_per_s if scan.revolutions_per_s > 0.0 else math.nan,
         "range_min": min(known, default=0.0),
         "range_max": max(known, default=0.0),
     }

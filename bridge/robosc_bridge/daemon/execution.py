@@ -94,7 +94,7 @@ class Execution:
                 self._requesters.release_silent(self.layer)
             self.executor.tick()
             self._robot.settle(self.executor)
-            self._robot.report_turn(self.executor)
+            self._robot.report_rotation(self.executor)
         period_s = self._job.settings.period_s
         self.due_s += period_s
         if self.due_s <= now_s:

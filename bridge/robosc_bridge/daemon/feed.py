@@ -22,7 +22,7 @@ MAXIMUM_WAITING = 1000
 
 @dataclass(frozen=True)
 class Snapshot:
-    """State of the daemon, as the loop saw it at the end of a turn. Nobody changes any part of it.
+    """State of the daemon, as the loop saw it at the end of a cycle. Nobody changes any part of it.
 
     Attributes:
         number: Number that grows with each snapshot.
@@ -37,7 +37,7 @@ class Snapshot:
             value}}}`; empty: nothing is executed.
         enabled: Names of the requests that are allowed now, in the model's order.
         reading: Last reading of the drive base; None: nothing yet, or it is lost.
-        scan: The LiDAR's last full turn; None: the same.
+        scan: The LiDAR's last full revolution; None: the same.
         overruns: Number of decisions that were left out because the one before took too long.
         communications: Location of each service and action, by name; empty: nothing is executed.
     """

@@ -20,7 +20,7 @@ def file_problems(configuration: Configuration, fastest: Velocity) -> list[str]:
 
     Args:
         configuration: Configuration that names the files.
-        fastest: Limits of speed and turn rate.
+        fastest: Limits of speed and yaw rate.
 
     Raises:
         GroundSettingsError: The ground station cannot be reached as configured.

@@ -62,7 +62,7 @@ class Lifecycle:
         self._stop_end_s = self._reset_end_s = 0.0
         self._after_stop = State.STANDBY
         self._is_drive_lost = False
-        self._failed_turn = self._missing = ""
+        self._failed_rotation = self._missing = ""
         self._hurry: Callable[[], None] = lambda: None
         self._reset_drive: Callable[[], None] = lambda: None
         self._are_alive: Callable[[], bool] = lambda: True
@@ -183,7 +183,7 @@ class Lifecycle:
             return
         if self.state is State.STANDBY:
             self._begin()
-        # What the first steps of the supervisor lead to is known at the end of this turn.
+        # What the first steps of the supervisor lead to is known at the end of this cycle.
         self._orders.wait(Until.STARTED, order)
 
     def _why_not_start(self) -> str:
@@ -297,12 +297,12 @@ class Lifecycle:
         self.problem = f"{self.problem}; {problem}" if self.problem else problem
 
     def poll(self, now_s: float) -> None:
-        """At the end of a turn: whether the state becomes another."""
+        """At the end of a cycle: whether the state becomes another."""
         if self.state is State.RUNNING and not self._are_alive():
             self._fault("a thread of a device or a remote endpoint has ended")
-        if self._failed_turn and self.state is State.RUNNING:
-            self._fault(f"a turn has failed, and no message of the model tells it so: {self._failed_turn}")
-        self._failed_turn = ""
+        if self._failed_rotation and self.state is State.RUNNING:
+            self._fault(f"a rotation has failed, and no message of the model tells it so: {self._failed_rotation}")
+        self._failed_rotation = ""
         executor = self._execution.executor
         if self.state is State.RUNNING and executor is not None and executor.is_faulty:
             self._safety.supervisor_fault()
@@ -373,6 +373,6 @@ class Lifecycle:
             self._enable()
         return why
 
-    def turn_failed(self, reason: str) -> None:
-        """A turn has failed of which the model hears nothing."""
-        self._failed_turn = reason or "it was ended"
+    def rotation_failed(self, reason: str) -> None:
+        """A rotation has failed of which the model hears nothing."""
+        self._failed_rotation = reason or "it was ended"

@@ -40,10 +40,10 @@ from robosc_bridge.skills import EmergencyStop, Rotate
 _log = logging.getLogger(__name__)
 
 PROGRAM_SHARE = 50
-"""Maximum number of items from programs that are taken up in one turn."""
+"""Maximum number of items from programs that are taken up in one cycle."""
 
 PROGRAM_SHARE_S = 0.002
-"""After how long in one turn no more of it is taken up; one of it is in any case."""
+"""After how long in one cycle no more of it is taken up; one of it is in any case."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Daemon:
     Args:
         job: Job that is executed.
         safety: Safety layer through which all motion passes.
-        rotate: The skill that turns.
+        rotate: The skill that rotates.
         emergency_stop: The operator's stop.
         clock: The only source of time.
         log: The executor's event log.
@@ -105,7 +105,7 @@ class Daemon:
             self._motion,
             self._switch,
             exchange,
-            lifecycle.turn_failed,
+            lifecycle.rotation_failed,
             job.settings.service_timeout_s,
             clock.monotonic,
         )
@@ -155,7 +155,7 @@ class Daemon:
         if isinstance(item, Command):
             item = Order(item, "", unanswered)
         if isinstance(item, Order) and item.command in HALTS:
-            # These do not wait for the loop's turn, and what came before them does not undo them.
+            # These do not wait for the loop, and what came before them does not undo them.
             self._orders.halting(item)
             self._safety.operator_stop() if item.command is Command.STOP else self._safety.disable()
             self._hurry()
@@ -164,15 +164,15 @@ class Daemon:
             self._drain()
 
     def run(self) -> None:
-        """Take turns until somebody wants it to end."""
+        """Run cycles until somebody wants it to end."""
         try:
             while self.state is not State.OVER:
                 try:
                     item = self._inbox.get(timeout=self._pause_s())
                 except queue.Empty:
-                    self.turn()
+                    self.cycle()
                 else:
-                    self.turn(item)
+                    self.cycle(item)
         finally:
             self._lifecycle.state = State.OVER
             self._close()
@@ -195,14 +195,14 @@ class Daemon:
                 break
             _refuse(item)
 
-    def turn(self, *items: Item) -> None:
+    def cycle(self, *items: Item) -> None:
         """Handle what has come, and decide if it is time."""
         self._in_hand = items
-        self._safety.loop_turned(self._clock.monotonic())
+        self._safety.loop_cycled(self._clock.monotonic())
         self._in_hand = ()
         for item in items:
             self._handle(item)
-        # Not what comes meanwhile: nobody can keep the loop from its turn.
+        # Not what comes meanwhile: nobody can keep the loop from its cycle.
         for _ in range(self._inbox.qsize()):
             self._handle(self._inbox.get_nowait())
         self._take_from_programs()
@@ -263,7 +263,7 @@ class Daemon:
                 self._lifecycle.execute(item)
                 self._in_hand = ()
             case _Woken():
-                pass  # What they have sent is taken up in any turn.
+                pass  # What they have sent is taken up in any cycle.
             case _:
                 assert_never(item)
 
@@ -272,8 +272,8 @@ class Daemon:
         if velocity == self._wish:
             return
         self._wish = velocity
-        # On its way, a turn has another speed after each exchange; the next one is soon enough for it.
-        if not self._motion.is_turning or velocity == STANDSTILL:
+        # On its way, a rotation has another speed after each exchange; the next one is soon enough for it.
+        if not self._motion.is_rotating or velocity == STANDSTILL:
             self._hurry()
 
 

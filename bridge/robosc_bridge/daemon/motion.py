@@ -1,7 +1,7 @@
-"""Wanted motion of the wheels: keep a velocity, turn by an angle, or stand still.
+"""Wanted motion of the wheels: keep a velocity, rotate by an angle, or stand still.
 
 A velocity that the supervisor asked for holds until it asks for something else, as on any drive base; its releases
-decide whether it still may (semantics 3.6). It is passed to the safety layer anew at every turn of the loop, so that
+decide whether it still may (semantics 3.6). It is passed to the safety layer anew at every cycle of the loop, so that
 it ends with the loop.
 """
 
@@ -15,7 +15,7 @@ class Motion:
     """One wish at a time; the last one counts.
 
     Args:
-        rotate: The skill that turns.
+        rotate: The skill that rotates.
         command: Takes a velocity for the safety layer, and the time.
     """
 
@@ -26,62 +26,62 @@ class Motion:
         self._is_paused = False
 
     @property
-    def is_turning(self) -> bool:
-        """True if a turn by an angle is under way."""
-        return self._rotate.is_turning
+    def is_rotating(self) -> bool:
+        """True if a rotation by an angle is under way."""
+        return self._rotate.is_rotating
 
     @property
     def remaining_rad(self) -> float:
-        """Remaining angle of a turn, in radians, counter-clockwise above zero."""
+        """Remaining angle of a rotation, in radians, counter-clockwise above zero."""
         return self._rotate.remaining_rad
 
     @property
     def reason(self) -> str:
-        """Reason why the last turn failed; empty: it did not."""
+        """Reason why the last rotation failed; empty: it did not."""
         return self._rotate.reason
 
     def drive(self, velocity: Velocity, now_s: float) -> None:
-        """Keep a velocity from now on; a turn under way has failed."""
+        """Keep a velocity from now on; a rotation under way has failed."""
         self._rotate.cancel("another motion was asked for")
         self._pass(velocity, now_s)
 
     def stop(self, now_s: float, reason: str = "the robot was told to stop") -> None:
-        """Stand still from now on; a turn under way has failed."""
+        """Stand still from now on; a rotation under way has failed."""
         self._rotate.cancel(reason)
         self._pass(STANDSTILL, now_s)
 
-    def turn(self, angle_rad: float, now_s: float) -> bool:
-        """Begin a turn, counter-clockwise above zero; False: another one is under way and goes on."""
+    def rotate(self, angle_rad: float, now_s: float) -> bool:
+        """Begin a rotation, counter-clockwise above zero; False: another one is under way and goes on."""
         if not self._rotate.start(angle_rad, now_s):
             return False
         self._pass(STANDSTILL, now_s)
         return True
 
     def pause(self, is_paused: bool, now_s: float) -> None:
-        """Stand still while the executor is in a safe stop; a velocity is forgotten, a turn goes on afterwards."""
-        if is_paused and not self._rotate.is_turning:
+        """Stand still while the executor is in a safe stop; a velocity is forgotten, a rotation goes on afterwards."""
+        if is_paused and not self._rotate.is_rotating:
             self._wish = STANDSTILL
         if is_paused != self._is_paused:
             self._is_paused = is_paused
             self._pass(self._wish, now_s)
 
     def saw(self, reading: DriveReading) -> None:
-        """The drive base told where it is: a turn goes on."""
-        if self._rotate.is_turning:
+        """The drive base told where it is: a rotation goes on."""
+        if self._rotate.is_rotating:
             self._pass(self._rotate.update(reading.pose.heading_rad, reading.time_s), reading.time_s)
 
     def refresh(self, now_s: float) -> None:
-        """The loop is at its turn: what was wanted is still wanted."""
-        if self._rotate.is_turning:
+        """The loop is at work: what was wanted is still wanted."""
+        if self._rotate.is_rotating:
             # For its time limit only: without a new heading nobody knows how far it is.
             self._rotate.update(None, now_s)
-            if not self._rotate.is_turning:
+            if not self._rotate.is_rotating:
                 self._wish = STANDSTILL
         self._pass(self._wish, now_s)
 
     @property
     def has_arrived(self) -> bool:
-        """True if the last turn has come to its end."""
+        """True if the last rotation has come to its end."""
         return self._rotate.state is RotateState.DONE
 
     def _pass(self, velocity: Velocity, now_s: float) -> None:

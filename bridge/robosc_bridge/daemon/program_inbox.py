@@ -1,6 +1,6 @@
 """Items of programs on their way to the loop: bounded for each program, so that none can hold up the others.
 
-The loop takes some at each of its turns, from each program in turn. A program that sends faster than they are taken
+The loop takes some in each of its cycles, from each program in turn. A program that sends faster than they are taken
 loses what is beyond the limits, and all that follows until it is told so, in its place in the order. Whatever it
 asked for ends then: what was lost may have been the message that ends it.
 """

@@ -16,7 +16,7 @@ class Readiness:
     Attributes:
         devices: For each device that belongs to the robot, True if it works; replaced at each change, never changed.
         reading: Last reading of the drive base; None: nothing yet, or it is lost.
-        scan: The LiDAR's last full turn; None: the same.
+        scan: The LiDAR's last full revolution; None: the same.
     """
 
     def __init__(self, *, needs_scanner: bool, needs_camera: bool = False) -> None:
@@ -57,5 +57,5 @@ class Readiness:
             if not is_there:
                 return f"the {_NAMES.get(device, device)} is not there"
         if Device.SCANNER in self.devices and self.scan is None:
-            return "the scanner has made no full turn yet"
+            return "the scanner has made no full revolution yet"
         return ""

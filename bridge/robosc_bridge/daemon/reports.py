@@ -19,7 +19,7 @@ class Device(StrEnum):
 class DeviceUp:
     """Report that a device works.
 
-    The drive base was opened, the scanner has made a full turn, or the camera has sent a picture.
+    The drive base was opened, the scanner has made a full revolution, or the camera has sent a picture.
 
     Attributes:
         device: Device that works.
@@ -75,7 +75,7 @@ class Sighting:
 
     Attributes:
         time_s: Time when the picture had come, or was missed, in seconds.
-        correction_rad_s: Turn rate to keep on the line, in rad/s, counter-clockwise above zero; None: no line is in
+        correction_rad_s: Yaw rate to keep on the line, in rad/s, counter-clockwise above zero; None: no line is in
             sight.
     """
 

@@ -117,17 +117,17 @@ class RequestChecker:
                 raise InvalidRequestError(
                     f"'{communication.name}': '{path}' must be 0: '{channel_name(channel)}' does not use it"
                 )
-        _require_turn(communication, channel, data)
+        _require_angle(communication, channel, data)
 
 
-def _require_turn(communication: Communication, channel: Channel, data: Any) -> None:
-    """Do nothing if a turn can be made of an angle; one that is not finite is held back by the layer."""
+def _require_angle(communication: Communication, channel: Channel, data: Any) -> None:
+    """Do nothing if a rotation can be made of an angle; one that is not finite is held back by the layer."""
     if isinstance(channel, RotateChannel):
         angle = angle_of(data)
         rad = math.radians(angle) if channel.unit == "degrees" else angle
         if math.isfinite(rad) and abs(rad) > MAXIMUM_ANGLE_RAD:
             raise InvalidRequestError(
-                f"'{communication.name}': an angle of {angle:g} {channel.unit} is beyond a hundred turns"
+                f"'{communication.name}': an angle of {angle:g} {channel.unit} is beyond a hundred revolutions"
             )
 
 

@@ -57,7 +57,7 @@ class Requesters:
     Args:
         checker: Requests that programs may make.
         clients: Connected programs.
-        abandon: Function that ends a turn that a communication asked for, with the reason.
+        abandon: Function that ends a rotation that a communication asked for, with the reason.
         command_timeout_s: Time without a message of a program after which its last one on an identifier is released,
             in seconds; 0: never.
         clock: Clock that returns the time, in seconds.
@@ -105,7 +105,7 @@ class Requesters:
         self._end(program, layer, _TOO_MUCH)
 
     def _end(self, program: Program, layer: Layer, reason: str) -> None:
-        """Stop what a program's messages keep moving, cancel its goals and end its turns."""
+        """Stop what a program's messages keep moving, cancel its goals and end its rotations."""
         for identifier, sender in tuple(self._senders.items()):
             if sender.program is program:
                 del self._senders[identifier]

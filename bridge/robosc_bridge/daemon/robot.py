@@ -1,7 +1,7 @@
 """The robot as the executor sees it: requests go to channels, and what the devices tell comes from them.
 
-What follows from a request at once, such as that a turn has failed, is told to the executor later, in `settle`: it must
-not be called while it is at work.
+What follows from a request at once, such as that a rotation has failed, is told to the executor later, in `settle`: it
+must not be called while it is at work.
 """
 
 import logging
@@ -15,9 +15,9 @@ from robosc_bridge.daemon.channel_data import battery_data, imu_data, odometry_d
 from robosc_bridge.daemon.exchange import Exchange
 from robosc_bridge.daemon.motion import Motion
 from robosc_bridge.daemon.reports import Device, Sighting
+from robosc_bridge.daemon.rotations import Rotations, done
 from robosc_bridge.daemon.stop_switch import StopSwitch
 from robosc_bridge.daemon.supervised import Listeners, Supervised
-from robosc_bridge.daemon.turns import Turns, done
 from robosc_bridge.daemon.wheel_messages import finite, is_default, velocity_of
 from robosc_bridge.devices.interface import DriveReading, Scan
 
@@ -35,7 +35,7 @@ class Robot:
         motion: Motion of the wheels.
         switch: The operator's stop.
         exchange: Exchange with programs on the other side of a remote endpoint.
-        on_failed_turn: Called with the reason when a turn has failed of which the model hears nothing.
+        on_failed_rotation: Called with the reason when a rotation has failed of which the model hears nothing.
         service_timeout_s: Time after which the executor takes a call for failed, in seconds; None: never.
         clock: Clock that returns the time, in seconds.
     """
@@ -47,7 +47,7 @@ class Robot:
         motion: Motion,
         switch: StopSwitch,
         exchange: Exchange,
-        on_failed_turn: Callable[[str], None],
+        on_failed_rotation: Callable[[str], None],
         service_timeout_s: float | None,
         clock: Callable[[], float],
     ) -> None:
@@ -60,13 +60,13 @@ class Robot:
         self._by_name = {item.name: item for item in mapping.communications}
         self._by_identifier = {item.identifier: item for item in reversed(mapping.communications)}
         self._owed: deque[Callable[[Supervised], None]] = deque()
-        self._turns = Turns(motion, listeners, self._owed.append, on_failed_turn, service_timeout_s, clock)
+        self._rotations = Rotations(motion, listeners, self._owed.append, on_failed_rotation, service_timeout_s, clock)
         self._buttons: Mapping[str, bool] = {}
 
     def forget(self) -> None:
         """A run of an executor begins or is over: what an earlier one asked for is none of its business."""
         self._owed.clear()
-        self._turns.forget()
+        self._rotations.forget()
         self._exchange.forget()
 
     # The executor's side.
@@ -88,13 +88,13 @@ class Robot:
         item = self._by_name[communication]
         match self._channels[communication]:
             case channels.DriveChannel():
-                self._turns.end("another motion was asked for", is_own=True)
+                self._rotations.end("another motion was asked for", is_own=True)
                 self._motion.drive(velocity_of(message), self._clock())
             case channels.StopChannel():
                 self._stop()
             case channels.RotateChannel() as channel:
-                self._turns.end("another turn was asked for", is_own=True)
-                self._turns.begin(item, channel, None, message)
+                self._rotations.end("another rotation was asked for", is_own=True)
+                self._rotations.begin(item, channel, None, message)
             case channels.GrpcChannel():
                 self._exchange.send(item, message)
             case channels.LogChannel():
@@ -103,11 +103,11 @@ class Robot:
                 pass  # `none`: dropped on purpose.
 
     def publish_default(self, identifier: str) -> None:
-        """The all-default message: on the drive, a standstill, which a turn by an angle does not mind."""
+        """The all-default message: on the drive, a standstill, which a rotation by an angle does not mind."""
         item = self._by_identifier[identifier]
         match self._channels[item.name]:
             case channels.DriveChannel():
-                if not self._motion.is_turning:
+                if not self._motion.is_rotating:
                     self._motion.stop(self._clock())
             case channels.StopChannel() | channels.RotateChannel():
                 self._stop()
@@ -125,22 +125,22 @@ class Robot:
             case channels.StopChannel():
                 self._stop()
                 self._owed.append(lambda executor: executor.on_reply(request_id, done("")))
-            case channels.RotateChannel() as channel if not self._turns.is_under_way:
-                self._turns.begin(item, channel, request_id, message)
+            case channels.RotateChannel() as channel if not self._rotations.is_under_way:
+                self._rotations.begin(item, channel, request_id, message)
             case channels.GrpcChannel():
                 why = self._exchange.call(item, request_id, message)
                 if why:
                     self._owed.append(lambda executor: executor.on_call_failed(request_id, why))
             case _:
-                self._owed.append(lambda executor: executor.on_call_failed(request_id, "another turn is under way"))
+                self._owed.append(lambda executor: executor.on_call_failed(request_id, "another rotation is under way"))
 
     def send_goal(self, communication: str, goal_id: int, message: Any) -> None:
         """Begin what an action is asked for."""
         item = self._by_name[communication]
         match self._channels[communication]:
-            case channels.RotateChannel() as channel if not self._turns.is_under_way:
+            case channels.RotateChannel() as channel if not self._rotations.is_under_way:
                 self._owed.append(lambda executor: executor.on_goal_accepted(goal_id))
-                self._turns.begin(item, channel, goal_id, message)
+                self._rotations.begin(item, channel, goal_id, message)
             case channels.GrpcChannel() if self._exchange.send_goal(item, goal_id, message):
                 pass
             case _:
@@ -151,20 +151,20 @@ class Robot:
         if isinstance(self._channels[communication], channels.GrpcChannel):
             self._exchange.cancel(goal_id)
         else:
-            self._turns.cancel(communication, goal_id)
+            self._rotations.cancel(communication, goal_id)
 
     def stop(self, reason: str) -> None:
-        """Stand still; a turn under way has failed."""
-        self._turns.end(reason)
+        """Stand still; a rotation under way has failed."""
+        self._rotations.end(reason)
         self._motion.stop(self._clock(), reason)
 
     def abandon(self, communication: str, reason: str) -> None:
         """End a motion because whoever asked for it is gone."""
-        if self._turns.asked_by == communication:
-            self._turns.end(reason, is_own=True)
+        if self._rotations.asked_by == communication:
+            self._rotations.end(reason, is_own=True)
 
     def _stop(self) -> None:
-        self._turns.end("the robot was told to stop", is_own=True)
+        self._rotations.end("the robot was told to stop", is_own=True)
         self._motion.stop(self._clock())
 
     # The devices' side.
@@ -188,7 +188,7 @@ class Robot:
         self._buttons = {}
 
     def saw_scan(self, scan: Scan, executor: Supervised) -> None:
-        """A full turn of the LiDAR."""
+        """A full revolution of the LiDAR."""
         for identifier, _ in self._listeners.of(channels.ScannerChannel):
             executor.receive(identifier, scan_data(scan))
         self.settle(executor)
@@ -208,7 +208,7 @@ class Robot:
             if channel.event == event and channel.device in (str(device), "any"):
                 executor.receive(identifier, shaped(self._by_identifier[identifier], text))
         if is_lost and device is Device.DRIVE:
-            self._turns.end("the drive base is lost")
+            self._rotations.end("the drive base is lost")
 
     def saw_key(self, key: str, executor: Supervised) -> None:
         """A key was typed in the terminal."""
@@ -219,14 +219,14 @@ class Robot:
 
     def settle(self, executor: Supervised) -> None:
         """Tell the executor what has become of its requests."""
-        self._turns.poll()
+        self._rotations.poll()
         while self._owed:
             self._owed.popleft()(executor)
-            self._turns.poll()
+            self._rotations.poll()
 
-    def report_turn(self, executor: Supervised) -> None:
-        """Tell how far a turn is that an action asked for."""
-        self._turns.report(executor)
+    def report_rotation(self, executor: Supervised) -> None:
+        """Tell how far a rotation is that an action asked for."""
+        self._rotations.report(executor)
 
     def _saw_buttons(self, buttons: Mapping[str, bool], executor: Supervised) -> None:
         before, self._buttons = self._buttons, dict(buttons)

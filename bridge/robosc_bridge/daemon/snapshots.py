@@ -65,7 +65,7 @@ class Snapshots:
             self._feed.tell({"time": self._clock.wall(), "kind": kind, "what": what})
 
     def poll(self, state: State, problem: str, notice: SafetyNotice) -> None:
-        """Show what is so at the end of a turn, if it is news or measurements have not been shown for a while."""
+        """Show what is so at the end of a cycle, if it is news or measurements have not been shown for a while."""
         stops, changes = self._execution.stops, self._execution.changes
         if changes != self._changes:
             self._changes = changes

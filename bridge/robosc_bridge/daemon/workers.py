@@ -36,10 +36,10 @@ The safety layer must notice that nothing holds any more.
 """
 
 RESTART_LIMIT = 3
-"""Restarts of a scanner's motor without a full turn after which the scanner is closed and opened anew."""
+"""Restarts of a scanner's motor without a full revolution after which the scanner is closed and opened anew."""
 
 VALID_LIMIT = 8
-"""A turn with fewer valid ranges shows nothing: the LiDAR is covered, or something is too near."""
+"""A revolution with fewer valid ranges shows nothing: the LiDAR is covered, or something is too near."""
 
 
 class Command(Protocol):
@@ -75,7 +75,7 @@ class Gate(Protocol):
         """The drive base did not answer."""
 
     def saw_scan(self, now_s: float, ranges_m: Sequence[float]) -> None:
-        """A full turn came, with a range for each degree."""
+        """A full revolution came, with a range for each degree."""
 
     def saw_noise(self, is_noisy: bool) -> None:
         """Take the report whether many frames of the scanner are damaged."""
@@ -238,15 +238,15 @@ class DriveWorker:
 
 
 class ScannerWorker:
-    """Worker that keeps a range scanner turning: each full turn is reported.
+    """Worker that keeps a range scanner turning: each full revolution is reported.
 
     Args:
         scanner: The scanner.
         gate: The safety layer.
         report: Function that takes the reports; must not wait.
-        silent_after_s: Time without a full turn after which it counts as lost, in seconds.
-        restart_after_s: Time without any turn after which its motor is restarted, in seconds, `RESTART_LIMIT` times;
-            then it is lost.
+        silent_after_s: Time without a full revolution after which it counts as lost, in seconds.
+        restart_after_s: Time without any revolution after which its motor is restarted, in seconds, `RESTART_LIMIT`
+            times; then it is lost.
         clock: Clock that returns the time, in seconds.
         backoff: Pauses between attempts to open it.
         bad_frames_share: Share of damaged frames in a second above which its line is reported to be noisy.
@@ -273,13 +273,13 @@ class ScannerWorker:
         self._clock = clock
         self._backoff = backoff or Backoff()
         self._is_open = False
-        self._is_turning = False
+        self._is_rotating = False
         self._heard_s = self._restart_at_s = 0.0
         self._restarts = 0
         self._frames = FrameErrorMonitor(scanner.counters, bad_frames_share)
 
     def step(self, now_s: float) -> float:
-        """Open it, or listen for a turn."""
+        """Open it, or listen for a rotation."""
         try:
             if self._is_open:
                 self._listen()
@@ -300,12 +300,12 @@ class ScannerWorker:
         scan = self._scanner.receive(_LISTEN_S)
         if scan is not None and sum(not math.isnan(value) for value in scan.ranges_m) >= VALID_LIMIT:
             self._heard(scan)
-        elif self._is_turning and self._clock() - self._heard_s > self._silent_after_s:
-            self._is_turning = False
-            what = f"no full turn with valid ranges for {self._silent_after_s:g} s"
+        elif self._is_rotating and self._clock() - self._heard_s > self._silent_after_s:
+            self._is_rotating = False
+            what = f"no full revolution with valid ranges for {self._silent_after_s:g} s"
             self._report(DeviceDown(Device.SCANNER, what, 0.0, is_first=True))
         if scan is not None:
-            # It turns, whatever it sees.
+            # It rotates, whatever it sees.
             self._restarts = 0
             self._restart_at_s = self._clock() + self._restart_after_s
         elif self._clock() >= self._restart_at_s:
@@ -314,7 +314,7 @@ class ScannerWorker:
 
     def _restart(self) -> None:
         if self._restarts >= RESTART_LIMIT:
-            raise DeviceSilentError(f"no full turn, also after its motor was started anew {RESTART_LIMIT} times")
+            raise DeviceSilentError(f"no full revolution, also after its motor was started anew {RESTART_LIMIT} times")
         self._restarts += 1
         self._scanner.restart()
         self._restart_at_s = self._clock() + self._restart_after_s
@@ -328,14 +328,14 @@ class ScannerWorker:
     def _heard(self, scan: Scan) -> None:
         self._backoff.succeeded()
         self._gate.saw_scan(scan.time_s, scan.ranges_m)
-        if not self._is_turning:
-            self._is_turning = True
+        if not self._is_rotating:
+            self._is_rotating = True
             self._report(DeviceUp(Device.SCANNER))
         self._report(scan)
         self._heard_s = scan.time_s
 
     def _failed(self, problem: str) -> float:
-        self._is_open = self._is_turning = False
+        self._is_open = self._is_rotating = False
         is_first = self._backoff.is_fresh
         retry_s = self._backoff.failed()
         self._report(DeviceDown(Device.SCANNER, problem, retry_s, is_first))

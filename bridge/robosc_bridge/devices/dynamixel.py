@@ -93,7 +93,7 @@ class DynamixelBase:
         self._is_doubtful = True
         self._commanded_s = 0.0
         self._check_s = 0.0
-        self._is_watchdogs_turn = False
+        self._is_watchdog_next = False
 
     @property
     def limits(self) -> DriveLimits:
@@ -135,7 +135,7 @@ class DynamixelBase:
             LineError: The line is gone.
             DeviceSilentError: A motor does not answer.
             DeviceFaultError: A motor has shut down, or does not do it.
-            DeviceError: The wheels still turn, or a motor refuses its settings.
+            DeviceError: The wheels still rotate, or a motor refuses its settings.
         """
         pair, _ = self._opened()
         self._is_torque_wanted = self._is_torque_on = False
@@ -245,7 +245,7 @@ class DynamixelBase:
         if any(self._odometry.jumps(*(one.ticks for one in measured))):
             # Of its own motion, or of a restart.
             self._check_torque(pair)
-        self._check_by_turns(pair)
+        self._check_alternately(pair)
         return self._reading(pair, measured, goals, time_s)
 
     def _has_paused(self) -> bool:
@@ -259,19 +259,19 @@ class DynamixelBase:
             pair.hardware[motor] = frozenset()
         elif faults := pair.read_hardware(motor) - {MotorFault.VOLTAGE}:
             self._is_torque_on = False
-            # The other wheel, at once: one alone turns the robot.
+            # The other wheel, at once: one alone rotates the robot.
             self._stop_for(pair, faults)
 
-    def _check_by_turns(self, pair: ServoPair) -> None:
+    def _check_alternately(self, pair: ServoPair) -> None:
         now_s = self._host.monotonic()
         if now_s < self._check_s:
             return
         self._check_s = now_s + CHECK_PERIOD_S / 2
-        if self._is_watchdogs_turn:
+        if self._is_watchdog_next:
             self._check_watchdogs(pair)
         else:
             self._check_torque(pair)
-        self._is_watchdogs_turn = not self._is_watchdogs_turn
+        self._is_watchdog_next = not self._is_watchdog_next
 
     def _check_torque(self, pair: ServoPair) -> None:
         self._is_torque_on, (has_left, has_right) = pair.read_torque()

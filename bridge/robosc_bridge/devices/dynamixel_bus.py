@@ -35,16 +35,18 @@ def exchange_limit_s(answer_limit_s: float) -> float:
 
 _EMPTY_STATUS = 11  # Bytes of an answer without data.
 
-# What a device is asked for to have all older answers behind it: address and length, by turns. Whole registers without
-# gaps, which every device has, of lengths that no request of a driver has; so many that with the usual limits an answer
-# must be 0.7 s late to be taken for one to a later turn.
+# What a device is asked for to have all older answers behind it: address and length, alternating. Whole registers
+# without gaps, which every device has, of lengths that no request of a driver has; so many that with the usual limits
+# an answer must be 0.7 s late to be taken for one to a later request.
 _SETTLING = (
     *((6, length) for length in (5, 6, 7, 8)),
     *((112, length) for length in (10, 11)),
     *((108, length) for length in (14, 15)),
     *((104, length) for length in (12, 16, 18, 19, 20, 22, 24, 28, 32, 36, 40, 42, 43)),
 )
-_turns = itertools.cycle(_SETTLING)  # Shared: a port that is opened anew may still get answers to the last session.
+_revolutions = itertools.cycle(
+    _SETTLING
+)  # Shared: a port that is opened anew may still get answers to the last session.
 
 
 class RefusedError(DeviceError):
@@ -140,7 +142,7 @@ class DynamixelBus:
             LineError: The line is gone.
             DeviceSilentError: There is no answer in time.
         """
-        address, length = next(_turns)
+        address, length = next(_revolutions)
 
         def fits(status: Status) -> bool:
             # A refusal has no length to know it by: it may be that of an older request.

@@ -1,4 +1,4 @@
-"""Watch over the wheels: whether they turn as they are told."""
+"""Watch over the wheels: whether they rotate as they are told."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ _SHARE = 0.5
 
 
 class FollowingWatch:
-    """Finds a wheel that is held, turns by itself, or has refused its goal without a word.
+    """Finds a wheel that is held, rotates by itself, or has refused its goal without a word.
 
     Args:
         limit_s: For how long a wheel may be far from its goal.

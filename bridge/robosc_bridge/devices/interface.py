@@ -51,7 +51,7 @@ class MotorFault(StrEnum):
     OVERLOAD = "overload"
     TORQUE_LOST = "torque off by itself"
     WATCHDOG = "bus watchdog"
-    BLOCKED = "does not turn as told"
+    BLOCKED = "does not rotate as told"
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class DriveLimits:
 
     Attributes:
         linear_m_s: Fastest speed forward and backward.
-        angular_rad_s: Fastest turn.
+        angular_rad_s: Fastest rotation.
         wheel_m_s: Fastest wheel.
     """
 
@@ -147,7 +147,7 @@ class DriveBase(Protocol):
 
 @dataclass(frozen=True)
 class RawScan:
-    """One turn as the device measured it, in its order.
+    """One revolution as the device measured it, in its order.
 
     Attributes:
         angles_rad: Of each point, counter-clockwise from the front, within [0, 2 pi).
@@ -165,20 +165,20 @@ BINS = 360
 
 @dataclass(frozen=True)
 class Scan:
-    """One full turn.
+    """One full revolution.
 
     Attributes:
         time_s: Time when its last byte had come, in seconds.
         ranges_m: `BINS` bins of one degree, counter-clockwise, the first straight ahead and half a degree to both
             sides of it; the smallest valid range of each, NaN if none.
         raw: The scan as it was measured.
-        turns_per_s: Speed of the motor as the device reports it.
+        revolutions_per_s: Speed of the motor as the device reports it.
     """
 
     time_s: float
     ranges_m: tuple[float, ...]
     raw: RawScan
-    turns_per_s: float
+    revolutions_per_s: float
 
 
 @dataclass
@@ -186,7 +186,7 @@ class ScannerCounters:
     """Health of a scanner's line.
 
     Attributes:
-        scans: Full turns.
+        scans: Full revolutions.
         frames: Well-formed frames.
         bad_frames: Frames with a wrong checksum or impossible contents.
         skipped_bytes: Bytes that belong to no frame.
@@ -199,7 +199,7 @@ class ScannerCounters:
 
 
 class RangeScanner(Protocol):
-    """A LiDAR that turns."""
+    """A LiDAR that rotates."""
 
     counters: ScannerCounters
 
@@ -211,7 +211,7 @@ class RangeScanner(Protocol):
         """
 
     def receive(self, limit_s: float) -> Scan | None:
-        """The next full turn; None: none was complete within the limit, or before `wake` was called.
+        """The next full revolution; None: none was complete within the limit, or before `wake` was called.
 
         Raises:
             LineError: The line is gone.

@@ -30,12 +30,12 @@ def _clamped(value: float, limit: float) -> float:
 
 def wheel_speeds(velocity: Velocity, separation_m: float) -> tuple[float, float]:
     """Speeds of the left and the right wheel, in metres per second."""
-    turn_m_s = velocity.angular_rad_s * separation_m / 2
-    return velocity.linear_m_s - turn_m_s, velocity.linear_m_s + turn_m_s
+    rotation_m_s = velocity.angular_rad_s * separation_m / 2
+    return velocity.linear_m_s - rotation_m_s, velocity.linear_m_s + rotation_m_s
 
 
 def body_velocity(left_m_s: float, right_m_s: float, separation_m: float) -> Velocity:
-    """The velocity of a body whose wheels turn that fast."""
+    """The velocity of a body whose wheels rotate that fast."""
     return Velocity((left_m_s + right_m_s) / 2, (right_m_s - left_m_s) / separation_m)
 
 

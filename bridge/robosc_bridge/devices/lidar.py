@@ -12,7 +12,7 @@ from robosc_bridge.errors import LineError, LineLostError
 from robosc_bridge.host import Host, Port
 from robosc_bridge.protocol import lds01, lds02, lds03
 from robosc_bridge.protocol.framing import FrameDecoder
-from robosc_bridge.protocol.turns import Points, Turn, TurnBuilder, nearest_by_degree, wrapped_deg
+from robosc_bridge.protocol.revolutions import Points, Revolution, RevolutionBuilder, nearest_by_degree, wrapped_deg
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 BAUD_TRIAL_S = 1.0
@@ -28,10 +28,10 @@ class Model[Frame]:
         bauds: Speeds of its line; the first is the likeliest.
         make_decoder: Function that makes a decoder of its frames.
         points: Function that returns the points of a frame.
-        start: Command that starts its motor; empty: it turns by itself.
+        start: Command that starts its motor; empty: it rotates by itself.
         stop: Command that stops its motor; empty: it cannot be stopped.
         restart_pause_s: Pause between stop and start, in seconds; None: a restart is the start alone.
-        stale_after_s: Three turns: after so long a silence, what came before says nothing about now.
+        stale_after_s: Three revolutions: after so long a silence, what came before says nothing about now.
         is_dtr_off: True if its official driver drops this modem line, which opening a port raises.
     """
 
@@ -62,7 +62,7 @@ class Lidar[Frame]:
         path: Path of its port.
         baud: Speed of its line; None: found out among those of the model.
         front_rad: Direction of its front, in radians, counter-clockwise from that of the robot.
-        is_upside_down: True if it hangs, so that it turns the other way round.
+        is_upside_down: True if it hangs, so that it rotates the other way round.
         host: Parts of its computer that it uses.
 
     Attributes:
@@ -88,7 +88,7 @@ class Lidar[Frame]:
         self._host = host
         self._clock = host.monotonic
         self._decoder = model.make_decoder()
-        self._turns = TurnBuilder()
+        self._revolutions = RevolutionBuilder()
         self._line: Port | None = None
         self._woken = threading.Event()
         self._listened_s = self._heard_s = self._clock()
@@ -124,7 +124,7 @@ class Lidar[Frame]:
             raise
 
     def receive(self, limit_s: float) -> Scan | None:
-        """The next full turn; when one read brings several, the newest.
+        """The next full revolution; when one read brings several, the newest.
 
         To be called again and again: it also sends what a restart still owes, and tries another speed while no
         well-formed frame has come. What waited in the line while nobody asked for so long that it is stale is
@@ -134,7 +134,7 @@ class Lidar[Frame]:
             limit_s: Longest wait.
 
         Returns:
-            None: no turn was complete within the limit, or before `wake` was called.
+            None: no revolution was complete within the limit, or before `wake` was called.
 
         Raises:
             LineError: The line is gone.
@@ -149,11 +149,11 @@ class Lidar[Frame]:
             due_s = self._keep_on(line, now_s)
             data = line.read(min(end_s, due_s) - now_s)
             now_s = self._listened_s = self._clock()
-            turn = self._decode(data, now_s) if data else None
+            revolution = self._decode(data, now_s) if data else None
             is_woken = self._woken.is_set()
-            if turn or is_woken or now_s >= end_s:
+            if revolution or is_woken or now_s >= end_s:
                 self._woken.clear()
-                return self._scan(turn, now_s) if turn else None
+                return self._scan(revolution, now_s) if revolution else None
 
     def wake(self) -> None:
         """Let a `receive` that waits in another thread return at once."""
@@ -199,7 +199,7 @@ class Lidar[Frame]:
     def _forget(self, now_s: float) -> None:
         self._decoder.forget()
         self._count()
-        self._turns.forget()
+        self._revolutions.forget()
         self._listened_s = self._heard_s = now_s
 
     def _start(self, line: Port) -> None:
@@ -216,17 +216,17 @@ class Lidar[Frame]:
             self._begin(line)
         return min(at_s for at_s in (self._start_at_s, self._trial_end_s, math.inf) if at_s is not None)
 
-    def _decode(self, data: bytes, now_s: float) -> Turn | None:
-        """The newest turn that these bytes complete."""
+    def _decode(self, data: bytes, now_s: float) -> Revolution | None:
+        """The newest revolution that these bytes complete."""
         if now_s - self._heard_s > self._model.stale_after_s:
             self._forget(now_s)
         newest = None
         for frame in self._decoder.feed(data):
             self._heard_s = now_s
-            turn = self._turns.add(self._model.points(frame))
-            if turn:
+            revolution = self._revolutions.add(self._model.points(frame))
+            if revolution:
                 self.counters.scans += 1
-                newest = turn
+                newest = revolution
         if self._decoder.counts.frames > self.counters.frames:
             self._is_baud_known = True
             self._trial_end_s = None
@@ -239,11 +239,13 @@ class Lidar[Frame]:
         self.counters.bad_frames = counts.bad_frames
         self.counters.skipped_bytes = counts.skipped_bytes
 
-    def _scan(self, turn: Turn, now_s: float) -> Scan:
-        angles_deg = self._seen_by_the_robot(turn.angles_deg)
-        ranges_m = nearest_by_degree(angles_deg, turn.ranges_m)
-        raw = RawScan(tuple([math.radians(angle_deg) for angle_deg in angles_deg]), turn.ranges_m, turn.intensities)
-        return Scan(now_s, ranges_m, raw, turn.turns_per_s)
+    def _scan(self, revolution: Revolution, now_s: float) -> Scan:
+        angles_deg = self._seen_by_the_robot(revolution.angles_deg)
+        ranges_m = nearest_by_degree(angles_deg, revolution.ranges_m)
+        raw = RawScan(
+            tuple([math.radians(angle_deg) for angle_deg in angles_deg]), revolution.ranges_m, revolution.intensities
+        )
+        return Scan(now_s, ranges_m, raw, revolution.revolutions_per_s)
 
     def _seen_by_the_robot(self, angles_deg: tuple[float, ...]) -> tuple[float, ...]:
         if self._is_upside_down:

@@ -74,7 +74,7 @@ class MavlinkObstacles:
         self._told.clear()
 
     def receive(self, limit_s: float) -> Scan | None:
-        """The next ring, or the next turn of single sensors; when several have come, the newest.
+        """The next ring, or the next round of single sensors; when several have come, the newest.
 
         Raises:
             LineError: The line is gone.
@@ -147,7 +147,7 @@ class MavlinkObstacles:
         return self._after_sensor(told.content, told.time_s)
 
     def _after_sensor(self, content: SectorDistance, time_s: float) -> Scan | None:
-        """A turn of them is complete when the first one tells again."""
+        """A round of them is complete when the first one tells again."""
         sector = sensor_sector(content)
         if sector is None or time_s - self._ring_s <= STALE_AFTER_S:
             return None
@@ -168,5 +168,5 @@ class MavlinkObstacles:
             tuple(sector.range_m for sector in sectors),
             (math.nan,) * len(sectors),
         )
-        # Nothing turns that it could tell the speed of.
+        # Nothing rotates that it could tell the speed of.
         return Scan(time_s, nearest_in_sectors(sectors), raw, math.nan)

@@ -37,7 +37,7 @@ def _of_place_and_attitude(state: VehicleState) -> Timestamped[Motion] | None:
         place.y_m,
         attitude.heading_rad,
         place.x_m_s * cosine + place.y_m_s * sine,
-        attitude.turn_rad_s,
+        attitude.yaw_rate_rad_s,
         _NO_ODOMETRY,
     )
     return Timestamped(min(state.position.time_s, state.attitude.time_s), motion)
@@ -67,12 +67,12 @@ class VehicleOdometry:
             jumps = self.rebases + (last is not None)
             return replace(self, velocity=velocity, last=motion, rebases=jumps)
         # The step, as seen along the vehicle's heading then, is the same in both frames.
-        turn_rad = self.pose.heading_rad - last.heading_rad
+        rotation_rad = self.pose.heading_rad - last.heading_rad
         x_m, y_m = motion.x_m - last.x_m, motion.y_m - last.y_m
-        heading_rad = math.remainder(motion.heading_rad + turn_rad, 2 * math.pi)
+        heading_rad = math.remainder(motion.heading_rad + rotation_rad, 2 * math.pi)
         pose = Pose(
-            self.pose.x_m + x_m * math.cos(turn_rad) - y_m * math.sin(turn_rad),
-            self.pose.y_m + x_m * math.sin(turn_rad) + y_m * math.cos(turn_rad),
+            self.pose.x_m + x_m * math.cos(rotation_rad) - y_m * math.sin(rotation_rad),
+            self.pose.y_m + x_m * math.sin(rotation_rad) + y_m * math.cos(rotation_rad),
             math.pi if heading_rad <= -math.pi else heading_rad,
         )
         return replace(self, pose=pose, velocity=velocity, last=motion)

@@ -1,4 +1,4 @@
-"""A MAVLink rover: ArduPilot Rover, driven in its mode GUIDED by velocity and turn rate.
+"""A MAVLink rover: ArduPilot Rover, driven in its mode GUIDED by velocity and yaw rate.
 
 The vehicle stops by itself 3 s after the last target. It is no real-time wheel bus: it tells once a second whether it
 is armed and in which mode, and a person with its remote control may take it over at any time, which is respected.

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from robosc_bridge.devices.interface import Pose
 
 _MODULUS = 2**32
-# A restart moves the count by whole turns; half a turn takes the fastest wheel 0.4 s.
+# A restart moves the count by whole revolutions; half a revolution takes the fastest wheel 0.4 s.
 _HALF_TURN = 2048
 
 
@@ -18,8 +18,8 @@ _HALF_TURN = 2048
 class Odometry:
     """An odometry after some readings; `advanced` gives the one after the next.
 
-    The encoders wrap around at 2**32, which is handled, and fall back into one turn when their motor restarts. The
-    odometry cannot know whether one has: a jump is a reason to look, and `rebased` what follows from it.
+    The encoders wrap around at 2**32, which is handled, and fall back into one revolution when their motor restarts.
+    The odometry cannot know whether one has: a jump is a reason to look, and `rebased` what follows from it.
 
     Attributes:
         tick_m: Way of a wheel in one tick.
@@ -69,12 +69,12 @@ def _step(before: int | None, now: int) -> int:
 
 def _moved(pose: Pose, left_m: float, right_m: float, separation_m: float) -> Pose:
     way_m = (left_m + right_m) / 2
-    turn_rad = (right_m - left_m) / separation_m
-    middle_rad = pose.heading_rad + turn_rad / 2
+    rotation_rad = (right_m - left_m) / separation_m
+    middle_rad = pose.heading_rad + rotation_rad / 2
     return Pose(
         pose.x_m + way_m * math.cos(middle_rad),
         pose.y_m + way_m * math.sin(middle_rad),
-        _wrapped(pose.heading_rad + turn_rad),
+        _wrapped(pose.heading_rad + rotation_rad),
     )
 
 

@@ -110,7 +110,7 @@ class OpenCrBase:
         """
         self._is_torque_wanted = False
         if not self._comes_to_rest() and is_on:
-            raise DeviceError(f"{self._path}: the wheels still turn")
+            raise DeviceError(f"{self._path}: the wheels still rotate")
         try:
             self._switch_torque(is_on)
         except DeviceFaultError:
@@ -143,7 +143,7 @@ class OpenCrBase:
         block = self._cycle(words if self._is_torque_wanted else None)
         if self._is_torque_wanted and not block.is_torque_on and not self._is_torque_lost:
             self._is_torque_lost = True
-            # A motor that has lost its power counts within one turn afterwards.
+            # A motor that has lost its power counts within one revolution afterwards.
             self._odometry = self._odometry.rebased()
             self._command((0, 0))
         faults = {MotorFault.TORQUE_LOST} if self._is_torque_lost else set()

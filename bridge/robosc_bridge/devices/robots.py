@@ -60,7 +60,7 @@ class Body:
 
     Attributes:
         linear_m_s: Fastest speed forward and backward; of a MAVLink rover, not more than its parameter CRUISE_SPEED.
-        angular_rad_s: Fastest turn.
+        angular_rad_s: Fastest rotation.
         wheel_separation_m: Distance between its left and its right wheels, in metres.
     """
 
@@ -91,7 +91,7 @@ class Robot:
         wheel_radius_m: Radius of both wheels.
         wheel_separation_m: Distance between the wheels' middles, in metres.
         linear_m_s: Fastest as published; also what the teleoperation of the stock robot clamps to.
-        angular_rad_s: The same of a turn.
+        angular_rad_s: The same of a rotation.
         motor: Motor of both wheels.
         firmware_rpm: Limit that OpenCR's firmware puts on its commands, in rpm.
         opencr_information: Numbers that an OpenCR for this robot reports as its model information.
@@ -128,8 +128,8 @@ class Robot:
         """Return the limits of the robot with servos that take goal velocities up to a limit."""
         firmware_m_s = self.firmware_rpm * 2 * math.pi / 60 * self.wheel_radius_m
         wheel_m_s = min(velocity_limit_raw * self.raw_m_s, firmware_m_s)
-        turning_rad_s = wheel_m_s / (self.wheel_separation_m / 2)
-        return DriveLimits(min(self.linear_m_s, wheel_m_s), min(self.angular_rad_s, turning_rad_s), wheel_m_s)
+        rotation_rad_s = wheel_m_s / (self.wheel_separation_m / 2)
+        return DriveLimits(min(self.linear_m_s, wheel_m_s), min(self.angular_rad_s, rotation_rad_s), wheel_m_s)
 
 
 BURGER = Robot("burger", 0.105, 0.033, 0.160, 0.22, 2.84, XL430_W250, 61.0, frozenset({1}))

@@ -89,7 +89,7 @@ class ServoPair:
         Raises:
             LineError: The line is gone.
             DeviceFaultError: One has shut down, or does not do it.
-            DeviceError: One does not answer or still turns, or refuses it.
+            DeviceError: One does not answer or still rotates, or refuses it.
         """
         self._bus.begin(self._limit_s)
         for motor in self.motors:
@@ -97,7 +97,7 @@ class ServoPair:
                 raise DeviceFaultError(f"{self._hardware_text(motor)}; it must be reset")
         self.halt()
         if not self.comes_to_rest():
-            raise DeviceError(f"{self._names[self.motors[0]]} or {self._names[self.motors[1]]} still turns")
+            raise DeviceError(f"{self._names[self.motors[0]]} or {self._names[self.motors[1]]} still rotates")
         for motor in self.motors:
             self._bus.begin(self._limit_s)
             # First the watchdog: a tripped one lets nothing else be written.

@@ -23,7 +23,7 @@ CHANNELS = {
 }
 
 WORLD_LIMIT_S = 1200.0
-"""Time limit of the world, in seconds: at 0.1 m/s that is a way of more than 80 m, turns included."""
+"""Time limit of the world, in seconds: at 0.1 m/s that is a way of more than 80 m, rotations included."""
 
 LIMIT_S = 240.0
 _LOOK_S = 0.1

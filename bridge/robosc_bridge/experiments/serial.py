@@ -110,7 +110,7 @@ def configuration(setting: Setting, base: str, scanner: str, camera: str | None)
 
     Reactions that must be soon in the world are N times as soon by the clock where the world passes N times as fast:
     the wheels stop without the LiDAR or the loop after some second of the world at most, the acceleration that the
-    safety layer allows is N times as large by the clock, and a turn slows down earlier, since an exchange with the
+    safety layer allows is N times as large by the clock, and a rotation slows down earlier, since an exchange with the
     drive base every 20 ms is one of 20 N ms in the world. Waits without any motion stay as patient as a busy machine
     needs.
 
@@ -121,7 +121,7 @@ def configuration(setting: Setting, base: str, scanner: str, camera: str | None)
         camera: Socket of the camera; None: there is none.
     """
     speed = setting.speed
-    # The least that the bridge takes: twice the period, and more than a turn of the LiDAR.
+    # The least that the bridge takes: twice the period, and more than a revolution of the LiDAR.
     loop_limit_s, scan_limit_s = min(max(1.2 / speed, 0.04), 0.3), min(max(1.0 / speed, 0.22), 0.6)
     # One exchange, and one to be felt; gain times delay stays below 1/e (`robosc_bridge.skills.rotate`).
     delay_s = min(2 * 0.02 * speed, 2 * PATIENCE_S) + 0.04

@@ -18,7 +18,7 @@ class Now:
         x_m: Position of the middle between its wheels, in metres.
         y_m: Position of the same, in metres.
         linear_m_s: Speed forward.
-        angular_rad_s: Turn rate, counter-clockwise.
+        angular_rad_s: Yaw rate, counter-clockwise.
         collisions: Number of times that it has come to something.
     """
 

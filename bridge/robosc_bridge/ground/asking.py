@@ -25,7 +25,7 @@ ANSWER_LIMIT_S = 5.0
 RESET_LIMIT_S = 20.0
 """Time that the daemon may take for an answer, in seconds."""
 
-LOOP_HANGS = "The bridge's loop does not turn."
+LOOP_HANGS = "The bridge's loop does not rotate."
 
 REPEATED_S = 10.0
 """For so long it is known how a command was answered, if its sender asks again."""

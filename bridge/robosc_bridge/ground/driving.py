@@ -1,7 +1,8 @@
 """Motion that is asked for by set-points, as requests of a program to a supervision layer.
 
-Sources: mavlink.io (SET_POSITION_TARGET_LOCAL_NED, MANUAL_CONTROL) and ArduPilot Rover. Turns are clockwise there and
-counter-clockwise here. Whoever drives by hand must go on telling so: a stream that ends is a request to stand still.
+Sources: mavlink.io (SET_POSITION_TARGET_LOCAL_NED, MANUAL_CONTROL) and ArduPilot Rover. Rotations are clockwise there
+and counter-clockwise here. Whoever drives by hand must go on telling so: a stream that ends is a request to stand
+still.
 """
 
 import math
@@ -33,22 +34,22 @@ def from_position_target(told: Any) -> Velocity:
     """The velocity that SET_POSITION_TARGET_LOCAL_NED asks for.
 
     Raises:
-        Unusable: It asks for anything else than a speed ahead and a turn rate.
+        Unusable: It asks for anything else than a speed ahead and a yaw rate.
     """
     mask = told.type_mask
     if told.coordinate_frame not in _BODY_FRAMES:
         raise Unusable("Set-points must be in the robot's own frame (8 BODY_NED, 9 or 12).")
     must_ignore = _POSITION | _ACCELERATION | _YAW
     if mask & must_ignore != must_ignore or mask & _FORCE or mask & (_VX | _YAW_RATE) == _VX | _YAW_RATE:
-        raise Unusable("Set-points may hold a velocity and a turn rate only, such as type mask 1511.")
+        raise Unusable("Set-points may hold a velocity and a yaw rate only, such as type mask 1511.")
     speed_m_s = 0.0 if mask & _VX else told.vx
     aside_m_s = 0.0 if mask & _VY else told.vy
-    turn_rad_s = 0.0 if mask & _YAW_RATE else told.yaw_rate
-    if not all(map(math.isfinite, (speed_m_s, aside_m_s, turn_rad_s))):
+    yaw_rate_rad_s = 0.0 if mask & _YAW_RATE else told.yaw_rate
+    if not all(map(math.isfinite, (speed_m_s, aside_m_s, yaw_rate_rad_s))):
         raise Unusable("A set-point is no number.")
     if aside_m_s != 0.0:
         raise Unusable("The robot cannot go sideways: vy must be 0.")
-    return Velocity(speed_m_s, -turn_rad_s + 0.0)
+    return Velocity(speed_m_s, -yaw_rate_rad_s + 0.0)
 
 
 def from_manual_control(told: Any, fastest: Velocity) -> Velocity:

@@ -65,7 +65,7 @@ def ground_settings(configuration: Configuration, fastest: Velocity) -> GroundSe
 
     Args:
         configuration: Configuration with them in its section `remote`.
-        fastest: Limits of speed and turn rate.
+        fastest: Limits of speed and yaw rate.
 
     Raises:
         GroundSettingsError: They do not go together.

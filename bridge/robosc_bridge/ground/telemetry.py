@@ -1,8 +1,8 @@
 """State of the daemon, as messages that are sent again and again.
 
 Each function gives what makes a message with the library's codec, or None where there is nothing to tell. Axes: the
-robot's are x forward, y left, z up and turns counter-clockwise (REP 103); MAVLink's are forward, right, down and
-clockwise, so that y, z and turns change their sign. Source: mavlink.io (common messages).
+robot's are x forward, y left, z up and rotations counter-clockwise (REP 103); MAVLink's are forward, right, down and
+clockwise, so that y, z and rotations change their sign. Source: mavlink.io (common messages).
 """
 
 import math
@@ -103,7 +103,7 @@ def odometry(reading: DriveReading) -> Make:
 
 
 def attitude(reading: DriveReading, boot_ms: int) -> Make:
-    """Heading from where the odometry began, and turn rate."""
+    """Heading from where the odometry began, and yaw rate."""
     return lambda codec: codec.attitude_encode(
         boot_ms, 0.0, 0.0, -reading.pose.heading_rad + 0.0, 0.0, 0.0, -reading.velocity.angular_rad_s + 0.0
     )
@@ -122,7 +122,7 @@ def obstacle_distance(scan: Scan, least_m: float, most_m: float) -> Make:
     """The nearest of each five degrees, clockwise from the front.
 
     Args:
-        scan: A full turn.
+        scan: A full revolution.
         least_m: Shortest that the LiDAR measures.
         most_m: Longest.
     """

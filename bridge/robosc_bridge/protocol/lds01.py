@@ -1,4 +1,4 @@
-"""LDS-01 (HLS-LFCD2): frames of 42 bytes with six points, one degree apart; sixty frames are a turn.
+"""LDS-01 (HLS-LFCD2): frames of 42 bytes with six points, one degree apart; sixty frames are a revolution.
 
 Format, direction and units are those of ROBOTIS' hls_lfcd_lds_driver 2.1.1 (src/hlds_laser_publisher.cpp).
 
@@ -13,7 +13,7 @@ import struct
 from dataclasses import dataclass
 
 from robosc_bridge.protocol.framing import FrameDecoder
-from robosc_bridge.protocol.turns import Points
+from robosc_bridge.protocol.revolutions import Points
 
 START = b"b"
 STOP = b"e"
@@ -41,7 +41,7 @@ class Frame:
 
     Attributes:
         index: 0 to 59: which sixth of a minute, as it were, clockwise.
-        speed: As sent; see `turns_per_s`.
+        speed: As sent; see `revolutions_per_s`.
         distances_mm: 0: nothing measured.
         intensities: Sixteen bits each.
     """
@@ -101,7 +101,7 @@ class Decoder(FrameDecoder[Frame]):
         return data[at + _LENGTH] == _HEADER and data[at + _LENGTH + 1] == successor
 
 
-def turns_per_s(speed: int) -> float:
+def revolutions_per_s(speed: int) -> float:
     """Speed of the motor, at 300 revolutions a minute when all is well.
 
     The official driver takes the number for tenths of a revolution a minute, another one for whole ones: what looks
@@ -117,7 +117,7 @@ def points(frame: Frame) -> Points:
         _ANGLES_DEG[frame.index],
         tuple([mm / 1000 if _MIN_MM <= mm <= _MAX_MM else math.nan for mm in frame.distances_mm]),
         frame.intensities,
-        turns_per_s(frame.speed),
+        revolutions_per_s(frame.speed),
         frame.index == FRAMES_PER_TURN - 1,
     )
 

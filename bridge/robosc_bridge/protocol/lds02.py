@@ -12,7 +12,7 @@ import struct
 from dataclasses import dataclass
 
 from robosc_bridge.protocol.framing import FrameDecoder
-from robosc_bridge.protocol.turns import WIDEST_STEP_DEG, Points, wrapped_deg
+from robosc_bridge.protocol.revolutions import WIDEST_STEP_DEG, Points, wrapped_deg
 
 POINTS_PER_FRAME = 12
 POINTS_PER_S = 2300

@@ -2,8 +2,8 @@
 
 Format, checksum and validity are those of ROBOTIS' coin_d4_driver 1.0.1 (src/lidar_sdk/lidar_data_processor.cpp); the
 checksum holds for frames captured from a real device. Two things are done otherwise. Points are where they were
-measured, while that driver spreads them evenly over the turn. And a turn ends where the angle passes 0: the mark of a
-ring start says the same, and a lost one would join two turns.
+measured, while that driver spreads them evenly over the revolution. And a revolution ends where the angle passes 0: the
+mark of a ring start says the same, and a lost one would join two revolutions.
 """
 
 import math
@@ -11,7 +11,7 @@ import struct
 from dataclasses import dataclass
 
 from robosc_bridge.protocol.framing import FrameDecoder
-from robosc_bridge.protocol.turns import WIDEST_STEP_DEG, Points
+from robosc_bridge.protocol.revolutions import WIDEST_STEP_DEG, Points
 
 START = bytes.fromhex("aa55f00f")
 STOP = bytes.fromhex("aa55f50a")
@@ -47,8 +47,8 @@ class Frame:
     """Some points.
 
     Attributes:
-        is_ring_start: True if it is the first of a turn.
-        frequency_hz: Turns a second; None: only the first frame of a turn reports it.
+        is_ring_start: True if it is the first of a revolution.
+        frequency_hz: Revolutions a second; None: only the first frame of a revolution reports it.
         first_ticks: Angle of the first point, clockwise, in 64ths of a degree.
         last_ticks: Angle of the last point.
         distances_mm: Distances in millimetres; 0: nothing measured.

@@ -19,7 +19,7 @@ _ONBOARD_CONTROLLER = 18
 NO_AUTOPILOT = 8
 _ACTIVE = 4
 BODY_NED = 8
-# All but the speeds and the turn rate is to be ignored; that of accelerations must be said.
+# All but the speeds and the yaw rate is to be ignored; that of accelerations must be said.
 VELOCITY_AND_TURN_RATE = 0x05E7
 CUSTOM_MODE = 1
 FORCE = 21196
@@ -116,17 +116,17 @@ class Heartbeat:
 
 @dataclass(frozen=True, slots=True)
 class Attitude:
-    """Heading and turn rate, counter-clockwise.
+    """Heading and yaw rate, counter-clockwise.
 
     Attributes:
         boot_s: Since the vehicle started.
         heading_rad: From north.
-        turn_rad_s: Its rate.
+        yaw_rate_rad_s: Its rate.
     """
 
     boot_s: float
     heading_rad: float
-    turn_rad_s: float
+    yaw_rate_rad_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,7 +239,7 @@ class SectorDistance:
     """One distance.
 
     Attributes:
-        orientation: Direction: 0 ahead, and on clockwise in eighths of a turn, as ArduPilot has it; others are no
+        orientation: Direction: 0 ahead, and on clockwise in eighths of a revolution, as ArduPilot has it; others are no
             such direction.
         distance_cm: Measured distance.
         least_cm: Shortest that is valid.
@@ -393,7 +393,7 @@ def velocity_target(
         component: Its component number.
         boot_ms: Time since the sender started, in milliseconds.
         linear_m_s: Speed forward.
-        angular_rad_s: Turn rate, counter-clockwise.
+        angular_rad_s: Yaw rate, counter-clockwise.
     """
     # Adding zero makes the negative zero, whose bytes are not all zero, a positive one.
     speeds = (linear_m_s + 0.0, 0.0, 0.0)

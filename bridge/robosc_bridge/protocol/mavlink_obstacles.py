@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from robosc_bridge.protocol.mavlink_messages import ObstacleRing, SectorDistance
-from robosc_bridge.protocol.turns import BINS, wrapped_deg
+from robosc_bridge.protocol.revolutions import BINS, wrapped_deg
 
 RING = 72
 RING_STEP_DEG = 5

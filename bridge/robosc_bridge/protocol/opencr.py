@@ -119,6 +119,6 @@ def encode_command(linear: int, angular: int) -> bytes:
 
     Args:
         linear: Linear velocity, in hundredths of a metre per second.
-        angular: Turn rate, in hundredths of a radian per second, counter-clockwise.
+        angular: Yaw rate, in hundredths of a radian per second, counter-clockwise.
     """
     return _COMMAND.pack(linear, angular)

@@ -49,7 +49,7 @@ class Measurement:
     Attributes:
         load: Of an XL430 in 0.1 %; of an XM430 its current in 2.69 mA.
         velocity_raw: In 0.229 revolutions per minute.
-        ticks: 4096 to a turn, signed.
+        ticks: 4096 to a revolution, signed.
         voltage_v: At its input.
         temperature_c: Of the motor.
     """

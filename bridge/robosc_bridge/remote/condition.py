@@ -33,7 +33,7 @@ class Condition(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # genera
 
     @property
     def is_serving(self) -> bool:
-        """True if the loop turns, and no fault has stopped the robot."""
+        """True if the loop rotates, and no fault has stopped the robot."""
         snapshot = self._feed.snapshot
         if snapshot is None or time.time() - snapshot.time_s > STALE_S:
             return False

@@ -1,4 +1,4 @@
-"""Watch over the places for connections: if all are taken, gRPC turns callers away and tells nobody."""
+"""Watch over the places for connections: if all are taken, gRPC refuses callers and tells nobody."""
 
 import logging
 from pathlib import Path

@@ -207,9 +207,9 @@ def _drive(reading: DriveReading) -> pb.DriveState:
 
 
 def put_scan(target: pb.Scan, scan: Scan) -> None:
-    """Fill a message with a turn of the LiDAR."""
+    """Fill a message with a revolution of the LiDAR."""
     target.age_s = max(time.monotonic() - scan.time_s, 0.0)
-    target.turns_per_s = scan.turns_per_s
+    target.turns_per_s = scan.revolutions_per_s
     target.ranges_m.extend(scan.ranges_m)
 
 

@@ -20,13 +20,13 @@ MAXIMUM_WAITING = 1000
 MAXIMUM_WAITING_BYTES = 4_000_000
 """Maximum memory for the data of waiting messages, in bytes; one message may wait whatever its size."""
 
-MESSAGES_A_TURN = 64
+MESSAGES_PER_CYCLE = 64
 """Number of messages that a program may send to the loop before the loop has shown its next snapshot.
 
 The rest waits at the program's end.
 """
 
-BYTES_A_TURN = 128 * 1024
+BYTES_PER_CYCLE = 128 * 1024
 """Maximum size of these messages as they arrive, in bytes; the message that exceeds it is the last one."""
 
 _LOOK_S = 0.005
@@ -103,7 +103,7 @@ class Session:
 
     async def _read(self, requests: AsyncIterator[convert.AttachRequest]) -> None:
         async for request in requests:
-            # Before it waits for its turn: an operator that has just sent something is there in any case.
+            # Before it waits: an operator that has just sent something is there in any case.
             if self._is_operator and self._pace.came():
                 self._operations.operator_seen()
             await self._turn()
@@ -123,7 +123,7 @@ class Session:
             number = -1 if snapshot is None else snapshot.number
             if number != self._seen_number:
                 self._seen_number, self._told, self._told_bytes = number, 0, 0
-            if self._told < MESSAGES_A_TURN and self._told_bytes < BYTES_A_TURN:
+            if self._told < MESSAGES_PER_CYCLE and self._told_bytes < BYTES_PER_CYCLE:
                 self._told += 1
                 return
             await asyncio.sleep(_LOOK_S)

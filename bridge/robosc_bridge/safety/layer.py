@@ -162,8 +162,8 @@ class SafetyLayer:
         with self._lock:
             self._failures += 1
 
-    def loop_turned(self, now_s: float) -> None:
-        """The supervisor's loop was at its turn then."""
+    def loop_cycled(self, now_s: float) -> None:
+        """The supervisor's loop was at work then."""
         with self._lock:
             self._loop.hear(now_s)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from types import MappingProxyType
 
 SCAN_TIMEOUTS_S: Mapping[str, float] = MappingProxyType({"lds01": 0.6, "lds02": 0.5, "lds03": 0.3})
-"""After how long a scanner counts as silent: three turns, by its driver's name."""
+"""After how long a scanner counts as silent: three revolutions, by its driver's name."""
 
 # A time that was meant in milliseconds, or is as long as a journey, must not switch a rule off.
 _LONGEST_S = {
@@ -33,7 +33,7 @@ class SafetyLimits:
 
     Attributes:
         linear_m_s: Fastest speed forward and backward.
-        angular_rad_s: Fastest turn.
+        angular_rad_s: Fastest rotation.
         wheel_m_s: Fastest wheel; where one would be faster, both are slowed alike, so that the curvature stays.
         separation_m: Distance between the wheels' middles.
         scan_timeout_s: Longest time without a full scan (`SCAN_TIMEOUTS_S`); None: no scanner is needed. It has no
@@ -45,7 +45,7 @@ class SafetyLimits:
         command_timeout_s: Time for which a command to move holds.
         motor_timeout_s: Longest time without a reading of the drive base.
         motor_failures: Number of failed exchanges in a row that count as silence, too.
-        loop_timeout_s: Longest time between two turns of the supervisor's loop.
+        loop_timeout_s: Longest time between two cycles of the supervisor's loop.
         operator_timeout_s: Longest time without a sign of the operator; None: none is needed.
         battery_warn_v: Mean voltage at and below which the safety layer warns.
         battery_stop_v: Mean voltage at and below which it stops the robot.

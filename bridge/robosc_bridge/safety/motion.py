@@ -26,8 +26,8 @@ def within(velocity: Velocity, limits: SafetyLimits) -> Velocity:
 
 def wheels(velocity: Velocity, limits: SafetyLimits) -> tuple[float, float]:
     """Speeds of the left and the right wheel, in metres per second."""
-    turn_m_s = velocity.angular_rad_s * limits.separation_m / 2
-    return velocity.linear_m_s - turn_m_s, velocity.linear_m_s + turn_m_s
+    rotation_m_s = velocity.angular_rad_s * limits.separation_m / 2
+    return velocity.linear_m_s - rotation_m_s, velocity.linear_m_s + rotation_m_s
 
 
 def ramped(present: Velocity, wanted: Velocity, limits: SafetyLimits, step_s: float) -> Velocity:

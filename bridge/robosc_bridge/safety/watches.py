@@ -67,7 +67,7 @@ class SightWatch:
         return sum(map(math.isfinite, ranges_m)) < self._min_share * len(ranges_m)
 
     def is_blind(self, linear_m_s: float) -> bool:
-        """Return True if nothing is seen in the direction of a speed; a turn on the spot has no direction."""
+        """Return True if nothing is seen in the direction of a speed; a rotation on the spot has no direction."""
         return (linear_m_s > 0 and self._is_blind_ahead) or (linear_m_s < 0 and self._is_blind_behind)
 
 
@@ -109,7 +109,7 @@ class BatteryWatch:
 
 
 class WheelWatch:
-    """Watch that finds wheels that are held, turn by themselves, or do not stop.
+    """Watch that finds wheels that are held, rotate by themselves, or do not stop.
 
     Args:
         limits: Limits of how far off a wheel may be, and for how long.

@@ -132,7 +132,7 @@ def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
         case ["scanner", "stall" | "go" as what]:
             robot.scanner.is_stalled = what == "stall"
         case ["scanner", "turn", share]:
-            robot.scanner.turn_at(number(share, 0.01, 2.0))
+            robot.scanner.set_speed(number(share, 0.01, 2.0))
         case ["camera", what] if robot.camera is not None:
             _to_camera(robot.camera, what)
         case ["base", "answers_as", device_id] if robot.rover is None:

@@ -128,7 +128,7 @@ class Model:
         items: Items in order of address.
         operating_modes: Operating modes that it has.
         no_load_rpm: No-load speed at 12 V, in rpm.
-        strongest_load: Value that item 126 reports for a motor that cannot turn.
+        strongest_load: Value that item 126 reports for a motor that cannot rotate.
     """
 
     items: tuple[Item, ...]

@@ -77,12 +77,12 @@ class Eye:
         scene = self._scene
         x_m, y_m, heading_rad = pose
         cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
-        turn = np.array(((cosine, sine), (-sine, cosine)))
+        rotation = np.array(((cosine, sine), (-sine, cosine)))
         is_there = [each for each in (scene.obstacles if obstacles is None else obstacles) if each.is_there]
         stands = self._standing.mask(
             x_m + cosine * self._mount.x_m,
             y_m + sine * self._mount.x_m,
-            turn.T,
+            rotation.T,
             ((each.x_m, each.y_m, each.radius_m) for each in is_there),
         ).ravel()
         shades = np.where(stands, np.uint8(scene.wall_shade), np.uint8(DISTANCE))
@@ -92,7 +92,7 @@ class Eye:
             is_open = ~stands
             floor = floor[is_open[is_floor]]
             is_floor = is_floor & is_open
-        points = floor @ turn + np.array((x_m, y_m))
+        points = floor @ rotation + np.array((x_m, y_m))
         seen = scene.floor.shades(points)
         if scene.line is not None:
             seen[scene.line.is_line(points)] = scene.line.shade

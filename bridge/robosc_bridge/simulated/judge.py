@@ -18,7 +18,7 @@ LATERAL_M = 0.08
 
 STILL_M_S = 0.005
 STILL_RAD_S = 0.02
-"""Largest turn rate that counts as standing still, in rad/s."""
+"""Largest yaw rate that counts as standing still, in rad/s."""
 
 SETTLE_S = 1.0
 """Maximum time of the world that a robot may take to stand still when it has to, in seconds."""

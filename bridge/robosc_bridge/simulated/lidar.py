@@ -1,9 +1,9 @@
 """The three LiDARs of the TurtleBot3, as bytes: frames paced in time, from what the world's walls return.
 
-Behaviour after the vendors' drivers (see `lidar_frames`). All turn clockwise. What goes on the wire is what the real
+Behaviour after the vendors' drivers (see `lidar_frames`). All rotate clockwise. What goes on the wire is what the real
 sensor would measure, so that a driver that corrects as the stock one does finds the walls where they are:
 
-- LDS-01: sample i of a turn is at 359 - i degrees counter-clockwise;
+- LDS-01: sample i of a revolution is at 359 - i degrees counter-clockwise;
 - LDS-02: distances are from the optical centre, beside the axis and in a direction that deviates from the nominal one;
 - LDS-03: angles are counter-clockwise when negated.
 """
@@ -52,10 +52,10 @@ class Lidar(ABC):
         is_covered: True if something covers it: it measures nothing.
         is_stalled: True if it has fallen silent.
         baud: Baud rate of its line; None: any.
-        nominal_hz: Turns a second.
+        nominal_hz: Revolutions a second.
         nearest_m: Shortest distance that it measures.
         farthest_m: Longest distance that it measures.
-        beams: Beams of a turn at the nominal speed.
+        beams: Beams of a revolution at the nominal speed.
     """
 
     baud: int | None
@@ -84,23 +84,23 @@ class Lidar(ABC):
         return self._is_spinning
 
     @property
-    def turns_per_s(self) -> float:
-        """As it turns now, in world time."""
+    def revolutions_per_s(self) -> float:
+        """As it rotates now, in world time."""
         return self.nominal_hz * self._speed_share
 
-    def turn_at(self, share: float) -> None:
-        """Turn at this share of the nominal speed.
+    def set_speed(self, share: float) -> None:
+        """Rotate at this share of the nominal speed.
 
         Raises:
             ValueError: The share is not above 0, or above 2.
         """
         if not 0 < share <= 2:
-            raise ValueError(f"a LiDAR turns at a share above 0 and up to 2 of its speed, not at {share}")
+            raise ValueError(f"a LiDAR rotates at a share above 0 and up to 2 of its speed, not at {share}")
         with self._time.lock:
             self._speed_share = share
 
     def plug_in(self) -> None:
-        """Power comes: it turns by itself."""
+        """Power comes: it rotates by itself."""
         self._spin()
 
     def due_s(self) -> float:
@@ -143,15 +143,15 @@ class Lidar(ABC):
         if not self._is_spinning:
             self._is_spinning = True
             self._is_cut = self._starts_mid_frame
-            self._begin_turn(self._chance.random())
+            self._begin_revolution(self._chance.random())
             self._frame_world_s = self._time.world_s() + self._frame_s()
 
     def _halt(self) -> None:
         self._is_spinning = False
 
     @abstractmethod
-    def _begin_turn(self, share: float) -> None:
-        """Be at this share of a turn when the motor starts."""
+    def _begin_revolution(self, share: float) -> None:
+        """Be at this share of a revolution when the motor starts."""
 
     @abstractmethod
     def _frame_s(self) -> float:
@@ -176,7 +176,7 @@ class Lidar(ABC):
 
 
 class Lds01(Lidar):
-    """LDS-01 (HLS-LFCD2): `b` starts the motor, `e` stops it; it turns at power-on without being told."""
+    """LDS-01 (HLS-LFCD2): `b` starts the motor, `e` stops it; it rotates at power-on without being told."""
 
     baud = 230_400
     nominal_hz = 5.0
@@ -193,15 +193,15 @@ class Lds01(Lidar):
                 self._halt()
         return ()
 
-    def _begin_turn(self, share: float) -> None:
+    def _begin_revolution(self, share: float) -> None:
         self._index = int(share * 60)
 
     def _frame_s(self) -> float:
-        return 1.0 / (60 * self.turns_per_s)
+        return 1.0 / (60 * self.revolutions_per_s)
 
     def _frame(self) -> _Frame:
         degrees = [6 * self._index + place + 1 for place in range(6)]
-        encoded = partial(self._encoded, self._index, round(self.turns_per_s * 600))
+        encoded = partial(self._encoded, self._index, round(self.revolutions_per_s * 600))
         self._index = (self._index + 1) % 60
         return _Frame(degrees, encoded)
 
@@ -225,14 +225,14 @@ class Lds02(Lidar):
     _CENTRE_M = (0.0059, -0.02014)
     _DIRECTION = (1.0, 0.11923)
 
-    def _begin_turn(self, share: float) -> None:
+    def _begin_revolution(self, share: float) -> None:
         self._degrees = share * 360
 
     def _frame_s(self) -> float:
         return self._POINTS / self._SAMPLES_PER_S
 
     def _frame(self) -> _Frame:
-        speed = self.turns_per_s * 360
+        speed = self.revolutions_per_s * 360
         start = round(self._degrees * 100) % 36_000
         span = round(speed / self._SAMPLES_PER_S * 100 * (self._POINTS - 1))
         # A host places the points in whole hundredths of a degree.
@@ -262,7 +262,7 @@ class Lds02(Lidar):
 class Lds03(Lidar):
     """LDS-03 (COIN-D4): idle until it is told to start; tells its identity then.
 
-    Which speeds its two exposures have is not documented: 6 and 10 turns a second.
+    Which speeds its two exposures have is not documented: 6 and 10 revolutions a second.
     """
 
     baud = 230_400
@@ -307,17 +307,17 @@ class Lds03(Lidar):
         self._heard = held
         return found
 
-    def _begin_turn(self, share: float) -> None:
-        # The part of a turn that is left, in samples.
+    def _begin_revolution(self, share: float) -> None:
+        # The part of a revolution that is left, in samples.
         self._degrees = share * 360
-        self._begins_turn = False
+        self._begins_revolution = False
 
     @property
     def _degrees_per_sample(self) -> float:
-        return 360 * self.turns_per_s / self._SAMPLES_PER_S
+        return 360 * self.revolutions_per_s / self._SAMPLES_PER_S
 
     def _samples(self) -> int:
-        if self._begins_turn:
+        if self._begins_revolution:
             return 1
         left = math.ceil((360 - self._degrees) / self._degrees_per_sample - 1e-6)
         return max(1, min(self._FULL, left))
@@ -331,10 +331,10 @@ class Lds03(Lidar):
         first, last = (_angle(self._degrees + place * step) for place in (0, count - 1))
         # Where a host places them.
         degrees = [(first + place * (last - first) / max(count - 1, 1)) / 64 for place in range(count)]
-        kind = (round(self.turns_per_s * 10) << 1 | 1) & 0xFF if self._begins_turn else 0
+        kind = (round(self.revolutions_per_s * 10) << 1 | 1) & 0xFF if self._begins_revolution else 0
         self._degrees += count * step
-        self._begins_turn = self._degrees >= 360 - 1e-6
-        if self._begins_turn:
+        self._begins_revolution = self._degrees >= 360 - 1e-6
+        if self._begins_revolution:
             self._degrees = max(self._degrees - 360, 0.0)
         return _Frame(degrees, partial(self._encoded, kind, first, last))
 
@@ -344,7 +344,7 @@ class Lds03(Lidar):
 
 
 def _angle(degrees: float) -> int:
-    """In degrees / 64, below a whole turn."""
+    """In degrees / 64, below a whole revolution."""
     return min(round(degrees * 64), 360 * 64 - 1)
 
 

@@ -44,7 +44,7 @@ def lds03_frame(kind: int, first: int, last: int, points: Sequence[Point]) -> by
     """A frame of LDS-03.
 
     Args:
-        kind: Byte CT: at the beginning of a turn the speed and bit 0, else 0.
+        kind: Byte CT: at the beginning of a revolution the speed and bit 0, else 0.
         first: Angle of the first point, in degrees / 64.
         last: Angle of the last one.
         points: At most 25; an intensity of 255 sets the mark of an overexposed sample, too.

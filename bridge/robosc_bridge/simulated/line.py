@@ -24,7 +24,7 @@ _BUFFER = 4095
 # A world that passes faster is lived in fewer and larger pieces: a wake-up for each frame would be thousands a second.
 _COARSE_S = 0.002
 _PIECE = 1024
-# Less than a turn of any LiDAR: who leaves more unread is behind.
+# Less than a revolution of any LiDAR: who leaves more unread is behind.
 _MOST_UNREAD = 1024
 
 

@@ -49,7 +49,7 @@ class Sample(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         y_m: y of the same.
         heading_rad: Heading counter-clockwise from x, unbounded.
         linear_m_s: Forward speed, as it moved on the floor since the last sample.
-        angular_rad_s: Turn rate, counter-clockwise, likewise.
+        angular_rad_s: Yaw rate, counter-clockwise, likewise.
         collisions: Number of times that it has come to a wall or an obstacle.
     """
 

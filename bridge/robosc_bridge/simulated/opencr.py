@@ -360,15 +360,15 @@ class OpenCr:
     def _sense_motion(self) -> None:
         """Update the readings of the inertial sensors: they feel the body on the floor, whatever the wheels do."""
         world = self._world
-        speed_m_s, turn_rad_s = world.floor_speed_m_s, world.floor_turn_rad_s
+        speed_m_s, yaw_rate_rad_s = world.floor_speed_m_s, world.floor_yaw_rate_rad_s
         yaw_rad = world.heading_rad - self._start_heading_rad
         since_s = world.lived_s - self._sensed_s
         if since_s > 0.0:
             self._forward_m_s2 = (speed_m_s - self._last_speed_m_s) / since_s
             self._last_speed_m_s, self._sensed_s = speed_m_s, world.lived_s
         readings = (
-            0.0, 0.0, turn_rad_s,
-            self._forward_m_s2, speed_m_s * turn_rad_s, _GRAVITY_M_S2,
+            0.0, 0.0, yaw_rate_rad_s,
+            self._forward_m_s2, speed_m_s * yaw_rate_rad_s, _GRAVITY_M_S2,
             _EARTH_FIELD_T * math.cos(yaw_rad), -_EARTH_FIELD_T * math.sin(yaw_rad), 0.0,
             math.cos(yaw_rad / 2), 0.0, 0.0, math.sin(yaw_rad / 2),
         )  # fmt: skip

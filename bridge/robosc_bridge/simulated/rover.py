@@ -199,10 +199,10 @@ class Rover:
         elif self.is_armed and self.mode == GUIDED and self._target is not None:
             linear_m_s, angular_rad_s = self._target
         body = self._world.body
-        turn_m_s = angular_rad_s * body.wheel_separation_m / 2
+        rotation_m_s = angular_rad_s * body.wheel_separation_m / 2
         for wheel, speed_m_s in (
-            (self._world.left, linear_m_s - turn_m_s),
-            (self._world.right, linear_m_s + turn_m_s),
+            (self._world.left, linear_m_s - rotation_m_s),
+            (self._world.right, linear_m_s + rotation_m_s),
         ):
             wheel.is_driven = self.is_armed
             wheel.goal_rad_s = speed_m_s / body.wheel_radius_m
@@ -318,7 +318,7 @@ class Rover:
 
     def _yaw(self) -> dict[str, float]:
         yaw_rad = math.remainder(-self._world.heading_rad, 2 * math.pi)
-        return {"yaw": yaw_rad, "yawspeed": -self._world.floor_turn_rad_s}
+        return {"yaw": yaw_rad, "yawspeed": -self._world.floor_yaw_rate_rad_s}
 
     def _place(self) -> dict[str, float]:
         world = self._world
@@ -341,7 +341,7 @@ class Rover:
             y=place["y"],
             q=(math.cos(half_rad), 0.0, 0.0, math.sin(half_rad)),
             vx=self._world.floor_speed_m_s,
-            yawspeed=-self._world.floor_turn_rad_s,
+            yawspeed=-self._world.floor_yaw_rate_rad_s,
             pose_covariance=unknown,
             velocity_covariance=unknown,
             frame=_LOCAL_FRD,

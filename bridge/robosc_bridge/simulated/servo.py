@@ -21,7 +21,7 @@ RAW_RAD_S = 0.229 * 2 * math.pi / 60
 TICKS = 4096
 _ACCELERATION_RAD_S2 = 214.577 * 2 * math.pi / 3600
 _WATCHDOG_S = 0.020
-# From which load on a motor that cannot turn is protected, and below which voltage its processor stops: not stated by
+# From which load on a motor that cannot rotate is protected, and below which voltage its processor stops: not stated by
 # the e-Manual.
 OVERLOAD_S = 1.0
 _PROCESSOR_V = 5.5
@@ -232,10 +232,10 @@ class Servo:
         return self.write(address, data)
 
     def clear(self) -> int:
-        """Bring the position back into one turn; returns the error's number: it must stand still."""
+        """Bring the position back into one revolution; returns the error's number: it must stand still."""
         if self._wheel.speed_rad_s:
             return Error.RESULT_FAIL
-        self._fall_into_one_turn()
+        self._wrap_position()
         return Error.NONE
 
     def reset(self, keeps: frozenset[str]) -> None:
@@ -244,7 +244,7 @@ class Servo:
         self.reboot()
 
     def reboot(self) -> None:
-        """Restart: silent for a while, torque off, errors forgotten, the position within one turn."""
+        """Restart: silent for a while, torque off, errors forgotten, the position within one revolution."""
         self._release()
         self._restart()
 
@@ -259,7 +259,7 @@ class Servo:
             self.table["goal current"] = self.table["current limit"]
         self._registered = None
         self._blocked_s = None
-        self._fall_into_one_turn()
+        self._wrap_position()
         self.table["goal position"] = self._position()
         if self.table["startup configuration"] & 1:
             self.table["torque enable"] = 1
@@ -275,13 +275,13 @@ class Servo:
                 # The watchdog acts with torque on only: time without torque does not count.
                 self._heard_s = self.time.now_s()
                 if self.table["operating mode"] == 3:
-                    self._fall_into_one_turn()
+                    self._wrap_position()
         self.table[item.name] = value
         if item.name == "operating mode" and value != before:
             self.table.restore(lambda other: other.name in _RESET_BY_MODE)
             self.table["goal pwm"] = self.table["pwm limit"]
             if value == 3:
-                self._fall_into_one_turn()
+                self._wrap_position()
         if item.name == "bus watchdog":
             self._heard_s = self.time.now_s()
         if item.is_goal and self.table["drive mode"] & _TORQUE_BY_GOAL and not self.table["hardware error status"]:
@@ -336,7 +336,7 @@ class Servo:
         # Unbounded: the register wraps.
         return self._base_ticks + self._sign() * turned
 
-    def _fall_into_one_turn(self) -> None:
+    def _wrap_position(self) -> None:
         offset = self.table["homing offset"]
         within = (self._position() - offset) % TICKS
         self._base_ticks += within + offset - self._position()

@@ -67,22 +67,22 @@ class Standing:
         self._first = np.maximum(np.where(sinking > 0, to_top, to_floor), 0.0)
         self._last = np.where(sinking > 0, to_floor, to_top)
 
-    def mask(self, x_m: float, y_m: float, turn: Floats, discs: Iterable[tuple[float, float, float]]) -> Mask:
+    def mask(self, x_m: float, y_m: float, rotation: Floats, discs: Iterable[tuple[float, float, float]]) -> Mask:
         """Return a mask of the pixels that show something that stands there.
 
         Args:
             x_m: x of the camera.
             y_m: y of the camera.
-            turn: Shape (2, 2): turns what is in the world's axes into the robot's, from the right.
+            rotation: Shape (2, 2): turns what is in the world's axes into the robot's, from the right.
             discs: Round things, (x, y, radius) in metres each.
 
         Returns:
             Shape (height, width).
         """
         place = np.array((x_m, y_m))
-        found = self._walls((self._ends - place) @ turn)
+        found = self._walls((self._ends - place) @ rotation)
         for disc_x_m, disc_y_m, radius_m in discs:
-            middle = (np.array((disc_x_m, disc_y_m)) - place) @ turn
+            middle = (np.array((disc_x_m, disc_y_m)) - place) @ rotation
             found |= self._disc(float(middle[0]), float(middle[1]), radius_m)
         return found
 

@@ -1,4 +1,4 @@
-"""A whole turn of a laser: evenly spaced rays from one point, as fast as what is around allows.
+"""A whole revolution of a laser: evenly spaced rays from one point, as fast as what is around allows.
 
 Each wall is met by the rays between the directions of its two ends and by no other, so that only these pairs of a wall
 and a ray are computed: in a maze a few for each wall, where all pairs are hundreds of times as many. In the laser's own
@@ -17,7 +17,7 @@ from robosc_bridge.simulated.rounds import Rounds
 from robosc_bridge.simulated.walls import Floats, Walls
 
 BEAMS = 360
-"""Number of beams of a turn, counter-clockwise; the first one straight ahead."""
+"""Number of beams of a revolution, counter-clockwise; the first one straight ahead."""
 
 _HALF = BEAMS // 2
 _PER_RAD = BEAMS / math.tau
@@ -26,12 +26,12 @@ _PARALLEL = 1e-12
 # In beams: who looks at the very end of a wall sees it, and never between two walls that meet.
 _SLACK = 1e-9
 _ANGLES = np.arange(-_HALF, BEAMS + _HALF + 1) / _PER_RAD
-# From half a turn on the right; twice around, since a wall may be across the place where the counting begins.
+# From half a revolution on the right; twice around, since a wall may be across the place where the counting begins.
 _ALONG_X, _ALONG_Y = np.cos(_ANGLES), np.sin(_ANGLES)
 
 
 class Sweep:
-    """Turns of a laser among walls.
+    """Revolutions of a laser among walls.
 
     Args:
         walls: Walls that it sees.
@@ -81,7 +81,7 @@ class Sweep:
         rights, lefts = np.where(is_ahead, places, places[::-1])
         firsts = np.ceil(rights - _SLACK).astype(np.intp)
         ends = np.floor(lefts + _SLACK).astype(np.intp) + 1
-        # A wall takes less than half a turn. What goes back by a hair is in line but for rounding.
+        # A wall takes less than half a revolution. What goes back by a hair is in line but for rounding.
         ends += BEAMS * (lefts - rights < -_HALF / 2)
         counts = np.maximum(ends - firsts, 0)
         totals = counts.cumsum()

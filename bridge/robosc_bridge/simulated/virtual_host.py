@@ -1,9 +1,9 @@
 """A host whose time passes only while everybody waits, for whole bridges in tests: exact, and as fast as they compute.
 
-Its threads take turns: one of them runs until it waits, then another one whose wait is over, in the order in which they
-began to wait. Where nobody's is, time jumps to the moment at which the first one is. So a run is the same each time,
-whatever else the computer does. This is what `trio.testing.MockClock` with its `autojump_threshold` of 0 does for
-tasks (N. J. Smith, trio), here for threads.
+Its threads run one at a time: one of them runs until it waits, then another one whose wait is over, in the order in
+which they began to wait. Where nobody's is, time jumps to the moment at which the first one is. So a run is the same
+each time, whatever else the computer does. This is what `trio.testing.MockClock` with its `autojump_threshold` of 0
+does for tasks (N. J. Smith, trio), here for threads.
 
 Its serial ports and its network are memory: what one end writes, the other end can read at once.
 """
@@ -37,11 +37,11 @@ class _Ended(BaseException):
     """The host was closed while a thread waited."""
 
 
-class _Turn:
-    """A thread's place among those that take turns."""
+class _Slot:
+    """A thread's place among those that run one at a time."""
 
     def __init__(self) -> None:
-        # Taken by whoever waits for its turn, released by whoever gives it: of all that waits in turn, the fastest.
+        # Taken by whoever waits for its slot, released by whoever gives it: of all waits, the fastest.
         self.given = threading.Lock()
         self.given.acquire()
         self.end_s = math.inf
@@ -50,7 +50,7 @@ class _Turn:
 
 
 class VirtualHost:
-    """A host on virtual time. The thread that makes it takes turns with those that are made by it.
+    """A host on virtual time. The thread that makes it alternates with those that are made by it.
 
     Args:
         now_s: First reading of its clock.
@@ -60,10 +60,10 @@ class VirtualHost:
     def __init__(self, now_s: float = 1000.0, epoch_s: float = 1_000_000.0) -> None:
         self._now_s = now_s
         self._epoch_s = epoch_s
-        self._maker = self._running = _Turn()
+        self._maker = self._running = _Slot()
         self._until_s = math.inf
         self._is_stuck = False
-        self._waiting: deque[_Turn] = deque()
+        self._waiting: deque[_Slot] = deque()
         self._threads: list[threading.Thread] = []
         self._is_closed = False
         self.ports: dict[str, _End] = {}
@@ -90,12 +90,12 @@ class VirtualHost:
         """
         if self._is_closed:
             raise _Ended
-        turn = self._running
-        turn.is_ready, turn.end_s = is_ready, self._now_s + max(limit_s, 0.0)
-        if turn is self._maker:
-            self._until_s = self._now_s + _VAIN_S if math.isinf(turn.end_s) else turn.end_s
-        self._waiting.append(turn)
-        self._pass_on(turn)
+        slot = self._running
+        slot.is_ready, slot.end_s = is_ready, self._now_s + max(limit_s, 0.0)
+        if slot is self._maker:
+            self._until_s = self._now_s + _VAIN_S if math.isinf(slot.end_s) else slot.end_s
+        self._waiting.append(slot)
+        self._pass_on(slot)
         return is_ready()
 
     def condition(self) -> "_Condition":
@@ -107,7 +107,7 @@ class VirtualHost:
         return _Queue(self)
 
     def thread(self, run: Callable[[], None], name: str) -> "_Thread":
-        """Return a new thread that takes turns with the others."""
+        """Return a new thread that alternates with the others."""
         return _Thread(self, run, name)
 
     def open_port(self, path: str, baud: int) -> "_Port":
@@ -168,50 +168,50 @@ class VirtualHost:
     ) -> None:
         self.close()
 
-    def _pass_on(self, turn: _Turn) -> None:
-        """Give the turn to whoever's wait is over first, and wait for the own one."""
+    def _pass_on(self, slot: _Slot) -> None:
+        """Give the processor to whoever's wait is over first, and wait for the own one."""
         following = self._next()
-        if following is not turn:
+        if following is not slot:
             self._running = following
             following.given.release()
-            turn.given.acquire()
+            slot.given.acquire()
         if self._is_closed:
             raise _Ended
         if self._is_stuck:
             self._is_stuck = False
             raise VirtualTimeError(f"everybody waits for ever, or this thread in vain; it is {self._now_s:g} s")
 
-    def _next(self) -> _Turn:
-        for turn in self._waiting:
+    def _next(self) -> _Slot:
+        for slot in self._waiting:
             # Nobody is left waiting whose time is over, so that it can be stated of any run that it ends.
-            if turn.end_s <= self._now_s or turn.is_ready():
+            if slot.end_s <= self._now_s or slot.is_ready():
                 break
         else:
-            turn = min(self._waiting, key=lambda turn: turn.end_s)
-            if not math.isinf(turn.end_s):
-                self._now_s = max(self._now_s, turn.end_s)
-            if math.isinf(turn.end_s) or self._now_s > self._until_s:
+            slot = min(self._waiting, key=lambda slot: slot.end_s)
+            if not math.isinf(slot.end_s):
+                self._now_s = max(self._now_s, slot.end_s)
+            if math.isinf(slot.end_s) or self._now_s > self._until_s:
                 self._is_stuck = True
-                turn = self._maker
-        self._waiting.remove(turn)
-        return turn
+                slot = self._maker
+        self._waiting.remove(slot)
+        return slot
 
-    def _start(self, turn: _Turn, run: Callable[[], None], name: str) -> int | None:
+    def _start(self, slot: _Slot, run: Callable[[], None], name: str) -> int | None:
         def work() -> None:
-            turn.given.acquire()
+            slot.given.acquire()
             try:
                 if not self._is_closed:
                     run()
             except _Ended:
                 pass
             finally:
-                turn.is_over = True
+                slot.is_over = True
                 if not self._is_closed:
                     self._running = self._next()
                     self._running.given.release()
 
-        turn.is_ready = lambda: True
-        self._waiting.append(turn)
+        slot.is_ready = lambda: True
+        self._waiting.append(slot)
         thread = threading.Thread(target=work, name=name, daemon=True)
         self._threads.append(thread)
         thread.start()
@@ -294,14 +294,14 @@ class _Queue:
 
 
 class _Thread:
-    """A thread that takes turns."""
+    """A thread that alternates with the others."""
 
     def __init__(self, host: VirtualHost, run: Callable[[], None], name: str) -> None:
         self.ident: int | None = None
         self._host = host
         self._run = run
         self._name = name
-        self._turn = _Turn()
+        self._turn = _Slot()
 
     def start(self) -> None:
         """Begin when the others wait."""

@@ -114,8 +114,8 @@ class World:
         y_m: y of the same.
         heading_rad: Heading counter-clockwise from x, unbounded.
         floor_speed_m_s: Forward speed, as it moved on the floor in the last step: slip and walls make it less than
-            what the wheels turn.
-        floor_turn_rad_s: Turn rate, counter-clockwise, likewise.
+            what the wheels rotate.
+        floor_yaw_rate_rad_s: Yaw rate, counter-clockwise, likewise.
         collisions: Number of times that the body has come to a wall or an obstacle.
         is_touching: True if it is at one now.
         left: The left wheel.
@@ -141,7 +141,7 @@ class World:
         fastest_rad_s = MODELS[body.servo_model].no_load_rpm * math.tau / 60
         self.left, self.right = Wheel(fastest_rad_s), Wheel(fastest_rad_s)
         self.floor_speed_m_s = 0.0
-        self.floor_turn_rad_s = 0.0
+        self.floor_yaw_rate_rad_s = 0.0
         self.collisions = 0
         self.is_touching = False
         self.lived_s = time.world_s()
@@ -154,12 +154,12 @@ class World:
 
     @property
     def speed_m_s(self) -> float:
-        """Forward, as the wheels turn."""
+        """Forward, as the wheels rotate."""
         return self.body.wheel_radius_m * (self.left.speed_rad_s + self.right.speed_rad_s) / 2
 
     @property
-    def turn_rad_s(self) -> float:
-        """Counter-clockwise, as the wheels turn."""
+    def yaw_rate_rad_s(self) -> float:
+        """Counter-clockwise, as the wheels rotate."""
         difference = self.right.speed_rad_s - self.left.speed_rad_s
         return self.body.wheel_radius_m * difference / self.body.wheel_separation_m
 
@@ -265,16 +265,16 @@ class World:
             left_rad *= 1.0 - drift.slips[0]
             right_rad *= 1.0 - drift.slips[1]
         if left_rad == 0.0 and right_rad == 0.0:
-            self.floor_speed_m_s = self.floor_turn_rad_s = 0.0
+            self.floor_speed_m_s = self.floor_yaw_rate_rad_s = 0.0
             return
         left_m, right_m = left_rad * self.body.wheel_radius_m, right_rad * self.body.wheel_radius_m
         forward_m = (left_m + right_m) / 2
-        turn_rad = (right_m - left_m) / self.body.wheel_separation_m
-        middle_rad = self.heading_rad + turn_rad / 2
-        # A round body can always turn, whatever it touches; its wheels slip where it cannot go on.
-        self.heading_rad += turn_rad
+        rotation_rad = (right_m - left_m) / self.body.wheel_separation_m
+        middle_rad = self.heading_rad + rotation_rad / 2
+        # A round body can always rotate, whatever it touches; its wheels slip where it cannot go on.
+        self.heading_rad += rotation_rad
         has_gone = self._go(forward_m, forward_m * math.cos(middle_rad), forward_m * math.sin(middle_rad))
-        self.floor_speed_m_s, self.floor_turn_rad_s = forward_m * has_gone / STEP_S, turn_rad / STEP_S
+        self.floor_speed_m_s, self.floor_yaw_rate_rad_s = forward_m * has_gone / STEP_S, rotation_rad / STEP_S
 
     def _go(self, forward_m: float, along_x_m: float, along_y_m: float) -> bool:
         """Move, unless something is in the way; whether it has."""
@@ -318,13 +318,13 @@ class World:
             cosine, sine = math.cos(self.heading_rad), math.sin(self.heading_rad)
             x_m, y_m = self._scanner_place()
             rounds = self._rounds
-        turn = np.array(((cosine, sine), (-sine, cosine)))
-        along = directions @ turn
+        rotation = np.array(((cosine, sine), (-sine, cosine)))
+        along = directions @ rotation
         if origins is None:
             found = self.walls.cast_from(x_m, y_m, along)
             starts = np.array(((x_m, y_m),))
         else:
-            starts = origins @ turn + np.array((x_m, y_m))
+            starts = origins @ rotation + np.array((x_m, y_m))
             found = self.walls.cast(starts, along)
         return np.minimum(found, rounds.cast(starts, along)) if rounds.discs else found
 
@@ -342,7 +342,7 @@ class World:
         return tuple(self.cast(None, directions).tolist())
 
     def scan(self) -> Floats:
-        """Return the ranges that an ideal laser would measure now in a whole turn.
+        """Return the ranges that an ideal laser would measure now in a whole revolution.
 
         Returns:
             Shape (360,): counter-clockwise from the front, in metres; infinity where nothing is met.

@@ -18,7 +18,7 @@ class Line:
     """Line that a picture shows.
 
     Attributes:
-        correction_rad_s: Turn rate to keep on it, counter-clockwise above zero; None: no line is in sight.
+        correction_rad_s: Yaw rate to keep on it, counter-clockwise above zero; None: no line is in sight.
     """
 
     correction_rad_s: float | None
@@ -28,7 +28,7 @@ LOST = Line(None)
 
 
 class LineDetector:
-    """Detector that turns pictures into corrections, and silence of the camera into a lost line.
+    """Detector that rotates pictures into corrections, and silence of the camera into a lost line.
 
     Args:
         settings: Settings of what counts as a line, and how to steer.

@@ -1,4 +1,4 @@
-"""Turns the robot by an angle, in a closed loop on the heading of its odometry.
+"""Rotates the robot by an angle, in a closed loop on the heading of its odometry.
 
 The speed is the least of three: the limit, what can be braked in time, v = sqrt(2 a r), and a share of what remains, so
 that a line with a delay of up to 1/(e * gain) seconds leads to no overshoot (the critical gain of a pure integrator
@@ -12,11 +12,11 @@ from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.skills.settings import RotateSettings
 
 MAXIMUM_ANGLE_RAD = 200 * math.pi
-"""A hundred turns; who asks for more has mistaken the unit."""
+"""A hundred revolutions; who asks for more has mistaken the unit."""
 
 
 class RotateState(StrEnum):
-    """Progress of a turn."""
+    """Progress of a rotation."""
 
     IDLE = "idle"
     TURNING = "turning"
@@ -25,12 +25,12 @@ class RotateState(StrEnum):
 
 
 class Rotate:
-    """A turn by an angle of any size, either way; one at a time.
+    """A rotation by an angle of any size, either way; one at a time.
 
     Attributes:
-        state: Progress of the turn; `DONE` and `FAILED` stay until the next `start`.
+        state: Progress of the rotation; `DONE` and `FAILED` stay until the next `start`.
         reason: Reason why it failed; empty: it did not.
-        remaining_rad: Angle left to turn, counter-clockwise above zero; 0 before the first turn.
+        remaining_rad: Angle left to rotate, counter-clockwise above zero; 0 before the first rotation.
 
     Args:
         settings: Limits and tolerances.
@@ -46,12 +46,12 @@ class Rotate:
         self._settled_s: float | None = None
 
     @property
-    def is_turning(self) -> bool:
-        """True if a turn is under way."""
+    def is_rotating(self) -> bool:
+        """True if a rotation is under way."""
         return self.state is RotateState.TURNING
 
     def start(self, angle_rad: float, time_s: float) -> bool:
-        """Begin a turn, from the next heading that comes.
+        """Begin a rotation, from the next heading that comes.
 
         Args:
             angle_rad: By how much, counter-clockwise above zero. One that is not finite or beyond `MAXIMUM_ANGLE_RAD`
@@ -59,16 +59,16 @@ class Rotate:
             time_s: Now.
 
         Returns:
-            Whether it was taken; False: another turn is under way and goes on.
+            Whether it was taken; False: another rotation is under way and goes on.
         """
-        if self.is_turning:
+        if self.is_rotating:
             return False
         self.reason = ""
         self.remaining_rad = 0.0
         self._heading_rad = None
         self._settled_s = None
         if not abs(angle_rad) <= MAXIMUM_ANGLE_RAD:
-            self._fail(f"an angle of {angle_rad:g} rad is beyond a hundred turns")
+            self._fail(f"an angle of {angle_rad:g} rad is beyond a hundred revolutions")
             return True
         self.remaining_rad = angle_rad
         self._end_s = time_s + 2 * abs(angle_rad) / self._settings.speed_rad_s + self._settings.patience_s
@@ -76,19 +76,19 @@ class Rotate:
         return True
 
     def cancel(self, reason: str) -> None:
-        """End a turn that is under way: it has failed."""
-        if self.is_turning:
+        """End a rotation that is under way: it has failed."""
+        if self.is_rotating:
             self._fail(reason)
 
     def update(self, heading_rad: float | None, time_s: float) -> Velocity:
-        """The velocity that is wanted now; a standstill unless a turn is under way.
+        """The velocity that is wanted now; a standstill unless a rotation is under way.
 
         Args:
-            heading_rad: Of the odometry, any number of turns; None: there is no new one. Between two of them the
-                robot must turn by less than half a turn.
+            heading_rad: Of the odometry, any number of revolutions; None: there is no new one. Between two of them the
+                robot must rotate by less than half a rotation.
             time_s: Now.
         """
-        if not self.is_turning:
+        if not self.is_rotating:
             return STANDSTILL
         is_known = heading_rad is not None and math.isfinite(heading_rad)
         if heading_rad is not None and is_known:
@@ -97,7 +97,7 @@ class Rotate:
                 self.state = RotateState.DONE
                 return STANDSTILL
         if time_s >= self._end_s:
-            self._fail("the turn has taken too long" if self._heading_rad is not None else "there is no odometry")
+            self._fail("the rotation has taken too long" if self._heading_rad is not None else "there is no odometry")
             return STANDSTILL
         # Without a heading nobody knows how far it is.
         return Velocity(0.0, self._speed_rad_s()) if is_known else STANDSTILL

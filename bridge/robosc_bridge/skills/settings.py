@@ -14,11 +14,11 @@ TypedKey = Annotated[
 
 
 class RotateSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Settings of the robot's turn by an angle."""
+    """Settings of the robot's rotation by an angle."""
 
-    speed_rad_s: Annotated[float, Meta(ge=0.05, le=10, description="Fastest turn, in rad/s.")] = 0.8
+    speed_rad_s: Annotated[float, Meta(ge=0.05, le=10, description="Fastest rotation, in rad/s.")] = 0.8
     slowest_rad_s: Annotated[
-        float, Meta(ge=0.01, le=1, description="Slowest turn, in rad/s: below it, wheels may stand still.")
+        float, Meta(ge=0.01, le=1, description="Slowest rotation, in rad/s: below it, wheels may stand still.")
     ] = 0.08
     braking_rad_s2: Annotated[float, Meta(ge=0.05, le=50, description="Deceleration towards the end, in rad/s².")] = 1.5
     gain_per_s: Annotated[
@@ -26,14 +26,14 @@ class RotateSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         Meta(ge=0.1, le=10, description="Speed for what remains, in rad/s per rad; less for slower lines."),
     ] = 2.0
     tolerance_rad: Annotated[
-        float, Meta(ge=0.002, le=0.8, description="By how much a finished turn may be off, in rad.")
+        float, Meta(ge=0.002, le=0.8, description="By how much a finished rotation may be off, in rad.")
     ] = 0.02
     settle_s: Annotated[
         float, Meta(ge=0, le=5, description="Time within the tolerance until it is done, in seconds.")
     ] = 0.3
     patience_s: Annotated[
         float,
-        Meta(ge=1, le=60, description="Seconds beyond twice the time at full speed after which a turn has failed."),
+        Meta(ge=1, le=60, description="Seconds beyond twice the time at full speed after which a rotation has failed."),
     ] = 5.0
 
 

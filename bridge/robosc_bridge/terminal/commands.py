@@ -48,7 +48,7 @@ def add_commands(commands: Any) -> None:
 
     watch = commands.add_parser("watch", help="tell what happens, until Ctrl-C", epilog=EPILOG)
     watch.add_argument("--json", action="store_true", help="for programs: one JSON document a line")
-    watch.add_argument("--scans", action="store_true", help="with the LiDAR's turns (only with --json)")
+    watch.add_argument("--scans", action="store_true", help="with the LiDAR's revolutions (only with --json)")
     watch.add_argument("--rate", type=float, default=10.0, metavar="HZ", help="looks a second (default: %(default)g)")
     _finish(watch, _watch)
 

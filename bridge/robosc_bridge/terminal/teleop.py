@@ -38,7 +38,7 @@ LINEAR_M_S, ANGULAR_RAD_S = 0.22, 2.0
 STEP_M_S, STEP_RAD_S = 0.02, 0.2
 
 HELP = (
-    "w/s or up/down: faster, slower   a/d or left/right: turn   hold k: go on like this   x: halt   space: STOP   "
+    "w/s or up/down: faster, slower   a/d or left/right: rotate   hold k: go on like this   x: halt   space: STOP   "
     "r: resume   q: end"
 )
 
@@ -111,8 +111,8 @@ class Wished:
                 step = STEP_M_S if key == "w" else -STEP_M_S
                 self.linear_m_s = _stepped(self.linear_m_s, step, LINEAR_M_S)
             case "a" | "d":
-                turn = STEP_RAD_S if key == "a" else -STEP_RAD_S
-                self.angular_rad_s = _stepped(self.angular_rad_s, turn, ANGULAR_RAD_S)
+                angular_rad_s = STEP_RAD_S if key == "a" else -STEP_RAD_S
+                self.angular_rad_s = _stepped(self.angular_rad_s, angular_rad_s, ANGULAR_RAD_S)
             case "x" | " ":
                 self.linear_m_s = self.angular_rad_s = 0.0
 

@@ -67,7 +67,7 @@ class Drive:
     Attributes:
         pose: x and y in metres, heading in radians.
         linear_m_s: Forward speed.
-        angular_rad_s: Turn rate, counter-clockwise.
+        angular_rad_s: Yaw rate, counter-clockwise.
         battery_v: Battery voltage; None: not known.
         is_torque_on: True if the motors hold.
     """
@@ -117,7 +117,7 @@ class Status:
 
 @dataclass(frozen=True, slots=True)
 class LaserScan:
-    """A turn of the LiDAR.
+    """A revolution of the LiDAR.
 
     Attributes:
         ranges_m: One a degree, counter-clockwise from the front; not finite: nothing was seen.

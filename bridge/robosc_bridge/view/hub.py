@@ -263,7 +263,7 @@ class Hub:
             viewer.happened(entries, happenings.lost)
 
     def scanned(self, scan: LaserScan) -> None:
-        """A turn of the LiDAR."""
+        """A revolution of the LiDAR."""
         text = scan_text(scan)
         for viewer in self._viewers:
             viewer.scanned(text)

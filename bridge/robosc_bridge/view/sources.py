@@ -42,7 +42,7 @@ class Sink(Protocol):
         """Entries of the event log; `first` is the number of the first of them, where they have one of their own."""
 
     def scanned(self, scan: LaserScan) -> None:
-        """A turn of the LiDAR; the latest alone counts."""
+        """A revolution of the LiDAR; the latest alone counts."""
 
     def jumped(self) -> None:
         """The replay of a log is elsewhere; all there is to tell of the place follows."""

@@ -19,7 +19,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "bridge"), str(ROOT / "tests"), str(ROOT /
 
 from figures import text_table  # noqa: E402  # found through the path above
 from robosc_bridge.devices.lidar import LDS01, LDS02, LDS03, Model  # noqa: E402
-from robosc_bridge.protocol.turns import TurnBuilder, nearest_by_degree  # noqa: E402
+from robosc_bridge.protocol.revolutions import RevolutionBuilder, nearest_by_degree  # noqa: E402
 from support.lidar_frames import lds01_frame, lds02_frame, lds03_frame  # noqa: E402
 
 RUNS = 7
@@ -64,13 +64,13 @@ def _frames(model: Model[Any], reads: list[bytes]) -> int:
 
 def _scans(model: Model[Any], reads: list[bytes]) -> int:
     decoder = model.make_decoder()
-    turns = TurnBuilder()
+    revolutions = RevolutionBuilder()
     found = 0
     for data in reads:
         for frame in decoder.feed(data):
-            turn = turns.add(model.points(frame))
-            if turn:
-                found += len(nearest_by_degree(turn.angles_deg, turn.ranges_m)) == 360
+            revolution = revolutions.add(model.points(frame))
+            if revolution:
+                found += len(nearest_by_degree(revolution.angles_deg, revolution.ranges_m)) == 360
     return found
 
 
@@ -94,9 +94,9 @@ def _row(
 def table() -> str:
     """The table."""
     rows = []
-    for model, turn, header in DEVICES:
+    for model, revolution, header in DEVICES:
         dice = Random(1)
-        frames = [frame for _ in range(TURNS) for frame in turn(dice)]
+        frames = [frame for _ in range(TURNS) for frame in revolution(dice)]
         stream = b"".join(frames)
         noise = dice.randbytes(NOISE_BYTES)
         headers = header * (NOISE_BYTES // len(header))

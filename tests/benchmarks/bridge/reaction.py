@@ -45,7 +45,7 @@ from rig import (  # noqa: E402
 
 from figures import text_table  # noqa: E402  # found through the path above
 from robosc_bridge.devices.lidar import LDS01, LDS02, LDS03, Model  # noqa: E402
-from robosc_bridge.protocol.turns import TurnBuilder, nearest_by_degree  # noqa: E402
+from robosc_bridge.protocol.revolutions import RevolutionBuilder, nearest_by_degree  # noqa: E402
 from robosc_bridge.simulated.recorder import Record, read_records  # noqa: E402
 from support.real_time import preferred  # noqa: E402  # rig adds its folder to the path
 
@@ -86,16 +86,16 @@ class Trial:
 
 
 def turns(records: Sequence[Record], lidar: str) -> Iterator[tuple[float, bool]]:
-    """Yield the time at which each turn of the LiDAR was sent to its end, and True if it shows an obstacle."""
+    """Yield the time at which each revolution of the LiDAR was sent to its end, and True if it shows an obstacle."""
     model = MODELS[lidar]
-    decoder, builder = model.make_decoder(), TurnBuilder()
+    decoder, builder = model.make_decoder(), RevolutionBuilder()
     for record in records:
         if record.line != "scanner" or record.is_from_host:
             continue
         for frame in decoder.feed(record.data):
-            turn = builder.add(model.points(frame))
-            if turn:
-                ranges = nearest_by_degree(turn.angles_deg, turn.ranges_m)
+            revolution = builder.add(model.points(frame))
+            if revolution:
+                ranges = nearest_by_degree(revolution.angles_deg, revolution.ranges_m)
                 # As the model has it: what is not measured is an obstacle.
                 yield record.time_s, not all(ranges[degree] > NEAREST_M for degree in AHEAD)
 

@@ -21,7 +21,7 @@ SERVOS_STOP = bytes.fromhex("fffffd00fe1100836800040001000000000200000000e4d0")
 SERVOS_READ = bytes.fromhex("fffffd00fe0900827e00150001023e1e")
 
 
-def turn(time_s: float, distance_mm: int) -> list[Record]:
+def revolution(time_s: float, distance_mm: int) -> list[Record]:
     """A turn of an LDS-01 whose last frame is sent then."""
     frames = [lds01_frame(index, [(100, distance_mm)] * 6) for index in range(60)]
     return [Record(time_s - (59 - index) / 300, "scanner", False, frame) for index, frame in enumerate(frames)]
@@ -39,8 +39,9 @@ def in_order(*records: Record | list[Record]) -> list[Record]:
 @pytest.mark.parametrize(("move", "stop"), [(OPENCR_MOVE, OPENCR_ZERO), (SERVOS_MOVE, SERVOS_STOP)])
 def test_a_reaction_is_from_the_turns_last_byte_to_the_first_zero(move: bytes, stop: bytes) -> None:
     records = in_order(
-        turn(1.0, 3000), sent(1.1, stop), sent(1.2, move), turn(2.0, 3000),
-        turn(3.0, 300), sent(3.001, move), sent(3.004, SERVOS_READ + stop), sent(3.02, stop), turn(4.0, 300),
+        revolution(1.0, 3000), sent(1.1, stop), sent(1.2, move), revolution(2.0, 3000),
+        revolution(3.0, 300), sent(3.001, move), sent(3.004, SERVOS_READ + stop), sent(3.02, stop), revolution(4.0,
+        300),
     )  # fmt: skip
     assert trials(records, "lds01") == [Trial(3.0, 3.004)]
 
@@ -51,10 +52,16 @@ def test_a_command_counts_from_its_first_byte() -> None:
 
 
 def test_a_robot_that_does_not_stop_has_no_reaction_time() -> None:
-    records = in_order(turn(1.0, 3000), sent(1.2, SERVOS_MOVE), turn(2.0, 300), turn(3.0, 3000), sent(3.1, SERVOS_STOP))
+    records = in_order(
+        revolution(1.0, 3000),
+        sent(1.2, SERVOS_MOVE),
+        revolution(2.0, 300),
+        revolution(3.0, 3000),
+        sent(3.1, SERVOS_STOP),
+    )
     assert trials(records, "lds01") == [Trial(2.0, math.inf)]
 
 
 def test_a_robot_that_was_not_driving_is_no_trial() -> None:
-    records = in_order(turn(1.0, 3000), sent(1.2, SERVOS_STOP), turn(2.0, 300), sent(2.1, SERVOS_STOP))
+    records = in_order(revolution(1.0, 3000), sent(1.2, SERVOS_STOP), revolution(2.0, 300), sent(2.1, SERVOS_STOP))
     assert trials(records, "lds01") == []

@@ -287,7 +287,7 @@ def test_devices_that_are_not_there_are_told(monkeypatch: pytest.MonkeyPatch) ->
 
     assert told("{channel: scanner}") == ": there is no scanner: the section 'scanner' is missing"
     assert told("{channel: fault, device: scanner}") == ": there is no scanner: the section 'scanner' is missing"
-    assert told("{channel: imu}") == ": the drive 'dynamixel' measures no accelerations and turn rates"
+    assert told("{channel: imu}") == ": the drive 'dynamixel' measures no accelerations and yaw rates"
     assert told("{channel: bumper}") == ": the drive 'dynamixel' has no bumpers"
     assert told("{channel: button, name: x}") == ".name: the drive 'dynamixel' has no button 'x'; there is none"
     line = told("{channel: none}", "skills: {emergency_stop: {stop_buttons: [button_1]}}")

@@ -106,7 +106,7 @@ def test_a_face_that_may_not_listen_so_is_refused_before_anything_is_made(
     [
         (
             "lds01, port: /dev/scanner}\nsafety: {scan_timeout_s: 0.2",
-            "safety.scan_timeout_s: a turn of the LiDAR takes 0.2",
+            "safety.scan_timeout_s: a revolution of the LiDAR takes 0.2",
         ),
         (
             "lds03, port: /dev/scanner, options: {front_rad: left}",

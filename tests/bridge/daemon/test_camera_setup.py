@@ -96,7 +96,7 @@ class Scene:
     def told(self, *reports: Report) -> list[str]:
         """The model's events that follow."""
         before = len(self.log.entries)
-        self.daemon.turn(*reports)
+        self.daemon.cycle(*reports)
         return [entry["event"] for entry in self.log.entries[before:] if entry["kind"] == "event"]
 
     def up(self) -> None:

@@ -22,7 +22,7 @@ def test_a_robot_wanders_on_and_on(base: str, period_s: float) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=280)
     assert done.returncode == 0, done.stderr
     found: dict[str, Any] = json.loads(done.stdout)
-    # Not in its first moments: all devices must be there, and one full turn.
+    # Not in its first moments: all devices must be there, and one full revolution.
     assert SECONDS / period_s - 100 < found["decisions"] <= SECONDS / period_s
     assert abs(found["drift_s"]) < 1e-6
     assert found["overruns"] == 0

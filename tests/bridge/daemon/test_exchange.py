@@ -257,14 +257,14 @@ def test_what_is_served_already_is_not_served_by_another() -> None:
     scene = helped()
     first = Connected(scene, "first", ("ask",))
     second = Connected(scene, "second", ("ask", "fetch", "note", "nothing"))
-    assert sorted(why(second.turn())) == [
+    assert sorted(why(second.cycle())) == [
         "'ask' is served by first already",
         "'note' is no service or action of the model that is mapped to grpc",
         "'nothing' is no service or action of the model that is mapped to grpc",
     ]
     first.leave()
     third = Connected(scene, "third", ("ask",))
-    assert why(third.turn()) == []
+    assert why(third.cycle()) == []
 
 
 def test_a_run_that_ends_takes_its_numbers_with_it() -> None:
@@ -384,17 +384,17 @@ def test_whatever_programs_say_the_bridge_goes_on(sayings: list[tuple[bool, tupl
 def test_who_sends_too_much_loses_it_and_is_told_and_others_are_not_held_up() -> None:
     scene = helped()
     loud, quiet = Connected(scene, "loud"), Connected(scene, "quiet")
-    scene.daemon.turn()
+    scene.daemon.cycle()
     for _ in range(MAXIMUM_WAITING + 30):
         scene.daemon.post(MessageReceived(loud.program, "/go", 4))
     quiet.say(MessageReceived, "/go", 5)
-    # Taken up in the first turn, though hundreds came before it.
+    # Taken up in the first rotation, though hundreds came before it.
     assert variable(scene, "wanted") in (4, 5)
     heard = [entry["data"] for entry in scene.log.entries if entry.get("event") == "go.response"]
     assert {"value": 5} in heard
     assert len(heard) < 60
     for _ in range(10):
-        scene.daemon.turn()
+        scene.daemon.cycle()
     assert why(loud.told) == ["this program sends too much at once: 30 of it were not looked at"]
     assert why(quiet.told) == []
     loud.say(MessageReceived, "/go", 7)
@@ -413,6 +413,6 @@ def test_a_number_that_is_none_reaches_no_model() -> None:
 def test_a_program_that_comes_twice_is_one() -> None:
     scene = helped()
     program = Connected(scene, "a program")
-    program.turn()
+    program.cycle()
     scene.daemon.post(Attached(program.program))
-    assert why(program.turn()) == ["this program is there already"]
+    assert why(program.cycle()) == ["this program is there already"]

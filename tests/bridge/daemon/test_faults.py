@@ -323,8 +323,8 @@ def test_a_lidar_that_shows_nothing_stops_the_wheels_until_it_does(base: str, li
     with driven(base, lidar, safety=_scan_timeout(lidar)) as bridge:
         row = f"{lidar} is silent" if how == "is_stalled" else f"{lidar} is covered"
         bridge.stopped_after(lambda: setattr(bridge.robot.scanner, how, True), STATED_S[row])
-        bridge.was_told(f"scanner: no full turn with valid ranges for {SCAN_TIMEOUTS_S[lidar]:g} s")
-        bridge.was_told("The scanner has made no full turn for too long.")
+        bridge.was_told(f"scanner: no full revolution with valid ranges for {SCAN_TIMEOUTS_S[lidar]:g} s")
+        bridge.was_told("The scanner has made no full revolution for too long.")
         bridge.stays(WHILE_S)
         assert (bridge.state, bridge.log.events().count("lost.response")) == (State.RUNNING, 1)
         setattr(bridge.robot.scanner, how, False)

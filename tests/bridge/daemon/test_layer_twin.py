@@ -89,7 +89,7 @@ class Twins:
         self.scene.up()
         self.caller = Connected(self.scene, "caller")
         self.server = Connected(self.scene, "server", ("think", "face"), may_request=False)
-        self.scene.daemon.turn()
+        self.scene.daemon.cycle()
         system = InterpretedSystem(supervisor_of(MODEL, Deployment.LAYER))
         self.twin = LayerBench(
             system, release_identifiers=("/cmd_vel",), command_timeout_s=0.4, service_timeout_s=1.0, period_s=0.02
@@ -134,7 +134,7 @@ class Twins:
     def wait(self, seconds: float) -> None:
         def live() -> None:
             self.scene.clock.advance(seconds)
-            self.scene.daemon.turn()
+            self.scene.daemon.cycle()
 
         self.compare(live, lambda: self.twin.wait(seconds))
 
@@ -143,7 +143,7 @@ class Twins:
 
         def say() -> None:
             self.scene.daemon.post(item)
-            self.scene.daemon.turn()
+            self.scene.daemon.cycle()
 
         self.compare(say, lambda: act(*arguments))
 

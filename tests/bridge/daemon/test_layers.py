@@ -151,10 +151,10 @@ def test_what_was_asked_for_during_an_operators_stop_does_not_move_it_afterwards
 
 def test_sensors_are_passed_on_after_the_supervisor_has_seen_them(scene: Scene, program: Connected) -> None:
     silent = Connected(scene, "a viewer", may_request=False)
-    silent.turn()
+    silent.cycle()
     program.say(MessageReceived, "/mood", "fine")
     scene.scan(0.3)
-    program.turn()
+    program.cycle()
     assert program.of(PassedOn) == silent.of(PassedOn)[-1:]
     assert program.of(PassedOn)[0].identifier == "/scan"
     assert PassedOn("/mood", "fine") in silent.told
@@ -302,7 +302,7 @@ def test_an_operators_stop_ends_a_goal_and_holds_everything_back(scene: Scene, p
 
 def test_in_standby_everything_is_held_back_and_what_was_awaited_is_answered(scene: Scene, program: Connected) -> None:
     server = Connected(scene, "a server", ("think",))
-    server.turn()
+    server.cycle()
     program.say(CallRequested, "think", "t", "about it")
     program.say(GoalRequested, "face", "g", {"angle": 90})
     scene.daemon.post(Command.STANDBY)
@@ -322,7 +322,7 @@ def test_in_standby_everything_is_held_back_and_what_was_awaited_is_answered(sce
 
 def test_a_service_of_a_program_answers_another_programs_call(scene: Scene, program: Connected) -> None:
     server = Connected(scene, "a server", ("think",))
-    server.turn()
+    server.cycle()
     server.told.clear()
     program.say(CallRequested, "think", "t", "about it")
     (call,) = server.of(CallMade)
@@ -350,8 +350,8 @@ WRONG = [
     (MessageRequested, ("/cmd_vel", {"linear": {"x": 1 << 80}}), "a number of more than 64 bits"),
     (MessageRequested, ("/spin", 1.5), "'spin': the data must be a whole number"),
     (MessageRequested, ("/spin", {"data": 90}), "'spin': the data must be number"),
-    (MessageRequested, ("/spin", 36_001), "beyond a hundred turns"),
-    (MessageRequested, ("/spin", -36_001), "beyond a hundred turns"),
+    (MessageRequested, ("/spin", 36_001), "beyond a hundred revolutions"),
+    (MessageRequested, ("/spin", -36_001), "beyond a hundred revolutions"),
     (MessageRequested, ("/scan", {}), "no message to the robot on '/scan'"),
     (MessageRequested, ("/nowhere", {}), "no message to the robot on '/nowhere'"),
     (CallRequested, ("turn", "", {}), "an id has 1 to 255 characters"),
@@ -361,7 +361,7 @@ WRONG = [
     (CallRequested, ("turn", "1", {"data": 90}), "there is no field 'data'; there is angle"),
     (CallRequested, ("think", "1", 5), "'think': the data must be a text"),
     (GoalRequested, ("turn", "1", {}), "the model has no action 'turn'"),
-    (GoalRequested, ("face", "1", {"angle": 1e9}), "beyond a hundred turns"),
+    (GoalRequested, ("face", "1", {"angle": 1e9}), "beyond a hundred revolutions"),
     (CancelRequested, ("face", "1"), "'1' is no goal of 'face' that is under way"),
 ]
 
@@ -416,7 +416,7 @@ def test_who_sends_too_much_is_stopped(scene: Scene, program: Connected) -> None
     for _ in range(300):
         scene.daemon.post(MessageRequested(program.program, "/cmd_vel", FORWARD))
     for _ in range(10):
-        program.turn()
+        program.cycle()
         scene.exchange()
     assert scene.out == STANDSTILL
 
@@ -463,19 +463,19 @@ def test_what_is_costly_to_take_up_is_spread_over_turns(scene: Scene) -> None:
 
     slow = Program("slow", take_time, may_request=True)
     scene.daemon.post(Attached(slow))
-    scene.daemon.turn()
+    scene.daemon.cycle()
     other = Connected(scene, "another")
-    other.turn()
+    other.cycle()
     for _ in range(50):
         scene.daemon.post(MessageRequested(slow, "/cmd_vel", {"linear": {"x": math.nan}}))
-    # Its first is taken up in the first turn, and so is that of the other one.
+    # Its first is taken up in the first rotation, and so is that of the other one.
     assert Blocked("/cmd_vel") in other.say(MessageRequested, "/cmd_vel", {"linear": {"x": math.nan}})
     for turns in range(1, 20):
         assert len(taken) <= 2 * turns
-        scene.daemon.turn()
+        scene.daemon.cycle()
     while len(taken) < 50:
         before = len(taken)
-        scene.daemon.turn()
+        scene.daemon.cycle()
         assert len(taken) > before
 
 
@@ -493,7 +493,7 @@ def test_data_is_looked_through_in_the_thread_of_who_sends_it(
 
     for name in ("why_not_shaped", "why_not_typed", "completed", "_leaves"):
         monkeypatch.setattr(request_checker, name, noting(getattr(request_checker, name)))
-    program.turn()
+    program.cycle()
     items: list[FromProgram] = [
         MessageRequested(program.program, "/cmd_vel", FORWARD),
         CallRequested(program.program, "turn", "1", {"angle": 20}),
@@ -510,7 +510,7 @@ def test_data_is_looked_through_in_the_thread_of_who_sends_it(
     assert len(looked) > 6
     assert threading.get_ident() not in looked
     looked.clear()
-    assert refused(program.turn()) == ["'face': 'angle' must be number"]
+    assert refused(program.cycle()) == ["'face': 'angle' must be number"]
     scene.live(0.3, 2.0)
     assert scene.out.angular_rad_s > 0.0
     assert looked == []
@@ -519,11 +519,11 @@ def test_data_is_looked_through_in_the_thread_of_who_sends_it(
 def test_a_lost_drive_base_ends_a_layers_run(scene: Scene, program: Connected) -> None:
     program.say(GoalRequested, "face", "g", {"angle": 90})
     scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))
-    program.turn()
+    program.cycle()
     assert [item.outcome for item in program.of(GoalOver)] == ["aborted"]
     assert scene.daemon.state is State.FAULT
     scene.daemon.post(Detached(program.program))
-    scene.daemon.turn()
+    scene.daemon.cycle()
 
 
 EVERYTHING = [

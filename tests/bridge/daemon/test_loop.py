@@ -49,7 +49,7 @@ def test_an_obstacle_stops_the_wheels_with_the_very_scan_that_shows_it(scene: Sc
     assert scene.out.linear_m_s == 0.1
     hurries = scene.hurries
     scene.scan(0.3)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     scene.exchange()
     assert scene.out == STANDSTILL
     assert scene.hurries > hurries
@@ -128,11 +128,11 @@ def test_a_notice_that_ends_by_itself_is_no_fault(scene: Scene) -> None:
 def test_why_nothing_moves_is_told_while_it_runs_and_not_before(scene: Scene, caplog: pytest.LogCaptureFixture) -> None:
     notice = SafetyNotice((Reason.SCAN_STALE, Reason.COMMAND_SILENT), ())
     scene.daemon.post(notice)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert not [item for item in caplog.records if item.levelname == "WARNING"]
     scene.up()
     scene.daemon.post(notice)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert [item.message for item in caplog.records if item.levelname == "WARNING"] == [Reason.SCAN_STALE]
 
 
@@ -146,7 +146,7 @@ def test_a_thread_that_has_ended_is_a_fault(scene: Scene) -> None:
 def test_a_velocity_from_before_an_operators_stop_does_not_move_the_robot_afterwards(scene: Scene) -> None:
     scene.up()
     scene.daemon.post(Key("space"))
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert scene.daemon._wish == STANDSTILL
     scene.live(0.1, 2.0)
     # Meanwhile something came into the way: nothing asks for a velocity any more.
@@ -162,7 +162,7 @@ def test_a_velocity_from_before_an_operators_stop_does_not_move_the_robot_afterw
 def test_a_drive_base_that_is_lost_ends_the_run_as_a_fault(scene: Scene) -> None:
     scene.up()
     scene.daemon.post(DeviceDown(Device.DRIVE, "/dev/base: the line is gone", 0.25, True))
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert scene.daemon.problem == "the drive base is lost: /dev/base: the line is gone"
     assert scene.daemon.state is State.OVER
     assert "lost.response" in scene.events()
@@ -172,7 +172,7 @@ def test_where_somebody_can_start_it_again_it_waits_and_never_moves_by_itself() 
     scene = Scene(stays=True)
     scene.up()
     scene.daemon.post(DeviceDown(Device.DRIVE, "/dev/base: the line is gone", 0.25, True))
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert scene.daemon.state is State.FAULT
     scene.daemon.post(DeviceUp(Device.DRIVE))
     scene.live(1.0, 2.0)
@@ -187,7 +187,7 @@ def test_quitting_stops_the_wheels_and_lets_go_first(scene: Scene) -> None:
     scene.daemon.post(Command.QUIT)
     # The safety layer hears of it at once, without the loop.
     assert scene.safety.output(scene.clock.monotonic()).velocity == STANDSTILL
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert scene.daemon.state is State.STOPPING
     scene.live(0.2, 2.0)
     assert (scene.daemon.state, scene.torque, scene.daemon.problem) == (State.OVER, False, "")
@@ -196,9 +196,9 @@ def test_quitting_stops_the_wheels_and_lets_go_first(scene: Scene) -> None:
 def test_quitting_does_not_wait_for_ever_for_motors(scene: Scene) -> None:
     scene.up()
     scene.daemon.post(Command.QUIT)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     scene.clock.advance(STOP_LIMIT_S)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert scene.daemon.state is State.OVER
 
 
@@ -247,7 +247,7 @@ def test_decisions_that_are_late_by_periods_are_left_out_and_counted(scene: Scen
     scene.up()
     before = len(scene.events())
     scene.clock.advance(5 * PERIOD_S)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert scene.daemon.overruns == 5
     assert len(scene.events()) <= before + 1
 
@@ -268,7 +268,7 @@ def test_a_turn_that_fails_unheard_is_a_fault() -> None:
     scene.live(0.3, 0.3)
     scene.daemon.post(Command.STOP)
     scene.live(0.2, 0.3)
-    assert scene.daemon.problem.startswith("a turn has failed, and no message of the model tells it so: ")
+    assert scene.daemon.problem.startswith("a rotation has failed, and no message of the model tells it so: ")
 
 
 def test_the_scan_from_before_the_start_is_decided_on_whatever_the_model_says_of_its_age() -> None:

@@ -63,21 +63,21 @@ def stopped() -> Operated:
 def stopping() -> Operated:
     scene = running()
     scene.order(Command.STANDBY)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     return scene
 
 
 def ending() -> Operated:
     scene = running()
     scene.order(Command.QUIT)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     return scene
 
 
 def fault() -> Operated:
     scene = running()
     scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))
-    scene.daemon.turn()
+    scene.daemon.cycle()
     return scene
 
 
@@ -257,7 +257,7 @@ def test_a_resume_before_the_stop_was_put_out_is_refused() -> None:
     scene = running()
     scene.order(Command.STOP)
     answers = scene.order(Command.RESUME)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert answers == [str(Reason.OPERATOR_STOP)]
     scene.live(0.1, 2.0)
     assert scene.out == STANDSTILL
@@ -285,7 +285,7 @@ def test_nothing_starts_without_a_device(device: Device) -> None:
     scene = standby()
     scene.daemon.post(DeviceDown(device, "gone", 0.25, True))
     answers = scene.order(Command.START)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     name = "drive base" if device is Device.DRIVE else "scanner"
     assert answers == [f"the {name} is not there"]
     assert scene.daemon.state is State.STANDBY
@@ -346,9 +346,9 @@ def test_a_reset_that_fails_or_never_ends_is_answered_and_the_fault_stays(proble
 def test_motors_that_do_not_let_go_are_a_fault_that_the_order_is_told() -> None:
     scene = running()
     answers = scene.order(Command.STANDBY)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     scene.clock.advance(STOP_LIMIT_S)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert answers == [f"the motors have not let go within {STOP_LIMIT_S:g} s"]
     assert scene.daemon.state is State.FAULT
 
@@ -356,7 +356,7 @@ def test_motors_that_do_not_let_go_are_a_fault_that_the_order_is_told() -> None:
 def test_an_end_that_is_ordered_comes_though_the_drive_is_lost_on_the_way() -> None:
     scene = ending()
     scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert scene.daemon.state is State.OVER
 
 
@@ -405,14 +405,14 @@ def test_a_stop_in_the_middle_of_a_reset_holds(command: Command, monkeypatch: py
 def test_a_stop_at_the_robot_while_a_reset_waits_for_the_standstill_holds(how: str) -> None:
     scene = running()
     answers = scene.order(Command.RESET)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert scene.daemon.state is State.STOPPING
     if how == "key":
         scene.daemon.post(Key("space"))
     else:
         scene.buttons["button_1"] = True
     scene.exchange()
-    scene.daemon.turn()
+    scene.daemon.cycle()
     scene.buttons["button_1"] = False
     scene.live(1.0, 2.0)
     assert answers == [str(Reason.OPERATOR_STOP)]
@@ -453,7 +453,7 @@ def test_a_standby_in_the_middle_of_a_start_is_not_undone(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(scene.safety, "enable", overtaken)
     scene.order(Command.START)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert Reason.STANDBY in scene.safety.output(scene.clock.monotonic()).reasons
     scene.live(0.3, 2.0)
     assert (scene.daemon.state, scene.out) == (State.STANDBY, STANDSTILL)
@@ -465,7 +465,7 @@ def test_nothing_starts_by_itself_while_a_reset_is_under_way() -> None:
     scene.daemon.post(DeviceUp(Device.DRIVE))
     scene.live(0.1)
     answers = scene.order(Command.RESET)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     scene.daemon.post(DeviceUp(Device.SCANNER))
     scene.live(0.3, 2.0)
     assert (answers, scene.daemon.state, scene.out) == ([], State.STANDBY, STANDSTILL)
@@ -480,10 +480,10 @@ def test_a_fault_outlives_a_drive_that_is_lost_and_back() -> None:
     executor = scene.daemon._execution.executor
     assert executor is not None
     executor.stop("broken", is_fault=True)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     # While it is being stopped.
     scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))
-    scene.daemon.turn()
+    scene.daemon.cycle()
     scene.daemon.post(DeviceUp(Device.DRIVE))
     scene.live(0.3, 2.0)
     assert scene.daemon.state is State.FAULT
@@ -507,7 +507,7 @@ def test_a_loop_that_breaks_answers_what_is_open(monkeypatch: pytest.MonkeyPatch
     def broken(now_s: float) -> None:
         raise RuntimeError(now_s)
 
-    monkeypatch.setattr(scene.safety, "loop_turned", broken)
+    monkeypatch.setattr(scene.safety, "loop_cycled", broken)
     late = scene.order(Command.START)
     with pytest.raises(RuntimeError):
         scene.daemon.run()

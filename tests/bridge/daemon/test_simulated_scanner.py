@@ -59,7 +59,7 @@ class Scene:
         """Return the output of the safety layer for a speed, with a drive base that does as it is told."""
         for _ in range(20):
             now_s = self.time.monotonic()
-            self.safety.loop_turned(now_s)
+            self.safety.loop_cycled(now_s)
             self.safety.operator_seen(now_s)
             self.safety.command(Velocity(speed_m_s), now_s)
             found = self.safety.output(now_s)
@@ -84,11 +84,11 @@ def test_one_that_stays_silent_is_restarted_so_often_and_then_opened_anew(scene:
     scene.robot.scanner.is_stalled = True
     before = scene.robot.scanner_line.received
     assert scene.until(lambda: bool(scene.downs())) == pytest.approx(SILENT_S, abs=0.3)
-    assert [item.problem for item in scene.downs()] == ["no full turn with valid ranges for 0.6 s"]
+    assert [item.problem for item in scene.downs()] == ["no full revolution with valid ranges for 0.6 s"]
     passed_s = SILENT_S + scene.until(lambda: len(scene.downs()) == 2, 20.0)
     # A last time of silence follows the last restart.
     assert passed_s == pytest.approx((RESTART_LIMIT + 1) * RESTART_S, abs=0.3)
-    silent = f"no full turn, also after its motor was started anew {RESTART_LIMIT} times"
+    silent = f"no full revolution, also after its motor was started anew {RESTART_LIMIT} times"
     assert scene.downs()[1] == DeviceDown(Device.SCANNER, silent, 0.5, is_first=True)
     # Each restart is one byte, and so is its end: it was closed, which stops its motor.
     assert scene.robot.scanner_line.received == before + RESTART_LIMIT + 1

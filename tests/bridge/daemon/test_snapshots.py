@@ -59,19 +59,19 @@ def test_each_change_is_shown_in_its_turn_and_measurements_now_and_then() -> Non
     # The state of the model stays what it is: only measurements change.
     assert 15 <= len(scene.shown) - before <= 20
     scene.scan(0.3)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert scene.latest.components["Eyes"]["variables"]["way"] == "blocked"
     assert "drive" not in scene.latest.enabled
     notice = SafetyNotice((Reason.SCAN_STALE,), (Caution.BATTERY,))
     scene.daemon.post(notice)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert (scene.latest.reasons, scene.latest.warnings) == (notice.reasons, notice.warnings)
     scene.daemon.post(DeviceDown(Device.SCANNER, "gone", 0.25, True))
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert scene.latest.devices[Device.SCANNER] is False
     assert scene.latest.scan is None
     scene.daemon.post(Command.STANDBY)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert (scene.latest.state, scene.latest.stops) == (State.STOPPING, ("standby",))
 
 
@@ -91,7 +91,7 @@ def test_a_fault_is_shown_with_its_problem() -> None:
     scene = Watched()
     scene.up()
     scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert (scene.latest.state, scene.latest.problem) == (State.FAULT, "the drive base is lost: no answer")
     assert (scene.latest.reading, scene.latest.devices[Device.DRIVE]) == (None, False)
 
@@ -120,5 +120,5 @@ def test_who_begins_to_look_later_is_told_all_the_same() -> None:
     assert scene.told() == []
     scene.subscription = scene.feed.subscribe(lambda: None)
     scene.scan(0.3)
-    scene.daemon.turn()
+    scene.daemon.cycle()
     assert ("event", "scan.response") in scene.told()

@@ -371,7 +371,7 @@ class ScannerScene:
         self.step()
         assert self.scanner.calls == ["open"]
         assert self.reports == []
-        # It is there with its first turn.
+        # It is there with its first rotation.
         first = scan(self.clock.now_s)
         self.scanner.coming = [first]
         self.step()
@@ -409,7 +409,7 @@ def test_a_silent_scanner_is_told_once_and_its_first_turn_again(turning: Scanner
     for _ in range(8):
         turning.step()
     told = [item for item in turning.reports if isinstance(item, DeviceDown)]
-    assert told == [DeviceDown(Device.SCANNER, "no full turn with valid ranges for 0.6 s", 0.0, is_first=True)]
+    assert told == [DeviceDown(Device.SCANNER, "no full revolution with valid ranges for 0.6 s", 0.0, is_first=True)]
     turning.reports.clear()
     turning.scanner.coming = [scan(turning.clock.now_s)]
     turning.step()
@@ -417,7 +417,7 @@ def test_a_silent_scanner_is_told_once_and_its_first_turn_again(turning: Scanner
 
 
 def test_a_motor_that_stays_silent_is_restarted_so_often_and_then_opened_anew(turning: ScannerScene) -> None:
-    problem = f"no full turn, also after its motor was started anew {RESTART_LIMIT} times"
+    problem = f"no full revolution, also after its motor was started anew {RESTART_LIMIT} times"
     for is_first, retry_s in ((True, 0.5), (False, 1.0)):
         turning.scanner.calls.clear()
         while "close" not in turning.scanner.calls:
@@ -437,7 +437,7 @@ def test_a_motor_that_stays_silent_is_restarted_so_often_and_then_opened_anew(tu
 def test_a_covered_scanner_that_turns_is_not_restarted(turning: ScannerScene) -> None:
     covered = replace(scan(0.0), ranges_m=(math.nan,) * BINS)
     for _ in range(40):
-        # A turn, and a wait for the next one that is in vain.
+        # A rotation, and a wait for the next one that is in vain.
         turning.scanner.coming = [covered]
         turning.step()
         turning.step()

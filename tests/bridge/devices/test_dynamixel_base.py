@@ -277,7 +277,7 @@ def test_torque_is_not_switched_on_while_the_wheels_turn(bench: Rig) -> None:
     wheel.is_driven = True
     wheel.goal_rad_s = 2.0
     bench.until(lambda: bool(bench.robot.world.pose) and wheel.speed_rad_s == 2.0)
-    with pytest.raises(DeviceError, match="still turns"):
+    with pytest.raises(DeviceError, match="still rotates"):
         bench.base.set_torque(True)
     assert TORQUE_ON not in bench.tap.packets
 

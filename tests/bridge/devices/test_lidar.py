@@ -33,15 +33,15 @@ START_LDS03 = bytes.fromhex("aa 55 f0 0f")
 STOP_LDS03 = bytes.fromhex("aa 55 f5 0a")
 
 
-def _lds01_turn(distance_mm: int) -> list[bytes]:
+def _lds01_revolution(distance_mm: int) -> list[bytes]:
     return [lds01_frame(k, [(9, distance_mm)] * 6) for k in range(60)]
 
 
-def _lds02_turn(distance_mm: int) -> list[bytes]:
+def _lds02_revolution(distance_mm: int) -> list[bytes]:
     return [lds02_frame(at, (at + 1100) % 36000, [(distance_mm, 200)] * 12) for at in range(0, 36000, 1200)]
 
 
-def _lds03_turn(distance_mm: int) -> list[bytes]:
+def _lds03_revolution(distance_mm: int) -> list[bytes]:
     frames = [lds03_frame(at, at + 19, [(distance_mm, 200)] * 20) for at in range(0, 360, 20)]
     return [lds03_frame(0, 0, [(distance_mm, 200)], ring_start_dhz=100), *frames]
 
@@ -52,18 +52,18 @@ class Kit:
 
     model: Model[Any]
     make: Callable[..., Lidar[Any]]
-    turn: Callable[[int], list[bytes]]
+    revolution: Callable[[int], list[bytes]]
     start: bytes
     stop: bytes
-    turns_per_s: float
+    revolutions_per_s: float
     # What a distance of 1 m is after correction.
     range_m: float
 
 
 KITS = {
-    "lds01": Kit(LDS01, make_lds01, _lds01_turn, b"b", b"e", 5.0, 1.0),
-    "lds02": Kit(LDS02, make_lds02, _lds02_turn, b"", b"", 2152 / 360, math.hypot(1005.9, 99.09) / 1000),
-    "lds03": Kit(LDS03, make_lds03, _lds03_turn, START_LDS03, STOP_LDS03, 10.0, 1.0),
+    "lds01": Kit(LDS01, make_lds01, _lds01_revolution, b"b", b"e", 5.0, 1.0),
+    "lds02": Kit(LDS02, make_lds02, _lds02_revolution, b"", b"", 2152 / 360, math.hypot(1005.9, 99.09) / 1000),
+    "lds03": Kit(LDS03, make_lds03, _lds03_revolution, START_LDS03, STOP_LDS03, 10.0, 1.0),
 }
 
 
@@ -88,8 +88,8 @@ class Rig:
 
     def whole_scan(self, distance_mm: int = 1000) -> Scan:
         """One from a turn and the beginning of the next."""
-        turn = self.kit.turn(distance_mm)
-        [scan] = self.scans(turn + turn[:1])
+        revolution = self.kit.revolution(distance_mm)
+        [scan] = self.scans(revolution + revolution[:1])
         return scan
 
     def close(self) -> None:
@@ -153,17 +153,17 @@ def test_a_turn_is_a_scan(rig: Rig) -> None:
     assert len(scan.ranges_m) == BINS
     assert all(_is_known(scan.ranges_m))
     assert (min(scan.ranges_m), max(scan.ranges_m)) == pytest.approx((rig.kit.range_m, rig.kit.range_m))
-    assert scan.turns_per_s == pytest.approx(rig.kit.turns_per_s)
+    assert scan.revolutions_per_s == pytest.approx(rig.kit.revolutions_per_s)
     assert len(scan.raw.angles_rad) == len(scan.raw.ranges_m) == len(scan.raw.intensities) >= 360
     assert all(0 <= angle_rad < 2 * math.pi for angle_rad in scan.raw.angles_rad)
     assert rig.lidar.counters.scans == 1
     assert rig.lidar.counters.bad_frames == 0
-    assert rig.lidar.counters.frames >= len(rig.kit.turn(0))
+    assert rig.lidar.counters.frames >= len(rig.kit.revolution(0))
 
 
 def test_the_time_of_a_scan_is_that_of_its_last_byte(rig: Rig) -> None:
-    turn = rig.kit.turn(1000)
-    frames = turn + turn[:1] if rig.kit.model is not LDS01 else turn
+    revolution = rig.kit.revolution(1000)
+    frames = revolution + revolution[:1] if rig.kit.model is not LDS01 else revolution
     assert rig.scans(frames[:-1]) == []
     rig.pty.send(frames[-1][:-1])
     assert rig.lidar.receive(0.01) is None
@@ -182,7 +182,7 @@ def test_a_scan_without_a_reading_is_a_scan_of_nan(rig: Rig) -> None:
 
 
 def test_lost_frames_leave_nan_and_no_earlier_range(rig: Rig) -> None:
-    near, far = rig.kit.turn(500), rig.kit.turn(2000)
+    near, far = rig.kit.revolution(500), rig.kit.revolution(2000)
     lost = slice(len(near) // 2, len(near) // 2 + len(near) // 6)
     holed = far[: lost.start] + far[lost.stop :]
     first, second = rig.scans(near + holed + near[:1])
@@ -194,18 +194,18 @@ def test_lost_frames_leave_nan_and_no_earlier_range(rig: Rig) -> None:
 
 
 def test_half_a_turn_is_no_scan(rig: Rig) -> None:
-    turn = rig.kit.turn(1000)
-    assert rig.scans(turn[len(turn) // 2 :] + turn[:1]) == []
+    revolution = rig.kit.revolution(1000)
+    assert rig.scans(revolution[len(revolution) // 2 :] + revolution[:1]) == []
 
 
 def test_a_frame_with_a_wrong_checksum_is_counted_and_dropped(rig: Rig) -> None:
-    turn = rig.kit.turn(1000)
-    broken = bytearray(turn[20 % len(turn)])
+    revolution = rig.kit.revolution(1000)
+    broken = bytearray(revolution[20 % len(revolution)])
     broken[20] ^= 0x10
     [scan] = (
-        rig.scans([*turn[:20], bytes(broken), *turn[21:], turn[0]])
+        rig.scans([*revolution[:20], bytes(broken), *revolution[21:], revolution[0]])
         if rig.kit.model is not LDS03
-        else rig.scans([*turn[:5], bytes(broken[:13]), *turn[6:], turn[0]])
+        else rig.scans([*revolution[:5], bytes(broken[:13]), *revolution[6:], revolution[0]])
     )
     assert rig.lidar.counters.bad_frames >= (rig.kit.model is not LDS03)
     assert rig.lidar.counters.skipped_bytes >= 13
@@ -214,11 +214,11 @@ def test_a_frame_with_a_wrong_checksum_is_counted_and_dropped(rig: Rig) -> None:
 
 def test_of_several_turns_in_one_read_the_newest_is_told(rig_lds01: Rig) -> None:
     # The line holds more than one turn; whoever was late wants what is now.
-    stream = b"".join(_lds01_turn(500) + _lds01_turn(600))[:4000]
+    stream = b"".join(_lds01_revolution(500) + _lds01_revolution(600))[:4000]
     rig_lds01.pty.send(stream)
     first = rig_lds01.lidar.receive(LIMIT_S)
     assert first
-    rig_lds01.pty.send(b"".join(_lds01_turn(600))[4000 - 2520 :])
+    rig_lds01.pty.send(b"".join(_lds01_revolution(600))[4000 - 2520 :])
     second = rig_lds01.lidar.receive(LIMIT_S)
     assert second
     assert (first.ranges_m[0], second.ranges_m[0]) == (0.5, 0.6)
@@ -235,10 +235,10 @@ def test_of_several_turns_in_one_read_the_newest_is_told(rig_lds01: Rig) -> None
 def test_a_turned_or_hanging_lidar(front_deg: float, is_upside_down: bool, found: int) -> None:
     made = Rig(KITS["lds03"], front_rad=math.radians(front_deg), is_upside_down=is_upside_down)
     try:
-        turn = _lds03_turn(0)
+        revolution = _lds03_revolution(0)
         # Something at 90 degrees clockwise of its front.
-        turn[5] = lds03_frame(80, 99, [(0, 0)] * 10 + [(1000, 200)] + [(0, 0)] * 9)
-        [scan] = made.scans(turn + turn[:1])
+        revolution[5] = lds03_frame(80, 99, [(0, 0)] * 10 + [(1000, 200)] + [(0, 0)] * 9)
+        [scan] = made.scans(revolution + revolution[:1])
         assert [k for k in range(BINS) if not math.isnan(scan.ranges_m[k])] == [found]
         [angle_rad] = [a for a, r in zip(scan.raw.angles_rad, scan.raw.ranges_m, strict=True) if not math.isnan(r)]
         assert angle_rad == pytest.approx(math.radians(found), abs=1e-9)
@@ -256,25 +256,25 @@ def test_nothing_in_time_is_no_scan(rig: Rig) -> None:
 
 
 def test_halves_on_both_sides_of_a_silence_are_no_scan(rig: Rig) -> None:
-    turn = rig.kit.turn(1000)
-    half = len(turn) // 2
-    assert rig.scans(turn[:half]) == []
+    revolution = rig.kit.revolution(1000)
+    half = len(revolution) // 2
+    assert rig.scans(revolution[:half]) == []
     for _ in range(5):
         rig.clock.skip(rig.kit.model.stale_after_s / 4)
         assert rig.lidar.receive(0.0) is None
-    assert rig.scans(turn[half:] + turn[:1]) == []
-    assert len(rig.scans(turn[1:] + turn[:1])) == 1
+    assert rig.scans(revolution[half:] + revolution[:1]) == []
+    assert len(rig.scans(revolution[1:] + revolution[:1])) == 1
 
 
 def test_noise_does_not_bridge_a_silence(rig: Rig) -> None:
-    turn = rig.kit.turn(1000)
-    half = len(turn) // 2
-    assert rig.scans(turn[:half]) == []
+    revolution = rig.kit.revolution(1000)
+    half = len(revolution) // 2
+    assert rig.scans(revolution[:half]) == []
     for _ in range(5):
         rig.clock.skip(rig.kit.model.stale_after_s / 4)
         rig.pty.send(bytes(100))
         assert rig.lidar.receive(0.01) is None
-    assert rig.scans(turn[half:] + turn[:1]) == []
+    assert rig.scans(revolution[half:] + revolution[:1]) == []
 
 
 def test_frames_are_found_in_the_midst_of_lasting_noise(rig: Rig) -> None:
@@ -286,7 +286,7 @@ def test_frames_are_found_in_the_midst_of_lasting_noise(rig: Rig) -> None:
 
 
 def test_halves_of_a_frame_on_both_sides_of_a_silence_are_no_frame(rig: Rig) -> None:
-    first, second = rig.kit.turn(1000)[1:3]
+    first, second = rig.kit.revolution(1000)[1:3]
     rig.pty.send(first[:11])
     for _ in range(5):
         assert rig.lidar.receive(0.01) is None
@@ -298,17 +298,17 @@ def test_halves_of_a_frame_on_both_sides_of_a_silence_are_no_frame(rig: Rig) -> 
 
 
 def test_halves_on_both_sides_of_a_short_pause_are_a_scan(rig: Rig) -> None:
-    turn = rig.kit.turn(1000)
-    half = len(turn) // 2
-    assert rig.scans(turn[:half]) == []
+    revolution = rig.kit.revolution(1000)
+    half = len(revolution) // 2
+    assert rig.scans(revolution[:half]) == []
     rig.clock.skip(rig.kit.model.stale_after_s / 2)
-    assert len(rig.scans(turn[half:] + turn[:1])) == 1
+    assert len(rig.scans(revolution[half:] + revolution[:1])) == 1
 
 
 def test_what_waited_too_long_in_the_line_is_discarded(rig: Rig) -> None:
     assert rig.lidar.receive(0.0) is None
-    turn = rig.kit.turn(500)
-    rig.pty.send(b"".join(turn + turn[:1]))
+    revolution = rig.kit.revolution(500)
+    rig.pty.send(b"".join(revolution + revolution[:1]))
     rig.clock.skip(rig.kit.model.stale_after_s + 0.1)
     assert rig.lidar.receive(0.05) is None
     assert rig.lidar.counters.frames == 0
@@ -325,7 +325,7 @@ def test_wake_ends_a_receive_that_waits(rig: Rig) -> None:
 
 
 def test_wake_ends_a_receive_while_frames_come(rig: Rig) -> None:
-    rig.pty.send(rig.kit.turn(1000)[1])
+    rig.pty.send(rig.kit.revolution(1000)[1])
     rig.lidar.wake()
     waiting = Waiting(rig.lidar)
     assert waiting.end() is None
@@ -334,11 +334,11 @@ def test_wake_ends_a_receive_while_frames_come(rig: Rig) -> None:
 def test_wake_holds_once(rig: Rig) -> None:
     rig.lidar.wake()
     assert rig.lidar.receive(LIMIT_S) is None
-    turn = rig.kit.turn(1000)
+    revolution = rig.kit.revolution(1000)
     waiting = Waiting(rig.lidar)
-    rig.pty.send(b"".join(turn[:4]))
+    rig.pty.send(b"".join(revolution[:4]))
     wait_until(lambda: rig.lidar.counters.frames > 0)
-    rig.pty.send(b"".join(turn[4:] + turn[:1]))
+    rig.pty.send(b"".join(revolution[4:] + revolution[:1]))
     assert isinstance(waiting.end(), Scan)
 
 
@@ -397,13 +397,13 @@ def test_a_line_that_is_lost_while_it_waits(rig: Rig) -> None:
 
 
 def test_opening_anew_begins_a_turn_anew_and_keeps_the_counters(rig: Rig) -> None:
-    turn = rig.kit.turn(1000)
-    half = len(turn) // 2
-    assert rig.scans(turn[:half]) == []
+    revolution = rig.kit.revolution(1000)
+    half = len(revolution) // 2
+    assert rig.scans(revolution[:half]) == []
     frames = rig.lidar.counters.frames
     assert frames
     rig.lidar.open()
-    assert rig.scans(turn[half:] + turn[:1]) == []
+    assert rig.scans(revolution[half:] + revolution[:1]) == []
     assert rig.lidar.counters.frames > frames
 
 
@@ -505,7 +505,7 @@ def test_without_frames_the_other_speed_is_tried_and_the_motor_started_again(rig
 
 
 def test_what_came_at_one_speed_is_not_read_at_the_other(rig_lds03: Rig) -> None:
-    frame = _lds03_turn(1000)[1]
+    frame = _lds03_revolution(1000)[1]
     rig_lds03.pty.send(frame[:30])
     assert rig_lds03.lidar.receive(0.05) is None
     for _ in range(4):

@@ -82,11 +82,11 @@ def test_every_degree_shows_the_wall_where_it_is(name: str) -> None:
     with scene(name) as seen:
         seen.lidar.open()
         scans = seen.scans(1.0)
-        turns = {"lds01": 4, "lds02": 4, "lds03": 8}[name]
-        assert turns <= len(scans) <= turns + 2
+        revolutions = {"lds01": 4, "lds02": 4, "lds03": 8}[name]
+        assert revolutions <= len(scans) <= revolutions + 2
         for scan in scans:
             assert seen.check(scan) >= FULL[name]
-            assert scan.turns_per_s == pytest.approx(seen.robot.scanner.turns_per_s, rel=0.01)
+            assert scan.revolutions_per_s == pytest.approx(seen.robot.scanner.revolutions_per_s, rel=0.01)
         assert seen.lidar.counters.scans == len(scans)
         assert seen.lidar.counters.bad_frames == 0
 
@@ -116,10 +116,10 @@ def test_a_covered_one_tells_scans_without_a_range(name: str) -> None:
 @each_lidar
 def test_a_slow_motor_tells_it(name: str) -> None:
     with scene(name) as seen:
-        seen.robot.scanner.turn_at(0.5)
+        seen.robot.scanner.set_speed(0.5)
         seen.lidar.open()
         scans = seen.scans(1.0)
-        assert {round(scan.turns_per_s / seen.robot.scanner.nominal_hz, 2) for scan in scans} == {0.5}
+        assert {round(scan.revolutions_per_s / seen.robot.scanner.nominal_hz, 2) for scan in scans} == {0.5}
 
 
 @each_lidar

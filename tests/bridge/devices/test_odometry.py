@@ -57,10 +57,10 @@ def test_the_pose_is_that_of_a_slow_twin(steps: list[tuple[int, int]]) -> None:
         at = [at[0] + left, at[1] + right]
         found = found.advanced(at[0], at[1])
         way_m = (left + right) / 2 / 4096 * 2 * math.pi * 0.033
-        turn_rad = (right - left) / 4096 * 2 * math.pi * 0.033 / 0.16
-        x_m += way_m * math.cos(heading_rad + turn_rad / 2)
-        y_m += way_m * math.sin(heading_rad + turn_rad / 2)
-        heading_rad += turn_rad
+        rotation_rad = (right - left) / 4096 * 2 * math.pi * 0.033 / 0.16
+        x_m += way_m * math.cos(heading_rad + rotation_rad / 2)
+        y_m += way_m * math.sin(heading_rad + rotation_rad / 2)
+        heading_rad += rotation_rad
     assert found.pose.x_m == pytest.approx(x_m, abs=1e-9)
     assert found.pose.y_m == pytest.approx(y_m, abs=1e-9)
     assert math.cos(found.pose.heading_rad - heading_rad) == pytest.approx(1.0)

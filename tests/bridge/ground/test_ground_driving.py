@@ -11,12 +11,12 @@ from support.ground import CONFIGURATION, PlayedDaemon, Station, joined_texts
 from support.ground_talk import Talk, layer_talk
 
 
-def _target(station: Station, speed_m_s: float, turn_rad_s: float = 0.0) -> bytes:
+def _target(station: Station, speed_m_s: float, yaw_rate_rad_s: float = 0.0) -> bytes:
     zeros = (0.0, 0.0, 0.0)
     library = station.codec
     return station.pack(
         library.set_position_target_local_ned_encode(
-            0, 1, 1, 8, 0x05E7, *zeros, speed_m_s, 0.0, 0.0, *zeros, 0.0, turn_rad_s
+            0, 1, 1, 8, 0x05E7, *zeros, speed_m_s, 0.0, 0.0, *zeros, 0.0, yaw_rate_rad_s
         )
     )
 

@@ -85,7 +85,7 @@ def test_lds01_worked_frame() -> None:
     assert points.angles_deg == (359, 358, 357, 356, 355, 354)
     assert [*points.ranges_m[:3], *points.ranges_m[4:]] == [0.5, 0.501, 0.502, 2.0, 3.499]
     assert math.isnan(points.ranges_m[3])
-    assert points.turns_per_s == 5.0
+    assert points.revolutions_per_s == 5.0
 
 
 def test_lds02_worked_frame() -> None:
@@ -94,7 +94,7 @@ def test_lds02_worked_frame() -> None:
     assert frame == lds02.Frame(2152, 32427, 33470, 6714, distances, (228, 226, 0, *(200,) * 8, 234))
     points = lds02.points(frame)
     assert points.counted_deg == tuple(round(324.27 + 0.94 * k, 2) for k in range(12))
-    assert points.turns_per_s == pytest.approx(5.978, abs=0.001)
+    assert points.revolutions_per_s == pytest.approx(5.978, abs=0.001)
 
 
 def test_lds02_is_corrected_to_the_axis_of_its_motor() -> None:
@@ -198,11 +198,11 @@ def test_lds03_range_and_weak_near_points(distance_mm: int, intensity: int, is_v
 
 
 @pytest.mark.parametrize(
-    ("speed", "turns_per_s"),
+    ("speed", "revolutions_per_s"),
     [(3000, 5.0), (300, 5.0), (200, 200 / 60), (400, 400 / 60), (199, 199 / 600), (401, 401 / 600), (0, 0.0)],
 )
-def test_lds01_speed_in_either_unit(speed: int, turns_per_s: float) -> None:
-    assert lds01.turns_per_s(speed) == turns_per_s
+def test_lds01_speed_in_either_unit(speed: int, revolutions_per_s: float) -> None:
+    assert lds01.revolutions_per_s(speed) == revolutions_per_s
 
 
 @pytest.mark.parametrize(

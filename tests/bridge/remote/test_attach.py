@@ -373,10 +373,10 @@ class TestHostilePrograms:
         daemon.turns = False
         for number in range(5000):
             program.send(give=pb.Message(identifier="/order", data=value_of(number)))
-        wait_until(lambda: daemon.waiting >= session.MESSAGES_A_TURN - 1)
+        wait_until(lambda: daemon.waiting >= session.MESSAGES_PER_CYCLE - 1)
         time.sleep(0.2)
         # The loop's thread has taken one more, and shown nothing since.
-        assert daemon.waiting <= session.MESSAGES_A_TURN + 1
+        assert daemon.waiting <= session.MESSAGES_PER_CYCLE + 1
         stub.Stop(pb.StopRequest(), timeout=PATIENCE_S)
         assert daemon.orders
         daemon.turns = True

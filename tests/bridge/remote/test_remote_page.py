@@ -23,7 +23,7 @@ def test_the_limits() -> None:
     events = f"| {watchers.MAXIMUM_EVENTS}, or {watchers.MAXIMUM_BYTES // 2**20} MiB |"
     megabytes = session.MAXIMUM_WAITING_BYTES // 1_000_000
     waiting = f"wait for a program | {session.MAXIMUM_WAITING}, or {megabytes} MB of data |"
-    turn = f"next snapshot | {session.MESSAGES_A_TURN}, or {session.BYTES_A_TURN // 1024} KiB |"
+    turn = f"next snapshot | {session.MESSAGES_PER_CYCLE}, or {session.BYTES_PER_CYCLE // 1024} KiB |"
     silence = f"| {endpoint.PING_S + endpoint.PING_LIMIT_S:g} s with a ping"
     operator = f"in a second | {pace.MESSAGES_A_S} | no sign of life; after {pace.FLOOD_S} such"
     limits = (operator, streams, connections, calls, reflection, message, values, events, waiting, turn, silence)

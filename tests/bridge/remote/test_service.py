@@ -98,7 +98,7 @@ class TestStatus:
         assert found.problem == "the drive base is lost"
         reasons = [(item.code, item.text, item.holds_until_reset) for item in found.reasons]
         assert reasons == [
-            ("SCAN_STALE", "The scanner has made no full turn for too long.", False),
+            ("SCAN_STALE", "The scanner has made no full revolution for too long.", False),
             ("OPERATOR_STOP", "An operator has stopped the robot.", True),
         ]
         assert [item.code for item in found.warnings] == ["BATTERY"]
@@ -315,15 +315,15 @@ class TestWatch:
         wait_until(lambda: not daemon.feed.is_watched)
 
     def test_scans_come_once_each_and_only_if_wanted(self, daemon: FakeDaemon, stub: Any) -> None:
-        turn = scan(1.25)
-        daemon.show(scan=turn)
+        revolution = scan(1.25)
+        daemon.show(scan=revolution)
         with_scans = stub.Watch(pb.WatchRequest(with_scans=True, maximum_rate_hz=100), timeout=PATIENCE_S)
         first = next(with_scans)
         assert first.scan.ranges_m[0] == 1.25
         assert len(first.scan.ranges_m) == 360
         assert all(map(math.isnan, first.scan.ranges_m[1:]))
         assert first.scan.turns_per_s == 5.0
-        daemon.show(scan=turn)
+        daemon.show(scan=revolution)
         assert not next(with_scans).HasField("scan")
         daemon.show(scan=scan(0.5))
         response = next(with_scans)

@@ -248,7 +248,7 @@ def test_all_threads_may_call_at_once() -> None:
     beyond: list[Velocity] = []
     calls: list[Callable[[float], Any]] = [
         layer.saw_scan,
-        layer.loop_turned,
+        layer.loop_cycled,
         layer.operator_seen,
         lambda now_s: layer.command(Velocity(1.0, 5.0), now_s),
         lambda now_s: layer.saw_drive(reading(now_s, wheels_m_s=(0.1, 0.1))),

@@ -220,7 +220,7 @@ def test_torque_is_late_only_beyond_its_time() -> None:
     layer = bench.layer
     layer.enable()
     layer.saw_drive(reading(64.0, is_torque_on=False))
-    layer.loop_turned(64.0)
+    layer.loop_cycled(64.0)
     assert layer.output(64.0).reasons == (Reason.TORQUE_AWAITED,)
     assert layer.output(64.5).reasons == (Reason.TORQUE_AWAITED,)
     assert layer.output(math.nextafter(64.5, 65)).reasons == (Reason.TORQUE_LOST, Reason.TORQUE_AWAITED)

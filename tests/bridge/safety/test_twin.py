@@ -79,7 +79,7 @@ class Sequence(RuleBasedStateMachine):
         self._tell(name, self.now_s + shift_s)
 
     def _tell(self, name: str, time_s: float) -> None:
-        tell = {"scan": self.layer.saw_scan, "loop": self.layer.loop_turned, "operator": self.layer.operator_seen}
+        tell = {"scan": self.layer.saw_scan, "loop": self.layer.loop_cycled, "operator": self.layer.operator_seen}
         tell[name](time_s)
         self.twin.happens(name, None, time_s)
 

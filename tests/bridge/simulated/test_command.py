@@ -143,7 +143,7 @@ def test_devices_are_told(robot: SimulatedTurtleBot3) -> None:
     obey(robot, "scanner cover")
     obey(robot, "scanner stall")
     obey(robot, "scanner turn 0.5")
-    assert (robot.scanner.is_covered, robot.scanner.is_stalled, robot.scanner.turns_per_s) == (True, True, 2.5)
+    assert (robot.scanner.is_covered, robot.scanner.is_stalled, robot.scanner.revolutions_per_s) == (True, True, 2.5)
     obey(robot, "scanner uncover")
     obey(robot, "scanner go")
     assert (robot.scanner.is_covered, robot.scanner.is_stalled) == (False, False)

@@ -172,7 +172,7 @@ def test_frames_are_paced_in_time(lidar: str, rate: float) -> None:
 @pytest.mark.parametrize("lidar", DECODERS)
 def test_a_slow_motor_takes_longer_for_a_turn_and_tells_it(lidar: str) -> None:
     with scene(lidar) as seen:
-        seen.robot.scanner.turn_at(0.5)
+        seen.robot.scanner.set_speed(0.5)
         seen.start()
         data = seen.heard(1.0)
         turned = {round(degrees) % 360 for degrees, _ in DECODERS[lidar](data[: len(data) // 6])}

@@ -155,7 +155,7 @@ def test_a_velocity_may_hold_for_ever() -> None:
     robot = in_room(command_timeout_s=0.0)
     robot.command(0.0, 0.1)
     lived(robot, 20.0)
-    assert robot.world.turn_rad_s == pytest.approx(0.1)
+    assert robot.world.yaw_rate_rad_s == pytest.approx(0.1)
 
 
 def test_a_world_in_motion_may_wait_for_the_next_velocity() -> None:

@@ -74,7 +74,7 @@ def test_a_target_is_followed_for_three_seconds() -> None:
     assert "STATUSTEXT" not in [packet.name for packet in station.passing(2.9)]
     assert station.world.speed_m_s == pytest.approx(0.2)
     # Turning right.
-    assert station.world.turn_rad_s == pytest.approx(-0.5)
+    assert station.world.yaw_rate_rad_s == pytest.approx(-0.5)
     told = station.passing(0.3)
     assert station.world.speed_m_s == 0.0
     assert any(b"target not received" in packet.values["text"] for packet in told if packet.name == "STATUSTEXT")

@@ -1,4 +1,4 @@
-"""A whole turn of the laser against the same rays one by one, among any walls and round things."""
+"""A whole revolution of the laser against the same rays one by one, among any walls and round things."""
 
 import math
 from fractions import Fraction

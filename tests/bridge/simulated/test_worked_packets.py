@@ -153,7 +153,7 @@ def test_sync_packets_move_both_wheels(bus: tuple[SimulatedTurtleBot3, Host]) ->
     host.send("ff ff fd 00 fe 11 00 83 68 00 04 00 01 00 00 00 00 02 00 00 00 00 e4 d0")
     host.ask("ff ff fd 00 01 03 00 01 19 4e")
     robot.advance(0.5)
-    assert (robot.world.speed_m_s, robot.world.turn_rad_s) == (0.0, 0.0)
+    assert (robot.world.speed_m_s, robot.world.yaw_rate_rad_s) == (0.0, 0.0)
     assert math.hypot(*robot.world.pose[:2]) < 0.01
 
 

@@ -103,7 +103,7 @@ def test_straight_on_and_on_the_spot() -> None:
     drive(world, -4.0, 4.0, 2.0)
     assert world.pose[:2] == pytest.approx((x_m, y_m), abs=0.005)
     assert world.pose[2] == pytest.approx(2.0 * 8.0 * 0.033 / 0.160, abs=0.1)
-    assert world.turn_rad_s == pytest.approx(8.0 * 0.033 / 0.160)
+    assert world.yaw_rate_rad_s == pytest.approx(8.0 * 0.033 / 0.160)
 
 
 def test_an_arc_comes_back_to_where_it_began() -> None:
@@ -128,7 +128,7 @@ def test_a_quarter_of_an_arc() -> None:
 def test_a_waffle_turns_slower() -> None:
     world = world_of(Walls(()), body="waffle")
     drive(world, -4.0, 4.0, 0.5)
-    assert world.turn_rad_s == pytest.approx(8.0 * 0.033 / 0.287)
+    assert world.yaw_rate_rad_s == pytest.approx(8.0 * 0.033 / 0.287)
 
 
 def test_a_wall_stops_the_body_and_is_counted_once() -> None:

@@ -57,7 +57,7 @@ def turn(rotate: Rotate, body: Body, angle_rad: float, period_s: float = PERIOD_
     """Turn, and return the time that it took, in seconds; every command is within the limit."""
     now_s = 1000.0
     assert rotate.start(angle_rad, now_s)
-    while rotate.is_turning:
+    while rotate.is_rotating:
         velocity = rotate.update(body.read(), now_s)
         assert velocity.linear_m_s == 0.0
         assert abs(velocity.angular_rad_s) <= USUAL.speed_rad_s
@@ -167,7 +167,7 @@ def test_the_next_turn_settles_by_itself() -> None:
     for start_s in (0.0, 10.0):
         assert rotate.start(0.01, start_s)
         rotate.update(0.5, start_s)
-        assert rotate.is_turning
+        assert rotate.is_rotating
         rotate.update(0.5, start_s + 0.31)
         assert rotate.state is RotateState.DONE
 
@@ -181,7 +181,7 @@ def test_it_is_never_so_slow_that_wheels_stand_still() -> None:
 def test_a_blocked_body_fails_after_the_stated_time() -> None:
     rotate = Rotate(USUAL)
     taken_s = turn(rotate, Body(is_blocked=True), math.pi / 2)
-    assert (rotate.state, rotate.reason) == (RotateState.FAILED, "the turn has taken too long")
+    assert (rotate.state, rotate.reason) == (RotateState.FAILED, "the rotation has taken too long")
     assert taken_s == pytest.approx(2 * (math.pi / 2) / 0.8 + 5.0, abs=2 * PERIOD_S)
 
 
@@ -191,7 +191,7 @@ def test_without_odometry_it_stands_still_and_fails_in_the_end(heading_rad: floa
     rotate.start(0.8, 0.0)
     assert rotate.update(heading_rad, 0.1) == STANDSTILL
     assert rotate.update(heading_rad, 6.9) == STANDSTILL
-    assert rotate.is_turning
+    assert rotate.is_rotating
     assert rotate.update(heading_rad, 7.0) == STANDSTILL
     assert (rotate.state, rotate.reason) == (RotateState.FAILED, "there is no odometry")
 
@@ -210,7 +210,7 @@ def test_an_impossible_angle_fails_at_once(angle_rad: float) -> None:
     rotate = Rotate(USUAL)
     assert rotate.start(angle_rad, 0.0)
     assert rotate.state is RotateState.FAILED
-    assert "beyond a hundred turns" in rotate.reason
+    assert "beyond a hundred revolutions" in rotate.reason
     assert rotate.update(0.0, 0.0) == STANDSTILL
 
 

@@ -158,7 +158,7 @@ class TestStatus:
         assert main(["status", "--address", address]) == 0
         assert capsys.readouterr().out.splitlines() == [
             "running",
-            "  nothing moves: The scanner has made no full turn for too long.",
+            "  nothing moves: The scanner has made no full revolution for too long.",
             "  nothing moves: An operator has stopped the robot. (until reset)",
             "  warning: The battery will soon be empty.",
             "  nothing is requested: '/order' is stale",
@@ -216,7 +216,7 @@ class TestWatch:
         with watching("--address", address, "--rate", "100") as process:
             assert process.stdout is not None
             assert process.stdout.readline().endswith(
-                "= running: The scanner has made no full turn for too long.; An operator has stopped the robot.\n"
+                "= running: The scanner has made no full revolution for too long.; An operator has stopped the robot.\n"
             )
             daemon.feed.tell({"time": 1.5, "kind": "blocked", "identifier": "/cmd_vel", "what": "not allowed"})
             line = process.stdout.readline()

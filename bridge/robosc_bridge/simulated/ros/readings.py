@@ -19,11 +19,11 @@ class Clock:
 
 @dataclass(frozen=True)
 class Scan:
-    """A turn of the LiDAR.
+    """A revolution of the LiDAR.
 
     Attributes:
         stamp_s: World time.
-        ranges_m: Ranges evenly over a turn, counter-clockwise from straight ahead; infinity where nothing is near
+        ranges_m: Ranges evenly over a revolution, counter-clockwise from straight ahead; infinity where nothing is near
             enough, minus infinity where something is too near (REP 117, ros.org/reps/rep-0117.html).
         nearest_m: Shortest distance that can be measured.
         farthest_m: Longest distance that can be measured.
@@ -47,7 +47,7 @@ class Odometry:
         y_m: y from the same.
         heading_rad: Heading counter-clockwise from how it stood.
         linear_m_s: Forward speed.
-        angular_rad_s: Turn rate, counter-clockwise.
+        angular_rad_s: Yaw rate, counter-clockwise.
     """
 
     stamp_s: float

@@ -99,7 +99,7 @@ class RosRobot:
         self._farthest_m: float = LIDARS[lidar].farthest_m  # type: ignore[attr-defined]
         self._beams: int = LIDARS[lidar].beams  # type: ignore[attr-defined]
         self._angles_rad = [math.tau * beam / self._beams for beam in range(self._beams)]
-        self._turn_s: float = 1.0 / LIDARS[lidar].nominal_hz  # type: ignore[attr-defined]
+        self._revolution_s: float = 1.0 / LIDARS[lidar].nominal_hz  # type: ignore[attr-defined]
         self._encoding = encoding
         self._timeout_s = command_timeout_s
         self._noise_m = scene.noise.lidar_m
@@ -117,7 +117,7 @@ class RosRobot:
             # No faster than a hundred times a second on the computer's clock.
             (max(1.0, self._time.factor) / CLOCK_HZ, Clock),
             (1.0 / ODOMETRY_HZ, self._odometry),
-            (self._turn_s, self._scan),
+            (self._revolution_s, self._scan),
             (1.0 / BATTERY_HZ, lambda stamp_s: Battery(stamp_s, self.battery_v)),
         ]
         if self._eye is not None:
@@ -207,11 +207,11 @@ class RosRobot:
         left_m = (world.left.angle_rad - self._left_rad) * body.wheel_radius_m
         right_m = (world.right.angle_rad - self._right_rad) * body.wheel_radius_m
         self._left_rad, self._right_rad = world.left.angle_rad, world.right.angle_rad
-        forward_m, turn_rad = (left_m + right_m) / 2, (right_m - left_m) / body.wheel_separation_m
-        self._x_m += forward_m * math.cos(self._heading_rad + turn_rad / 2)
-        self._y_m += forward_m * math.sin(self._heading_rad + turn_rad / 2)
-        self._heading_rad += turn_rad
-        return Odometry(stamp_s, self._x_m, self._y_m, self._heading_rad, world.speed_m_s, world.turn_rad_s)
+        forward_m, rotation_rad = (left_m + right_m) / 2, (right_m - left_m) / body.wheel_separation_m
+        self._x_m += forward_m * math.cos(self._heading_rad + rotation_rad / 2)
+        self._y_m += forward_m * math.sin(self._heading_rad + rotation_rad / 2)
+        self._heading_rad += rotation_rad
+        return Odometry(stamp_s, self._x_m, self._y_m, self._heading_rad, world.speed_m_s, world.yaw_rate_rad_s)
 
     def _scan(self, stamp_s: float) -> Scan:
         if self.is_scanner_covered:
@@ -225,7 +225,7 @@ class RosRobot:
                 ranges_m += [self._chance.gauss(0.0, self._noise_m) for _ in range(self._beams)]
         ranges_m[ranges_m > self._farthest_m] = np.inf
         ranges_m[ranges_m < self._nearest_m] = -np.inf
-        return Scan(stamp_s, ranges_m.astype(np.float32), self._nearest_m, self._farthest_m, self._turn_s)
+        return Scan(stamp_s, ranges_m.astype(np.float32), self._nearest_m, self._farthest_m, self._revolution_s)
 
     def _picture(self, eye: Eye, stamp_s: float) -> Picture:
         shades = eye.picture(self.world.pose, self.world.obstacles)

@@ -213,7 +213,7 @@ def parser(prog: str, description: str) -> argparse.ArgumentParser:
         "--lidar",
         choices=sorted(LIDARS),
         default="lds01",
-        help="LiDAR: its range, turns and beams; default: %(default)s",
+        help="LiDAR: its range, revolutions and beams; default: %(default)s",
     )
     found.add_argument(
         "--encoding", choices=ENCODINGS, default="mono8", help="of the camera's pictures; default: %(default)s"

@@ -1,4 +1,4 @@
-// The canvas: walls and line of the simulated world, the robot's way, the LiDAR's last turn.
+// The canvas: walls and line of the simulated world, the robot's way, the LiDAR's last revolution.
 
 import { byId, mark, say, show } from "./dom.js";
 import { figure } from "./format.js";

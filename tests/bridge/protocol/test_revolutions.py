@@ -1,4 +1,4 @@
-"""Points of frames become full turns, and turns 360 ranges."""
+"""Points of frames become full revolutions, and turns 360 ranges."""
 
 import math
 from collections.abc import Iterable
@@ -8,50 +8,50 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc_bridge.protocol import lds01, lds02, lds03
-from robosc_bridge.protocol.turns import (
+from robosc_bridge.protocol.revolutions import (
     BINS,
     MOST_POINTS,
     Points,
-    Turn,
-    TurnBuilder,
+    Revolution,
+    RevolutionBuilder,
     nearest_by_degree,
     wrapped_deg,
 )
 
 
-def _points(first_deg: float, last_deg: float, range_m: float, turns_per_s: float | None = None) -> Points:
+def _points(first_deg: float, last_deg: float, range_m: float, revolutions_per_s: float | None = None) -> Points:
     """One point a degree, clockwise from the first to the last one."""
     count = round((last_deg - first_deg) % 360) + 1
     counted = tuple((first_deg + k) % 360 for k in range(count))
     return Points(
-        counted, tuple(wrapped_deg(360 - deg) for deg in counted), (range_m,) * count, (1,) * count, turns_per_s
+        counted, tuple(wrapped_deg(360 - deg) for deg in counted), (range_m,) * count, (1,) * count, revolutions_per_s
     )
 
 
-def _turns(builder: TurnBuilder, parts: Iterable[Points]) -> list[Turn]:
-    return [turn for part in parts if (turn := builder.add(part))]
+def _turns(builder: RevolutionBuilder, parts: Iterable[Points]) -> list[Revolution]:
+    return [revolution for part in parts if (revolution := builder.add(part))]
 
 
-def _counted(turn: Turn) -> list[float]:
-    return [wrapped_deg(360 - deg) for deg in turn.angles_deg]
+def _counted(revolution: Revolution) -> list[float]:
+    return [wrapped_deg(360 - deg) for deg in revolution.angles_deg]
 
 
 # Turns
 
 
 def test_a_turn_ends_where_the_angle_passes_zero_between_two_frames() -> None:
-    builder = TurnBuilder()
+    builder = RevolutionBuilder()
     parts = [_points(0, 119, 1), _points(120, 239, 1), _points(240, 359, 1)]
     assert _turns(builder, parts) == []
-    turn = builder.add(_points(0, 9, 2, 7.0))
-    assert turn
-    assert _counted(turn) == list(range(360))
-    assert set(turn.ranges_m) == {1}
-    assert turn.turns_per_s == 7.0
+    revolution = builder.add(_points(0, 9, 2, 7.0))
+    assert revolution
+    assert _counted(revolution) == list(range(360))
+    assert set(revolution.ranges_m) == {1}
+    assert revolution.revolutions_per_s == 7.0
 
 
 def test_a_turn_ends_where_the_angle_passes_zero_within_a_frame() -> None:
-    builder = TurnBuilder()
+    builder = RevolutionBuilder()
     first, second = _turns(builder, [_points(0, 349, 1), _points(350, 9, 2), _points(10, 355, 3), _points(356, 5, 4)])
     assert _counted(first) == list(range(360))
     assert first.ranges_m == (1,) * 350 + (2,) * 10
@@ -60,13 +60,13 @@ def test_a_turn_ends_where_the_angle_passes_zero_within_a_frame() -> None:
 
 
 def test_a_turn_of_which_the_end_is_known_does_not_wait_for_the_next_frame() -> None:
-    builder = TurnBuilder()
+    builder = RevolutionBuilder()
     frame = lds01.Frame(0, 3000, (1000,) * 6, (1,) * 6)
     ended = []
     for n in range(180):
-        turn = builder.add(lds01.points(lds01.Frame(n % 60, *_rest(frame))))
-        if turn:
-            ended.append((n, len(turn.angles_deg)))
+        revolution = builder.add(lds01.points(lds01.Frame(n % 60, *_rest(frame))))
+        if revolution:
+            ended.append((n, len(revolution.angles_deg)))
     assert ended == [(59, 360), (119, 360), (179, 360)]
 
 
@@ -75,39 +75,39 @@ def _rest(frame: lds01.Frame) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
 
 
 def test_what_came_before_the_first_beginning_is_no_turn() -> None:
-    builder = TurnBuilder()
+    builder = RevolutionBuilder()
     assert _turns(builder, [_points(4, 359, 1), _points(0, 350, 2)]) == []
-    [turn] = _turns(builder, [_points(351, 5, 3)])
-    assert set(turn.ranges_m) == {2, 3}
+    [revolution] = _turns(builder, [_points(351, 5, 3)])
+    assert set(revolution.ranges_m) == {2, 3}
 
 
 def test_a_device_that_begins_at_zero_loses_no_turn() -> None:
-    assert len(_turns(TurnBuilder(), [_points(3, 359, 1), _points(0, 9, 2)])) == 1
+    assert len(_turns(RevolutionBuilder(), [_points(3, 359, 1), _points(0, 9, 2)])) == 1
 
 
 def test_after_forgetting_there_is_no_half_turn_and_nothing_stale() -> None:
-    builder = TurnBuilder()
+    builder = RevolutionBuilder()
     assert _turns(builder, [_points(0, 179, 1)]) == []
     builder.forget()
     assert _turns(builder, [_points(180, 359, 2), _points(0, 359, 3)]) == []
-    [turn] = _turns(builder, [_points(0, 0, 4)])
-    assert set(turn.ranges_m) == {3}
+    [revolution] = _turns(builder, [_points(0, 0, 4)])
+    assert set(revolution.ranges_m) == {3}
     builder.forget()
     assert _turns(builder, [_points(60, 359, 5), _points(0, 0, 6)]) == []
 
 
-@pytest.mark.parametrize(("resumes_deg", "is_turn"), [(190, True), (191, False)])
-def test_a_turn_may_miss_a_quarter_and_no_more(resumes_deg: int, is_turn: bool) -> None:
+@pytest.mark.parametrize(("resumes_deg", "is_revolution"), [(190, True), (191, False)])
+def test_a_turn_may_miss_a_quarter_and_no_more(resumes_deg: int, is_revolution: bool) -> None:
     parts = [_points(0, 100, 1), _points(resumes_deg, 359, 1), _points(0, 9, 2)]
-    turns = _turns(TurnBuilder(), parts)
-    assert len(turns) == is_turn
-    for turn in turns:
-        assert _counted(turn) == [*range(101), *range(resumes_deg, 360)]
+    revolutions = _turns(RevolutionBuilder(), parts)
+    assert len(revolutions) == is_revolution
+    for revolution in revolutions:
+        assert _counted(revolution) == [*range(101), *range(resumes_deg, 360)]
 
 
 def test_what_is_lost_over_zero_is_missing_in_both_turns() -> None:
     parts = [_points(0, 319, 1), _points(40, 359, 2), _points(0, 9, 3)]
-    first, second = _turns(TurnBuilder(), parts)
+    first, second = _turns(RevolutionBuilder(), parts)
     assert _counted(first) == list(range(320))
     assert _counted(second) == list(range(40, 360))
     assert set(second.ranges_m) == {2}
@@ -115,25 +115,27 @@ def test_what_is_lost_over_zero_is_missing_in_both_turns() -> None:
 
 def test_two_halves_of_different_turns_are_no_turn() -> None:
     # Lost from 200 over 0 to 150: a fall of the angle by 50 degrees only.
-    assert _turns(TurnBuilder(), [_points(0, 200, 1), _points(150, 359, 2), _points(0, 9, 3)]) == []
+    assert _turns(RevolutionBuilder(), [_points(0, 200, 1), _points(150, 359, 2), _points(0, 9, 3)]) == []
 
 
 def test_an_angle_that_trembles_ends_no_turn() -> None:
-    [turn] = _turns(TurnBuilder(), [_points(0, 100, 1), _points(98, 200, 1), _points(199, 359, 1), _points(0, 9, 2)])
-    assert set(turn.ranges_m) == {1}
-    assert len(turn.angles_deg) == 101 + 103 + 161
+    [revolution] = _turns(
+        RevolutionBuilder(), [_points(0, 100, 1), _points(98, 200, 1), _points(199, 359, 1), _points(0, 9, 2)]
+    )
+    assert set(revolution.ranges_m) == {1}
+    assert len(revolution.angles_deg) == 101 + 103 + 161
 
 
 def test_the_speed_is_the_last_one_told() -> None:
     parts = [_points(0, 359, 1), _points(0, 99, 2, 10.0), _points(100, 359, 2), _points(0, 9, 3)]
-    first, second = _turns(TurnBuilder(), parts)
-    assert first.turns_per_s == second.turns_per_s == 10.0
-    [turn] = _turns(TurnBuilder(), [_points(0, 359, 1), _points(0, 9, 1)])
-    assert math.isnan(turn.turns_per_s)
+    first, second = _turns(RevolutionBuilder(), parts)
+    assert first.revolutions_per_s == second.revolutions_per_s == 10.0
+    [revolution] = _turns(RevolutionBuilder(), [_points(0, 359, 1), _points(0, 9, 1)])
+    assert math.isnan(revolution.revolutions_per_s)
 
 
 def test_a_device_that_stays_where_it_is_fills_no_memory() -> None:
-    builder = TurnBuilder()
+    builder = RevolutionBuilder()
     same = _points(10, 10, 1)
     for _ in range(3 * MOST_POINTS):
         assert builder.add(same) is None
@@ -150,15 +152,15 @@ def test_turns_hold_points_of_one_turn_in_order_and_every_complete_turn_is_there
     widths: list[int], lost: set[int], begin: int
 ) -> None:
     """A device that measures its own count of points: which turn a point is from can be told from its range."""
-    builder = TurnBuilder()
-    turns: list[Turn] = []
+    builder = RevolutionBuilder()
+    revolutions: list[Revolution] = []
     came: dict[int, set[int]] = {}
     at = begin
     gap = 0
     for number, width in enumerate(widths):
         places = list(range(at, at + width))
         at += width
-        # A whole turn that is lost shows in no angle: the driver sees to that by the time that it takes.
+        # A whole revolution that is lost shows in no angle: the driver sees to that by the time that it takes.
         gap = gap + width if number in lost and gap + width < 340 else 0
         if gap:
             continue
@@ -167,14 +169,14 @@ def test_turns_hold_points_of_one_turn_in_order_and_every_complete_turn_is_there
         counted = tuple(float(place % 360) for place in places)
         angles = tuple(wrapped_deg(360.0 - deg) for deg in counted)
         points = Points(counted, angles, tuple(float(place // 360) for place in places), (0,) * width)
-        turns += _turns(builder, [points])
+        revolutions += _turns(builder, [points])
     seen = []
-    for turn in turns:
-        assert len(set(turn.ranges_m)) == 1
-        number = int(turn.ranges_m[0])
+    for revolution in revolutions:
+        assert len(set(revolution.ranges_m)) == 1
+        number = int(revolution.ranges_m[0])
         seen.append(number)
-        assert _counted(turn) == sorted(came[number])
-        assert len(turn.angles_deg) >= 360 - 90
+        assert _counted(revolution) == sorted(came[number])
+        assert len(revolution.angles_deg) >= 360 - 90
     assert seen == sorted(set(seen))
     is_passed = [number for number, places in came.items() if len(places) == 360 and any(n > number for n in came)]
     assert set(is_passed) <= set(seen)
@@ -211,8 +213,8 @@ def test_lds03_counts_clockwise_from_the_front() -> None:
 
 
 def _nearest(frames: Iterable[Points]) -> tuple[float, ...]:
-    [turn] = _turns(TurnBuilder(), frames)
-    return nearest_by_degree(turn.angles_deg, turn.ranges_m)
+    [revolution] = _turns(RevolutionBuilder(), frames)
+    return nearest_by_degree(revolution.angles_deg, revolution.ranges_m)
 
 
 # Bins
@@ -244,7 +246,8 @@ def test_a_bin_has_the_smallest_of_its_ranges(points: list[tuple[int, float]]) -
         inside = [
             range_m
             for millis, range_m in points
-            if not math.isnan(range_m) and any(-500 <= millis - 1000 * (k + turn) < 500 for turn in (0, 360))
+            if not math.isnan(range_m)
+            and any(-500 <= millis - 1000 * (k + revolution) < 500 for revolution in (0, 360))
         ]
         expected.append(min(inside, default=None))
     found = nearest_by_degree([millis / 1000 for millis, _ in points], [range_m for _, range_m in points])

@@ -1,8 +1,8 @@
-"""From points to full turns and from a turn to 360 ranges, the same for all LiDARs.
+"""From points to full revolutions and from a revolution to 360 ranges, the same for all LiDARs.
 
-A turn ends where the angle that the device counts passes 360 degrees. Whatever came before the first turn that was seen
-from its beginning is dropped, and so is a turn of which too much is missing; what is missing of another one stays
-missing, as nothing is taken from an earlier turn.
+A revolution ends where the angle that the device counts passes 360 degrees. Whatever came before the first revolution
+that was seen from its beginning is dropped, and so is a revolution of which too much is missing; what is missing of
+another one stays missing, as nothing is taken from an earlier revolution.
 """
 
 import math
@@ -12,16 +12,16 @@ from dataclasses import dataclass
 BINS = 360
 
 WIDEST_STEP_DEG = 3.0
-"""Two points of one turn that are further apart than this have lost others between them.
+"""Two points of one revolution that are further apart than this have lost others between them.
 
-The widest step of a sound device is 2 degrees (LDS-03 at 20 turns/s); the narrowest frame of a full length is 6.
+The widest step of a sound device is 2 degrees (LDS-03 at 20 revolutions/s); the narrowest frame of a full length is 6.
 """
 
 MOST_LOST_DEG = 90.0
-"""A turn of which more is missing is no full turn."""
+"""A revolution of which more is missing is no full revolution."""
 
 MOST_POINTS = 2048
-"""Maximum number of points of one turn; the slowest of the three LiDARs has 800 at half its speed."""
+"""Maximum number of points of one revolution; the slowest of the three LiDARs has 800 at half its speed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,43 +33,43 @@ class Points:
         angles_deg: Angles of the points: counter-clockwise from the front, within [0, 360).
         ranges_m: Ranges; NaN where nothing valid was measured.
         intensities: Intensities as the device gives them.
-        turns_per_s: Speed of the motor; None: this frame does not report it.
-        is_last: True if it is known without the next frame that the turn ends here.
+        revolutions_per_s: Speed of the motor; None: this frame does not report it.
+        is_last: True if it is known without the next frame that the revolution ends here.
     """
 
     counted_deg: tuple[float, ...]
     angles_deg: tuple[float, ...]
     ranges_m: tuple[float, ...]
     intensities: tuple[float, ...]
-    turns_per_s: float | None = None
+    revolutions_per_s: float | None = None
     is_last: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
-    """One full turn.
+class Revolution:
+    """One full revolution.
 
     Attributes:
         angles_deg: Of each point, counter-clockwise from the front, within [0, 360).
         ranges_m: NaN where nothing valid was measured.
         intensities: As the device gives them.
-        turns_per_s: Speed of the motor; NaN: the device has not told yet.
+        revolutions_per_s: Speed of the motor; NaN: the device has not told yet.
     """
 
     angles_deg: tuple[float, ...]
     ranges_m: tuple[float, ...]
     intensities: tuple[float, ...]
-    turns_per_s: float
+    revolutions_per_s: float
 
 
-class TurnBuilder:
-    """Joins points to full turns."""
+class RevolutionBuilder:
+    """Joins points to full revolutions."""
 
     def __init__(self) -> None:
         self._angles: list[float] = []
         self._ranges: list[float] = []
         self._intensities: list[float] = []
-        self._turns_per_s = math.nan
+        self._revolutions_per_s = math.nan
         self._reached_deg: float | None = None
         self._lost_deg = 0.0
 
@@ -78,10 +78,10 @@ class TurnBuilder:
         self._begin()
         self._reached_deg = None
 
-    def add(self, points: Points) -> Turn | None:
-        """The turn that these points end; those behind its end begin the next one."""
-        if points.turns_per_s is not None:
-            self._turns_per_s = points.turns_per_s
+    def add(self, points: Points) -> Revolution | None:
+        """The revolution that these points end; those behind its end begin the next one."""
+        if points.revolutions_per_s is not None:
+            self._revolutions_per_s = points.revolutions_per_s
         counted = points.counted_deg
         ended = None
         if counted[-1] < counted[0]:
@@ -93,12 +93,12 @@ class TurnBuilder:
         ended = self._move(points, 0, len(counted))
         return self._end() if points.is_last else ended
 
-    def _move(self, points: Points, begin: int, end: int) -> Turn | None:
-        """Take points that do not pass 0 among themselves; the turn that ended before the first of them."""
+    def _move(self, points: Points, begin: int, end: int) -> Revolution | None:
+        """Take points that do not pass 0 among themselves; the revolution that ended before the first of them."""
         ended = None
         first_deg = points.counted_deg[begin]
         if self._reached_deg is None:
-            # Nobody knows what came before; only a beginning at 0 makes this a turn.
+            # Nobody knows what came before; only a beginning at 0 makes this a revolution.
             self._reached_deg = 0.0
             self._lost_deg = 0.0 if first_deg <= WIDEST_STEP_DEG else math.inf
         elif first_deg < self._reached_deg - WIDEST_STEP_DEG:
@@ -117,13 +117,15 @@ class TurnBuilder:
         if gap_deg > WIDEST_STEP_DEG:
             self._lost_deg += gap_deg
 
-    def _end(self) -> Turn | None:
+    def _end(self) -> Revolution | None:
         self._lose(360.0 - (self._reached_deg or 0.0))
-        turn = None
+        revolution = None
         if self._angles and self._lost_deg <= MOST_LOST_DEG:
-            turn = Turn(tuple(self._angles), tuple(self._ranges), tuple(self._intensities), self._turns_per_s)
+            revolution = Revolution(
+                tuple(self._angles), tuple(self._ranges), tuple(self._intensities), self._revolutions_per_s
+            )
         self._begin()
-        return turn
+        return revolution
 
     def _begin(self) -> None:
         self._angles.clear()

@@ -1,4 +1,4 @@
-"""Turns by an angle that the model asked for, one at a time: who wants to know of their end, and is told so."""
+"""Rotations by an angle that the model asked for, one at a time: who wants to know of their end, and is told so."""
 
 import logging
 import math
@@ -14,11 +14,11 @@ from robosc_bridge.daemon.wheel_messages import angle_of
 _log = logging.getLogger(__name__)
 
 _SERVICE_SHARE = 0.9
-"""Share of a call's time that a turn may take."""
+"""Share of a call's time that a rotation may take."""
 
 
-class _Turn:
-    """A turn under way."""
+class _Rotation:
+    """A rotation under way."""
 
     def __init__(self, asked: Communication, channel: RotateChannel, number: int | None, end_s: float) -> None:
         self.asked = asked
@@ -27,14 +27,14 @@ class _Turn:
         self.end_s = end_s
 
 
-class Turns:
-    """The turn under way.
+class Rotations:
+    """The rotation under way.
 
     Args:
         motion: Motion of the wheels.
-        listeners: Identifiers that receive the end of a turn that a message asked for.
+        listeners: Identifiers that receive the end of a cycle that a message asked for.
         owe: Function that takes what the executor is to be told, once it is not at work.
-        on_failed: Called with the reason when a turn has failed of which the model hears nothing.
+        on_failed: Called with the reason when a rotation has failed of which the model hears nothing.
         service_timeout_s: Time after which the executor takes a call for failed, in seconds; None: never.
         clock: Clock that returns the time, in seconds.
     """
@@ -54,24 +54,24 @@ class Turns:
         self._on_failed = on_failed
         self._service_timeout_s = math.inf if service_timeout_s is None else service_timeout_s
         self._clock = clock
-        self._turn: _Turn | None = None
+        self._rotation: _Rotation | None = None
 
     @property
     def is_under_way(self) -> bool:
-        """True if somebody waits for the end of a turn."""
-        return self._turn is not None
+        """True if somebody waits for the end of a cycle."""
+        return self._rotation is not None
 
     @property
     def asked_by(self) -> str | None:
-        """Name of the communication that asked for the turn under way; None: there is none."""
-        return None if self._turn is None else self._turn.asked.name
+        """Name of the communication that asked for the rotation under way; None: there is none."""
+        return None if self._rotation is None else self._rotation.asked.name
 
     def forget(self) -> None:
-        """A new run: who asked for a turn in an earlier one is not told."""
-        self._turn = None
+        """A new run: who asked for a rotation in an earlier one is not told."""
+        self._rotation = None
 
     def begin(self, asked: Communication, channel: RotateChannel, number: int | None, message: Any) -> None:
-        """Begin a turn; none is under way.
+        """Begin a rotation; none is under way.
 
         Args:
             asked: Communication that asked for it.
@@ -83,37 +83,37 @@ class Turns:
         is_call = asked.kind is CommunicationKind.SERVICE
         end_s = self._clock() + self._service_timeout_s * _SERVICE_SHARE if is_call else math.inf
         angle = angle_of(message) * (1.0 if channel.direction == "left" else -1.0)
-        self._turn = _Turn(asked, channel, number, end_s)
-        self._motion.turn(math.radians(angle) if channel.unit == "degrees" else angle, self._clock())
+        self._rotation = _Rotation(asked, channel, number, end_s)
+        self._motion.rotate(math.radians(angle) if channel.unit == "degrees" else angle, self._clock())
 
     def end(self, reason: str, *, is_own: bool = False) -> None:
-        """End a turn that is under way: it has failed; `is_own`: because the model asked for another motion."""
-        if self._turn is not None:
+        """End a rotation that is under way: it has failed; `is_own`: because the model asked for another motion."""
+        if self._rotation is not None:
             self._motion.stop(self._clock(), reason)
             self.poll(is_own=is_own)
 
     def cancel(self, communication: str, number: int) -> None:
-        """End a turn that an action asked for."""
-        turn = self._turn
-        if turn is not None and turn.number == number and turn.asked.name == communication:
-            self._turn = None
+        """End a rotation that an action asked for."""
+        rotation = self._rotation
+        if rotation is not None and rotation.number == number and rotation.asked.name == communication:
+            self._rotation = None
             self._motion.stop(self._clock(), "it was cancelled")
             self._owe(lambda executor: executor.on_goal_ended(number, "cancelled"))
 
     def poll(self, *, is_own: bool = False) -> None:
-        """Check whether a turn has ended; if so, whoever asked for it is told later."""
-        turn = self._turn
-        if turn is not None and self._motion.is_turning and self._clock() >= turn.end_s:
-            self._motion.stop(self._clock(), "the turn takes longer than a call may")
-        if turn is None or self._motion.is_turning:
+        """Check whether a rotation has ended; if so, whoever asked for it is told later."""
+        rotation = self._rotation
+        if rotation is not None and self._motion.is_rotating and self._clock() >= rotation.end_s:
+            self._motion.stop(self._clock(), "the rotation takes longer than a call may")
+        if rotation is None or self._motion.is_rotating:
             return
-        self._turn = None
-        has_arrived, reason, number = self._motion.has_arrived, self._motion.reason, turn.number
+        self._rotation = None
+        has_arrived, reason, number = self._motion.has_arrived, self._motion.reason, rotation.number
         if not has_arrived:
-            _log.warning("the turn asked for by %s has failed: %s", turn.asked.identifier, reason)
+            _log.warning("the rotation asked for by %s has failed: %s", rotation.asked.identifier, reason)
         if number is None:
             self._tell_end(reason, has_arrived=has_arrived, is_own=is_own)
-        elif turn.asked.kind is CommunicationKind.ACTION:
+        elif rotation.asked.kind is CommunicationKind.ACTION:
             outcome = "succeeded" if has_arrived else "aborted"
             self._owe(lambda executor: executor.on_goal_ended(number, outcome, done(reason)))
         elif has_arrived:
@@ -122,7 +122,7 @@ class Turns:
             self._owe(lambda executor: executor.on_call_failed(number, reason))
 
     def _tell_end(self, reason: str, *, has_arrived: bool, is_own: bool) -> None:
-        """A turn that a message asked for has ended."""
+        """A rotation that a message asked for has ended."""
         outcomes = ("done", "any") if has_arrived else ("failed", "any")
         told = [name for name, channel in self._listeners.of(RotatedChannel) if channel.outcome in outcomes]
         for identifier in told:
@@ -131,13 +131,13 @@ class Turns:
             self._on_failed(reason)
 
     def report(self, executor: Supervised) -> None:
-        """Tell how far a turn is that an action asked for."""
-        turn = self._turn
-        if turn is not None and turn.number is not None and turn.asked.kind is CommunicationKind.ACTION:
-            left = self._motion.remaining_rad * (1.0 if turn.channel.direction == "left" else -1.0)
-            left = math.degrees(left) if turn.channel.unit == "degrees" else left
-            feedback = turn.asked.feedback
-            executor.on_feedback(turn.number, {"remaining": left} if hasattr(feedback, "name") else left)
+        """Tell how far a rotation is that an action asked for."""
+        rotation = self._rotation
+        if rotation is not None and rotation.number is not None and rotation.asked.kind is CommunicationKind.ACTION:
+            left = self._motion.remaining_rad * (1.0 if rotation.channel.direction == "left" else -1.0)
+            left = math.degrees(left) if rotation.channel.unit == "degrees" else left
+            feedback = rotation.asked.feedback
+            executor.on_feedback(rotation.number, {"remaining": left} if hasattr(feedback, "name") else left)
 
 
 def done(reason: str) -> dict[str, Any]:

@@ -11,8 +11,8 @@ import pytest
 from robosc.model.structure import Deployment
 from robosc.targets import generate, write_files
 from robosc_bridge.simulated import MotionError, load_scene, read_motion
-from robosc_bridge.simulated.judge import judge_line, judge_maze
 from robosc_bridge.simulated.motion import Motion
+from robosc_bridge.simulated.motion_checks import check_line, check_maze
 from support.generated import example_supervisor
 from support.models import EXAMPLES
 from support.process import Process
@@ -77,7 +77,7 @@ def test_the_maze_solver_is_launched_and_gets_out(master: Master, tmp_path: Path
         end(launch)
     found = motion_of(path)
     assert found is not None
-    assert judge_maze(load_scene("maze-rooms"), found) == ()
+    assert check_maze(load_scene("maze-rooms"), found) == ()
 
 
 def test_the_supervised_line_follower_is_launched_and_keeps_to_its_line(master: Master, tmp_path: Path) -> None:
@@ -95,4 +95,4 @@ def test_the_supervised_line_follower_is_launched_and_keeps_to_its_line(master: 
         end(launch)
     found = motion_of(path)
     assert found is not None
-    assert judge_line(load_scene("line-oval"), found, least_m=0.9) == ()
+    assert check_line(load_scene("line-oval"), found, least_m=0.9) == ()

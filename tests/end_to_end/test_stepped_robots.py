@@ -11,7 +11,7 @@ import pytest
 
 from robosc.model.structure import Deployment
 from robosc_bridge.simulated import Motion, Obstacle, Scene, load_scene, maze_scene, room
-from robosc_bridge.simulated.judge import Halt, judge_line, judge_maze
+from robosc_bridge.simulated.motion_checks import Halt, check_line, check_maze
 from support.models import EXAMPLES
 from support.stepped_twin import SteppedTwin
 
@@ -30,7 +30,7 @@ def hall(person_x_m: float) -> Scene:
 def get_out(twin: SteppedTwin) -> Judge:
     """The mazes are solved whole."""
     twin.until(lambda: twin.world.reached_s is not None, "the goal", 400.0)
-    return lambda motion: judge_maze(twin.world.scene, motion)
+    return lambda motion: check_maze(twin.world.scene, motion)
 
 
 def follow_the_line(twin: SteppedTwin) -> Judge:
@@ -45,14 +45,14 @@ def follow_the_line(twin: SteppedTwin) -> Judge:
     halts.append(Halt(*twin.stand("the robot to stand after the stop button"), "after the stop button"))
     twin.tell("/emergency_stop/resume")
     twin.drive(0.3, "the robot to go on after the other button")
-    return lambda motion: judge_line(twin.world.scene, motion, halts, lateral_m=0.025, least_m=1.0)
+    return lambda motion: check_line(twin.world.scene, motion, halts, lateral_m=0.025, least_m=1.0)
 
 
 def follow_the_line_without_care(twin: SteppedTwin) -> Judge:
     """The same, with a follower that never heeds box or button."""
-    judge = follow_the_line(twin)
+    check = follow_the_line(twin)
     assert twin.held_back > 20
-    return judge
+    return check
 
 
 def follow_the_person(twin: SteppedTwin) -> Judge:
@@ -127,10 +127,10 @@ NOT_CARRIED = {"object_finder/object_finder", "ball_pusher/ball_pusher"}
 def test_it_does_what_it_is_for_and_only_what_its_supervisor_allows(model: str, tmp_path: Path) -> None:
     play = PLAYS[model]
     with SteppedTwin(model, play.scene(), tmp_path, play.deployment) as twin:
-        judge = play.act(twin)
+        check = play.act(twin)
         motion, wrong = twin.finish()
     assert wrong == ()
-    assert judge(motion) == ()
+    assert check(motion) == ()
 
 
 def test_every_example_robot_is_driven_or_told_why_not() -> None:

@@ -5,8 +5,8 @@ from typing import Any
 
 from robosc_bridge.daemon.states import State
 from robosc_bridge.devices.interface import Velocity
-from robosc_bridge.ground.session import Session
-from robosc_bridge.ground.settings import GroundSettings
+from robosc_bridge.ground_station.session import Session
+from robosc_bridge.ground_station.settings import GroundSettings
 from support.ground import PlayedDaemon, Station, of_type
 
 BEGIN_S = 100.0
@@ -32,7 +32,7 @@ class Talk:
         return self.station.hear(self.session.step(self.now_s, data))
 
     def live(self, seconds: float, step_s: float = 0.05, *, is_fresh: bool = True) -> list[Any]:
-        """Return everything that comes within some time, while the loop turns or hangs."""
+        """Return everything that comes within some time, while the loop runs or hangs."""
         found = []
         for _ in range(round(seconds / step_s)):
             if is_fresh:

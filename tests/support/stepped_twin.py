@@ -21,8 +21,18 @@ from robosc.execution.runtime.executor import Executor
 from robosc.execution.runtime.layer import Layer
 from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import Deployment
-from robosc_bridge.simulated import BODIES, Eye, Motion, MotionRecorder, Mount, Scene, Timebase, World, read_motion
-from robosc_bridge.simulated.judge import STILL_M_S, STILL_RAD_S
+from robosc_bridge.simulated import (
+    BODIES,
+    Motion,
+    MotionRecorder,
+    Mount,
+    PinholeCamera,
+    Scene,
+    Timebase,
+    World,
+    read_motion,
+)
+from robosc_bridge.simulated.motion_checks import STILL_M_S, STILL_RAD_S
 from robosc_bridge.skills.line import LineDetector
 from robosc_bridge.skills.settings import LineSettings
 from robosc_examples.motion import Turn, clamped, steered, turning_speed, wrapped
@@ -77,7 +87,7 @@ class SteppedTwin:
         self._time = Timebase(clock)
         self.world = World(BODIES["burger"], scene, self._time, seed=seed)
         self.world.left.is_driven = self.world.right.is_driven = True
-        self._eye = Eye(Mount(), scene, seed)
+        self._eye = PinholeCamera(Mount(), scene, seed)
         self._detector = LineDetector(LineSettings(), 0.0)
         log = open_event_log(str(folder / "events"), "run", clock.wall())
         self._stack.callback(log.close)

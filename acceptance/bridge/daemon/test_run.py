@@ -88,7 +88,7 @@ def test_a_base_that_is_unplugged_is_one_clear_message_and_the_wheels_stop(tmp_p
         assert "Traceback" not in errors
         end_s = time.monotonic() + LIMIT_S
         while not stands_still(robot):
-            assert time.monotonic() < end_s, "the wheels still turn"
+            assert time.monotonic() < end_s, "the wheels still rotate"
             time.sleep(0.01)
 
 
@@ -99,7 +99,7 @@ def test_a_bridge_that_is_killed_leaves_wheels_that_stop(tmp_path: Path) -> None
         process.wait()
         end_s = time.monotonic() + LIMIT_S
         while not stands_still(robot):
-            assert time.monotonic() < end_s, "the wheels still turn"
+            assert time.monotonic() < end_s, "the wheels still rotate"
             time.sleep(0.01)
 
 

@@ -183,13 +183,13 @@ def test_a_stop_reaches_the_motors_at_once(
     robot: SimulatedTurtleBot3, tmp_path: Path, record_property: Callable[[str, object], None]
 ) -> None:
     from robosc_api.security import Credentials
-    from robosc_bridge.terminal.client import BridgeClient, Wish
+    from robosc_bridge.terminal.client import BridgeClient, RequestedCommand
 
     with running(tmp_path, robot) as bridge:
         address = bridge.address()
         wait_until(lambda: state(address) == "BRIDGE_STATE_STANDBY", limit_s=START_LIMIT_S)
         with BridgeClient(address, Credentials()) as client:
-            client.want(Wish.START)
+            client.request(RequestedCommand.START)
             becomes(lambda: moves(robot))
             client.status()
             begin_s = time.monotonic()

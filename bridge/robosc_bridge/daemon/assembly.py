@@ -265,10 +265,10 @@ def _require_endpoints(configuration: Configuration, mapping: ChannelMapping) ->
             raise AssemblyError(f"view: {error}") from error
         if page.scene is not None:
             # Where nobody wants one, nothing of the simulator is loaded.
-            from robosc_bridge.view.scenery import scenery
+            from robosc_bridge.view.scene_map import scene_map
 
             try:
-                scenery(page.scene, page.scene_seed)
+                scene_map(page.scene, page.scene_seed)
             except BridgeError as error:
                 raise AssemblyError(f"view: {error}") from error
 

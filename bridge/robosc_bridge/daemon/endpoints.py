@@ -8,7 +8,7 @@ from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.daemon.device_thread import DeviceThread
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.devices.interface import Velocity
-from robosc_bridge.ground import GroundLink, ground_settings
+from robosc_bridge.ground_station import GroundLink, ground_settings
 from robosc_bridge.remote import RemoteEndpoint, settings_of
 from robosc_bridge.safety import SafetyLimits
 from robosc_bridge.view import ViewEndpoint

@@ -145,7 +145,7 @@ class Exchange:
             elif executor is not None:
                 executor.on_call_failed(item.number, why)
 
-    def hear(self, item: MessageReceived, executor: Supervised | None) -> None:
+    def receive(self, item: MessageReceived, executor: Supervised | None) -> None:
         """A program tells the model something; while nothing is executed, nobody listens."""
         if item.identifier not in self._heard:
             self._clients.refuse(item.program, f"the model hears nothing on '{item.identifier:.255}' from programs")

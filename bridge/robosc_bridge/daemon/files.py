@@ -11,7 +11,7 @@ from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.daemon.supervisors import credentials_of
 from robosc_bridge.devices.interface import Velocity
 from robosc_bridge.errors import BridgeError
-from robosc_bridge.ground import ground_settings
+from robosc_bridge.ground_station import ground_settings
 from robosc_bridge.remote import settings_of
 
 

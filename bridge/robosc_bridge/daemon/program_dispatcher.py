@@ -84,7 +84,7 @@ class ProgramDispatcher:
                 if layer is not None:
                     self._requesters.overflow(program, layer)
             case MessageReceived():
-                self._exchange.hear(item, executor)
+                self._exchange.receive(item, executor)
             case Replied() | CallFailed() | GoalAccepted() | FeedbackGiven() | GoalEnded():
                 self._exchange.take(item, executor)
             case MessageRequested() | CallRequested() | GoalRequested() | CancelRequested():

@@ -12,12 +12,12 @@ import logging
 from collections.abc import Sequence
 
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, DynamixelBus, exchange_limit_s
-from robosc_bridge.devices.following import FollowingWatch
 from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFault, Velocity
 from robosc_bridge.devices.kinematics import body_velocity, wheel_goals
 from robosc_bridge.devices.odometry import Odometry
 from robosc_bridge.devices.robots import ACCELERATION_RAW_RAD_S2, Robot
 from robosc_bridge.devices.servo_pair import ServoPair
+from robosc_bridge.devices.wheel_following import FollowingMonitor
 from robosc_bridge.errors import BridgeError, DeviceError, DeviceSilentError
 from robosc_bridge.host import Host, Port
 from robosc_bridge.protocol import servo
@@ -80,7 +80,7 @@ class DynamixelBase:
         self._exchange_limit_s = exchange_limit_s(answer_limit_s)
         self._limits = robot.limits(robot.motor.velocity_limit_raw)
         self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m)
-        self._following = FollowingWatch(_FOLLOWING_S + ramp_s)
+        self._following = FollowingMonitor(_FOLLOWING_S + ramp_s)
         self._host = host
         self._line: Port | None = None
         self._bus: DynamixelBus | None = None

@@ -10,13 +10,13 @@ import contextlib
 import math
 from collections.abc import Callable
 
-from robosc_bridge.devices.following import FollowingWatch
 from robosc_bridge.devices.interface import STANDSTILL, DriveLimits, DriveReading, MotorFault, Velocity
 from robosc_bridge.devices.kinematics import wheel_speeds, within_limits
 from robosc_bridge.devices.mavlink_link import BAUD, LinkSettings, VehicleLink, acquire, release
 from robosc_bridge.devices.mavlink_odometry import VehicleOdometry, estimate
 from robosc_bridge.devices.mavlink_state import Timestamped, VehicleState
 from robosc_bridge.devices.robots import Body
+from robosc_bridge.devices.wheel_following import FollowingMonitor
 from robosc_bridge.errors import (
     BridgeError,
     DeviceError,
@@ -110,7 +110,7 @@ class MavlinkRover:
         self._telemetry_s = telemetry_s
         self._link: VehicleLink | None = None
         self._odometry = VehicleOdometry()
-        self._following = FollowingWatch(_FOLLOWING_LIMIT_S)
+        self._following = FollowingMonitor(_FOLLOWING_LIMIT_S)
         self._began_s = self._host.monotonic()
         self._restarts = 0
         self._is_torque_wanted = False

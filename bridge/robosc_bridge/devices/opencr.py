@@ -11,11 +11,11 @@ import contextlib
 from collections.abc import Callable
 
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, DynamixelBus, exchange_limit_s
-from robosc_bridge.devices.following import FollowingWatch
 from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFault, Velocity
 from robosc_bridge.devices.kinematics import body_velocity, opencr_words, wheel_speeds
 from robosc_bridge.devices.odometry import Odometry
 from robosc_bridge.devices.robots import Robot
+from robosc_bridge.devices.wheel_following import FollowingMonitor
 from robosc_bridge.errors import BridgeError, DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
 from robosc_bridge.host import Host, Port
 from robosc_bridge.protocol import opencr
@@ -65,7 +65,7 @@ class OpenCrBase:
         self._line: Port | None = None
         self._bus: DynamixelBus | None = None
         self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m)
-        self._following = FollowingWatch()
+        self._following = FollowingMonitor()
         self._heartbeat = 0
         self._uptime_ms: int | None = None
         self._is_torque_wanted = False

@@ -16,10 +16,10 @@ from robosc_bridge.experiments.processes import Program, finish
 from robosc_bridge.experiments.scenario import Outcome, Say, ScenarioError
 from robosc_bridge.experiments.serial import EXAMPLES, Rig, Setting, running, scene_of
 from robosc_bridge.experiments.tail import LineCount, Now, latest
-from robosc_bridge.simulated.judge import Halt, judge_line
 from robosc_bridge.simulated.motion import Motion
+from robosc_bridge.simulated.motion_checks import Halt, check_line
 from robosc_bridge.simulated.scene import Scene
-from robosc_bridge.terminal.client import BridgeClient, RefusedError, UnreachableError, Wish
+from robosc_bridge.terminal.client import BridgeClient, RefusedError, RequestedCommand, UnreachableError
 
 MODEL = EXAMPLES / "line_follower" / "line_follower_layer.rscd"
 SCENES = ("line-oval", "line-curves")
@@ -73,7 +73,7 @@ def run_line(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
     with running(setting) as rig:
         follower = Program("follower", ("-m", "robosc_bridge.experiments.follower", "--address", rig.address), folder)
         with follower:
-            play = _Play(rig, follower, say)
+            play = _Scenario(rig, follower, say)
             try:
                 play.play()
             except (RefusedError, UnreachableError) as error:
@@ -82,12 +82,12 @@ def run_line(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
             figures = rig.finish()
             asked = follower.wait_for(r"^asked (\d+) times, blocked (\d+) times$")
     motion = setting.read_motion()
-    faults = (*play.faults, *judge_line(place, motion, play.halts))
+    faults = (*play.faults, *check_line(place, motion, play.halts))
     told = {"asked": float(asked[1]), "blocked": float(asked[2])}
     return setting.outcome("line", "serial", faults, {**figures, **line_figures(place, motion), **told})
 
 
-class _Play:
+class _Scenario:
     """Events that happen to the robot, one after the other.
 
     Attributes:
@@ -118,7 +118,7 @@ class _Play:
             self._drive("after the other button")
             tell("let button_2")
             operator.stop()
-            self._stand("after the operator's stop", lambda: operator.want(Wish.RESUME))
+            self._stand("after the operator's stop", lambda: operator.request(RequestedCommand.RESUME))
             self._drive("when the operator lets it go on")
 
     def _drive(self, what: str) -> None:

@@ -7,8 +7,8 @@ from robosc.model.structure import Deployment
 from robosc_bridge.experiments.scenario import Outcome, Say, ScenarioError
 from robosc_bridge.experiments.serial import EXAMPLES, Rig, Setting, running, scene_of
 from robosc_bridge.experiments.tail import LineCount, latest
-from robosc_bridge.simulated.judge import judge_maze
 from robosc_bridge.simulated.motion import Motion
+from robosc_bridge.simulated.motion_checks import check_maze
 
 MODEL = EXAMPLES / "maze_solver" / "narrow_maze.rscd"
 SCENES = ("maze-rooms", "maze-spiral", "maze-random")
@@ -55,7 +55,7 @@ def run_maze(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
         _until_out(rig, say)
         figures = rig.finish()
     motion = setting.read_motion()
-    return setting.outcome("maze", "serial", judge_maze(place, motion), {**figures, **way_figures(motion)})
+    return setting.outcome("maze", "serial", check_maze(place, motion), {**figures, **way_figures(motion)})
 
 
 def _until_out(rig: Rig, say: Say) -> None:

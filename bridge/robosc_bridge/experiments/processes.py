@@ -26,7 +26,7 @@ STOP_LIMIT_S = 15.0
 
 ANSWER_LIMIT_S = 10.0
 _POLL_S = 0.02
-_BEGIN = str(Path(__file__).with_name("begin.py"))
+_END_WITH_PARENT = str(Path(__file__).with_name("end_with_parent.py"))
 _PREFERRED = -15
 _SHOWN_BYTES = 4096
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -160,7 +160,15 @@ class Program:
         with self.log.open("w", encoding="utf-8") as log, _interrupts.held():
             try:
                 self._process = subprocess.Popen(  # noqa: S603 (our own programs)
-                    [sys.executable, "-I", "-S", _BEGIN, str(os.getpid()), self._interpreter, *self._arguments],
+                    [
+                        sys.executable,
+                        "-I",
+                        "-S",
+                        _END_WITH_PARENT,
+                        str(os.getpid()),
+                        self._interpreter,
+                        *self._arguments,
+                    ],
                     env=environment() if self._variables is None else dict(self._variables),
                     cwd=self._folder,
                     stdin=pipe or subprocess.DEVNULL,

@@ -28,7 +28,7 @@ from robosc_bridge.experiments.records import Recorded
 from robosc_bridge.experiments.scenario import Connection, Outcome, Say, ScenarioError
 from robosc_bridge.experiments.serial import EXAMPLES, scene_of
 from robosc_bridge.experiments.tail import LineCount, Now, latest
-from robosc_bridge.simulated.judge import SETTLE_S, Halt, judge_line, judge_maze
+from robosc_bridge.simulated.motion_checks import SETTLE_S, Halt, check_line, check_maze
 from robosc_bridge.simulated.scene import scene_names
 
 HELPERS = EXAMPLES / "robosc_examples"
@@ -302,7 +302,7 @@ def run_maze(
         figures = stage.finish()
     motion = setting.read_motion()
     return setting.outcome(
-        "maze", setting.middleware.connection, judge_maze(setting.scene, motion), {**figures, **way_figures(motion)}
+        "maze", setting.middleware.connection, check_maze(setting.scene, motion), {**figures, **way_figures(motion)}
     )
 
 
@@ -354,7 +354,7 @@ def run_line(
         watch.drive("after the resume button")
         figures = stage.finish()
     motion = setting.read_motion()
-    judged = judge_line(place, motion, watch.halts, settle_s=setting.settle_s, least_m=3 * FREE_M)
+    judged = check_line(place, motion, watch.halts, settle_s=setting.settle_s, least_m=3 * FREE_M)
     faults = (*watch.faults, *judged)
     return setting.outcome("line", setting.middleware.connection, faults, {**figures, **line_figures(place, motion)})
 

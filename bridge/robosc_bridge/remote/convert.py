@@ -142,7 +142,7 @@ def rate_hz_of(request: pb.WatchRequest, default_hz: float, least_hz: float, mos
     return rate_hz
 
 
-class Shown:
+class SnapshotEncoder:
     """Snapshots as messages; each is made once, whoever watches."""
 
     def __init__(self) -> None:
@@ -246,7 +246,7 @@ def program_of(hello: pb.Hello, name: str, tell: Callable[[programs.ToProgram], 
     return programs.Program(name, tell, frozenset(hello.serves), may_request)
 
 
-def told(request: pb.AttachRequest, program: programs.Program) -> programs.FromProgram | None:
+def item_of(request: pb.AttachRequest, program: programs.Program) -> programs.FromProgram | None:
     """Return the item that a program tells the loop; None: only that it is there.
 
     Raises:
@@ -304,7 +304,7 @@ def refused(why: str) -> pb.AttachResponse:
     return pb.AttachResponse(refused=pb.Refusal(why=text_of(why)))
 
 
-def telling(item: programs.ToProgram) -> pb.AttachResponse:
+def response_of(item: programs.ToProgram) -> pb.AttachResponse:
     """Return the response for an item that the loop tells a program."""
     match item:
         case programs.MessageSent(name, identifier, data):

@@ -16,17 +16,17 @@ from grpc_reflection.v1alpha import reflection
 
 from robosc_api.layers import Layers
 from robosc_api.malformed import MalformedRequests
-from robosc_api.request_timeouts import REFLECTION_METHODS, RequestTimeouts
+from robosc_api.request_timeouts import REFLECTION_METHODS
 from robosc_api.security import Guard, SecurityError, ServerSecurity, TokenFile, add_port
 from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.served_endpoint import ServedEndpoint
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.remote import convert
-from robosc_bridge.remote.condition import Condition
-from robosc_bridge.remote.connections import Places
-from robosc_bridge.remote.ending import EndingCalls
+from robosc_bridge.remote.connection_slots import ConnectionSlots
+from robosc_bridge.remote.health import Health
 from robosc_bridge.remote.service import RULES, BridgeService
+from robosc_bridge.remote.shutdown import ShutdownLayer
 
 _log = logging.getLogger(__name__)
 
@@ -123,29 +123,29 @@ class RemoteEndpoint(ServedEndpoint):
             None if security.tokens is None else TokenFile(security.tokens),
             has_client_certificates=security.client_ca is not None,
         )
-        ending = EndingCalls()
-        prompt = RequestTimeouts(REQUEST_LIMIT_S, dict.fromkeys(REFLECTION_METHODS, REFLECTION_IDLE_S))
+        shutdown = ShutdownLayer()
+        prompt = PromptRequests(REQUEST_LIMIT_S, dict.fromkeys(REFLECTION_METHODS, REFLECTION_IDLE_S))
         # Whatever looks at a call sees it with its request.
-        layers = Layers(ending, prompt, guard, MalformedRequests(convert.SERVICE_NAME))
+        layers = Layers(shutdown, prompt, guard, MalformedRequests(convert.SERVICE_NAME))
         server = grpc.aio.server(interceptors=[layers], options=_options())
         service = BridgeService(self._operations, settings.operator_timeout_s)
         convert.add_service(service, server)  # type: ignore[no-untyped-call]  # generated
-        health_pb2_grpc.add_HealthServicer_to_server(Condition(self._operations.feed), server)
+        health_pb2_grpc.add_HealthServicer_to_server(Health(self._operations.feed), server)
         names = (convert.SERVICE_NAME, health.SERVICE_NAME, reflection.SERVICE_NAME)
         reflection.enable_server_reflection(names, server)
         self.address = add_port(server, settings.address, security)
         await server.start()
         self._is_listening()
-        places = Places(int(self.address.rpartition(":")[2]), MAXIMUM_CONNECTIONS)
+        slots = ConnectionSlots(int(self.address.rpartition(":")[2]), MAXIMUM_CONNECTIONS)
         try:
             while not self._end.is_set():
-                places.poll()
+                slots.poll()
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(_LOOK_S):
                         await self._end.wait()
         finally:
             service.close()
-            ending.close()
+            shutdown.close()
             await server.stop(_GRACE_S)
 
 

@@ -17,7 +17,7 @@ from robosc_api.security import CALLER, Rule, Scope
 from robosc_bridge.daemon import states
 from robosc_bridge.daemon.operations import UNDONE_BY, Operations
 from robosc_bridge.remote import convert
-from robosc_bridge.remote.pace import FloodError
+from robosc_bridge.remote.operator_presence import FloodError
 from robosc_bridge.remote.session import Session, TooSlowError
 from robosc_bridge.remote.watchers import Watchers
 
@@ -73,7 +73,7 @@ class BridgeService(convert.BridgeServiceServicer):
         self._operations = operations
         self._operator_timeout_s = operator_timeout_s
         self._definition = convert.definition(operations)
-        self._shown = convert.Shown()
+        self._snapshots = convert.SnapshotEncoder()
         self._watchers = Watchers(operations.feed)
         self._counts = {"watchers": 0, "programs": 0, "commands": 0}
         self._closing = asyncio.Event()
@@ -96,7 +96,7 @@ class BridgeService(convert.BridgeServiceServicer):
         response = convert.GetStatusResponse()
         snapshot = self._operations.feed.snapshot
         if snapshot is not None:
-            self._shown.put(response.snapshot, snapshot)
+            self._snapshots.put(response.snapshot, snapshot)
         return response
 
     async def Stop(  # noqa: N802
@@ -174,7 +174,7 @@ class BridgeService(convert.BridgeServiceServicer):
                     response = convert.WatchResponse(events=events, lost_events=lost)
                     snapshot = self._operations.feed.snapshot
                     if snapshot is not None:
-                        self._shown.put(response.snapshot, snapshot)
+                        self._snapshots.put(response.snapshot, snapshot)
                         if request.with_scans and snapshot.scan is not None and snapshot.scan.time_s != scan_s:
                             scan_s = snapshot.scan.time_s
                             convert.put_scan(response.scan, snapshot.scan)

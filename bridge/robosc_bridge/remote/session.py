@@ -10,7 +10,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.programs import Attached, Detached, Program, ToProgram
 from robosc_bridge.remote import convert
-from robosc_bridge.remote.pace import OperatorPace
+from robosc_bridge.remote.operator_presence import OperatorPresence
 
 _log = logging.getLogger(__name__)
 
@@ -56,7 +56,7 @@ class Session:
         self._operator_timeout_s = operator_timeout_s
         self._is_operator = hello.is_operator
         self._loop = asyncio.get_running_loop()
-        self._pace = OperatorPace(self._loop.time)
+        self._presence = OperatorPresence(self._loop.time)
         self._news = asyncio.Event()
         self._overflow = asyncio.Event()
         # Filled by the loop's thread and this one.
@@ -104,11 +104,11 @@ class Session:
     async def _read(self, requests: AsyncIterator[convert.AttachRequest]) -> None:
         async for request in requests:
             # Before it waits: an operator that has just sent something is there in any case.
-            if self._is_operator and self._pace.came():
+            if self._is_operator and self._presence.message_received():
                 self._operations.operator_seen()
             await self._turn()
             try:
-                item = convert.told(request, self._program)
+                item = convert.item_of(request, self._program)
             except convert.RequestError as error:
                 self._put(str(error))
                 continue
@@ -136,7 +136,7 @@ class Session:
                 with self._lock:
                     item = self._waiting.popleft()
                     self._waiting_bytes -= _weight_bytes(item)
-                await write(convert.refused(item) if isinstance(item, str) else convert.telling(item))
+                await write(convert.refused(item) if isinstance(item, str) else convert.response_of(item))
 
     async def _fall_behind(self) -> None:
         await self._overflow.wait()

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from robosc_bridge.devices.interface import STANDSTILL, DriveReading, MotorFault, Velocity
 from robosc_bridge.safety.limits import SafetyLimits
+from robosc_bridge.safety.monitors import BatteryMonitor, Freshness, ScanCoverageMonitor, WheelMonitor
 from robosc_bridge.safety.motion import ramped, wheels, within
 from robosc_bridge.safety.reasons import LATCHING, TORQUE_OFF, Caution, Reason
-from robosc_bridge.safety.watches import BatteryWatch, Freshness, SightWatch, WheelWatch
 
 # The supply's bit alone does not switch a motor off; how much is left in the battery has a rule of its own.
 _HARMLESS = frozenset({MotorFault.VOLTAGE})
@@ -71,10 +71,10 @@ class SafetyLayer:
         self._operator = Freshness(limits.operator_timeout_s)
         self._failures = 0
         self._faults: frozenset[MotorFault] = frozenset()
-        self._sight = SightWatch(limits.min_valid_share)
+        self._sight = ScanCoverageMonitor(limits.min_valid_share)
         self._is_noisy = False
-        self._battery = BatteryWatch(limits)
-        self._wheels = WheelWatch(limits)
+        self._battery = BatteryMonitor(limits)
+        self._wheels = WheelMonitor(limits)
         # When torque began to be wanted, None: it is not; whether the motors told since then that they hold.
         self._torque_since_s: float | None = None
         self._is_torque_seen = False
@@ -113,19 +113,19 @@ class SafetyLayer:
             else:
                 self._wanted = within(velocity, self._limits)
                 self._asked_m_s = self._wanted.linear_m_s
-                self._commands.hear(now_s)
+                self._commands.update(now_s)
 
     def saw_scan(self, now_s: float, ranges_m: Sequence[float] = ()) -> None:
         """Record that a full scan was complete.
 
         Args:
             now_s: Time at which it was complete, in seconds.
-            ranges_m: Measured ranges (`SightWatch.hear`); none: nothing is known about them.
+            ranges_m: Measured ranges (`ScanCoverageMonitor.update`); none: nothing is known about them.
         """
         with self._lock:
-            self._scans.hear(now_s)
+            self._scans.update(now_s)
             if ranges_m:
-                self._sight.hear(ranges_m)
+                self._sight.update(ranges_m)
 
     def saw_noise(self, is_noisy: bool) -> None:
         """Record whether many frames of the scanner are damaged."""
@@ -136,11 +136,11 @@ class SafetyLayer:
         """The drive base has answered."""
         with self._lock:
             self._failures = 0
-            self._readings.hear(reading.time_s)
+            self._readings.update(reading.time_s)
             self._faults = reading.faults
             if reading.faults - _HARMLESS:
                 self._latched.add(Reason.MOTOR_FAULT)
-            self._battery.hear(reading.battery_v, reading.time_s)
+            self._battery.update(reading.battery_v, reading.time_s)
             if self._battery.is_empty:
                 self._latched.add(Reason.BATTERY_LOW)
             is_still = all(abs(speed) <= self._limits.standstill_m_s for speed in reading.wheels_m_s)
@@ -165,7 +165,7 @@ class SafetyLayer:
     def loop_cycled(self, now_s: float) -> None:
         """The supervisor's loop was at work then."""
         with self._lock:
-            self._loop.hear(now_s)
+            self._loop.update(now_s)
 
     def supervisor_fault(self) -> None:
         """The supervisor, or what runs it, has failed."""
@@ -180,7 +180,7 @@ class SafetyLayer:
     def operator_seen(self, now_s: float) -> None:
         """There was a sign of the operator then."""
         with self._lock:
-            self._operator.hear(now_s)
+            self._operator.update(now_s)
 
     def reset(self) -> tuple[Reason, ...]:
         """Forget what has latched, when an operator says so; the robot is in standby afterwards.

@@ -8,12 +8,12 @@ decoders: both sides stand on the manuals alone.
 
 from robosc_bridge.simulated.camera import SimulatedCamera
 from robosc_bridge.simulated.datagram_line import DatagramFaults, DatagramLine
-from robosc_bridge.simulated.eye import Eye, Mount
 from robosc_bridge.simulated.floor import Track, oval, parse_track, spline
 from robosc_bridge.simulated.lidar import LIDARS, Lds01, Lds02, Lds03, Lidar
 from robosc_bridge.simulated.line import Faults, SimulatedLine
 from robosc_bridge.simulated.motion import Motion, MotionError, MotionRecorder, read_motion
 from robosc_bridge.simulated.opencr import OpenCr
+from robosc_bridge.simulated.pinhole_camera import Mount, PinholeCamera
 from robosc_bridge.simulated.recorder import Record, Recorder, Tap, read_records
 from robosc_bridge.simulated.robots import BODIES, Body
 from robosc_bridge.simulated.rover import Rover
@@ -34,7 +34,6 @@ __all__ = [
     "Body",
     "DatagramFaults",
     "DatagramLine",
-    "Eye",
     "Faults",
     "Goal",
     "HardwareError",
@@ -49,6 +48,7 @@ __all__ = [
     "Noise",
     "Obstacle",
     "OpenCr",
+    "PinholeCamera",
     "Record",
     "Recorder",
     "Rover",

@@ -19,9 +19,9 @@ from types import FrameType
 from robosc_bridge.configuration.document import MAXIMUM_BYTES, read_file
 from robosc_bridge.configuration.problems import ConfigurationError
 from robosc_bridge.simulated.commands import UnknownCommandError, obey
+from robosc_bridge.simulated.error_monitor import ErrorMonitor
 from robosc_bridge.simulated.floor import Track, oval, parse_track
 from robosc_bridge.simulated.lidar import LIDARS
-from robosc_bridge.simulated.mishaps import Mishaps
 from robosc_bridge.simulated.motion import MotionRecorder
 from robosc_bridge.simulated.output import Output
 from robosc_bridge.simulated.recorder import Recorder
@@ -67,16 +67,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     for which in (signal.SIGINT, signal.SIGTERM):
         signal.signal(which, end)
-    mishaps = Mishaps()
+    errors = ErrorMonitor()
     try:
         with contextlib.ExitStack() as stack:
-            stack.enter_context(mishaps)
+            stack.enter_context(errors)
             recorder = None
             if options.record is not None:
-                recorder = Recorder(stack.enter_context(contextlib.closing(Output(options.record, mishaps.tell))))
+                recorder = Recorder(stack.enter_context(contextlib.closing(Output(options.record, errors.tell))))
             motion = None
             if options.motion is not None:
-                motion = stack.enter_context(contextlib.closing(Output(options.motion, mishaps.tell)))
+                motion = stack.enter_context(contextlib.closing(Output(options.motion, errors.tell)))
             robot = stack.enter_context(_robot(options, recorder))
             if motion is not None:
                 stack.enter_context(contextlib.closing(MotionRecorder(robot.world, motion)))
@@ -87,12 +87,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
             threading.Thread(target=_listen, args=(robot,), name="commands", daemon=True).start()
             # Nor without end: a signal that comes just before a wait begins does not end it.
-            while not received and not mishaps.has_crashed:
+            while not received and not errors.has_crashed:
                 time.sleep(_POLL_S)
     except (OSError, ValueError) as error:
         print(f"the robot cannot be simulated: {error}", file=sys.stderr)
         return 1
-    return mishaps.status
+    return errors.status
 
 
 def _robot(options: argparse.Namespace, recorder: Recorder | None) -> SimulatedTurtleBot3:

@@ -13,7 +13,7 @@ import tempfile
 import threading
 from pathlib import Path
 
-from robosc_bridge.simulated.eye import DARKNESS, Eye, Mount
+from robosc_bridge.simulated.pinhole_camera import DARKNESS, Mount, PinholeCamera
 from robosc_bridge.simulated.world import World
 
 _MOST_CLIENTS = 4
@@ -47,7 +47,7 @@ class SimulatedCamera:
         mount = mount or Mount()
         self._world = world
         self._time = world.time
-        self._eye = Eye(mount, world.scene, seed)
+        self._camera = PinholeCamera(mount, world.scene, seed)
         self._period_s = 1.0 / mount.rate_hz
         self._due_s = self._time.now_s()
         self._lock = threading.RLock()
@@ -167,7 +167,7 @@ class SimulatedCamera:
                 self._clients[client] = b""
 
     def _send(self) -> None:
-        shades = self._eye.picture(self._world.pose, self._world.obstacles)
+        shades = self._camera.picture(self._world.pose, self._world.obstacles)
         if self.is_covered:
             shades[:] = DARKNESS
         data = b"P5 %d %d 255\n" % (shades.shape[1], shades.shape[0]) + shades.tobytes()

@@ -1,4 +1,4 @@
-"""Causes of differences between a robot's way on the floor, what its wheels rotate, and what its encoders count."""
+"""Causes of differences between a robot's way on the floor, how far its wheels rotate, and what its encoders count."""
 
 import random
 

@@ -143,14 +143,14 @@ def _interval(
     # Of the upper tangent; the lower one's is opposite.
     across, up = (y1 - y2) / scale * reach, np.where(is_point, 1.0, (x2 - x1) / scale) * reach
     slopes = np.divide(y2 - y1, x2 - x1, out=np.zeros_like(x1), where=x2 > x1)
-    rounds = [np.sqrt(np.maximum(reach**2 - (columns - middle) ** 2, 0.0)) for middle in (x1, x2)]
+    discs = [np.sqrt(np.maximum(reach**2 - (columns - middle) ** 2, 0.0)) for middle in (x1, x2)]
     found = []
     for sign in (-1.0, 1.0):
         # Left of the tangent the one round end bounds it, right of it the other.
         begin, end = x1 + sign * across, x2 + sign * across
         straight = y1 + sign * up + slopes * (columns - begin)
         found.append(
-            np.where(columns <= begin, y1 + sign * rounds[0], np.where(columns >= end, y2 + sign * rounds[1], straight))
+            np.where(columns <= begin, y1 + sign * discs[0], np.where(columns >= end, y2 + sign * discs[1], straight))
         )
     return np.ceil(found[0]).astype(int), np.floor(found[1]).astype(int)
 

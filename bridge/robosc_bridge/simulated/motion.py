@@ -18,7 +18,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from robosc_bridge.simulated.output import Sink
-from robosc_bridge.simulated.world import STEP_S, Happening, World
+from robosc_bridge.simulated.world import STEP_S, World, WorldEvent
 
 SAMPLE_S = 0.05
 """Time of the world between two samples, in seconds."""
@@ -156,7 +156,7 @@ class MotionRecorder:
             world.collisions,
         )
 
-    def _happen(self, world_s: float, happening: Happening) -> None:
+    def _happen(self, world_s: float, happening: WorldEvent) -> None:
         self._write(
             Event(
                 self._time(world_s),

@@ -29,7 +29,7 @@ from robosc_bridge.simulated.scene_file import (
 from robosc_bridge.simulated.textures import PLAIN, Texture
 from robosc_bridge.simulated.walls import CELL_M, Segment, Walls, open_maze
 
-# Of a cell: the robot's middle is out of the gap before it is there, and is there also where it rotates round the
+# Of a cell: the robot's middle is out of the gap before it is there, and is there also where it rounds the
 # corner of the gap at once, 0.3 of a cell from it.
 _GOAL_SHARE = 0.45
 _FOLDER = Path(__file__).parent / "scenes"

@@ -6,14 +6,14 @@ axes the rays are always the same; it is the ends of the walls that are turned. 
 the ray d at the length t with 1/t = (d x (b - a)) / (a x b), which is linear in d: the greatest is the nearest wall.
 Who is in line with a wall sees its near end, if a ray goes there; who is on one sees nothing else.
 
-`Walls.cast` and `Rounds.cast` tell the same for any rays, pair by pair.
+`Walls.cast` and `Discs.cast` tell the same for any rays, pair by pair.
 """
 
 import math
 
 import numpy as np
 
-from robosc_bridge.simulated.rounds import Rounds
+from robosc_bridge.simulated.discs import Discs
 from robosc_bridge.simulated.walls import Floats, Walls
 
 BEAMS = 360
@@ -43,21 +43,21 @@ class Sweep:
         self._xs: Floats = np.ascontiguousarray(table[:, :, 0].T)
         self._ys: Floats = np.ascontiguousarray(table[:, :, 1].T)
 
-    def lengths_m(self, x_m: float, y_m: float, heading_rad: float, rounds: Rounds) -> Floats:
+    def lengths_m(self, x_m: float, y_m: float, heading_rad: float, discs: Discs) -> Floats:
         """Return the lengths of the rays, in metres.
 
         Args:
             x_m: x of the laser.
             y_m: y of the laser.
             heading_rad: Heading of the first ray.
-            rounds: Round things, which it sees, too.
+            discs: Round things, which it sees, too.
 
         Returns:
             Shape (360,): infinity where nothing is met.
         """
         cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
         found = self._to_walls(x_m, y_m, cosine, sine)
-        for disc_x_m, disc_y_m, radius_m in rounds.discs:
+        for disc_x_m, disc_y_m, radius_m in discs.discs:
             apart_x, apart_y = disc_x_m - x_m, disc_y_m - y_m
             _see_disc(found, cosine * apart_x + sine * apart_y, cosine * apart_y - sine * apart_x, radius_m)
         return found

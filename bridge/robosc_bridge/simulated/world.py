@@ -12,9 +12,9 @@ from typing import Literal
 import numpy as np
 
 from robosc_bridge.simulated.control_table import MODELS
+from robosc_bridge.simulated.discs import Discs
 from robosc_bridge.simulated.drift import Drift
 from robosc_bridge.simulated.robots import Body
-from robosc_bridge.simulated.rounds import Rounds
 from robosc_bridge.simulated.scene import IDEAL, Obstacle, Scene
 from robosc_bridge.simulated.sweep import Sweep
 from robosc_bridge.simulated.timebase import Timebase
@@ -70,7 +70,7 @@ class Wheel:
 
 
 @dataclass(frozen=True)
-class Happening:
+class WorldEvent:
     """Something that is worth writing down.
 
     Attributes:
@@ -93,7 +93,7 @@ class Happening:
 OnStep = Callable[[float], None]
 """Is told the world time of every step that was lived."""
 
-OnHappening = Callable[[float, Happening], None]
+OnWorldEvent = Callable[[float, WorldEvent], None]
 """Is told what happened, and the world time."""
 
 
@@ -114,7 +114,7 @@ class World:
         y_m: y of the same.
         heading_rad: Heading counter-clockwise from x, unbounded.
         floor_speed_m_s: Forward speed, as it moved on the floor in the last step: slip and walls make it less than
-            what the wheels rotate.
+            the rotation of the wheels.
         floor_yaw_rate_rad_s: Yaw rate, counter-clockwise, likewise.
         collisions: Number of times that the body has come to a wall or an obstacle.
         is_touching: True if it is at one now.
@@ -149,7 +149,7 @@ class World:
         self._obstacles = {obstacle.name: obstacle for obstacle in self.scene.obstacles}
         self._see_obstacles()
         self._drift = Drift(self.scene.noise, seed) if self.scene.noise != IDEAL else None
-        self._watchers: list[tuple[OnStep, OnHappening]] = []
+        self._watchers: list[tuple[OnStep, OnWorldEvent]] = []
         self._see_goal()
 
     @property
@@ -217,32 +217,32 @@ class World:
                 raise ValueError(f"there is no obstacle {name!r}; there is {known}")
             found = self._obstacles[name] = change(self._obstacles[name])
             self._see_obstacles()
-            self._tell(Happening("obstacle", found.x_m, found.y_m, name, found.radius_m, found.is_there))
+            self._tell(WorldEvent("obstacle", found.x_m, found.y_m, name, found.radius_m, found.is_there))
 
     def _see_obstacles(self) -> None:
         self._there = tuple(obstacle for obstacle in self._obstacles.values() if obstacle.is_there)
-        self._rounds = Rounds((obstacle.x_m, obstacle.y_m, obstacle.radius_m) for obstacle in self._there)
+        self._discs = Discs((obstacle.x_m, obstacle.y_m, obstacle.radius_m) for obstacle in self._there)
         self._clear_m = 0.0
 
-    def watch(self, on_step: OnStep, on_happening: OnHappening) -> None:
+    def watch(self, on_step: OnStep, on_event: OnWorldEvent) -> None:
         """Tell somebody of every step and of what happens, under the lock of the time."""
         with self.time.lock:
-            self._watchers.append((on_step, on_happening))
+            self._watchers.append((on_step, on_event))
 
-    def unwatch(self, on_step: OnStep, on_happening: OnHappening) -> None:
+    def unwatch(self, on_step: OnStep, on_event: OnWorldEvent) -> None:
         """Tell them no more."""
         with self.time.lock:
-            self._watchers.remove((on_step, on_happening))
+            self._watchers.remove((on_step, on_event))
 
-    def _tell(self, happening: Happening) -> None:
-        for _, on_happening in self._watchers:
-            on_happening(self.lived_s, happening)
+    def _tell(self, happening: WorldEvent) -> None:
+        for _, on_event in self._watchers:
+            on_event(self.lived_s, happening)
 
     def _see_goal(self) -> None:
         goal = self.scene.goal
         if goal is not None and self.reached_s is None and goal.is_reached(self.x_m, self.y_m):
             self.reached_s = self.lived_s
-            self._tell(Happening("goal", self.x_m, self.y_m))
+            self._tell(WorldEvent("goal", self.x_m, self.y_m))
 
     def catch_up(self) -> None:
         """Live until now, in whole steps; what is commanded now acts from here on."""
@@ -289,7 +289,7 @@ class World:
                 if forward_m != 0.0 and not self.is_touching:
                     self.is_touching = True
                     self.collisions += 1
-                    self._tell(Happening("collision", self.x_m, self.y_m, name))
+                    self._tell(WorldEvent("collision", self.x_m, self.y_m, name))
                 return False
             self._clear_m = nearest_m
             self.is_touching = self.is_touching and nearest_m < radius_m + _APART_M
@@ -300,7 +300,7 @@ class World:
     def _nearest(self, x_m: float, y_m: float) -> tuple[float, str]:
         """Return the distance of the nearest thing, and its name; nothing for a wall."""
         to_wall_m = self.walls.distance_m(x_m, y_m)
-        to_round_m, place = self._rounds.nearest(x_m, y_m)
+        to_round_m, place = self._discs.nearest(x_m, y_m)
         return (to_round_m, self._there[place].name) if to_round_m < to_wall_m else (to_wall_m, "")
 
     def cast(self, origins: Floats | None, directions: Floats) -> Floats:
@@ -317,7 +317,7 @@ class World:
             self.catch_up()
             cosine, sine = math.cos(self.heading_rad), math.sin(self.heading_rad)
             x_m, y_m = self._scanner_place()
-            rounds = self._rounds
+            discs = self._discs
         rotation = np.array(((cosine, sine), (-sine, cosine)))
         along = directions @ rotation
         if origins is None:
@@ -326,7 +326,7 @@ class World:
         else:
             starts = origins @ rotation + np.array((x_m, y_m))
             found = self.walls.cast(starts, along)
-        return np.minimum(found, rounds.cast(starts, along)) if rounds.discs else found
+        return np.minimum(found, discs.cast(starts, along)) if discs.discs else found
 
     def ranges(self, angles_rad: Sequence[float]) -> tuple[float, ...]:
         """Return the ranges that an ideal laser would measure now.
@@ -350,7 +350,7 @@ class World:
         with self.time.lock:
             self.catch_up()
             x_m, y_m = self._scanner_place()
-            return self._sweep.lengths_m(x_m, y_m, self.heading_rad, self._rounds)
+            return self._sweep.lengths_m(x_m, y_m, self.heading_rad, self._discs)
 
     def _scanner_place(self) -> tuple[float, float]:
         aside_m = self.body.scanner_x_m

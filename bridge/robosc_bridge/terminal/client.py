@@ -53,7 +53,7 @@ class UnreachableError(Exception):
     """No bridge answers, or what should reach it cannot be used; one sentence for a person."""
 
 
-class Wish(StrEnum):
+class RequestedCommand(StrEnum):
     """Request that may be made to a bridge."""
 
     START = "start"
@@ -62,7 +62,7 @@ class Wish(StrEnum):
     RESET = "reset"
 
 
-_WISHES = {wish: f"COMMAND_KIND_{wish.name}" for wish in Wish}
+_COMMANDS = {command: f"COMMAND_KIND_{command.name}" for command in RequestedCommand}
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,10 +113,10 @@ class BridgeClient:
         with self._translated():
             self._stub.Stop(pb.StopRequest(), timeout=STOP_LIMIT_S)
 
-    def want(self, wish: Wish) -> None:
+    def request(self, command: RequestedCommand) -> None:
         """Want something, and wait until it is done."""
         with self._translated():
-            response = self._stub.Command(pb.CommandRequest(command=_WISHES[wish]), timeout=COMMAND_LIMIT_S)
+            response = self._stub.Command(pb.CommandRequest(command=_COMMANDS[command]), timeout=COMMAND_LIMIT_S)
         if response.refusal:
             raise RefusedError(response.refusal)
 

@@ -23,13 +23,13 @@ DONE, REFUSED, WRONG = 0, 1, 2
 EPILOG = "exit status: 0 done; 1 the bridge refuses, or a fault has stopped it; 2 wrong use, or no bridge answers"
 
 _ADDRESS = re.compile(r"(\[[0-9A-Fa-f:.%]+\]|[A-Za-z0-9._-]+):([0-9]{1,5})\Z")
-_WISHES = {
+_COMMANDS = {
     "start": "execute the supervisor, in standby or after a fault",
     "standby": "bring the robot to rest and let the motors go",
     "resume": "let the robot go on after a stop",
     "reset": "forget faults whose cause is gone; standby follows",
 }
-NAMES = ("stop", *_WISHES, "status", "watch", "teleop", "token")
+NAMES = ("stop", *_COMMANDS, "status", "watch", "teleop", "token")
 """Names of the commands."""
 
 
@@ -37,9 +37,9 @@ def add_commands(commands: Any) -> None:
     """Add the commands to subparsers of argparse."""
     stop = commands.add_parser("stop", help="stop a robot, whatever its bridge does", epilog=EPILOG)
     _finish(stop, lambda client, arguments: _stop(client))
-    for name, text in _WISHES.items():
+    for name, text in _COMMANDS.items():
         parser = commands.add_parser(name, help=text, epilog=EPILOG)
-        parser.set_defaults(wish=name)
+        parser.set_defaults(command=name)
         _finish(parser, _want)
 
     status = commands.add_parser("status", help="tell what a bridge is doing", epilog=EPILOG)
@@ -120,16 +120,16 @@ def _stop(client: Any) -> int:
 
 
 def _want(client: Any, arguments: argparse.Namespace) -> int:
-    from robosc_bridge.terminal.client import Wish
+    from robosc_bridge.terminal.client import RequestedCommand
 
-    client.want(Wish(arguments.wish))
-    sys.stdout.write(f"{arguments.wish}: done\n")
+    client.request(RequestedCommand(arguments.command))
+    sys.stdout.write(f"{arguments.command}: done\n")
     return DONE
 
 
 def _status(client: Any, arguments: argparse.Namespace) -> int:
     from robosc_bridge.terminal.client import as_json, is_fault
-    from robosc_bridge.terminal.shown import STALE_S, status_lines
+    from robosc_bridge.terminal.formatting import STALE_S, status_lines
 
     snapshot = client.status()
     if snapshot is None:
@@ -143,7 +143,7 @@ def _status(client: Any, arguments: argparse.Namespace) -> int:
 
 def _watch(client: Any, arguments: argparse.Namespace) -> int:
     from robosc_bridge.terminal.client import as_json
-    from robosc_bridge.terminal.shown import Lines
+    from robosc_bridge.terminal.formatting import Lines
 
     lines = Lines()
     try:

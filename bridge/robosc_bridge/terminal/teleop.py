@@ -17,8 +17,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, Protocol
 
-from robosc_bridge.terminal.client import BridgeClient, DriveTopic, Operator, RefusedError, UnreachableError, Wish
-from robosc_bridge.terminal.shown import printable
+from robosc_bridge.terminal.client import (
+    BridgeClient,
+    DriveTopic,
+    Operator,
+    RefusedError,
+    RequestedCommand,
+    UnreachableError,
+)
+from robosc_bridge.terminal.formatting import printable
 
 PERIOD_S = 0.1
 """Time between requests while the robot is to move."""
@@ -78,7 +85,7 @@ class Terminal(Protocol):
         """Let something go on beside the keys."""
 
 
-class Wished:
+class RequestedVelocity:
     """The velocity that the keys ask for.
 
     Attributes:
@@ -149,11 +156,11 @@ def teleop(client: BridgeClient) -> int:
 
 def drive(terminal: Terminal, client: BridgeClient, topic: DriveTopic) -> None:
     """Drive from a terminal until `q`; raises as `teleop`."""
-    teller = _Teller(terminal)
-    operator = client.operate(f"teleop of {os.environ.get('USER', 'somebody')}"[:100], teller.told)
+    status_line = _StatusLine(terminal)
+    operator = client.operate(f"teleop of {os.environ.get('USER', 'somebody')}"[:100], status_line.told)
     try:
         terminal.write(f"{HELP}\r\n")
-        _drive(terminal, client, operator, topic, teller)
+        _drive(terminal, client, operator, topic, status_line)
     finally:
         # However it ends, also by a signal: nothing is wished any more.
         with suppress(RefusedError, UnreachableError):
@@ -165,10 +172,12 @@ def drive(terminal: Terminal, client: BridgeClient, topic: DriveTopic) -> None:
             terminal.write("\r\n")
 
 
-def _drive(terminal: Terminal, client: BridgeClient, operator: Operator, topic: DriveTopic, teller: "_Teller") -> None:
+def _drive(
+    terminal: Terminal, client: BridgeClient, operator: Operator, topic: DriveTopic, status_line: "_StatusLine"
+) -> None:
     """Until a key or the end of the input ends it; raises as `teleop`."""
-    wished, zeros_left, next_s, ask_s = Wished(), 0, terminal.monotonic(), 0.0
-    heard_s, resuming = next_s, _Resuming(terminal, client, teller)
+    requested, zeros_left, next_s, ask_s = RequestedVelocity(), 0, terminal.monotonic(), 0.0
+    heard_s, resuming = next_s, _Resuming(terminal, client, status_line)
     while True:
         keys = terminal.read(max(next_s - terminal.monotonic(), 0.0))
         now_s = terminal.monotonic()
@@ -179,36 +188,36 @@ def _drive(terminal: Terminal, client: BridgeClient, operator: Operator, topic: 
                 return
             if key == PRESENT:
                 continue
-            wished.press(key, now_s)
+            requested.press(key, now_s)
             # What is wished goes out with the key, not with the next period.
             next_s, zeros_left = now_s, _ZEROS
-            _obey(client, key, teller, resuming)
+            _obey(client, key, status_line, resuming)
         resuming.poll()
         now_s = terminal.monotonic()
         if now_s < next_s:
             continue
-        wished.lapse(now_s)
-        if wished.is_motion or zeros_left:
-            zeros_left = _ZEROS if wished.is_motion else zeros_left - 1
-            operator.drive(topic, wished.linear_m_s, wished.angular_rad_s)
+        requested.lapse(now_s)
+        if requested.is_motion or zeros_left:
+            zeros_left = _ZEROS if requested.is_motion else zeros_left - 1
+            operator.drive(topic, requested.linear_m_s, requested.angular_rad_s)
             next_s = now_s + PERIOD_S
         else:
             if now_s - heard_s < PRESENT_S:
                 operator.keep_alive()
             next_s = now_s + KEEP_ALIVE_S
-        teller.show(wished, asks=now_s >= ask_s)
+        status_line.show(requested, asks=now_s >= ask_s)
         if now_s >= ask_s:
             ask_s = now_s + KEEP_ALIVE_S
 
 
-def _obey(client: BridgeClient, key: str, teller: "_Teller", resuming: "_Resuming") -> None:
+def _obey(client: BridgeClient, key: str, status_line: "_StatusLine", resuming: "_Resuming") -> None:
     """Keys that are for the bridge itself."""
     if key == " ":
         try:
             client.stop()
-            teller.note = "stopped: r lets it go on"
+            status_line.note = "stopped: r lets it go on"
         except RefusedError as error:
-            teller.note = str(error)
+            status_line.note = str(error)
     elif key == "r":
         resuming.begin()
 
@@ -216,10 +225,10 @@ def _obey(client: BridgeClient, key: str, teller: "_Teller", resuming: "_Resumin
 class _Resuming:
     """Lets the robot go on, in a thread: until the bridge has answered, a stop must be typed as ever."""
 
-    def __init__(self, terminal: Terminal, client: BridgeClient, teller: "_Teller") -> None:
+    def __init__(self, terminal: Terminal, client: BridgeClient, status_line: "_StatusLine") -> None:
         self._terminal = terminal
         self._client = client
-        self._teller = teller
+        self._teller = status_line
         self._running: Running | None = None
         self._failure: UnreachableError | None = None
 
@@ -239,7 +248,7 @@ class _Resuming:
 
     def _ask(self) -> None:
         try:
-            self._client.want(Wish.RESUME)
+            self._client.request(RequestedCommand.RESUME)
             self._teller.note = ""
         except RefusedError as error:
             self._teller.note = str(error)
@@ -247,7 +256,7 @@ class _Resuming:
             self._failure = error
 
 
-class _Teller:
+class _StatusLine:
     """The one line that reports the progress.
 
     Attributes:
@@ -268,12 +277,12 @@ class _Teller:
             else:
                 self.note = text
 
-    def show(self, wished: Wished, *, asks: bool) -> None:
+    def show(self, requested: RequestedVelocity, *, asks: bool) -> None:
         """Write it again, and ask the terminal whether it is there."""
         with self._lock:
             name, time_s = self._blocked
         blocked = f"   BLOCKED {name}" if name and self._terminal.monotonic() - time_s < _BLOCKED_S else ""
-        text = f"{wished.linear_m_s:+.2f} m/s {wished.angular_rad_s:+.1f} rad/s{blocked}   {self.note}"
+        text = f"{requested.linear_m_s:+.2f} m/s {requested.angular_rad_s:+.1f} rad/s{blocked}   {self.note}"
         self._terminal.write(f"\r\x1b[K{printable(text)}{_ASK if asks else ''}")
 
 
@@ -335,4 +344,4 @@ class _ThisTerminal:
         return thread
 
 
-__all__ = ["HELP", "RefusedError", "Terminal", "UnreachableError", "Wished", "drive", "keys_of", "teleop"]
+__all__ = ["HELP", "RefusedError", "RequestedVelocity", "Terminal", "UnreachableError", "drive", "keys_of", "teleop"]

@@ -16,9 +16,9 @@ from robosc.cli.output import CommandError, ExitCode, UsageError
 if TYPE_CHECKING:
     from robosc.supervisor import Supervisor
     from robosc_bridge.view.definition import Robot
-    from robosc_bridge.view.model_alone import ModelAlone
     from robosc_bridge.view.settings import ViewSettings
     from robosc_bridge.view.sources import Source
+    from robosc_bridge.view.static_model import StaticModel
 
 _ADDRESS = "127.0.0.1:8066"
 
@@ -194,9 +194,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool, Robot | None]":
     """Return a function that makes the source, whether all pages share one, and the robot where it is known."""
-    from robosc_bridge.view.scenery import scenery
+    from robosc_bridge.view.scene_map import scene_map
 
-    scene = scenery(arguments.scene, arguments.scene_seed)
+    scene = scene_map(arguments.scene, arguments.scene_seed)
     if arguments.bridge is not None:
         from robosc_api.security import SecurityError, check_credentials, credentials_of
         from robosc_bridge.view.remote_bridge import RemoteBridge
@@ -223,11 +223,11 @@ def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool,
     return lambda: Replay(recording), False, recording.robot
 
 
-def _alone(arguments: argparse.Namespace, supervisor: "Supervisor | None", scene: Any) -> "ModelAlone":
+def _alone(arguments: argparse.Namespace, supervisor: "Supervisor | None", scene: Any) -> "StaticModel":
     """The source for a model alone, which looks at its files again and again."""
     from robosc.cli.arguments import read_bundle
     from robosc.errors import RoboscError
-    from robosc_bridge.view.model_alone import ModelAlone, NoSupervisorError, file_digest, read, synthesized
+    from robosc_bridge.view.static_model import NoSupervisorError, StaticModel, file_digest, read, synthesized
 
     assert supervisor is not None  # noqa: S101  # `run` has seen to that.
     model: Path = arguments.model
@@ -236,7 +236,7 @@ def _alone(arguments: argparse.Namespace, supervisor: "Supervisor | None", scene
         async def read_again() -> "Supervisor":
             return read(model)
 
-        return ModelAlone(supervisor, file_digest(model), lambda: file_digest(model), read_again, scene)
+        return StaticModel(supervisor, file_digest(model), lambda: file_digest(model), read_again, scene)
 
     def digest() -> str:
         try:
@@ -250,7 +250,7 @@ def _alone(arguments: argparse.Namespace, supervisor: "Supervisor | None", scene
     words += ["--reorder"] if arguments.reorder else []
     words += [] if arguments.max_nodes is None else ["--max-nodes", str(arguments.max_nodes)]
     seen = supervisor.certificate.bundle_sha256
-    return ModelAlone(supervisor, seen, digest, lambda: synthesized((*words, "--", str(model))), scene)
+    return StaticModel(supervisor, seen, digest, lambda: synthesized((*words, "--", str(model))), scene)
 
 
 def _require_ros2() -> None:

@@ -14,8 +14,8 @@ from robosc.documentation.diagram import label
 from robosc.model.structure import CommunicationKind, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.ros.state_topic import state_topic
-from robosc_bridge.view.facts import LogSpan, SourceKind, Talk
 from robosc_bridge.view.graphs import Arrow, Node, drawn
+from robosc_bridge.view.reports import LogSpan, SourceKind, Talk
 
 MAXIMUM_COMPONENTS = 2000
 MAXIMUM_STATES = 100_000

@@ -29,12 +29,12 @@ class ViewEndpoint(ServedEndpoint):
 
         require_view()
         from robosc_bridge.view.running import RunningBridge
-        from robosc_bridge.view.scenery import scenery
+        from robosc_bridge.view.scene_map import scene_map
         from robosc_bridge.view.server import ViewServer
 
         super().__init__("live view", "the live view", ViewError)
         self.url = ""
-        source = RunningBridge(operations, scenery(settings.scene, settings.scene_seed))
+        source = RunningBridge(operations, scene_map(settings.scene, settings.scene_seed))
         # Laid out before the robot moves: a large automaton would hold up everything for a while.
         self._server = ViewServer(settings, lambda: source, is_shared=True, robot=source.robot)
 

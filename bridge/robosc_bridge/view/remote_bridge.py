@@ -17,6 +17,7 @@ from robosc_bridge.daemon.states import Command
 from robosc_bridge.terminal.client import (
     BridgeClient,
     DriveState,
+    RequestedCommand,
     Snapshot,
     UnreachableError,
     WatchResponse,
@@ -24,10 +25,16 @@ from robosc_bridge.terminal.client import (
     state_name,
 )
 from robosc_bridge.terminal.client import RefusedError as ClientRefusedError
-from robosc_bridge.terminal.client import Wish as ClientWish
 from robosc_bridge.view.definition import DefinitionError, Robot, robot_of, shape_of
-from robosc_bridge.view.facts import Drive, Happenings, LaserScan, Notice, SourceKind, Status, Talk
-from robosc_bridge.view.sources import RefusedError, Sink, SourceLostError, SourceWrongError, Wish, not_replayed
+from robosc_bridge.view.reports import Drive, EventBatch, LaserScan, Notice, SourceKind, Status, Talk
+from robosc_bridge.view.sources import (
+    RefusedError,
+    ReplayCommand,
+    Sink,
+    SourceLostError,
+    SourceWrongError,
+    not_replayed,
+)
 
 _log = logging.getLogger(__name__)
 
@@ -89,11 +96,11 @@ class RemoteBridge:
                 # It is sent, whether or not anybody waits for the answer.
                 await asyncio.shield(self._stop())
             else:
-                await self._asked(lambda client: client.want(ClientWish(str(command))))
+                await self._asked(lambda client: client.request(RequestedCommand(str(command))))
         except (SourceLostError, SourceWrongError) as error:
             raise RefusedError(str(error)) from error
 
-    def steer(self, wish: Wish) -> None:
+    def control_replay(self, command: ReplayCommand) -> None:
         """Not here: it is live.
 
         Raises:
@@ -221,7 +228,7 @@ class _Watch:
 
 def _pass_on(response: WatchResponse, sink: Sink) -> None:
     if response.events or response.lost_events:
-        sink.happened(Happenings(events_of(response), response.lost_events))
+        sink.happened(EventBatch(events_of(response), response.lost_events))
     if response.HasField("snapshot"):
         sink.show(status_of(response.snapshot))
     if response.HasField("scan"):

@@ -18,9 +18,9 @@ from robosc.model.structure import CommunicationKind, Model
 from robosc.supervisor import Supervisor
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.view.definition import robot_of
-from robosc_bridge.view.facts import Happenings, LogSpan, SourceKind, Status
-from robosc_bridge.view.sources import Pause, Play, RefusedError, Seek, Sink, ViewError, Wish
-from robosc_bridge.view.telling import Lights
+from robosc_bridge.view.messages import TransitionTracker
+from robosc_bridge.view.reports import EventBatch, LogSpan, SourceKind, Status
+from robosc_bridge.view.sources import Pause, Play, RefusedError, ReplayCommand, Seek, Sink, ViewError
 
 HISTORY = 200
 """Entries before the place that is gone to which are told again."""
@@ -75,7 +75,7 @@ class Recording:
         self._frames = _frames(run, supervisor.model)
         span = LogSpan(self.begin_s, self.end_s, len(self.documents))
         self.robot = robot_of(supervisor, SourceKind.LOG, version="", can_command=False, log=span, scene=scene)
-        self._last = LastTaken(Lights(self.robot), self.documents)
+        self._last = LastTaken(TransitionTracker(self.robot), self.documents)
 
     @property
     def begin_s(self) -> float:
@@ -104,19 +104,19 @@ class LastTaken:
     """Transition that each component took last, after any number of entries, since the model began.
 
     Args:
-        lights: Lights that report which transitions an entry takes; in the initial state.
+        tracker: Lights that report which transitions an entry takes; in the initial state.
         documents: The entries.
     """
 
-    def __init__(self, lights: Lights, documents: Iterable[Mapping[str, Any]]) -> None:
+    def __init__(self, tracker: TransitionTracker, documents: Iterable[Mapping[str, Any]]) -> None:
         # How many entries there are after which a component has taken something, and what.
         self._taken: dict[str, tuple[list[int], list[int]]] = {}
         self._begins = [0]
-        lights.begin({})
+        tracker.begin({})
         for count, document in enumerate(documents, 1):
             if document.get("kind") == "restart":
                 self._begins.append(count)
-            for component, transition in lights.of(document):
+            for component, transition in tracker.of(document):
                 counts, transitions = self._taken.setdefault(component, ([], []))
                 counts.append(count)
                 transitions.append(transition)
@@ -201,10 +201,10 @@ class Player:
         self.speed = 1.0
         self.is_playing = False
 
-    def steer(self, wish: Wish) -> None:
+    def control_replay(self, command: ReplayCommand) -> None:
         """Move, go on or stand still."""
         recording = self._recording
-        match wish:
+        match command:
             case Seek(time_s=time_s):
                 self.time_s = min(max(time_s, recording.begin_s), recording.end_s)
             case Play(speed=speed):
@@ -232,7 +232,7 @@ class Replay:
         self._recording = recording
         self._player = Player(recording)
         self._is_steered = asyncio.Event()
-        self._wishes: list[Wish] = []
+        self._wishes: list[ReplayCommand] = []
 
     async def run(self, sink: Sink) -> None:
         """Tell where the log is, until cancelled."""
@@ -253,9 +253,9 @@ class Replay:
             wishes, self._wishes = self._wishes, []
             self._is_steered.clear()
             before_s = player.time_s
-            for wish in wishes:
-                player.steer(wish)
-            if player.time_s != before_s or any(isinstance(wish, Seek) for wish in wishes):
+            for command in wishes:
+                player.control_replay(command)
+            if player.time_s != before_s or any(isinstance(command, Seek) for command in wishes):
                 told = self._go_to(sink)
             else:
                 told = self._go_on(sink, told)
@@ -268,11 +268,11 @@ class Replay:
         """
         raise RefusedError("what is replayed cannot be commanded")
 
-    def steer(self, wish: Wish) -> None:
+    def control_replay(self, command: ReplayCommand) -> None:
         """Move in the log; done with the next step."""
         if len(self._wishes) >= MOST_AT_ONCE:
             del self._wishes[0]
-        self._wishes.append(wish)
+        self._wishes.append(command)
         self._is_steered.set()
 
     def _go_to(self, sink: Sink) -> int:
@@ -284,7 +284,7 @@ class Replay:
         sink.begin(self._recording.frame(first).components)
         entries: Sequence[Any] = self._recording.documents[first:count]
         if entries:
-            sink.happened(Happenings(entries), first + 1)
+            sink.happened(EventBatch(entries), first + 1)
         sink.show(self._status(count))
         return count
 
@@ -295,7 +295,7 @@ class Replay:
             first = max(told, count - MOST_AT_ONCE)
             sink.begin(self._recording.frame(first).components)
             entries: Sequence[Any] = self._recording.documents[first:count]
-            sink.happened(Happenings(entries, first - told), first + 1)
+            sink.happened(EventBatch(entries, first - told), first + 1)
         self._tell_position(sink)
         sink.show(self._status(count))
         return max(count, told)

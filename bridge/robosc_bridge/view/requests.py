@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from robosc_bridge.daemon.states import Command
-from robosc_bridge.view.sources import Pause, Play, RefusedError, Seek, Wish
+from robosc_bridge.view.sources import Pause, Play, RefusedError, ReplayCommand, Seek
 
 MAXIMUM_BYTES = 4096
 """Maximum size of one request, in bytes."""
@@ -34,7 +34,7 @@ class Order:
     token: object
 
 
-Asked = Stop | Order | Wish
+Asked = Stop | Order | ReplayCommand
 
 
 def asked(text: str) -> Asked:

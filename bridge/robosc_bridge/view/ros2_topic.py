@@ -30,14 +30,14 @@ from robosc_bridge.view.definition import (
     table_of,
     talks_of,
 )
-from robosc_bridge.view.facts import Happenings, SourceKind, Status
+from robosc_bridge.view.reports import EventBatch, SourceKind, Status
 from robosc_bridge.view.sources import (
     RefusedError,
+    ReplayCommand,
     Sink,
     SourceLostError,
     SourceWrongError,
     ViewError,
-    Wish,
     not_replayed,
 )
 
@@ -61,7 +61,7 @@ _numbers = count(1)
 
 
 @dataclass(frozen=True, slots=True)
-class _Heard:
+class _Received:
     """A message.
 
     Attributes:
@@ -237,7 +237,7 @@ def _communications(told: object, robot: Robot) -> Mapping[str, str]:
 class _News:
     """News that the thread of rclpy has heard and the event loop has not taken yet."""
 
-    latest: _Heard | None = None
+    latest: _Received | None = None
     entries: list[dict[str, Any]] = field(default_factory=list)
     lost: int = 0
     failure: Exception | None = None
@@ -274,7 +274,7 @@ class StateTopic:
                     known = news.latest.robot
                     await sink.define(known)
                 if news.entries or news.lost:
-                    sink.happened(Happenings(news.entries, news.lost))
+                    sink.happened(EventBatch(news.entries, news.lost))
                 if news.latest is not None:
                     sink.show(news.latest.status)
                 if news.failure is not None:
@@ -290,7 +290,7 @@ class StateTopic:
         """
         raise RefusedError("a ROS 2 node cannot be commanded from here")
 
-    def steer(self, wish: Wish) -> None:
+    def control_replay(self, command: ReplayCommand) -> None:
         """Not here: it is live.
 
         Raises:
@@ -372,11 +372,11 @@ class _Listener:
     def _hear(self, message: Any) -> None:
         self._heard_s = time.monotonic()
         robot, status, entries = self._reader.read(message.data, time.time())
-        self._tell(_Heard(robot, status), entries)
+        self._tell(_Received(robot, status), entries)
 
     def _tell(
         self,
-        latest: _Heard | None = None,
+        latest: _Received | None = None,
         entries: list[dict[str, Any]] | None = None,
         failure: Exception | None = None,
     ) -> None:

@@ -14,8 +14,8 @@ from robosc_bridge.daemon.operations import UNDONE_BY, Operations
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.safety import LATCHING, Caution, Reason
 from robosc_bridge.view.definition import Robot, robot_of
-from robosc_bridge.view.facts import Drive, Happenings, LaserScan, Notice, SourceKind, Status
-from robosc_bridge.view.sources import RefusedError, Sink, Wish, not_replayed
+from robosc_bridge.view.reports import Drive, EventBatch, LaserScan, Notice, SourceKind, Status
+from robosc_bridge.view.sources import RefusedError, ReplayCommand, Sink, not_replayed
 
 COMMAND_LIMIT_S = 20.0
 """Longer than the motors may take to be restarted."""
@@ -51,7 +51,7 @@ class RunningBridge:
             while True:
                 update = subscription.take()
                 if update.entries or update.lost:
-                    sink.happened(Happenings(update.entries, update.lost))
+                    sink.happened(EventBatch(update.entries, update.lost))
                 snapshot = update.snapshot
                 if snapshot is not None and snapshot.number != number:
                     number = snapshot.number
@@ -95,7 +95,7 @@ class RunningBridge:
         if refusal:
             raise RefusedError(refusal)
 
-    def steer(self, wish: Wish) -> None:
+    def control_replay(self, command: ReplayCommand) -> None:
         """Not here: it is live.
 
         Raises:

@@ -19,13 +19,13 @@ from robosc_api.security import SecurityError, ServerSecurity, check_files, chec
 from robosc_api.security.addresses import split
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.view.access import Access
+from robosc_bridge.view.broadcaster import Broadcaster, RobotCache, Viewer
 from robosc_bridge.view.definition import Robot
-from robosc_bridge.view.hub import Hub, Studio, Viewer
+from robosc_bridge.view.messages import done_text, refused_text
 from robosc_bridge.view.page_files import PageFiles, read_page
 from robosc_bridge.view.requests import MAXIMUM_BYTES, Order, Stop, asked
 from robosc_bridge.view.settings import ViewSettings
 from robosc_bridge.view.sources import RefusedError, Source, ViewError
-from robosc_bridge.view.telling import done_text, refused_text
 
 _log = logging.getLogger(__name__)
 
@@ -104,9 +104,9 @@ class ViewServer:
         self._settings = settings
         self._headers = answer_headers(settings.framed_by)
         self._source = source
-        self._studio = Studio(robot)
-        self._shared = Hub(source(), self._studio) if is_shared else None
-        self._hubs: set[Hub] = set()
+        self._robot_cache = RobotCache(robot)
+        self._shared = Broadcaster(source(), self._robot_cache) if is_shared else None
+        self._broadcasters: set[Broadcaster] = set()
         self._page: PageFiles | None = None
         self._access: Access | None = None
         self._runner: web.AppRunner | None = None
@@ -169,8 +169,8 @@ class ViewServer:
             self._sweep.cancel()
         if self._server is not None:
             self._server.close()
-        for hub in {*self._hubs, *([self._shared] if self._shared else [])}:
-            await hub.close()
+        for broadcaster in {*self._broadcasters, *([self._shared] if self._shared else [])}:
+            await broadcaster.close()
         closing = [_close(socket, WSCloseCode.GOING_AWAY, b"the server ends") for socket in self._sockets]
         await asyncio.gather(*closing, return_exceptions=True)
         for transport in self._sockets.values():
@@ -245,16 +245,16 @@ class ViewServer:
         if self._viewers >= MAXIMUM_VIEWERS:
             raise web.HTTPServiceUnavailable(text=f"{MAXIMUM_VIEWERS} pages are open already\n")
         self._viewers += 1
-        hub = self._shared or Hub(self._source(), self._studio)
-        self._hubs.add(hub)
+        broadcaster = self._shared or Broadcaster(self._source(), self._robot_cache)
+        self._broadcasters.add(broadcaster)
         try:
-            return await self._serve(request, hub)
+            return await self._serve(request, broadcaster)
         finally:
             self._viewers -= 1
-            if not hub.is_watched:
-                self._hubs.discard(hub)
+            if not broadcaster.is_watched:
+                self._broadcasters.discard(broadcaster)
 
-    async def _serve(self, request: web.Request, hub: Hub) -> web.StreamResponse:
+    async def _serve(self, request: web.Request, broadcaster: Broadcaster) -> web.StreamResponse:
         page = web.WebSocketResponse(max_msg_size=MAXIMUM_BYTES, compress=False, heartbeat=PING_S, autoping=True)
         page.headers.update(self._headers)
         await page.prepare(request)
@@ -263,8 +263,8 @@ class ViewServer:
         if transport is None:
             return page  # It has ended already.
         self._sockets[page] = transport
-        viewer = hub.join()
-        session = _Session(page, viewer, hub.source, self._access, str(request.remote))
+        viewer = broadcaster.join()
+        session = _Session(page, viewer, broadcaster.source, self._access, str(request.remote))
         writing = asyncio.create_task(_write(page, viewer, transport))
         try:
             await session.read()
@@ -273,7 +273,7 @@ class ViewServer:
             writing.cancel()
             session.close()
             await asyncio.gather(writing, return_exceptions=True)
-            await hub.leave(viewer)
+            await broadcaster.leave(viewer)
             # One that is only closed stays until everything was sent, which a page that reads nothing never lets be.
             if transport.get_write_buffer_size() > 0:
                 transport.abort()
@@ -351,11 +351,11 @@ class _Session:
                 self._stop()
             case Order(command=command, token=token):
                 self._order(command, token)
-            case wish:
+            case command:
                 try:
-                    self._source.steer(wish)
+                    self._source.control_replay(command)
                 except RefusedError as error:
-                    self._viewer.answer(refused_text(type(wish).__name__.lower(), str(error)))
+                    self._viewer.answer(refused_text(type(command).__name__.lower(), str(error)))
         return self._is_in_time()
 
     def _order(self, command: Command, token: object) -> None:

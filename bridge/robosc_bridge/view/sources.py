@@ -7,7 +7,7 @@ from typing import Protocol
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.view.definition import Robot
-from robosc_bridge.view.facts import Happenings, LaserScan, Status
+from robosc_bridge.view.reports import EventBatch, LaserScan, Status
 
 
 class ViewError(BridgeError):
@@ -38,7 +38,7 @@ class Sink(Protocol):
     def show(self, status: Status) -> None:
         """Receive what the robot is doing; the latest alone counts."""
 
-    def happened(self, happenings: Happenings, first: int | None = None) -> None:
+    def happened(self, batch: EventBatch, first: int | None = None) -> None:
         """Entries of the event log; `first` is the number of the first of them, where they have one of their own."""
 
     def scanned(self, scan: LaserScan) -> None:
@@ -78,7 +78,7 @@ class Pause:
     """Stand still in the log."""
 
 
-Wish = Seek | Play | Pause
+ReplayCommand = Seek | Play | Pause
 
 
 class Source(Protocol):
@@ -101,7 +101,7 @@ class Source(Protocol):
             RefusedError: It is not done.
         """
 
-    def steer(self, wish: Wish) -> None:
+    def control_replay(self, command: ReplayCommand) -> None:
         """Move in what is replayed.
 
         Raises:

@@ -130,7 +130,7 @@ def test_a_program_ends_politely_when_who_runs_it_is_killed(tmp_path: Path) -> N
 
 
 def test_a_program_whose_parent_died_before_it_began_does_not_run(tmp_path: Path) -> None:
-    begin = Path(processes.__file__).with_name("begin.py")
+    begin = Path(processes.__file__).with_name("end_with_parent.py")
     nobody = str(os.getppid())
     command = [sys.executable, "-I", "-S", str(begin), nobody, sys.executable, *script(tmp_path, "print('runs')")]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S)

@@ -19,7 +19,7 @@ from robosc_bridge.daemon import programs
 from robosc_bridge.remote import RemoteEndpoint, RemoteSettings, service, session
 from robosc_bridge.remote import endpoint as endpoint_module
 from robosc_bridge.remote.data import MAXIMUM_DEPTH, value_of
-from robosc_bridge.remote.pace import FLOOD_S, MESSAGES_A_S, FloodError, OperatorPace
+from robosc_bridge.remote.operator_presence import FLOOD_S, MESSAGES_A_S, FloodError, OperatorPresence
 from support.remote import Attachment, FakeDaemon, connected, served
 from support.waiting import PATIENCE_S, wait_until
 
@@ -219,7 +219,9 @@ class TestOperator:
     ) -> None:
         looks = itertools.count()
         # By its clock, which is looked at for each message, more come than may.
-        monkeypatch.setattr(session, "OperatorPace", lambda _: OperatorPace(lambda: next(looks) / (1.2 * MESSAGES_A_S)))
+        monkeypatch.setattr(
+            session, "OperatorPresence", lambda _: OperatorPresence(lambda: next(looks) / (1.2 * MESSAGES_A_S))
+        )
         program = attached(stub, is_operator=True)
         for _ in range(2 * FLOOD_S * MESSAGES_A_S):
             program.send(keep_alive=pb.KeepAlive())
@@ -247,30 +249,30 @@ class TestOperator:
 class TestPace:
     def test_what_waited_in_buffers_is_no_sign_of_life(self) -> None:
         now_s = 100.0
-        pace = OperatorPace(lambda: now_s)
-        assert sum(pace.came() for _ in range(1000)) == MESSAGES_A_S
+        presence = OperatorPresence(lambda: now_s)
+        assert sum(presence.message_received() for _ in range(1000)) == MESSAGES_A_S
         now_s += 1.0
         # The rest of what waited, at whatever speed it is read.
-        assert not any(pace.came() for _ in range(50))
+        assert not any(presence.message_received() for _ in range(50))
         now_s += 1.0
-        assert pace.came()
+        assert presence.message_received()
 
     def test_a_busy_operator_is_seen_with_each_message(self) -> None:
         now_s = 100.0
-        pace = OperatorPace(lambda: now_s)
+        presence = OperatorPresence(lambda: now_s)
         for _ in range(1000):
-            assert pace.came()
+            assert presence.message_received()
             now_s += 0.01
 
     def test_a_flood_ends_it(self) -> None:
         now_s = 100.0
-        pace = OperatorPace(lambda: now_s)
+        presence = OperatorPresence(lambda: now_s)
         for _ in range(FLOOD_S):
             for _ in range(MESSAGES_A_S + 1):
-                pace.came()
+                presence.message_received()
             now_s += 1.0
         with pytest.raises(FloodError):
-            pace.came()
+            presence.message_received()
 
 
 def nested(levels: int) -> Any:

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from robosc_api.v1 import bridge_pb2
-from robosc_bridge.remote import data, endpoint, pace, service, session, watchers
+from robosc_bridge.remote import data, endpoint, operator_presence, service, session, watchers
 from robosc_bridge.remote.convert import MAXIMUM_TEXT
 from robosc_bridge.terminal import teleop
 from robosc_bridge.terminal.commands import ADDRESS, NAMES
@@ -25,7 +25,9 @@ def test_the_limits() -> None:
     waiting = f"wait for a program | {session.MAXIMUM_WAITING}, or {megabytes} MB of data |"
     turn = f"next snapshot | {session.MESSAGES_PER_CYCLE}, or {session.BYTES_PER_CYCLE // 1024} KiB |"
     silence = f"| {endpoint.PING_S + endpoint.PING_LIMIT_S:g} s with a ping"
-    operator = f"in a second | {pace.MESSAGES_A_S} | no sign of life; after {pace.FLOOD_S} such"
+    operator = (
+        f"in a second | {operator_presence.MESSAGES_A_S} | no sign of life; after {operator_presence.FLOOD_S} such"
+    )
     limits = (operator, streams, connections, calls, reflection, message, values, events, waiting, turn, silence)
     for text in (*limits, f"| {MAXIMUM_TEXT} characters"):
         assert text in PAGE, text

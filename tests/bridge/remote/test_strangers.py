@@ -15,7 +15,7 @@ from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.remote import RemoteEndpoint
 from robosc_bridge.remote import endpoint as endpoint_module
-from robosc_bridge.remote.connections import Places
+from robosc_bridge.remote.connection_slots import ConnectionSlots
 from robosc_bridge.remote.endpoint import MAXIMUM_CALLS, MAXIMUM_CONNECTIONS
 from support.remote import FakeDaemon, connected, served
 from support.strangers import SETTINGS, strangers
@@ -59,18 +59,18 @@ def test_idle_connections_are_ended_so_that_a_stop_comes_through(
 def test_that_all_places_are_taken_is_told_once(caplog: pytest.LogCaptureFixture) -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
-        places = Places(port, 2)
+        slots = ConnectionSlots(port, 2)
         lines = [socket.create_connection(("127.0.0.1", port)) for _ in range(2)]
         ends = [listener.accept()[0] for _ in lines]
         for _ in range(3):
-            places.poll()
+            slots.poll()
         assert caplog.text.count("all 2 connections") == 1
         for line in (*lines, *ends):
             line.close()
-        places.poll()
+        slots.poll()
         assert caplog.text.count("all 2 connections") == 1
         with socket.create_connection(("127.0.0.1", port)) as first, socket.create_connection(("127.0.0.1", port)):
-            places.poll()
+            slots.poll()
             assert caplog.text.count("all 2 connections") == 2
             first.close()
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import BODIES, Eye, Mount, Timebase, World, load_scene
+from robosc_bridge.simulated import BODIES, Mount, PinholeCamera, Timebase, World, load_scene
 from robosc_bridge.skills.line import LineDetector
 from robosc_bridge.skills.settings import LineSettings
 
@@ -23,13 +23,13 @@ def test_a_lap_is_driven_on_the_line(name: str, seed: int) -> None:
     body = BODIES["burger"]
     time = Timebase(ManualClock())
     world = World(body, scene, time, seed=seed)
-    eye = Eye(Mount(), scene, seed)
+    camera = PinholeCamera(Mount(), scene, seed)
     detector = LineDetector(LineSettings(), 0.0)
     length_m = sum(math.dist(*pair) for pair in zip(line.points, line.points[1:], strict=False))
     world.left.is_driven = world.right.is_driven = True
     driven_m = farthest_m = aside_most_m = 0.0
     while driven_m < length_m:
-        seen = detector.update(eye.picture(world.pose, world.obstacles), time.world_s())
+        seen = detector.update(camera.picture(world.pose, world.obstacles), time.world_s())
         assert seen is not None
         assert seen.correction_rad_s is not None, f"the line is lost at {world.pose}"
         aside_m_s = seen.correction_rad_s * body.wheel_separation_m / 2

@@ -1,4 +1,4 @@
-"""The record of a motion, its judges and its picture: good motions pass, and each judge fails on bad ones."""
+"""The record of a motion, its checks and its picture: good motions pass, and each check fails on bad ones."""
 
 import io
 import json
@@ -30,9 +30,9 @@ from robosc_bridge.simulated import (
     read_motion,
     room,
 )
-from robosc_bridge.simulated.judge import Halt, judge_line, judge_maze, lateral_errors_m, way_m
 from robosc_bridge.simulated.map_picture import draw_map
 from robosc_bridge.simulated.motion import Sample
+from robosc_bridge.simulated.motion_checks import Halt, check_line, check_maze, lateral_errors_m, way_m
 
 YARD = Scene(
     "yard",
@@ -172,12 +172,12 @@ def test_no_file_is_told(path: Path) -> None:
 
 
 def test_who_comes_to_the_goal_without_touching_is_right(path: Path) -> None:
-    assert judge_maze(YARD, recorded(YARD, there, path)) == ()
+    assert check_maze(YARD, recorded(YARD, there, path)) == ()
 
 
 def test_who_is_not_at_the_goal_is_told(path: Path) -> None:
     motion = recorded(YARD, lambda world: drive(world, 6.0, 6.0, 3.0), path)
-    (fault,) = judge_maze(YARD, motion)
+    (fault,) = check_maze(YARD, motion)
     assert fault.startswith("it was never at the goal; at the end, 3.00 s, it is 0.4")
 
 
@@ -186,7 +186,7 @@ def test_who_touches_a_wall_on_the_way_is_told(path: Path) -> None:
         drive(world, -6.0, -6.0, 10.0)
         drive(world, 6.0, 6.0, 15.0)
 
-    (fault,) = judge_maze(YARD, recorded(YARD, act, path))
+    (fault,) = check_maze(YARD, recorded(YARD, act, path))
     assert fault.startswith("it has touched something 1 times, first at 9.6")
     assert fault.endswith(": a wall")
 
@@ -195,12 +195,12 @@ def test_walls_and_obstacles_are_measured_again(path: Path) -> None:
     """A simulator that counts no collisions is found out."""
     motion = recorded(YARD, there, path)
     nearer = replace(YARD, walls=Walls([*YARD.walls.segments, (0.3, 0.05, 0.4, 0.05)]))
-    (fault,) = judge_maze(nearer, motion)
+    (fault,) = check_maze(nearer, motion)
     assert "its middle is 0.10" in fault or "its middle is 0.09" in fault
     other = replace(YARD, obstacles=(Obstacle("bin", 0.5, 0.19, 0.1),))
-    (fault,) = judge_maze(other, motion)
+    (fault,) = check_maze(other, motion)
     assert fault.endswith("it is where the obstacle 'bin' is")
-    assert judge_maze(replace(YARD, obstacles=(Obstacle("bin", 0.5, 0.19, 0.1, False),)), motion) == ()
+    assert check_maze(replace(YARD, obstacles=(Obstacle("bin", 0.5, 0.19, 0.1, False),)), motion) == ()
 
 
 def test_obstacles_count_from_when_they_are_there(path: Path) -> None:
@@ -211,7 +211,7 @@ def test_obstacles_count_from_when_they_are_there(path: Path) -> None:
         drive(world, 6.0, 6.0, 3.0)
 
     # It stands where the robot was, and is no longer.
-    assert judge_maze(YARD, recorded(YARD, act, path)) == ()
+    assert check_maze(YARD, recorded(YARD, act, path)) == ()
 
 
 def test_a_robot_that_was_carried_is_told(path: Path) -> None:
@@ -220,21 +220,21 @@ def test_a_robot_that_was_carried_is_told(path: Path) -> None:
         world.place(0.9, 0.0, 0.0)
         drive(world, 0.0, 0.0, 0.5)
 
-    (fault,) = judge_maze(YARD, recorded(YARD, act, path))
+    (fault,) = check_maze(YARD, recorded(YARD, act, path))
     assert "moved by hand, or time is missing" in fault
 
 
 def test_nothing_is_no_success() -> None:
     empty = Motion((), ())
-    assert judge_maze(YARD, empty) == ("nothing was recorded",)
-    assert judge_line(YARD, empty) == ("nothing was recorded",)
+    assert check_maze(YARD, empty) == ("nothing was recorded",)
+    assert check_line(YARD, empty) == ("nothing was recorded",)
 
 
 def test_a_record_with_a_hole_is_no_success(path: Path) -> None:
     motion = recorded(YARD, there, path)
-    assert judge_maze(YARD, motion) == ()
+    assert check_maze(YARD, motion) == ()
     hole = [sample for sample in motion.samples if not 4.8 < sample.world_s < 5.2]
-    (fault,) = judge_maze(YARD, Motion(tuple(hole), motion.happenings))
+    (fault,) = check_maze(YARD, Motion(tuple(hole), motion.happenings))
     assert fault == "nothing was recorded from 4.80 s to 5.20 s"
 
 
@@ -243,16 +243,16 @@ def test_a_record_that_its_writer_did_not_end_is_no_success(path: Path) -> None:
     lines = path.read_bytes().splitlines(keepends=True)
     assert b'"end"' in lines[-1]
     path.write_bytes(b"".join(lines[:-1]))
-    assert judge_maze(YARD, read_motion(path)) == (
+    assert check_maze(YARD, read_motion(path)) == (
         "the record has no end: whoever wrote it was killed, or had no room",
     )
 
 
 def test_scenes_without_goal_or_line_are_not_judged() -> None:
     bare = Scene("bare", Walls(()))
-    for judge in (judge_maze, judge_line, lateral_errors_m):
+    for check in (check_maze, check_line, lateral_errors_m):
         with pytest.raises(ValueError, match="bare has no"):
-            judge(bare, Motion((), ()))
+            check(bare, Motion((), ()))
 
 
 def follow(world: World) -> None:
@@ -263,45 +263,45 @@ def follow(world: World) -> None:
 
 def test_who_keeps_to_the_line_and_stands_when_told_is_right(path: Path) -> None:
     motion = recorded(YARD, follow, path)
-    assert judge_line(YARD, motion, (Halt(2.0, 5.0, "the stop button"),), least_m=0.7) == ()
+    assert check_line(YARD, motion, (Halt(2.0, 5.0, "the stop button"),), least_m=0.7) == ()
     assert max(lateral_errors_m(YARD, motion)) < 1e-6
     assert way_m(motion) == pytest.approx(0.79, abs=0.02)
 
 
 def test_who_does_not_stand_when_told_is_told(path: Path) -> None:
     motion = recorded(YARD, follow, path)
-    (fault,) = judge_line(YARD, motion, (Halt(1.5, 7.0, "an obstacle"),))
+    (fault,) = check_line(YARD, motion, (Halt(1.5, 7.0, "an obstacle"),))
     assert fault.startswith("at 5.05 s it moves at")
     assert fault.endswith("since 1.50 s it was to stand still for an obstacle")
     # Or too late.
-    (fault,) = judge_line(YARD, motion, (Halt(1.5, 5.0, "an obstacle"),), settle_s=0.2)
+    (fault,) = check_line(YARD, motion, (Halt(1.5, 5.0, "an obstacle"),), settle_s=0.2)
     assert fault.startswith("at 1.70 s it moves at 0.198 m/s")
 
 
 def test_a_halt_that_was_not_recorded_is_told(path: Path) -> None:
     motion = recorded(YARD, follow, path)
-    (fault,) = judge_line(YARD, motion, (Halt(20.0, 25.0, "an obstacle"),))
+    (fault,) = check_line(YARD, motion, (Halt(20.0, 25.0, "an obstacle"),))
     assert "there is no sample of that" in fault
 
 
 def test_who_turns_on_the_spot_does_not_stand(path: Path) -> None:
     motion = recorded(YARD, lambda world: drive(world, -1.0, 1.0, 3.0), path)
-    (fault,) = judge_line(YARD, motion, (Halt(0.0, 3.0, "the stop button"),))
+    (fault,) = check_line(YARD, motion, (Halt(0.0, 3.0, "the stop button"),))
     assert "rad/s" in fault
 
 
 def test_who_leaves_the_line_is_told(path: Path) -> None:
     motion = recorded(YARD, lambda world: drive(world, 5.0, 6.0, 4.0), path)
-    (fault,) = judge_line(YARD, motion)
+    (fault,) = check_line(YARD, motion)
     assert fault.startswith("at 4.00 s it is 0.")
     assert fault.endswith("m beside the line; 0.08 m are allowed")
-    assert judge_line(YARD, motion, lateral_m=2.0) == ()
+    assert check_line(YARD, motion, lateral_m=2.0) == ()
 
 
 def test_who_never_drives_is_told(path: Path) -> None:
     motion = recorded(YARD, lambda world: drive(world, 0.0, 0.0, 4.0), path)
-    assert judge_line(YARD, motion) == ()
-    (fault,) = judge_line(YARD, motion, least_m=0.5)
+    assert check_line(YARD, motion) == ()
+    (fault,) = check_line(YARD, motion, least_m=0.5)
     assert fault == "it has driven 0.00 m in all; 0.5 m were to be driven"
 
 

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import BODIES, Timebase, Walls, World, load_scene, maze, maze_scene, room
-from robosc_bridge.simulated.rounds import Rounds
+from robosc_bridge.simulated.discs import Discs
 from robosc_bridge.simulated.sweep import BEAMS, Sweep
 from robosc_bridge.simulated.walls import Floats
 from support.effort import examples
 
-NOTHING = Rounds(())
+NOTHING = Discs(())
 _DEGREES = np.radians(np.arange(float(BEAMS)))
 # So far a ray may be turned where it passes the very end of something; rounding decides there.
 _TURN_RAD = 1e-10
@@ -23,18 +23,18 @@ _TURN_RAD = 1e-10
 _NEAR_M, _NEARLY = 1e-4, 1e-6
 
 
-def one_by_one(walls: Walls, rounds: Rounds, place: tuple[float, float], angles_rad: Floats) -> Floats:
+def one_by_one(walls: Walls, discs: Discs, place: tuple[float, float], angles_rad: Floats) -> Floats:
     directions = np.stack((np.cos(angles_rad), np.sin(angles_rad)), axis=1)
     origins = np.broadcast_to(np.array(place), directions.shape)
-    return np.minimum(walls.cast(origins, directions), rounds.cast(origins, directions))
+    return np.minimum(walls.cast(origins, directions), discs.cast(origins, directions))
 
 
-def require_agreement(walls: Walls, rounds: Rounds, x_m: float, y_m: float, heading_rad: float) -> Floats:
-    found = Sweep(walls).lengths_m(x_m, y_m, heading_rad, rounds)
+def require_agreement(walls: Walls, discs: Discs, x_m: float, y_m: float, heading_rad: float) -> Floats:
+    found = Sweep(walls).lengths_m(x_m, y_m, heading_rad, discs)
     assert found.shape == (BEAMS,)
     assert (found >= 0.0).all()
     rays = heading_rad + _DEGREES
-    around = [one_by_one(walls, rounds, (x_m, y_m), rays + turn) for turn in (-_TURN_RAD, 0.0, _TURN_RAD)]
+    around = [one_by_one(walls, discs, (x_m, y_m), rays + turn) for turn in (-_TURN_RAD, 0.0, _TURN_RAD)]
     shortest, longest = np.minimum.reduce(around), np.maximum.reduce(around)
     # How much the length of a ray changes with its direction, on the most slanted of the walls.
     slants = [apart / seen for apart, seen in _seen(walls, x_m, y_m) if seen > _NEARLY]
@@ -53,10 +53,10 @@ def _seen(walls: Walls, x_m: float, y_m: float) -> list[tuple[float, float]]:
     ]
 
 
-def is_apart(walls: Walls, rounds: Rounds, x_m: float, y_m: float) -> bool:
+def is_apart(walls: Walls, discs: Discs, x_m: float, y_m: float) -> bool:
     if any(1e-13 < seen < _NEARLY for _, seen in _seen(walls, x_m, y_m)):
         return False
-    return walls.distance_m(x_m, y_m) > _NEAR_M and abs(rounds.nearest(x_m, y_m)[0]) > _NEAR_M
+    return walls.distance_m(x_m, y_m) > _NEAR_M and abs(discs.nearest(x_m, y_m)[0]) > _NEAR_M
 
 
 SIZES = st.floats(-5.0, 5.0, allow_nan=False)
@@ -76,11 +76,11 @@ def test_a_turn_is_its_rays(
     y_m: float,
     heading_rad: float,
 ) -> None:
-    walls, rounds = Walls(segments), Rounds(discs)
-    if is_apart(walls, rounds, x_m, y_m):
-        require_agreement(walls, rounds, x_m, y_m, heading_rad)
+    walls, seen = Walls(segments), Discs(discs)
+    if is_apart(walls, seen, x_m, y_m):
+        require_agreement(walls, seen, x_m, y_m, heading_rad)
     else:
-        found = Sweep(walls).lengths_m(x_m, y_m, heading_rad, rounds)
+        found = Sweep(walls).lengths_m(x_m, y_m, heading_rad, seen)
         assert (found >= 0.0).all()
 
 
@@ -115,7 +115,7 @@ def test_a_laser_close_to_a_wall_sees_it_on_half_of_its_turn(aside_m: float) -> 
 def test_who_is_on_a_wall_sees_nothing_else() -> None:
     walls = Walls([(-1.0, -1.0, 2.0, 2.0), (3.0, -1.0, 3.0, 1.0)])
     for place in ((0.5, 0.5), (-1.0, -1.0), (2.0, 2.0)):
-        assert (Sweep(walls).lengths_m(*place, 0.3, Rounds([(1.0, 0.0, 0.2)])) == 0.0).all()
+        assert (Sweep(walls).lengths_m(*place, 0.3, Discs([(1.0, 0.0, 0.2)])) == 0.0).all()
 
 
 @pytest.mark.parametrize("heading_rad", [0.0, 1.0, -2.0, math.pi])
@@ -197,7 +197,7 @@ def test_a_robot_comes_to_the_end_of_a_wall_and_its_laser_sees_that() -> None:
 def test_open_space_is_without_end_and_a_disc_is_seen_from_within() -> None:
     open_space = Sweep(Walls(()))
     assert np.isinf(open_space.lengths_m(1.0, 2.0, 3.0, NOTHING)).all()
-    within = open_space.lengths_m(1.0, 0.0, 0.0, Rounds([(0.0, 0.0, 3.0)]))
+    within = open_space.lengths_m(1.0, 0.0, 0.0, Discs([(0.0, 0.0, 3.0)]))
     assert (within[0], within[180]) == (pytest.approx(2.0), pytest.approx(4.0))
 
 

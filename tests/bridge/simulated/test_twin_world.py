@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated import (
     BODIES,
-    Eye,
     Goal,
     Mount,
     Noise,
     Obstacle,
+    PinholeCamera,
     Scene,
     SimulatedTurtleBot3,
     Texture,
@@ -27,8 +27,8 @@ from robosc_bridge.simulated import (
     room,
 )
 from robosc_bridge.simulated.commands import UnknownCommandError, obey
-from robosc_bridge.simulated.rounds import Rounds
-from robosc_bridge.simulated.world import STEP_S, Happening
+from robosc_bridge.simulated.discs import Discs
+from robosc_bridge.simulated.world import STEP_S, WorldEvent
 from robosc_bridge.skills.line import line_offset
 from robosc_bridge.skills.settings import LineSettings
 from support.effort import examples
@@ -102,7 +102,7 @@ def slow_disc(disc: tuple[float, float, float], x_m: float, y_m: float, angle: f
 def test_rays_meet_discs_as_a_slow_twin_does(
     discs: list[tuple[float, float, float]], x_m: float, y_m: float, angle: float
 ) -> None:
-    (found,) = Rounds(discs).cast(np.array([(x_m, y_m)]), _directions([angle])).tolist()
+    (found,) = Discs(discs).cast(np.array([(x_m, y_m)]), _directions([angle])).tolist()
     expected = min((slow_disc(disc, x_m, y_m, angle) for disc in discs), default=math.inf)
     missed = [abs((disc[0] - x_m) * math.sin(angle) - (disc[1] - y_m) * math.cos(angle)) - disc[2] for disc in discs]
     # A ray that just grazes a disc is met or not by rounding.
@@ -114,8 +114,8 @@ def test_discs_do_not_mind_how_long_a_direction_is(
     discs: list[tuple[float, float, float]], x_m: float, y_m: float, length: float
 ) -> None:
     directions = _directions(np.arange(12.0))
-    many = Rounds(discs).cast(np.tile((x_m, y_m), (12, 1)), directions * length)
-    one = Rounds(discs).cast(np.array([(x_m, y_m)]), directions)
+    many = Discs(discs).cast(np.tile((x_m, y_m), (12, 1)), directions * length)
+    one = Discs(discs).cast(np.array([(x_m, y_m)]), directions)
     aside = np.array([(disc[0] - x_m) * directions[:, 1] - (disc[1] - y_m) * directions[:, 0] for disc in discs])
     # A ray that just grazes a disc is met or not by rounding.
     radii = np.array([disc[2] for disc in discs]).reshape(-1, 1)
@@ -147,7 +147,7 @@ def test_a_world_that_measures_seldom_goes_where_one_goes_that_always_does(
 def test_obstacles_are_seen_and_met() -> None:
     world = world_of(YARD)
     assert world.ranges((0.0,))[0] == pytest.approx(2.032)
-    told: list[tuple[float, Happening]] = []
+    told: list[tuple[float, WorldEvent]] = []
     world.watch(lambda world_s: None, lambda world_s, happening: told.append((world_s, happening)))
     world.move_obstacle("box", 0.6, 0.0)
     assert world.ranges((0.0, math.pi)) == pytest.approx((0.6 - 0.1 + 0.032, 2.0 - 0.032))
@@ -218,18 +218,18 @@ def test_an_ideal_world_has_no_chance_in_it() -> None:
 def test_the_line_detector_sees_the_line_of_a_scene(name: str) -> None:
     scene = load_scene(name, seed=3)
     assert scene.line is not None
-    eye = Eye(Mount(), scene, 3)
+    camera = PinholeCamera(Mount(), scene, 3)
     settings_ = LineSettings()
     points = scene.line.points
     for place in range(0, len(points) - 30, 60):
         (x_m, y_m), (next_x_m, next_y_m) = points[place], points[place + 2]
         heading_rad = math.atan2(next_y_m - y_m, next_x_m - x_m)
-        offset = line_offset(eye.picture((x_m, y_m, heading_rad)), settings_)
+        offset = line_offset(camera.picture((x_m, y_m, heading_rad)), settings_)
         assert offset is not None, (x_m, y_m)
         assert abs(offset) < 0.45
         # Beside it, to the right, it is seen more to the left.
         aside = (x_m + 0.05 * math.sin(heading_rad), y_m - 0.05 * math.cos(heading_rad), heading_rad)
-        moved = line_offset(eye.picture(aside), settings_)
+        moved = line_offset(camera.picture(aside), settings_)
         assert moved is not None
         assert moved > offset
 
@@ -238,14 +238,14 @@ def test_the_line_detector_sees_the_line_of_a_scene(name: str) -> None:
 def test_a_textured_floor_without_a_line_shows_none(kind: str) -> None:
     texture = Texture(kind, 215, 150, 0.1)  # type: ignore[arg-type]
     scene = Scene("floor", Walls(()), floor=texture, noise=Noise(camera_shades=5.0))
-    picture = Eye(Mount(), scene, 1).picture((0.3, 0.2, 0.1))
+    picture = PinholeCamera(Mount(), scene, 1).picture((0.3, 0.2, 0.1))
     assert len(np.unique(picture)) > 10
     assert line_offset(picture, LineSettings()) is None
 
 
 def test_noise_of_the_camera_is_as_large_as_told_and_seeded() -> None:
     scene = Scene("noisy", Walls(()), noise=Noise(camera_shades=6.0))
-    first, same, other = (Eye(Mount(), scene, seed).picture((0.0, 0.0, 0.0)) for seed in (1, 1, 2))
+    first, same, other = (PinholeCamera(Mount(), scene, seed).picture((0.0, 0.0, 0.0)) for seed in (1, 1, 2))
     assert (first == same).all()
     assert (first != other).any()
     assert float(first.std()) == pytest.approx(6.0, rel=0.05)

@@ -22,7 +22,7 @@ from robosc_bridge.main import main as robosc_bridge
 from robosc_bridge.remote import RemoteSettings
 from robosc_bridge.safety import Reason
 from robosc_bridge.terminal.commands import NAMES, main
-from robosc_bridge.terminal.shown import Lines, event_line, status_lines
+from robosc_bridge.terminal.formatting import Lines, event_line, status_lines
 from support.certificates import Authority
 from support.remote import READING, FakeDaemon, connected, served
 from support.waiting import PATIENCE_S, wait_until

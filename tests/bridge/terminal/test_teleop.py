@@ -8,7 +8,7 @@ import pytest
 
 from robosc_bridge.host import Thread
 from robosc_bridge.simulated import VirtualHost
-from robosc_bridge.terminal.client import DriveTopic, RefusedError, UnreachableError, Wish
+from robosc_bridge.terminal.client import DriveTopic, RefusedError, RequestedCommand, UnreachableError
 from robosc_bridge.terminal.teleop import (
     ANGULAR_RAD_S,
     KEEP_ALIVE_S,
@@ -17,7 +17,7 @@ from robosc_bridge.terminal.teleop import (
     PERIOD_S,
     PRESENT,
     PRESENT_S,
-    Wished,
+    RequestedVelocity,
     drive,
     keys_of,
 )
@@ -25,66 +25,66 @@ from robosc_bridge.terminal.teleop import (
 
 class TestKeys:
     def test_steps_add_up_and_end_at_exactly_zero(self) -> None:
-        wished = Wished()
+        requested = RequestedVelocity()
         for _ in range(3):
-            wished.press("w", 0.0)
-        assert wished.linear_m_s == 0.06
+            requested.press("w", 0.0)
+        assert requested.linear_m_s == 0.06
         for _ in range(3):
-            wished.press("s", 0.0)
-        assert wished.linear_m_s == 0.0
-        assert not wished.is_motion
+            requested.press("s", 0.0)
+        assert requested.linear_m_s == 0.0
+        assert not requested.is_motion
 
     def test_left_is_counter_clockwise(self) -> None:
-        wished = Wished()
-        wished.press("a", 0.0)
-        assert wished.angular_rad_s == 0.2
-        wished.press("d", 0.0)
-        wished.press("d", 0.0)
-        assert wished.angular_rad_s == -0.2
+        requested = RequestedVelocity()
+        requested.press("a", 0.0)
+        assert requested.angular_rad_s == 0.2
+        requested.press("d", 0.0)
+        requested.press("d", 0.0)
+        assert requested.angular_rad_s == -0.2
 
     @pytest.mark.parametrize(
         ("key", "linear_m_s", "angular_rad_s"),
         [("w", LINEAR_M_S, 0.0), ("s", -LINEAR_M_S, 0.0), ("a", 0.0, ANGULAR_RAD_S), ("d", 0.0, -ANGULAR_RAD_S)],
     )
     def test_wishes_are_bounded(self, key: str, linear_m_s: float, angular_rad_s: float) -> None:
-        wished = Wished()
+        requested = RequestedVelocity()
         for _ in range(100):
-            wished.press(key, 0.0)
-        assert (wished.linear_m_s, wished.angular_rad_s) == (linear_m_s, angular_rad_s)
+            requested.press(key, 0.0)
+        assert (requested.linear_m_s, requested.angular_rad_s) == (linear_m_s, angular_rad_s)
 
     @pytest.mark.parametrize("key", ["x", " "])
     def test_halting(self, key: str) -> None:
-        wished = Wished()
-        wished.press("w", 0.0)
-        wished.press("a", 0.0)
-        wished.press(key, 0.0)
-        assert not wished.is_motion
+        requested = RequestedVelocity()
+        requested.press("w", 0.0)
+        requested.press("a", 0.0)
+        requested.press(key, 0.0)
+        assert not requested.is_motion
 
     def test_other_keys_change_nothing(self) -> None:
-        wished = Wished()
-        wished.press("w", 0.0)
+        requested = RequestedVelocity()
+        requested.press("w", 0.0)
         for key in "qrWé\x1b[":
-            wished.press(key, 0.0)
-        assert wished.linear_m_s == 0.02
+            requested.press(key, 0.0)
+        assert requested.linear_m_s == 0.02
 
     def test_a_wish_lapses_after_the_last_key_that_asks_for_motion(self) -> None:
-        wished = Wished()
-        wished.press("w", 10.0)
-        wished.press("k", 10.5)
-        wished.press("?", 11.0)
-        wished.lapse(10.5 + LAPSE_S - 0.01)
-        assert wished.linear_m_s == 0.02
-        wished.lapse(10.5 + LAPSE_S)
-        assert not wished.is_motion
+        requested = RequestedVelocity()
+        requested.press("w", 10.0)
+        requested.press("k", 10.5)
+        requested.press("?", 11.0)
+        requested.lapse(10.5 + LAPSE_S - 0.01)
+        assert requested.linear_m_s == 0.02
+        requested.lapse(10.5 + LAPSE_S)
+        assert not requested.is_motion
 
     def test_a_key_after_that_begins_anew(self) -> None:
-        wished = Wished()
+        requested = RequestedVelocity()
         for _ in range(5):
-            wished.press("w", 10.0)
-        wished.press("k", 11.0)
-        assert not wished.is_motion
-        wished.press("w", 12.0)
-        assert wished.linear_m_s == 0.02
+            requested.press("w", 10.0)
+        requested.press("k", 11.0)
+        assert not requested.is_motion
+        requested.press("w", 12.0)
+        assert requested.linear_m_s == 0.02
 
     def test_the_answer_of_the_terminal_is_no_key(self) -> None:
         assert keys_of("w\x1b[0n\x1b[A") == ["w", PRESENT, "w"]
@@ -112,7 +112,7 @@ class Bridge:
     def __init__(self, time: VirtualHost) -> None:
         self.wishes: list[tuple[float, float, float]] = []
         self.signs_s: list[float] = []
-        self.heard: list[Wish | str] = []
+        self.heard: list[RequestedCommand | str] = []
         self.told: Callable[[str, str], None] = lambda what, text: None
         self.refusal: str | None = ""
         self.failure: Exception | None = None
@@ -140,7 +140,7 @@ class Bridge:
     def stop(self) -> None:
         self.heard.append("stop")
 
-    def want(self, wish: Wish) -> None:
+    def request(self, wish: RequestedCommand) -> None:
         self.heard.append(wish)
         if self.refusal is None:
             self._time.sleep(math.inf)
@@ -271,7 +271,7 @@ class TestDriving:
         typed.bridge.refusal = "a button that stops is pressed"
         typed.type("r")
         typed.time.sleep(KEEP_ALIVE_S)
-        assert typed.bridge.heard == ["stop", Wish.RESUME]
+        assert typed.bridge.heard == ["stop", RequestedCommand.RESUME]
         assert "a button that stops is pressed" in typed.seen
 
     def test_a_resume_without_an_answer_does_not_keep_a_stop_from_being_typed(self, typed: Typed) -> None:
@@ -279,7 +279,7 @@ class TestDriving:
         typed.type("r")
         typed.time.sleep(1.0)
         typed.type("r ")
-        assert typed.bridge.heard == [Wish.RESUME, "stop"]
+        assert typed.bridge.heard == [RequestedCommand.RESUME, "stop"]
         typed.type("q")
         typed.program.join()
         assert typed.error is None

@@ -14,7 +14,7 @@ import pytest
 from robosc_api.security import ServerSecurity
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.view import ViewEndpoint, ViewError, ViewSettings
-from robosc_bridge.view import hub as hub_module
+from robosc_bridge.view import broadcaster as hub_module
 from robosc_bridge.view import server as server_module
 from robosc_bridge.view.access import Access
 from robosc_bridge.view.page_files import FOLDER, TOKEN_PLACE, read_page

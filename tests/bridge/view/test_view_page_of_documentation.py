@@ -4,7 +4,7 @@ from pathlib import Path
 
 from robosc.explanation.blocked import MAXIMUM_REASONS
 from robosc_bridge.remote.convert import MAXIMUM_SUPERVISOR_BYTES
-from robosc_bridge.view import ADDRESS, graphs, hub, remote_bridge, requests, ros2_topic, server
+from robosc_bridge.view import ADDRESS, broadcaster, graphs, remote_bridge, requests, ros2_topic, server
 
 DOCS = Path(__file__).parents[3] / "docs"
 PAGE = (DOCS / "live-view.md").read_text(encoding="utf-8")
@@ -16,15 +16,15 @@ def test_the_limits() -> None:
     assert f"time for a request | {server.REQUEST_LIMIT_S:g} s |" in PAGE
     assert f"| {requests.MAXIMUM_BYTES} bytes; {server.REQUESTS_A_S:g}, {server.BURST} in a burst |" in PAGE
     assert f"wait for an answer | {server.MAXIMUM_WAITING} |" in PAGE
-    assert f"| {hub.MAXIMUM_EVENTS}, or {hub.MAXIMUM_BYTES // 2**20} MiB |" in PAGE
-    assert f"updates a second | {1 / hub.UPDATE_S:g} |" in PAGE
+    assert f"| {broadcaster.MAXIMUM_EVENTS}, or {broadcaster.MAXIMUM_BYTES // 2**20} MiB |" in PAGE
+    assert f"updates a second | {1 / broadcaster.UPDATE_S:g} |" in PAGE
     assert (
         f"answers no ping, sent after {server.PING_S:g} s without a word of it | {server.PING_S / 2:g} s after" in PAGE
     )
     assert f"has no room for its next message | {server.SEND_LIMIT_S:g} s |" in PAGE
     assert f"one each {remote_bridge.FOLLOW_S:g} s until it answers" in PAGE
     assert f"| {graphs.MAXIMUM_STATES} and {graphs.MAXIMUM_EDGES} |" in PAGE
-    assert f"after {hub.FIRST_PAUSE_S:g} s at first and {hub.LONGEST_PAUSE_S:g} s at most" in WORDS
+    assert f"after {broadcaster.FIRST_PAUSE_S:g} s at first and {broadcaster.LONGEST_PAUSE_S:g} s at most" in WORDS
     assert f"nothing comes for {ros2_topic.SILENCE_S:g} s" in WORDS
     assert f"at most {MAXIMUM_REASONS}:" in WORDS
     assert f"at most {MAXIMUM_SUPERVISOR_BYTES // 2**20} MiB" in WORDS

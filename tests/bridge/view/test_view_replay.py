@@ -14,10 +14,10 @@ from hypothesis import given, settings
 from robosc.event_logs import LoggedRun, read_log
 from robosc.execution.runtime.event_log import json_line, plain
 from robosc_bridge.view import ViewError
-from robosc_bridge.view.hub import Viewer
+from robosc_bridge.view.broadcaster import Viewer
+from robosc_bridge.view.messages import events_text
 from robosc_bridge.view.replay import HISTORY, MAXIMUM_STOPS, Player, Recording, Replay
 from robosc_bridge.view.sources import Pause, Play, Seek
-from robosc_bridge.view.telling import events_text
 from support.effort import examples
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
 from support.pages_open import opened
@@ -178,7 +178,7 @@ def test_a_player_stays_within_the_log(wishes: list[Any]) -> None:
             player.advance(wish)
             expected_s = min(before_s + wish * player.speed, RECORDING.end_s) if was_playing else before_s
         else:
-            player.steer(wish)
+            player.control_replay(wish)
             if isinstance(wish, Seek):
                 expected_s = min(max(wish.time_s, RECORDING.begin_s), RECORDING.end_s)
             elif isinstance(wish, Play) and before_s >= RECORDING.end_s:

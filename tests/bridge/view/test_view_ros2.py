@@ -7,8 +7,8 @@ import pytest
 
 from robosc.supervisor import Supervisor
 from robosc_bridge.view.definition import DefinitionError
+from robosc_bridge.view.messages import MessageBuilder, PreparedRobot
 from robosc_bridge.view.ros2_topic import MAXIMUM_CHARACTERS, StateReader
-from robosc_bridge.view.telling import Portrait, Teller
 from support.live import large_model, supervisor_without_synthesis
 from support.view_nodes import Node
 
@@ -75,11 +75,11 @@ def test_a_node_of_before_does_not_tell_where_services_are(large: Supervisor, tm
     reader = StateReader(large)
     robot, status, _ = reader.read(json.dumps(told), 1.0)
     assert status.communications == {}
-    shown = json.loads(Teller(Portrait(robot)).update(status, 1, 0.0))
+    shown = json.loads(MessageBuilder(PreparedRobot(robot)).update(status, 1, 0.0))
     named = {*shown["enabled"], *(item["event"] for item in shown["disabled"])}
     assert set(robot.requests) - named == {"hold2.request", "hold5.request"}
     # One that tells leaves nothing open.
-    shown = json.loads(Teller(Portrait(robot)).update(reader.read(text, 1.0)[1], 1, 0.0))
+    shown = json.loads(MessageBuilder(PreparedRobot(robot)).update(reader.read(text, 1.0)[1], 1, 0.0))
     assert shown["communications"] == {"hold2": "idle", "hold5": "idle"}
     assert {*shown["enabled"], *(item["event"] for item in shown["disabled"])} == set(robot.requests)
 

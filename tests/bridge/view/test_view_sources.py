@@ -10,13 +10,13 @@ from robosc.execution.interpreter import InterpretedSystem
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.remote import RemoteSettings, convert, serve
-from robosc_bridge.view import hub as hub_module
+from robosc_bridge.view import broadcaster as hub_module
 from robosc_bridge.view.definition import DefinitionError
-from robosc_bridge.view.facts import Happenings, Status
+from robosc_bridge.view.messages import NOT_EXECUTED, NOT_KNOWN, MessageBuilder, PreparedRobot, entry_text
 from robosc_bridge.view.remote_bridge import robot_told
+from robosc_bridge.view.reports import EventBatch, Status
 from robosc_bridge.view.running import RunningBridge
 from robosc_bridge.view.sources import RefusedError
-from robosc_bridge.view.telling import NOT_EXECUTED, NOT_KNOWN, Portrait, Teller, entry_text
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
 from support.pages_open import opened, token_of
 from support.view_servers import remotely_viewed, served
@@ -157,28 +157,28 @@ def test_the_feed_is_asked_only_while_somebody_looks(robot: LiveRobot) -> None:
     asyncio.run(asyncio.wait_for(look(), 30))
 
 
-def update(teller: Teller, status: Status) -> Any:
-    return json.loads(teller.update(status, 1, 0.0))
+def update(builder: MessageBuilder, status: Status) -> Any:
+    return json.loads(builder.update(status, 1, 0.0))
 
 
 def test_what_is_not_known_is_neither_enabled_nor_not(robot: LiveRobot) -> None:
     defined = RunningBridge(robot.operations).robot
-    teller = Teller(Portrait(defined))
+    builder = MessageBuilder(PreparedRobot(defined))
     system = InterpretedSystem(robot.supervisor)
-    told = update(teller, Status(1.0, components=system.state()))
+    told = update(builder, Status(1.0, components=system.state()))
     named = {*told["enabled"], *(item["event"] for item in told["disabled"])}
     assert set(defined.requests) - named == {"hold2.request", "hold5.request"}
     wrong = {**system.state(), "Motor1": {"state": "flying", "variables": {}}}
-    told = update(teller, Status(1.0, components=wrong))
+    told = update(builder, Status(1.0, components=wrong))
     assert (told["enabled"], told["disabled"]) == ([], [])
     assert "flying" in told["warnings"][0]["text"]
-    told = update(teller, Status(1.0, components=wrong, enabled=["go1"]))
+    told = update(builder, Status(1.0, components=wrong, enabled=["go1"]))
     assert told["enabled"] == ["go1.request"]
     assert {tuple(item["why"]) for item in told["disabled"]} == {(NOT_KNOWN,)}
 
 
 def test_after_a_gap_only_what_is_sure_is_lit(robot: LiveRobot) -> None:
-    teller = Teller(Portrait(RunningBridge(robot.operations).robot))
+    builder = MessageBuilder(PreparedRobot(RunningBridge(robot.operations).robot))
     system = InterpretedSystem(robot.supervisor)
     entries: list[dict[str, Any]] = []
     for event in ("seen0.response", "seen0.response", "go1.request", "halt1.request"):
@@ -186,7 +186,7 @@ def test_after_a_gap_only_what_is_sure_is_lit(robot: LiveRobot) -> None:
         entries.append({"time": 1.0, "kind": "event", "event": event, "controllable": True, "state": system.state()})
 
     def lit(lost: int, *places: int) -> list[int]:
-        found = teller.entries(Happenings([entries[place] for place in places], lost))
+        found = builder.entries(EventBatch([entries[place] for place in places], lost))
         return [len(json.loads(text)["transitions"]) for text in found]
 
     # One state alone leads to where each of them ended.
@@ -194,7 +194,7 @@ def test_after_a_gap_only_what_is_sure_is_lit(robot: LiveRobot) -> None:
     # Told twice: the state before is not one that it leads from.
     assert lit(0, 3) == [0]
     assert lit(5, 3) == [1]
-    numbers = [json.loads(text)["number"] for text in teller.entries(Happenings(entries[:1]))]
+    numbers = [json.loads(text)["number"] for text in builder.entries(EventBatch(entries[:1]))]
     assert numbers == [12]
 
 
@@ -210,4 +210,4 @@ def test_an_entry_says_what_there_is_to_say() -> None:
 
 def test_a_live_robot_cannot_be_moved_in_time(robot: LiveRobot) -> None:
     with pytest.raises(RefusedError):
-        RunningBridge(robot.operations).steer(None)  # type: ignore[arg-type]
+        RunningBridge(robot.operations).control_replay(None)  # type: ignore[arg-type]

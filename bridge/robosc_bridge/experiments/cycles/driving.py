@@ -12,7 +12,7 @@ from robosc.model.structure import Communication, CommunicationKind, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.c99.layout import make_layout
 from robosc.targets.cpp.model import fill_name
-from robosc_bridge.experiments.cycles.alone import SCRIPTS, write_unit
+from robosc_bridge.experiments.cycles.isolated import SCRIPTS, write_unit
 from robosc_bridge.experiments.cycles.times import LIMIT_S, OTHER, Samples, free_way
 from robosc_bridge.experiments.processes import Program
 from robosc_bridge.experiments.ros import Middleware

@@ -1,8 +1,8 @@
 """Cycles of a controller in every form that this machine can run."""
 
 from robosc.supervisor import Supervisor
-from robosc_bridge.experiments.cycles.alone import measured_c, measured_python
 from robosc_bridge.experiments.cycles.driving import measured_driving
+from robosc_bridge.experiments.cycles.isolated import measured_c, measured_python
 from robosc_bridge.experiments.cycles.times import CYCLES, RUNS, CycleTimes, cycle_times
 
 _WITH_MIDDLEWARE = (

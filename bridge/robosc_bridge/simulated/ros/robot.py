@@ -11,8 +11,8 @@ from functools import partial
 
 import numpy as np
 
-from robosc_bridge.simulated.eye import DARKNESS, Eye, Mount
 from robosc_bridge.simulated.lidar import LIDARS
+from robosc_bridge.simulated.pinhole_camera import DARKNESS, Mount, PinholeCamera
 from robosc_bridge.simulated.ros.readings import (
     BASE,
     CAMERA,
@@ -94,7 +94,7 @@ class RosRobot:
         self._time = world.time
         self._mount = mount = mount or Mount()
         scene = world.scene
-        self._eye = None if scene.line is None else Eye(mount, scene, seed)
+        self._camera = None if scene.line is None else PinholeCamera(mount, scene, seed)
         self._nearest_m: float = LIDARS[lidar].nearest_m  # type: ignore[attr-defined]
         self._farthest_m: float = LIDARS[lidar].farthest_m  # type: ignore[attr-defined]
         self._beams: int = LIDARS[lidar].beams  # type: ignore[attr-defined]
@@ -120,8 +120,8 @@ class RosRobot:
             (self._revolution_s, self._scan),
             (1.0 / BATTERY_HZ, lambda stamp_s: Battery(stamp_s, self.battery_v)),
         ]
-        if self._eye is not None:
-            self._periods.append((1.0 / mount.rate_hz, partial(self._picture, self._eye)))
+        if self._camera is not None:
+            self._periods.append((1.0 / mount.rate_hz, partial(self._picture, self._camera)))
         self._due_s = [0.0] * len(self._periods)
         for wheel in (world.left, world.right):
             wheel.is_driven = True
@@ -134,7 +134,7 @@ class RosRobot:
             Mounted(FOOTPRINT, BASE, 0.0, _BASE_Z_M),
             Mounted(BASE, SCANNER, body.scanner_x_m, _SCANNER_Z_M),
         ]
-        if self._eye is not None:
+        if self._camera is not None:
             mount = self._mount
             found.append(Mounted(BASE, CAMERA, mount.x_m, mount.height_m - _BASE_Z_M, mount.tilt_rad))
         return tuple(found)
@@ -227,8 +227,8 @@ class RosRobot:
         ranges_m[ranges_m < self._nearest_m] = -np.inf
         return Scan(stamp_s, ranges_m.astype(np.float32), self._nearest_m, self._farthest_m, self._revolution_s)
 
-    def _picture(self, eye: Eye, stamp_s: float) -> Picture:
-        shades = eye.picture(self.world.pose, self.world.obstacles)
+    def _picture(self, camera: PinholeCamera, stamp_s: float) -> Picture:
+        shades = camera.picture(self.world.pose, self.world.obstacles)
         if self.is_camera_covered:
             shades[:] = DARKNESS
         height, width = shades.shape

@@ -19,8 +19,8 @@ from typing import Protocol
 
 from robosc.execution.runtime.clock import ManualClock
 from robosc_bridge.simulated.commands import UnknownCommandError
+from robosc_bridge.simulated.error_monitor import ErrorMonitor
 from robosc_bridge.simulated.lidar import LIDARS
-from robosc_bridge.simulated.mishaps import Mishaps
 from robosc_bridge.simulated.motion import MotionRecorder
 from robosc_bridge.simulated.output import Output
 from robosc_bridge.simulated.robots import BODIES
@@ -128,22 +128,22 @@ def serve(options: argparse.Namespace, make_face: MakeNode) -> int:
 
     for which in (signal.SIGINT, signal.SIGTERM):
         signal.signal(which, end)
-    mishaps = Mishaps()
+    errors = ErrorMonitor()
     try:
         with contextlib.ExitStack() as stack:
-            stack.enter_context(mishaps)
+            stack.enter_context(errors)
             robot, pacer = make_robot(options)
             if options.motion is not None:
-                stream = stack.enter_context(contextlib.closing(Output(options.motion, mishaps.tell)))
+                stream = stack.enter_context(contextlib.closing(Output(options.motion, errors.tell)))
                 stack.enter_context(contextlib.closing(MotionRecorder(robot.world, stream)))
             node = stack.enter_context(make_face(robot, pacer, ended))
             print(READY, flush=True)
             threading.Thread(target=_listen, args=(robot,), name="commands", daemon=True).start()
-            run(robot, pacer, node, lambda: ended.is_set() or mishaps.has_crashed)
+            run(robot, pacer, node, lambda: ended.is_set() or errors.has_crashed)
     except (MissingRosError, ServingError, OSError, ValueError) as error:
         print(f"the robot cannot be simulated: {error}", file=sys.stderr)
         return 1
-    return mishaps.status
+    return errors.status
 
 
 def run(robot: RosRobot, pacer: Pacer, node: RosNode, should_end: Callable[[], bool]) -> None:

@@ -1,0 +1,68 @@
+"""Messages that a ground station, or anybody, has sent, and the commands that some of them are."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from robosc_bridge.ground_station.command_handler import ReceivedCommand
+from robosc_bridge.ground_station.commands import Meaning, meaning, mode_meaning
+from robosc_bridge.ground_station.settings import GroundSettings
+from robosc_bridge.protocol.mavlink import is_old, is_signed
+from robosc_bridge.protocol.mavlink_messages import Incoming
+
+STOPPING = frozenset({Incoming.SET_MODE, Incoming.COMMAND_LONG, Incoming.COMMAND_INT})
+"""Messages that can stop the robot: they are heard whoever has signed them."""
+
+OLD = STOPPING | {Incoming.HEARTBEAT}
+"""Messages that are heard as MAVLink 1, too."""
+
+
+@dataclass(frozen=True)
+class ReceivedMessage:
+    """A message that came.
+
+    Attributes:
+        sender: System and component.
+        number: Number of the message.
+        told: The library's message.
+        is_signed: True if it has a valid signature.
+        is_old: True if it came as MAVLink 1.
+    """
+
+    sender: tuple[int, int]
+    number: int
+    told: Any
+    is_signed: bool
+    is_old: bool
+
+    def is_for(self, settings: GroundSettings) -> bool:
+        """Return True if the message is for the bridge, or for everybody."""
+        system, component = getattr(self.told, "target_system", 0), getattr(self.told, "target_component", 0)
+        return system in (0, settings.system) and component in (0, settings.component)
+
+
+def received_from(told: Any) -> ReceivedMessage:
+    """Return the message as it was heard, from a message of the library."""
+    sender = (told.get_srcSystem(), told.get_srcComponent())
+    return ReceivedMessage(sender, told.get_msgId(), told, is_signed(told), is_old(told))
+
+
+def command_in(received: ReceivedMessage, settings: GroundSettings) -> ReceivedCommand | None:
+    """The command that a message is, if it is one and for us."""
+    told = received.told
+    if received.number not in STOPPING or not received.is_for(settings):
+        return None
+    if received.number == Incoming.SET_MODE:
+        return ReceivedCommand(received.sender, Incoming.SET_MODE, (told.base_mode, told.custom_mode, 0, 0, 0, 0, 0))
+    first = (told.param1, told.param2, told.param3, told.param4)
+    if received.number == Incoming.COMMAND_INT:
+        return ReceivedCommand(received.sender, told.command, (*first, float(told.x), float(told.y), told.z))
+    last = (told.param5, told.param6, told.param7)
+    return ReceivedCommand(received.sender, told.command, (*first, *last), told.confirmation > 0)
+
+
+def meaning_of(command: ReceivedCommand) -> Meaning:
+    """Return the meaning of a command."""
+    # The old message for modes is answered as a command of its number, as ArduPilot does.
+    if command.number == Incoming.SET_MODE:
+        return mode_meaning(command.parameters[0], command.parameters[1])
+    return meaning(command.number, command.parameters)

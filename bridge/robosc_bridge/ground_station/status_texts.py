@@ -1,0 +1,203 @@
+"""Texts for a person at the ground station: cut into chunks, not too many a second, the same one not again and again.
+
+The grave ones go first. What answers somebody's asking goes last, and waits in one place for each sender: nobody keeps
+the news of the robot from being told by asking nonsense.
+
+Source: mavlink.io (STATUSTEXT). A text of up to 50 bytes goes as it is. A longer one goes in chunks of 50, of which one
+that is shorter is the last: so a text that fills its chunks is followed by an empty one, and a chunk that would end
+within a character is filled up with spaces.
+"""
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+
+from robosc_bridge.ground_station.schedule import Bucket
+from robosc_bridge.ground_station.telemetry import Make
+from robosc_bridge.protocol.mavlink_messages import CHUNK
+
+LONGEST = 245
+"""Bytes of a text; what is longer is cut."""
+
+RATE_PER_S = 8.0
+"""Messages a second, over some time."""
+
+BURST = 12.0
+"""Messages at once."""
+
+REPEAT_S = 20.0
+"""Time after which a text that still holds is told again, in seconds; the same news is not told again sooner."""
+
+FLAPPING_S = 2.0
+"""Shortest time between two reports of something that comes and goes, in seconds.
+
+It is reported when it comes, but not sooner than this after it was reported last.
+"""
+
+MOST_WAITING = 30
+"""Chunks that wait; the last text of them may go beyond it."""
+
+_MOST_RECENT = 200
+
+
+class Severity(IntEnum):
+    """MAV_SEVERITY, as far as it is used."""
+
+    CRITICAL = 2
+    ERROR = 3
+    WARNING = 4
+    NOTICE = 5
+    INFO = 6
+
+
+type Sender = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """A piece of a text; number 0: it is a whole one."""
+
+    data: bytes
+    number: int
+    place: int
+
+
+def plain_text(text: str) -> str:
+    """On one line, within `LONGEST` bytes."""
+    line = "".join(character if character.isprintable() else " " for character in text)
+    data = line.encode("utf-8", errors="replace")
+    if len(data) <= LONGEST:
+        return data.decode("utf-8")
+    return data[: LONGEST - 3].decode("utf-8", errors="ignore") + "..."
+
+
+def chunks(text: str, number: int) -> tuple[Chunk, ...]:
+    """Return a text as it is sent.
+
+    Args:
+        text: Text without the character 0.
+        number: Number that distinguishes it from other long ones, 1 to 65535.
+    """
+    data = text.encode("utf-8")
+    if len(data) <= CHUNK:
+        return (Chunk(data, 0, 0),)
+    pieces: list[bytes] = []
+    while len(data) >= CHUNK:
+        end = CHUNK
+        while end < len(data) and data[end] & 0xC0 == 0x80:
+            end -= 1
+        pieces.append(data[:end].ljust(CHUNK))
+        data = data[end:]
+    pieces.append(data)
+    return tuple(Chunk(piece, number, place) for place, piece in enumerate(pieces))
+
+
+def status_text(severity: Severity, chunk: Chunk) -> Make:
+    """A chunk as a message."""
+    return lambda codec: codec.statustext_encode(int(severity), chunk.data, chunk.number, chunk.place)
+
+
+@dataclass
+class _Waiting:
+    severity: Severity
+    text: str
+    pieces: deque[Chunk]
+    asked_by: Sender | None
+
+    @property
+    def rank(self) -> tuple[bool, int]:
+        """The smaller, the sooner it is told."""
+        return self.asked_by is not None, self.severity
+
+
+class StatusTexts:
+    """Texts that are to be told, and their times."""
+
+    def __init__(self) -> None:
+        self._waiting: list[_Waiting] = []
+        # Of which a piece has gone: a station that joins pieces must get the others next.
+        self._begun: _Waiting | None = None
+        self._recent: dict[str, float] = {}
+        self._standing: frozenset[str] = frozenset()
+        self._number = 0
+        self._bucket = Bucket(RATE_PER_S, BURST)
+
+    def say(
+        self,
+        now_s: float,
+        severity: Severity,
+        text: str,
+        *,
+        again_s: float = REPEAT_S,
+        asked_by: Sender | None = None,
+    ) -> None:
+        """Tell something, unless the same was told less than `again_s` ago.
+
+        Args:
+            now_s: The time.
+            severity: The graver, the sooner it is told.
+            text: Of any length.
+            again_s: Seconds.
+            asked_by: Asker that it answers, system and component; None: it is news of the robot, which goes first.
+        """
+        text = plain_text(text)
+        told_s = self._recent.get(text)
+        if told_s is not None and now_s - told_s < again_s:
+            return
+        if asked_by is not None:
+            self._waiting = [item for item in self._waiting if item.asked_by != asked_by]
+        if any(item.text == text and item.asked_by == asked_by for item in self._waiting):
+            return
+        self._number = self._number % 65535 + 1
+        item = _Waiting(severity, text, deque(chunks(text, self._number)), asked_by)
+        if not self._find_room(item):
+            return
+        self._waiting.append(item)
+        if again_s > 0.0:
+            self._note(text, now_s)
+
+    def _find_room(self, item: _Waiting) -> bool:
+        """Return True if it may wait; what is less grave makes room for it, the latest first."""
+        while sum(len(waiting.pieces) for waiting in self._waiting) >= MOST_WAITING:
+            last = max(reversed(self._waiting), key=lambda waiting: waiting.rank)
+            if last.rank <= item.rank:
+                return False
+            self._waiting.remove(last)
+            # It was not told: whoever says it again is to be heard.
+            self._recent.pop(last.text, None)
+        return True
+
+    def _note(self, text: str, now_s: float) -> None:
+        # The oldest is first.
+        self._recent.pop(text, None)
+        if len(self._recent) >= _MOST_RECENT:
+            del self._recent[next(iter(self._recent))]
+        self._recent[text] = now_s
+
+    def stand(self, now_s: float, holding: Iterable[tuple[Severity, str]]) -> None:
+        """Tell what holds now: when it begins, and again every `REPEAT_S`."""
+        standing = {plain_text(text): severity for severity, text in holding}
+        for text, severity in standing.items():
+            self.say(now_s, severity, text, again_s=REPEAT_S if text in self._standing else FLAPPING_S)
+        self._standing = frozenset(standing)
+
+    def forget(self) -> None:
+        """Somebody listens anew, to whom nothing was told yet."""
+        self._recent.clear()
+
+    def take(self, now_s: float) -> list[Make]:
+        """Return the messages that go out now."""
+        self._bucket.pass_time(now_s)
+        found = []
+        while self._bucket.has_some and (item := self._next()) is not None:
+            self._bucket.take()
+            found.append(status_text(item.severity, item.pieces.popleft()))
+            self._begun = item if item.pieces else None
+        return found
+
+    def _next(self) -> _Waiting | None:
+        if self._begun is None and self._waiting:
+            self._begun = min(self._waiting, key=lambda waiting: waiting.rank)
+            self._waiting.remove(self._begun)
+        return self._begun

@@ -1,0 +1,142 @@
+"""Monitors that remember what was reported to the safety layer.
+
+Times come from outside and are believed in one direction only: a time in the future counts as the moment in which it
+is
+first looked at, and one that is no time is ignored.
+"""
+
+import math
+from collections.abc import Sequence
+
+from robosc_bridge.safety.limits import SafetyLimits
+
+SECTOR_DEG = 30
+"""To both sides of where the robot goes, that the scanner must see: its own width, half a metre away."""
+
+
+class Freshness:
+    """Age of the last report of something.
+
+    Args:
+        timeout_s: Age after which it is stale, in seconds; None: it never is.
+    """
+
+    def __init__(self, timeout_s: float | None) -> None:
+        self._timeout_s = timeout_s
+        self._heard_s: float | None = None
+
+    def update(self, time_s: float) -> None:
+        """It was heard of then."""
+        if math.isfinite(time_s):
+            self._heard_s = time_s
+
+    def is_stale(self, now_s: float) -> bool:
+        """Return True if the last report is too long ago, or there never was one."""
+        if self._timeout_s is None:
+            return False
+        if self._heard_s is None:
+            return True
+        self._heard_s = min(self._heard_s, now_s)
+        return now_s - self._heard_s > self._timeout_s
+
+
+class ScanCoverageMonitor:
+    """Finds out whether the scanner measures anything where the robot goes.
+
+    Ahead and behind are the sectors of 30 degrees to both sides of the front and of the back.
+
+    Args:
+        min_share: Of the ranges in a sector, below which nothing is seen there.
+    """
+
+    def __init__(self, min_share: float) -> None:
+        self._min_share = min_share
+        # Without any scan, nobody can tell that a part of it is missing.
+        self._is_blind_ahead = self._is_blind_behind = False
+
+    def update(self, ranges_m: Sequence[float]) -> None:
+        """A full scan came.
+
+        Args:
+            ranges_m: One for each degree, counter-clockwise from the front; NaN where nothing valid was measured.
+        """
+        self._is_blind_ahead = self._is_blind((*ranges_m[-SECTOR_DEG:], *ranges_m[: SECTOR_DEG + 1]))
+        self._is_blind_behind = self._is_blind(ranges_m[180 - SECTOR_DEG : 180 + SECTOR_DEG + 1])
+
+    def _is_blind(self, ranges_m: Sequence[float]) -> bool:
+        return sum(map(math.isfinite, ranges_m)) < self._min_share * len(ranges_m)
+
+    def is_blind(self, linear_m_s: float) -> bool:
+        """Return True if nothing is seen in the direction of a speed; a rotation on the spot has no direction."""
+        return (linear_m_s > 0 and self._is_blind_ahead) or (linear_m_s < 0 and self._is_blind_behind)
+
+
+class BatteryMonitor:
+    """Mean voltages of times that follow each other, so that two of them at the latest tell of an empty battery.
+
+    Args:
+        limits: The voltages, and the time of a mean.
+    """
+
+    def __init__(self, limits: SafetyLimits) -> None:
+        self._limits = limits
+        self._mean_v = math.inf
+        self._sum_v = 0.0
+        self._count = 0
+        self._begin_s = 0.0
+
+    def update(self, voltage_v: float | None, time_s: float) -> None:
+        """A voltage was measured; None and what is not finite tell nothing."""
+        if voltage_v is None or not math.isfinite(voltage_v) or not math.isfinite(time_s):
+            return
+        if not self._count or time_s < self._begin_s:
+            self._sum_v, self._count, self._begin_s = 0.0, 0, time_s
+        self._sum_v += voltage_v
+        self._count += 1
+        if time_s - self._begin_s >= self._limits.battery_mean_s:
+            self._mean_v = self._sum_v / self._count
+            self._count = 0
+
+    @property
+    def is_near_empty(self) -> bool:
+        """True if a person should be warned."""
+        return self._mean_v <= self._limits.battery_warn_v
+
+    @property
+    def is_empty(self) -> bool:
+        """True if the robot must stop."""
+        return self._mean_v <= self._limits.battery_stop_v
+
+
+class WheelMonitor:
+    """Monitor that finds wheels that are held, rotate by themselves, or do not stop.
+
+    Args:
+        limits: Limits of how far off a wheel may be, and for how long.
+    """
+
+    def __init__(self, limits: SafetyLimits) -> None:
+        self._limits = limits
+        self._since_s: float | None = None
+
+    def forget(self) -> None:
+        """Nothing is asked of the wheels."""
+        self._since_s = None
+
+    def is_astray(self, goals_m_s: tuple[float, float], wheels_m_s: tuple[float, float], time_s: float) -> bool:
+        """Return True if some wheel has been off its goal for too long.
+
+        Args:
+            goals_m_s: Goals of the left and the right wheel.
+            wheels_m_s: Actual speeds of the left and the right wheel.
+            time_s: Time at which the speeds were measured, in seconds.
+        """
+        if self._follows(goals_m_s[0], wheels_m_s[0]) and self._follows(goals_m_s[1], wheels_m_s[1]):
+            self._since_s = None
+            return False
+        self._since_s = time_s if self._since_s is None else min(self._since_s, time_s)
+        return time_s - self._since_s > self._limits.astray_s
+
+    def _follows(self, goal_m_s: float, speed_m_s: float) -> bool:
+        # What is not a number does not follow.
+        return abs(goal_m_s - speed_m_s) <= max(self._limits.astray_m_s, abs(goal_m_s) / 2)

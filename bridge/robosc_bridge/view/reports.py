@@ -1,0 +1,141 @@
+"""Facts that any source reports: the robot, what it is doing, what happens. Plain values, ready for the page."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from robosc.execution.runtime.event_log import Entry
+
+
+class SourceKind(StrEnum):
+    """Source of what is shown."""
+
+    BRIDGE = "bridge"
+    ROS2 = "ros2"
+    LOG = "log"
+    MODEL = "model"
+
+
+@dataclass(frozen=True, slots=True)
+class Talk:
+    """A communication of the model.
+
+    Attributes:
+        name: Its name.
+        component: Component that declares it.
+        kind: `incoming message`, `outgoing message`, `service` or `action`.
+        identifier: Its topic, service or action.
+        channel: Channel that it is mapped to in a bridge; empty: nothing is known of that.
+    """
+
+    name: str
+    component: str
+    kind: str
+    identifier: str
+    channel: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class LogSpan:
+    """The log that is replayed.
+
+    Attributes:
+        begin_s: Time of its first entry, in seconds since 1970-01-01 UTC.
+        end_s: Time of its last one.
+        count: Its entries.
+    """
+
+    begin_s: float
+    end_s: float
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """Something that a person is told."""
+
+    code: str
+    text: str
+    holds_until_reset: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Report of the drive base.
+
+    Attributes:
+        pose: x and y in metres, heading in radians.
+        linear_m_s: Forward speed.
+        angular_rad_s: Yaw rate, counter-clockwise.
+        battery_v: Battery voltage; None: not known.
+        is_torque_on: True if the motors hold.
+    """
+
+    pose: tuple[float, float, float]
+    linear_m_s: float
+    angular_rad_s: float
+    battery_v: float | None
+    is_torque_on: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """Status of the robot: what it is doing.
+
+    Attributes:
+        time_s: Time when that was so, in seconds since 1970-01-01 UTC.
+        state: State of the bridge; empty: there is none.
+        problem: The fault that has stopped it; empty: none.
+        reasons: Reasons why nothing moves.
+        warnings: Warnings that a person should know though it moves.
+        stops: Reasons why nothing is requested.
+        devices: Devices, with True for each that works.
+        components: State and variables of each component with a behaviour; empty: nothing is executed.
+        communications: Location of services and actions, as far as they are known.
+        enabled: Names of the communications that may be requested, as the executor says; None: nobody says so.
+        drive: Report of the drive base; None: none.
+        age_s: Age of this when it came, in seconds.
+        last: Number of the transition that each component took last; of one that is not named none is known. None:
+            the entries show it.
+    """
+
+    time_s: float
+    state: str = ""
+    problem: str = ""
+    reasons: Sequence[Notice] = ()
+    warnings: Sequence[Notice] = ()
+    stops: Sequence[str] = ()
+    devices: Mapping[str, bool] = field(default_factory=dict)
+    components: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    communications: Mapping[str, str] = field(default_factory=dict)
+    enabled: Sequence[str] | None = None
+    drive: Drive | None = None
+    age_s: float = 0.0
+    last: Mapping[str, int] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LaserScan:
+    """A revolution of the LiDAR.
+
+    Attributes:
+        ranges_m: One a degree, counter-clockwise from the front; not finite: nothing was seen.
+        pose: Pose of the robot at that time; None: not known.
+    """
+
+    ranges_m: Sequence[float]
+    pose: tuple[float, float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class EventBatch:
+    """Entries of the event log.
+
+    Attributes:
+        entries: Entries in their order.
+        lost: Number of entries before them that were lost.
+    """
+
+    entries: Sequence[Entry]
+    lost: int = 0

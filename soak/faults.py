@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("robosc", "server/robosc_server", "client/robosc_client", "bridge/robosc_bridge")
+PACKAGES = ("robosc", "server/robosc_server", "client/robosc_client", "bridge")
 LEFT_OUT = (".git", ".venv*", "out", "node_modules", "__pycache__", ".*_cache", ".hypothesis", "build", "dist")
 
 FIRST = 150

@@ -9,8 +9,8 @@ import pytest
 from robosc.certification import OutcomeStatus, make_supervisor
 from robosc.cli.main import make_parser
 from robosc_bridge import main as bridge
-from robosc_bridge.simulated import __main__ as simulated
 from robosc_client.main import make_parser as client_parser
+from robosc_simulated import __main__ as simulated
 from support.models import bundle_of
 
 ROOT = Path(__file__).parents[1]

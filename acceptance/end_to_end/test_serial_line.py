@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from robosc.event_logs import read_log
-from robosc_bridge.experiments.line import run_line
+from robosc_experiments.line import run_line
 
 pytestmark = pytest.mark.real_time
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from robosc.event_logs import read_log
-from robosc_bridge.experiments.maze import run_maze
+from robosc_experiments.maze import run_maze
 
 pytestmark = pytest.mark.real_time
 

@@ -13,15 +13,15 @@ from typing import Any
 
 import pytest
 
-from robosc_bridge.experiments.ros1 import run_line, run_maze
-from robosc_bridge.experiments.scenario import Outcome
+from robosc_experiments.ros1 import run_line, run_maze
+from robosc_experiments.scenario import Outcome
 from support.process import Process
 from support.ros1 import Master, Peer, clean_environment, missing, until
 from support.waiting import wait_until
 
 pytestmark = [pytest.mark.ros1, pytest.mark.skipif(missing() is not None, reason=str(missing())), pytest.mark.real_time]
 
-TWIN = (sys.executable, "-m", "robosc_bridge.simulated.ros.ros1")
+TWIN = (sys.executable, "-m", "robosc_simulated.ros.ros1")
 TWIST = "geometry_msgs/Twist"
 TYPES = {
     "/clock": "rosgraph_msgs/Clock",

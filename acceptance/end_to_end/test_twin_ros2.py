@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from robosc_bridge.experiments.ros2 import run_line, run_maze
-from robosc_bridge.experiments.scenario import Outcome, ScenarioError
-from robosc_bridge.simulated.ros.readings import Mounted, Odometry
-from robosc_bridge.simulated.ros.ros2 import mounting, moved
+from robosc_experiments.ros2 import run_line, run_maze
+from robosc_experiments.scenario import Outcome, ScenarioError
+from robosc_simulated.ros.readings import Mounted, Odometry
+from robosc_simulated.ros.ros2 import mounting, moved
 from support.ros2 import Peer, RosProcess, environment, own_domain
 
 pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
@@ -20,7 +20,7 @@ pytest.importorskip("cv2", reason="OpenCV (the extra examples) is not installed"
 
 pytestmark = [pytest.mark.ros2, pytest.mark.real_time]
 
-TWIN = ("-m", "robosc_bridge.simulated.ros.ros2")
+TWIN = ("-m", "robosc_simulated.ros.ros2")
 LIMIT_S = 20.0
 
 

@@ -10,9 +10,9 @@ import pytest
 
 from robosc.model.structure import Deployment
 from robosc.targets import generate, write_files
-from robosc_bridge.simulated import MotionError, load_scene, read_motion
-from robosc_bridge.simulated.motion import Motion
-from robosc_bridge.simulated.motion_checks import check_line, check_maze
+from robosc_simulated import MotionError, load_scene, read_motion
+from robosc_simulated.motion import Motion
+from robosc_simulated.motion_checks import check_line, check_maze
 from support.generated import example_supervisor
 from support.models import EXAMPLES
 from support.process import Process

@@ -1,7 +1,7 @@
 """The bridge's computer: clocks, waiting, threads, serial ports and network, as one value.
 
 Whatever waits or measures time does so through a `Host`, so that a test can put the whole bridge on a clock of its own:
-`robosc_bridge.simulated.virtual_host`. The real one is `robosc_bridge.transport.system_host`. Readings are in seconds.
+`robosc_simulated.virtual_host`. The real one is `robosc_bridge.transport.system_host`. Readings are in seconds.
 """
 
 from abc import ABC, abstractmethod

@@ -37,11 +37,11 @@ from robosc_bridge.daemon.supervisors import (
     obtain,
     trusted_keys,
 )
+from robosc_bridge.daemon.view_settings import ADDRESS as VIEW_ADDRESS
 from robosc_bridge.driver_registry import Kind, available_drivers
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.health_check import add_command as add_health_command
 from robosc_bridge.terminal.commands import add_commands
-from robosc_bridge.view.settings import ADDRESS as VIEW_ADDRESS
 
 OK, FAULT, WRONG_USE = 0, 1, 2
 

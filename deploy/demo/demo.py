@@ -14,12 +14,12 @@ import tempfile
 from pathlib import Path
 
 from robosc.event_logs import draw_sequence, read_log
-from robosc_bridge.experiments.maze import MODEL, SCENES, run_maze
-from robosc_bridge.experiments.processes import interruptible
-from robosc_bridge.experiments.scenario import Outcome, ScenarioError
-from robosc_bridge.simulated.map_picture import draw_map
-from robosc_bridge.simulated.motion import read_motion
-from robosc_bridge.simulated.values import option, seed
+from robosc_experiments.maze import MODEL, SCENES, run_maze
+from robosc_experiments.processes import interruptible
+from robosc_experiments.scenario import Outcome, ScenarioError
+from robosc_simulated.map_picture import draw_map
+from robosc_simulated.motion import read_motion
+from robosc_simulated.values import option, seed
 
 ROOT = Path(__file__).resolve().parents[2]
 SPEED = 10.0

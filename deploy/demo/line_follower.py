@@ -21,7 +21,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from judge import judge_log, judge_motion, read_lines, table
-from robosc_bridge.experiments.domains import own_domain
+from robosc_experiments.domains import own_domain
 
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = ROOT / "examples" / "line_follower" / "line_follower.rscd"

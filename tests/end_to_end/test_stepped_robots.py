@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from robosc.model.structure import Deployment
-from robosc_bridge.simulated import Motion, Obstacle, Scene, load_scene, maze_scene, room
-from robosc_bridge.simulated.motion_checks import Halt, check_line, check_maze
+from robosc_simulated import Motion, Obstacle, Scene, load_scene, maze_scene, room
+from robosc_simulated.motion_checks import Halt, check_line, check_maze
 from support.models import EXAMPLES
 from support.stepped_twin import SteppedTwin
 

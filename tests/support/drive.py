@@ -11,10 +11,10 @@ from robosc_bridge.devices.mavlink_rover import MavlinkRover
 from robosc_bridge.devices.opencr import OpenCrBase
 from robosc_bridge.devices.robots import ROBOTS
 from robosc_bridge.host import Host
-from robosc_bridge.simulated import SimulatedTurtleBot3
-from robosc_bridge.simulated.line import Device, Sending
-from robosc_bridge.simulated.virtual_host import VirtualHost
 from robosc_bridge.transport.system_host import SystemHost
+from robosc_simulated import SimulatedTurtleBot3
+from robosc_simulated.line import Device, Sending
+from robosc_simulated.virtual_host import VirtualHost
 
 # The simulator is a thread of this process, on a machine that may be busy; time-outs are for the tests of time-outs.
 PATIENT_S = 0.5

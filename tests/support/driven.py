@@ -17,10 +17,10 @@ from robosc_bridge.daemon.assembly import Machine, assemble, safety_limits
 from robosc_bridge.daemon.states import State
 from robosc_bridge.host import Host, Thread
 from robosc_bridge.safety import SafetyLimits
-from robosc_bridge.simulated import SimulatedTurtleBot3
-from robosc_bridge.simulated.line import Device, Sending
-from robosc_bridge.simulated.virtual_host import VirtualHost
 from robosc_bridge.transport.system_host import SYSTEM_HOST, SystemHost
+from robosc_simulated import SimulatedTurtleBot3
+from robosc_simulated.line import Device, Sending
+from robosc_simulated.virtual_host import VirtualHost
 from support.daemons import supervisor_of
 from support.real_time import Lateness
 

@@ -25,9 +25,10 @@ from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.programs import FromProgram
 from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import Command, Order, State
+from robosc_bridge.daemon.view_settings import ViewSettings
 from robosc_bridge.devices.interface import BINS, DriveReading, Pose, RawScan, Scan, Velocity
 from robosc_bridge.safety import Caution, Reason
-from robosc_bridge.view import ViewEndpoint, ViewSettings
+from robosc_view import ViewEndpoint
 from support.models import model_of
 from support.random_supervisors import CERTIFICATE
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from robosc.execution.runtime.clock import ManualClock
 from robosc.execution.runtime.executor import Executor
-from robosc_bridge.simulated import BODIES, Scene, Timebase, World
+from robosc_simulated import BODIES, Scene, Timebase, World
 from support.execution import RecordingMiddleware, Sent, example_system
 
 _STEP_S = 0.02

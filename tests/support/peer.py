@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Self
 
-from robosc_bridge.simulated.virtual_host import VirtualHost
+from robosc_simulated.virtual_host import VirtualHost
 
 Answers = Iterable[bytes | float]
 """Data to send, in order; a number is a pause in seconds."""

@@ -6,8 +6,8 @@ from pathlib import Path
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.event_log import json_line
 from robosc.supervisor import encode
-from robosc_bridge.experiments.scenario import Outcome
-from robosc_bridge.simulated.scene import load_scene
+from robosc_experiments.scenario import Outcome
+from robosc_simulated.scene import load_scene
 from support.execution import Bench
 from support.generated import example_supervisor
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from _pytest.mark import ParameterSet
 
-from robosc_bridge.simulated import SimulatedTurtleBot3
+from robosc_simulated import SimulatedTurtleBot3
 from support.driven import Driven
 
 PAGE = (Path(__file__).parents[2] / "docs" / "bridge-safety.md").read_text(encoding="utf-8")

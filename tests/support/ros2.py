@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from robosc_bridge.experiments.domains import own_domain
+from robosc_experiments.domains import own_domain
 from support.process import Process
 
 __all__ = ["Peer", "RosProcess", "environment", "own_domain"]

@@ -14,9 +14,9 @@ from robosc_bridge.devices.interface import (
 from robosc_bridge.devices.mavlink_rover import MavlinkRover
 from robosc_bridge.devices.robots import Body
 from robosc_bridge.host import Host, Thread
-from robosc_bridge.simulated import BODIES, DatagramLine, Rover, SimulatedLine, Timebase, World, room
-from robosc_bridge.simulated.virtual_host import VirtualHost
 from robosc_bridge.transport.system_host import SYSTEM_HOST
+from robosc_simulated import BODIES, DatagramLine, Rover, SimulatedLine, Timebase, World, room
+from robosc_simulated.virtual_host import VirtualHost
 
 BODY = Body(0.5, 2.0, BODIES["burger"].wheel_separation_m)
 FORWARD = Velocity(0.2)

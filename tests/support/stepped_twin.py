@@ -21,7 +21,11 @@ from robosc.execution.runtime.executor import Executor
 from robosc.execution.runtime.layer import Layer
 from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import Deployment
-from robosc_bridge.simulated import (
+from robosc_bridge.skills.line import LineDetector
+from robosc_bridge.skills.settings import LineSettings
+from robosc_examples.motion import Turn, clamped, steered, turning_speed, wrapped
+from robosc_examples.persons import Scan, find_person
+from robosc_simulated import (
     BODIES,
     Motion,
     MotionRecorder,
@@ -32,11 +36,7 @@ from robosc_bridge.simulated import (
     World,
     read_motion,
 )
-from robosc_bridge.simulated.motion_checks import STILL_M_S, STILL_RAD_S
-from robosc_bridge.skills.line import LineDetector
-from robosc_bridge.skills.settings import LineSettings
-from robosc_examples.motion import Turn, clamped, steered, turning_speed, wrapped
-from robosc_examples.persons import Scan, find_person
+from robosc_simulated.motion_checks import STILL_M_S, STILL_RAD_S
 from support.generated import example_supervisor
 from support.layers import BothSides
 

@@ -7,11 +7,11 @@ import sys
 from collections.abc import AsyncIterator, Callable, Iterator
 
 from robosc_api.security import Credentials
-from robosc_bridge.view import ViewSettings
-from robosc_bridge.view.definition import Robot
-from robosc_bridge.view.remote_bridge import RemoteBridge
-from robosc_bridge.view.server import ViewServer
-from robosc_bridge.view.sources import Source
+from robosc_bridge.daemon.view_settings import ViewSettings
+from robosc_view.definition import Robot
+from robosc_view.remote_bridge import RemoteBridge
+from robosc_view.server import ViewServer
+from robosc_view.sources import Source
 
 
 @contextlib.asynccontextmanager
@@ -41,7 +41,7 @@ async def remotely_viewed(address: str) -> AsyncIterator[ViewServer]:
 _START = """
 import sys
 from robosc.cli.arguments import Parser
-from robosc_bridge.view import command
+from robosc_view import command
 parser = Parser(prog="robosc")
 command.add_parser(parser.add_subparsers())
 arguments = parser.parse_args(["view", *sys.argv[1:]])

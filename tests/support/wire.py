@@ -6,8 +6,8 @@ from typing import Any, Self
 import serial
 from dynamixel_sdk import PortHandler
 
-from robosc_bridge.simulated import SimulatedLine
-from robosc_bridge.simulated.virtual_host import VirtualHost
+from robosc_simulated import SimulatedLine
+from robosc_simulated.virtual_host import VirtualHost
 from support.waiting import PATIENCE_S, wait_until
 
 

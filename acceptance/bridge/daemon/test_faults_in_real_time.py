@@ -9,8 +9,8 @@ import os
 import pytest
 
 from robosc_bridge.daemon.states import Command, State
-from robosc_bridge.simulated import SimulatedTurtleBot3
 from robosc_bridge.transport.system_host import SYSTEM_HOST
+from robosc_simulated import SimulatedTurtleBot3
 from support.driven import PATIENT, driven
 from support.robot_faults import GRAVE, SCAN_TIMEOUTS_S, STATED_S
 

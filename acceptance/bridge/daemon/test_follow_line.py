@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from robosc_bridge.simulated import SimulatedTurtleBot3, Track, Walls, oval, room
+from robosc_simulated import SimulatedTurtleBot3, Track, Walls, oval, room
 from support.models import EXAMPLES
 
 pytestmark = pytest.mark.real_time

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from robosc.cli.main import main as robosc
-from robosc_bridge.simulated import SimulatedTurtleBot3
+from robosc_simulated import SimulatedTurtleBot3
 from support.models import EXAMPLES
 
 pytestmark = pytest.mark.real_time

@@ -8,7 +8,7 @@ from robosc_bridge.devices.interface import (
     STANDSTILL,
     Velocity,
 )
-from robosc_bridge.simulated.rover import GUIDED
+from robosc_simulated.rover import GUIDED
 from support.rovers import FORWARD, POSE, Bench
 
 pytestmark = pytest.mark.real_time

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from robosc.supervisor import Supervisor
-from robosc_bridge.experiments.cycles.driving import measured_driving
-from robosc_bridge.experiments.cycles.measure import measure
-from robosc_bridge.experiments.cycles.times import PAPER
-from robosc_bridge.experiments.ros1 import missing
+from robosc_experiments.cycles.driving import measured_driving
+from robosc_experiments.cycles.measure import measure
+from robosc_experiments.cycles.times import PAPER
+from robosc_experiments.ros1 import missing
 from support.generated import example_supervisor
 
 FORMS = (
@@ -58,7 +58,7 @@ def test_a_model_without_velocities_has_no_cycles_with_middleware() -> None:
 
 @pytest.mark.skipif(not HAS_ROSCPP, reason="gcc, g++ or roscpp is not installed")
 def test_what_does_not_compile_is_told(supervisor: Supervisor, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robosc_bridge.experiments.cycles.driving._LIBRARIES", ("nowhere",))
+    monkeypatch.setattr("robosc_experiments.cycles.driving._LIBRARIES", ("nowhere",))
     found = measured_driving("roscpp", "line", supervisor, 1, 1)
     assert isinstance(found, str)
     assert found.startswith("it failed: ")

@@ -18,7 +18,7 @@ os.environ.setdefault("MAVLINK20", "1")
 import pytest
 from pymavlink import mavutil
 
-from robosc_bridge.simulated import SimulatedTurtleBot3
+from robosc_simulated import SimulatedTurtleBot3
 from support.ground import joined_texts
 from support.models import EXAMPLES
 from support.waiting import wait_until

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from robosc_api.v1 import bridge_pb2 as pb
-from robosc_bridge.simulated import SimulatedTurtleBot3
+from robosc_simulated import SimulatedTurtleBot3
 from support.real_time import preferred
 from support.remote import Attachment, connected
 from support.terminals import Terminal

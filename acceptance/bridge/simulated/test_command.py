@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from robosc_bridge.simulated import read_motion
+from robosc_simulated import read_motion
 from support.waiting import wait_until
 from support.wire import Host
 
@@ -19,7 +19,7 @@ class Program:
 
     def __init__(self, *arguments: str) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "robosc_bridge.simulated", *arguments],
+            [sys.executable, "-m", "robosc_simulated", *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from robosc_bridge.simulated import SimulatedTurtleBot3
+from robosc_simulated import SimulatedTurtleBot3
 
 
 @pytest.mark.real_time

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from robosc_bridge.simulated import Record, read_records
+from robosc_simulated import Record, read_records
 from support.wire import Host
 
 PING = bytes.fromhex("fffffd0001030001194e")
@@ -17,7 +17,7 @@ PONG = bytes.fromhex("fffffd00010700550024042df4df")
 
 def test_all_bytes_are_recorded_with_their_times(tmp_path: Path) -> None:
     file = tmp_path / "record"
-    command = [sys.executable, "-m", "robosc_bridge.simulated", "--base", "dynamixel", "--record", str(file)]
+    command = [sys.executable, "-m", "robosc_simulated", "--base", "dynamixel", "--record", str(file)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         base, scanner = (process.stdout.readline().split()[1] for _ in range(2))
@@ -51,7 +51,7 @@ def test_what_is_no_record_is_refused() -> None:
 
 
 def test_a_record_that_cannot_be_written_is_one_message(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "robosc_bridge.simulated", "--record", str(tmp_path / "missing" / "record")]
+    command = [sys.executable, "-m", "robosc_simulated", "--record", str(tmp_path / "missing" / "record")]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=30)
     assert done.returncode == 1
     assert done.stdout == ""

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from robosc_bridge.simulated import SimulatedTurtleBot3, Walls
+from robosc_simulated import SimulatedTurtleBot3, Walls
 from support.waiting import wait_until
 from support.wire import Host
 

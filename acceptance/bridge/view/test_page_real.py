@@ -13,7 +13,7 @@ from playwright.sync_api import Browser
 from robosc.event_logs import read_log
 from robosc.execution.runtime.event_log import json_line, plain
 from robosc_bridge.daemon.states import Command
-from robosc_bridge.view.replay import Recording, Replay
+from robosc_view.replay import Recording, Replay
 from support.browser import visit
 from support.generated import example_supervisor
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed

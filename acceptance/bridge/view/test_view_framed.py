@@ -12,8 +12,8 @@ import pytest
 from playwright.sync_api import Browser
 
 from robosc.cli.arguments import Parser
-from robosc_bridge.view import command
-from robosc_bridge.view.server import answer_headers
+from robosc_view import command
+from robosc_view.server import answer_headers
 from support.browser import visit
 from support.models import EXAMPLES
 from support.view_servers import view_process

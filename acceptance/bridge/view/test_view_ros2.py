@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from robosc_bridge.view.ros2_topic import StateReader, StateTopic
+from robosc_view.ros2_topic import StateReader, StateTopic
 from support.generated import example_supervisor
 from support.live import large_model, supervisor_without_synthesis
 from support.pages_open import LIMIT_S, OpenPage, opened
@@ -89,7 +89,7 @@ def test_a_node_that_is_not_there_is_told_and_found_when_it_comes(
 ) -> None:
     from std_msgs.msg import String
 
-    monkeypatch.setattr("robosc_bridge.view.ros2_topic.SILENCE_S", 1.0)
+    monkeypatch.setattr("robosc_view.ros2_topic.SILENCE_S", 1.0)
     node = Node(supervisor_without_synthesis(large_model(3)), tmp_path / "package")
 
     async def look() -> None:

@@ -26,6 +26,7 @@ from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.view_settings import settings_of as view_settings
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
 from robosc_bridge.devices.factory import make_drive_base, make_range_scanner
 from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
@@ -39,7 +40,6 @@ from robosc_bridge.remote import settings_of
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
 from robosc_bridge.transport.system_host import SYSTEM_HOST
-from robosc_bridge.view import settings_of as view_settings
 
 EXCHANGE_S = 0.02
 """Time between exchanges with the drive base: what OpenCR refreshes its registers at."""
@@ -265,7 +265,7 @@ def _require_endpoints(configuration: Configuration, mapping: ChannelMapping) ->
             raise AssemblyError(f"view: {error}") from error
         if page.scene is not None:
             # Where nobody wants one, nothing of the simulator is loaded.
-            from robosc_bridge.view.scene_map import scene_map
+            from robosc_view.scene_map import scene_map
 
             try:
                 scene_map(page.scene, page.scene_seed)

@@ -7,12 +7,11 @@ from typing import Protocol
 from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.daemon.device_thread import DeviceThread
 from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.view_settings import settings_of as view_settings
 from robosc_bridge.devices.interface import Velocity
 from robosc_bridge.ground_station import GroundLink, ground_settings
 from robosc_bridge.remote import RemoteEndpoint, settings_of
 from robosc_bridge.safety import SafetyLimits
-from robosc_bridge.view import ViewEndpoint
-from robosc_bridge.view import settings_of as view_settings
 
 _log = logging.getLogger(__name__)
 
@@ -90,5 +89,8 @@ def make_endpoints(configuration: Configuration, operations: Operations, limits:
         endpoints.append(GroundLink(operations, ground))
     page = view_settings(configuration)
     if page is not None:
+        # Where nobody asks for the page, nothing of it is loaded.
+        from robosc_view import ViewEndpoint
+
         endpoints.append(ViewEndpoint(operations, page))
     return tuple(endpoints)

@@ -25,7 +25,7 @@ from robosc_bridge.daemon.assembly import Machine, assemble
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.daemon.supervisors import Source, obtain
-from robosc_bridge.view import ViewEndpoint, ViewSettings
+from robosc_view import ViewEndpoint, ViewSettings
 
 LIMIT_S = 60.0
 SETTLE_S = 1.0

@@ -36,7 +36,7 @@ HEADER = ["base, period", "p50, ms", "p99, ms", "max, ms", "command p50, ms", "p
 @contextmanager
 def _simulated(base: str) -> Iterator[str]:
     """The port of a robot's base."""
-    command = [sys.executable, "-m", "robosc_bridge.simulated", "--base", base]
+    command = [sys.executable, "-m", "robosc_simulated", "--base", base]
     paths = f"{ROOT}:{ROOT / 'bridge'}"
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": paths}

@@ -1,6 +1,6 @@
 """Hours of driving in minutes: growth of what is held, drift of the schedule, and collisions.
 
-A robot wanders through a simulated room on virtual time (`robosc_bridge.simulated.VirtualHost`): the bridge and the
+A robot wanders through a simulated room on virtual time (`robosc_simulated.VirtualHost`): the bridge and the
 simulated devices are the real ones. *Drift*: difference between the schedule of the last decision and that of the
 first one and as many periods. *Memory* and what is behind it: growth since a tenth of the time had passed, of resident
 memory, Python objects, items in the loop's inbox, open files.
@@ -33,8 +33,8 @@ from robosc_bridge.daemon.assembly import Machine, assemble  # noqa: E402
 from robosc_bridge.daemon.states import State  # noqa: E402
 from robosc_bridge.daemon.supervisors import Source, obtain  # noqa: E402
 from robosc_bridge.safety import SafetyLayer  # noqa: E402
-from robosc_bridge.simulated import SimulatedTurtleBot3, VirtualHost  # noqa: E402
-from robosc_bridge.simulated.walls import room  # noqa: E402
+from robosc_simulated import SimulatedTurtleBot3, VirtualHost  # noqa: E402
+from robosc_simulated.walls import room  # noqa: E402
 
 HOURS = 0.5
 CASES = {"dynamixel": 0.010, "opencr": 0.020}

@@ -19,8 +19,8 @@ sys.path[:0] = [
 from rig import Machine  # noqa: E402
 
 from figures import text_table  # noqa: E402  # found through the path above
-from robosc_bridge.experiments.maze import SCENES, run_maze  # noqa: E402
-from robosc_bridge.experiments.scenario import Outcome  # noqa: E402
+from robosc_experiments.maze import SCENES, run_maze  # noqa: E402
+from robosc_experiments.scenario import Outcome  # noqa: E402
 
 SPEEDS = (5.0, 10.0, 20.0)
 SEED = 3

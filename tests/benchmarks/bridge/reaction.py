@@ -46,7 +46,7 @@ from rig import (  # noqa: E402
 from figures import text_table  # noqa: E402  # found through the path above
 from robosc_bridge.devices.lidar import LDS01, LDS02, LDS03, Model  # noqa: E402
 from robosc_bridge.protocol.revolutions import RevolutionBuilder, nearest_by_degree  # noqa: E402
-from robosc_bridge.simulated.recorder import Record, read_records  # noqa: E402
+from robosc_simulated.recorder import Record, read_records  # noqa: E402
 from support.real_time import preferred  # noqa: E402  # rig adds its folder to the path
 
 TRIALS = 200

@@ -61,8 +61,8 @@ class Simulator:
 
 @contextmanager
 def simulated(*arguments: str) -> Iterator[Simulator]:
-    """A robot, simulated until the block ends; arguments are those of `python -m robosc_bridge.simulated`."""
-    command = [sys.executable, "-m", "robosc_bridge.simulated", *arguments]
+    """A robot, simulated until the block ends; arguments are those of `python -m robosc_simulated`."""
+    command = [sys.executable, "-m", "robosc_simulated", *arguments]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment())
     try:
         yield Simulator(process)

@@ -15,8 +15,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "bridge"), str(ROOT / "tests"), str(ROOT /
 
 from figures import text_table  # noqa: E402  # found through the path above
 from robosc.execution.runtime.clock import ManualClock  # noqa: E402
-from robosc_bridge.simulated import BODIES, Scene, Timebase, World, load_scene, maze_scene  # noqa: E402
-from robosc_bridge.simulated.world import STEP_S  # noqa: E402
+from robosc_simulated import BODIES, Scene, Timebase, World, load_scene, maze_scene  # noqa: E402
+from robosc_simulated.world import STEP_S  # noqa: E402
 
 RUNS = 5
 STEPS = 2_000

@@ -8,7 +8,7 @@ from pathlib import Path
 from execution.robots import WITHOUT, supervisor
 from figures import micro
 from robosc.targets import generate
-from robosc_bridge.experiments.cycles.times import CYCLES, RUNS
+from robosc_experiments.cycles.times import CYCLES, RUNS
 
 _MAIN = """
 #define _POSIX_C_SOURCE 199309L

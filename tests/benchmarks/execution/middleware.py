@@ -4,8 +4,8 @@ import statistics
 
 from execution.robots import EXPERIMENTS, SMALL, WITH, supervisor
 from figures import micro
-from robosc_bridge.experiments.cycles.driving import measured_driving
-from robosc_bridge.experiments.cycles.times import CYCLES, RUNS
+from robosc_experiments.cycles.driving import measured_driving
+from robosc_experiments.cycles.times import CYCLES, RUNS
 
 _AIM = "34"
 

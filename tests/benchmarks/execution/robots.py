@@ -3,8 +3,8 @@
 from typing import Any
 
 from robosc.supervisor import Supervisor
-from robosc_bridge.experiments.cycles.times import PAPER
-from robosc_bridge.experiments.cycles.times import feed as comes
+from robosc_experiments.cycles.times import PAPER
+from robosc_experiments.cycles.times import feed as comes
 from support.execution import supervisor_of
 from support.generated import example_supervisor
 from support.models import model_of

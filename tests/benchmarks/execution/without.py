@@ -19,8 +19,8 @@ from execution.robots import LARGE, SMALL, WITHOUT, feed, supervisor
 from figures import micro
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.protocol import ControlledSystem
-from robosc_bridge.experiments.cycles.isolated import NullMiddleware
-from robosc_bridge.experiments.cycles.times import CYCLES, RUNS
+from robosc_experiments.cycles.isolated import NullMiddleware
+from robosc_experiments.cycles.times import CYCLES, RUNS
 from support.generated import load_system
 
 AIM_CYCLE, AIM_EVENT = "5", "2"

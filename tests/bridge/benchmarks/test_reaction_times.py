@@ -10,7 +10,7 @@ sys.path.append(str(Path(__file__).parents[2] / "benchmarks" / "bridge"))
 
 from reaction import Trial, commands, trials  # A folder of programs, not on the path of tests.
 
-from robosc_bridge.simulated import Record
+from robosc_simulated import Record
 from support.lidar_frames import lds01_frame
 
 # As the fact sheets have them.

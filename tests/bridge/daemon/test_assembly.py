@@ -13,8 +13,8 @@ from robosc_bridge.daemon.assembly import AssemblyError, check_settings, safety_
 from robosc_bridge.daemon.states import State
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.safety import Reason
-from robosc_bridge.simulated import SimulatedTurtleBot3, VirtualHost
-from robosc_bridge.simulated.mavlink_packets import Encoder
+from robosc_simulated import SimulatedTurtleBot3, VirtualHost
+from robosc_simulated.mavlink_packets import Encoder
 from support.certificates import Authority
 from support.daemons import CONFIGURATION
 from support.driven import driven

@@ -18,8 +18,8 @@ from robosc_bridge.daemon.motion import Motion
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.errors import LineDeniedError
 from robosc_bridge.host import Port
-from robosc_bridge.simulated import SimulatedTurtleBot3
-from robosc_bridge.simulated.virtual_host import VirtualHost
+from robosc_simulated import SimulatedTurtleBot3
+from robosc_simulated.virtual_host import VirtualHost
 from support.driven import LIMIT_S, PATIENT, Driven, driven
 from support.robot_faults import BASES, GRAVE, SCAN_TIMEOUTS_S, STATED_S, TABLE, Fault, answer_as, cases, speak, wires
 

@@ -11,7 +11,7 @@ from robosc_bridge.daemon.workers import RESTART_LIMIT, ScannerWorker
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.devices.lidar import make_lds01
 from robosc_bridge.safety import Caution, Reason, SafetyLayer
-from robosc_bridge.simulated import SimulatedTurtleBot3, VirtualHost, Walls, room
+from robosc_simulated import SimulatedTurtleBot3, VirtualHost, Walls, room
 from support.safety import LIMITS, reading
 
 RESTART_S, SILENT_S = 3.0, 0.6

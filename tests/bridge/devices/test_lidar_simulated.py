@@ -12,7 +12,7 @@ import pytest
 from robosc_bridge.devices.interface import BINS, Scan
 from robosc_bridge.devices.lidar import BAUD_TRIAL_S, Lidar, make_lds01, make_lds02, make_lds03
 from robosc_bridge.errors import LineLostError
-from robosc_bridge.simulated import SimulatedTurtleBot3, VirtualHost, Walls, room
+from robosc_simulated import SimulatedTurtleBot3, VirtualHost, Walls, room
 
 MAKERS: dict[str, Callable[..., Lidar[Any]]] = {"lds01": make_lds01, "lds02": make_lds02, "lds03": make_lds03}
 # Of an LDS-02, the correction moves neighbouring points apart where a wall comes nearer: a bin may lie between.

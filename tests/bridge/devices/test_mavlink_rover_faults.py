@@ -16,7 +16,7 @@ from robosc_bridge.errors import (
     LineMissingError,
 )
 from robosc_bridge.protocol.mavlink_signing import Signing
-from robosc_bridge.simulated import SimulatedLine, VirtualHost
+from robosc_simulated import SimulatedLine, VirtualHost
 from support.rovers import BODY, FORWARD, KEY, Bench, rig
 
 

@@ -14,7 +14,7 @@ from robosc_bridge.errors import (
     LineError,
     LineLostError,
 )
-from robosc_bridge.simulated import SimulatedLine, Walls
+from robosc_simulated import SimulatedLine, Walls
 from support.rovers import FORWARD, Bench
 
 

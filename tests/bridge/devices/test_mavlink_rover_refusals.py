@@ -10,7 +10,7 @@ from robosc_bridge.errors import (
     DeviceSilentError,
     WrongDeviceError,
 )
-from robosc_bridge.simulated.rover import AUTO, GUIDED, HOLD, MANUAL
+from robosc_simulated.rover import AUTO, GUIDED, HOLD, MANUAL
 from support.rovers import FORWARD, Bench, rig
 
 

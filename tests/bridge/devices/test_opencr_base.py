@@ -10,7 +10,7 @@ from robosc_bridge.devices.interface import MotorFault, Velocity
 from robosc_bridge.devices.opencr import OpenCrBase
 from robosc_bridge.devices.robots import BURGER, WAFFLE
 from robosc_bridge.errors import DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
-from robosc_bridge.simulated import OpenCr
+from robosc_simulated import OpenCr
 from support.drive import PATIENT_S, Rig, rig
 from support.peer import Answers, VirtualPeer, asked, status
 

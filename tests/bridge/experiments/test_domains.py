@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from robosc_bridge.experiments import domains
-from robosc_bridge.experiments.domains import own_domain
-from robosc_bridge.experiments.ros2 import Ros2
+from robosc_experiments import domains
+from robosc_experiments.domains import own_domain
+from robosc_experiments.ros2 import Ros2
 
 
 def test_two_have_two_domains_and_another_process_a_third(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -20,7 +20,7 @@ def test_two_have_two_domains_and_another_process_a_third(monkeypatch: pytest.Mo
     monkeypatch.setattr(os, "getpid", lambda: 40)
     code = """
         import itertools, os
-        from robosc_bridge.experiments import domains
+        from robosc_experiments import domains
         domains._used, os.getpid = itertools.repeat(0), lambda: 40
         with domains.own_domain() as found:
             print(found)

@@ -12,8 +12,8 @@ import pytest
 
 from robosc.cli.main import guarded, make_parser
 from robosc.cli.plugins import Plugin
-from robosc_bridge.experiments import evaluate
-from robosc_bridge.experiments.scenario import Outcome, ScenarioError
+from robosc_experiments import evaluate
+from robosc_experiments.scenario import Outcome, ScenarioError
 from support.models import EXAMPLES
 from support.recorded_runs import recorded
 
@@ -35,7 +35,7 @@ def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ..
         raise ScenarioError("ROS 1 is not installed")
 
     for name, function in (("maze", run), ("line", run), ("ros1", fail)):
-        module = ModuleType(f"robosc_bridge.experiments.{name}")
+        module = ModuleType(f"robosc_experiments.{name}")
         vars(module).update(run_maze=function, run_line=function, MODEL=EXAMPLES / "maze_solver" / "maze_solver.rscd")
         monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setattr(evaluate, "_sizes", _sizes)

@@ -1,7 +1,7 @@
 """Lines of code, counted by hand beside."""
 
 from robosc.source import Bundle, SourceFile
-from robosc_bridge.experiments.lines_of_code import CodeSize, count_lines, model_size, target_sizes
+from robosc_experiments.lines_of_code import CodeSize, count_lines, model_size, target_sizes
 from support.generated import example_supervisor
 
 PYTHON = '''#!/usr/bin/env python3

@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from robosc_bridge.experiments import processes
-from robosc_bridge.experiments.processes import Program, finish, interruptible
-from robosc_bridge.experiments.scenario import ScenarioError
+from robosc_experiments import processes
+from robosc_experiments.processes import Program, finish, interruptible
+from robosc_experiments.scenario import ScenarioError
 from support.waiting import wait_until
 
 LIMIT_S = 30.0
@@ -109,7 +109,7 @@ def test_a_program_ends_politely_when_who_runs_it_is_killed(tmp_path: Path) -> N
     text = f"""
         import time
         from pathlib import Path
-        from robosc_bridge.experiments.processes import Program
+        from robosc_experiments.processes import Program
         with Program("robot", {script(tmp_path, ending, "robot.py")!r}, Path({str(tmp_path)!r})) as program:
             program.wait_for("^ready$")
             print(program._used.pid, flush=True)
@@ -159,7 +159,7 @@ def test_a_signal_stops_programs_and_a_second_one_changes_nothing(number: signal
     text = f"""
         import time
         from pathlib import Path
-        from robosc_bridge.experiments.processes import Program, interruptible
+        from robosc_experiments.processes import Program, interruptible
         code = {SLOW!r}
         try:
             with interruptible(), Program("slow", ("-c", code), Path({str(tmp_path)!r})) as program:

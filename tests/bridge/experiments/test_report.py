@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from robosc_bridge.experiments.cycles.times import CycleTimes
-from robosc_bridge.experiments.evaluate import reported
-from robosc_bridge.experiments.lines_of_code import CodeSize
-from robosc_bridge.experiments.report import FailedRun, Report, ReportedRun, machine_facts, write_report
-from robosc_bridge.experiments.scenario import ScenarioError
+from robosc_experiments.cycles.times import CycleTimes
+from robosc_experiments.evaluate import reported
+from robosc_experiments.lines_of_code import CodeSize
+from robosc_experiments.report import FailedRun, Report, ReportedRun, machine_facts, write_report
+from robosc_experiments.scenario import ScenarioError
 from support.recorded_runs import recorded
 
 NAMES = ("report.html", "report.md", "scenarios.csv", "figures.csv", "cycles.csv", "lines_of_code.csv")

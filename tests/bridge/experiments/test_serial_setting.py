@@ -9,11 +9,11 @@ from robosc.model import check
 from robosc.model.structure import Deployment
 from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.daemon.assembly import check_settings
-from robosc_bridge.experiments import line, maze
-from robosc_bridge.experiments.maze import run_maze
-from robosc_bridge.experiments.scenario import ScenarioError
-from robosc_bridge.experiments.serial import FASTEST, SLOWEST, Setting, configuration, scene_of
-from robosc_bridge.experiments.tail import LineCount, latest
+from robosc_experiments import line, maze
+from robosc_experiments.maze import run_maze
+from robosc_experiments.scenario import ScenarioError
+from robosc_experiments.serial import FASTEST, SLOWEST, Setting, configuration, scene_of
+from robosc_experiments.tail import LineCount, latest
 
 
 def quiet(text: str) -> None:

@@ -18,7 +18,7 @@ from robosc_bridge.ground_station.session import STATION_LIMIT_S
 from robosc_bridge.ground_station.settings import GroundSettings
 from robosc_bridge.host import NetworkPort
 from robosc_bridge.protocol.mavlink_signing import Signing
-from robosc_bridge.simulated import VirtualHost
+from robosc_simulated import VirtualHost
 from support.ground import KEY, PlayedDaemon, Station, of_type
 
 FASTEST = Velocity(0.2, 2.0)

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import Faults, SimulatedTurtleBot3, scene_names
-from robosc_bridge.simulated.__main__ import main
-from robosc_bridge.simulated.commands import UnknownCommandError, obey
+from robosc_simulated import Faults, SimulatedTurtleBot3, scene_names
+from robosc_simulated.__main__ import main
+from robosc_simulated.commands import UnknownCommandError, obey
 
 
 def test_scenes_are_listed(capsys: pytest.CaptureFixture[str]) -> None:

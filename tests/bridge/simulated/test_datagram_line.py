@@ -7,8 +7,8 @@ from contextlib import contextmanager
 import pytest
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import DatagramLine, Timebase
-from robosc_bridge.simulated.line import Sending
+from robosc_simulated import DatagramLine, Timebase
+from robosc_simulated.line import Sending
 from support.waiting import PATIENCE_S, wait_until
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from robosc_bridge.simulated import OpenCr
-from robosc_bridge.simulated.__main__ import main
-from robosc_bridge.simulated.error_monitor import ErrorMonitor
-from robosc_bridge.simulated.output import Output
+from robosc_simulated import OpenCr
+from robosc_simulated.__main__ import main
+from robosc_simulated.error_monitor import ErrorMonitor
+from robosc_simulated.output import Output
 
 FULL = Path("/dev/full")
 

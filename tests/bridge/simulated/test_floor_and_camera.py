@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robosc_bridge.simulated import Mount, PinholeCamera, Scene, Track, Walls, oval, parse_track
-from robosc_bridge.simulated.floor import SHADE as LINE
-from robosc_bridge.simulated.floor import Point
-from robosc_bridge.simulated.pinhole_camera import DISTANCE, ground_points
-from robosc_bridge.simulated.textures import PLAIN
+from robosc_simulated import Mount, PinholeCamera, Scene, Track, Walls, oval, parse_track
+from robosc_simulated.floor import SHADE as LINE
+from robosc_simulated.floor import Point
+from robosc_simulated.pinhole_camera import DISTANCE, ground_points
+from robosc_simulated.textures import PLAIN
 from support.effort import examples
 
 FLOOR = PLAIN.shade
@@ -63,7 +63,7 @@ def test_a_track_is_drawn_as_a_slow_twin_draws_it(points: list[Point], width_m: 
 
 def test_many_pieces_are_drawn_part_by_part(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = oval()
-    monkeypatch.setattr("robosc_bridge.simulated.floor._COLUMNS_AT_ONCE", 40)
+    monkeypatch.setattr("robosc_simulated.floor._COLUMNS_AT_ONCE", 40)
     assert (oval()._is_line == whole._is_line).all()
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from robosc_bridge.errors import LineLostError
-from robosc_bridge.simulated import SimulatedTurtleBot3, VirtualHost, room
-from robosc_bridge.simulated.lidar_frames import crc8, lds01_frame, lds02_frame, lds03_frame, lds03_identity
+from robosc_simulated import SimulatedTurtleBot3, VirtualHost, room
+from robosc_simulated.lidar_frames import crc8, lds01_frame, lds02_frame, lds03_frame, lds03_identity
 from support.wire import Host
 
 BAUDS = {"lds01": 230_400, "lds02": 115_200, "lds03": 230_400}

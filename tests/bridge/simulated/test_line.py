@@ -9,7 +9,7 @@ import pytest
 import serial
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import SimulatedTurtleBot3, VirtualHost
+from robosc_simulated import SimulatedTurtleBot3, VirtualHost
 from support.descriptors import open_descriptors
 from support.waiting import wait_until
 from support.wire import Host

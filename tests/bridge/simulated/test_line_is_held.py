@@ -5,9 +5,9 @@ import math
 import pytest
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import BODIES, Mount, PinholeCamera, Timebase, World, load_scene
 from robosc_bridge.skills.line import LineDetector
 from robosc_bridge.skills.settings import LineSettings
+from robosc_simulated import BODIES, Mount, PinholeCamera, Timebase, World, load_scene
 
 PICTURES_HZ = 10.0
 SPEED_M_S = 0.15

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from robosc_bridge.simulated.mavlink_packets import BY_NAME, LAYOUTS, Encoder, Layout, Parser
+from robosc_simulated.mavlink_packets import BY_NAME, LAYOUTS, Encoder, Layout, Parser
 
 KEY = bytes(range(32))
 WORKED: dict[str, tuple[str, dict[str, Any]]] = {

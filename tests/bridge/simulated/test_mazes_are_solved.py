@@ -2,7 +2,7 @@
 
 import pytest
 
-from robosc_bridge.simulated import Scene, load_scene, maze_scene
+from robosc_simulated import Scene, load_scene, maze_scene
 from support.maze_solver import MazeSolver
 
 # A way through a maze of n cells is at most 2 n cells long: 10 s each, and as much for turns.

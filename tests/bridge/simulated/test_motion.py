@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import (
+from robosc_simulated import (
     BODIES,
     Goal,
     Motion,
@@ -30,9 +30,9 @@ from robosc_bridge.simulated import (
     read_motion,
     room,
 )
-from robosc_bridge.simulated.map_picture import draw_map
-from robosc_bridge.simulated.motion import Sample
-from robosc_bridge.simulated.motion_checks import Halt, check_line, check_maze, lateral_errors_m, way_m
+from robosc_simulated.map_picture import draw_map
+from robosc_simulated.motion import Sample
+from robosc_simulated.motion_checks import Halt, check_line, check_maze, lateral_errors_m, way_m
 
 YARD = Scene(
     "yard",

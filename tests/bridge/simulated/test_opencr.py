@@ -9,7 +9,7 @@ import pytest
 from dynamixel_sdk import PacketHandler
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import Noise, OpenCr, Scene, SimulatedTurtleBot3, Walls
+from robosc_simulated import Noise, OpenCr, Scene, SimulatedTurtleBot3, Walls
 from support.wire import SdkPort
 
 OPEN_SPACE = Walls(())

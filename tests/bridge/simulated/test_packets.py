@@ -5,8 +5,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import BODIES, OpenCr, ServoBus, Timebase, Walls, World, wheel_servos
-from robosc_bridge.simulated.packets import Request, RequestParser, crc16, status
+from robosc_simulated import BODIES, OpenCr, ServoBus, Timebase, Walls, World, wheel_servos
+from robosc_simulated.packets import Request, RequestParser, crc16, status
 from support.effort import examples
 
 SDK = PacketHandler(2.0)

@@ -5,8 +5,8 @@ import os
 import pytest
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import SimulatedTurtleBot3
-from robosc_bridge.simulated.timebase import Timebase
+from robosc_simulated import SimulatedTurtleBot3
+from robosc_simulated.timebase import Timebase
 
 
 def test_time_passes_until_the_patience_is_over_and_goes_on_when_the_host_is_heard() -> None:

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc_bridge.simulated.ros.rospy_side import frames as frames_module
-from robosc_bridge.simulated.ros.rospy_side.frames import MOST_DATA, MOST_HEAD, Decoder, Frame, FrameError, encode
+from robosc_simulated.ros.rospy_side import frames as frames_module
+from robosc_simulated.ros.rospy_side.frames import MOST_DATA, MOST_HEAD, Decoder, Frame, FrameError, encode
 
 VALUES = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=8)
 HEADS = st.builds(

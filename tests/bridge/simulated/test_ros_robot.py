@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import BODIES, Timebase, Walls, World, oval, room
-from robosc_bridge.simulated.commands import UnknownCommandError
-from robosc_bridge.simulated.ros import ros1
-from robosc_bridge.simulated.ros.commands import HELP, obey
-from robosc_bridge.simulated.ros.readings import Battery, Clock, Odometry, Picture, Reading, Scan
-from robosc_bridge.simulated.ros.robot import RosRobot
-from robosc_bridge.simulated.ros.serving import LONGEST_S, PacedClock, Pacer, make_robot, parser
-from robosc_bridge.simulated.scene import Noise, Obstacle, Scene, SceneError
+from robosc_simulated import BODIES, Timebase, Walls, World, oval, room
+from robosc_simulated.commands import UnknownCommandError
+from robosc_simulated.ros import ros1
+from robosc_simulated.ros.commands import HELP, obey
+from robosc_simulated.ros.readings import Battery, Clock, Odometry, Picture, Reading, Scan
+from robosc_simulated.ros.robot import RosRobot
+from robosc_simulated.ros.serving import LONGEST_S, PacedClock, Pacer, make_robot, parser
+from robosc_simulated.scene import Noise, Obstacle, Scene, SceneError
 
 STEP_S = 0.01
 

@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import BODIES, Rover, Timebase, Walls, World
-from robosc_bridge.simulated.mavlink_packets import Encoder, Packet, Parser
-from robosc_bridge.simulated.rover import ACCEPTED, DENIED, FAILED, GUIDED, HOLD, MANUAL, UNSUPPORTED
+from robosc_simulated import BODIES, Rover, Timebase, Walls, World
+from robosc_simulated.mavlink_packets import Encoder, Packet, Parser
+from robosc_simulated.rover import ACCEPTED, DENIED, FAILED, GUIDED, HOLD, MANUAL, UNSUPPORTED
 
 
 class Station:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robosc_bridge.simulated import (
+from robosc_simulated import (
     Goal,
     Noise,
     Obstacle,
@@ -20,8 +20,8 @@ from robosc_bridge.simulated import (
     scene_names,
     spline,
 )
-from robosc_bridge.simulated.scene import parse_scene
-from robosc_bridge.simulated.scene_file import (
+from robosc_simulated.scene import parse_scene
+from robosc_simulated.scene_file import (
     FloorPart,
     GoalPart,
     LinePart,
@@ -31,7 +31,7 @@ from robosc_bridge.simulated.scene_file import (
     PosePart,
     WallsPart,
 )
-from robosc_bridge.simulated.textures import Texture
+from robosc_simulated.textures import Texture
 from support.effort import examples
 
 WHOLE = """\

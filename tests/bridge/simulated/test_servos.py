@@ -8,7 +8,7 @@ import pytest
 from dynamixel_sdk import GroupBulkRead, GroupBulkWrite, GroupSyncRead, GroupSyncWrite, PacketHandler
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import HardwareError, Servo, SimulatedTurtleBot3, Walls
+from robosc_simulated import HardwareError, Servo, SimulatedTurtleBot3, Walls
 from support.wire import SdkPort
 
 OPEN_SPACE = Walls(())

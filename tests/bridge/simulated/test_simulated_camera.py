@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import (
+from robosc_simulated import (
     BODIES,
     Scene,
     SimulatedCamera,
@@ -21,8 +21,8 @@ from robosc_bridge.simulated import (
     World,
     oval,
 )
-from robosc_bridge.simulated.commands import UnknownCommandError, obey
-from robosc_bridge.simulated.floor import SHADE as LINE
+from robosc_simulated.commands import UnknownCommandError, obey
+from robosc_simulated.floor import SHADE as LINE
 from support.descriptors import open_descriptors
 
 HEAD = b"P5 160 120 255\n"

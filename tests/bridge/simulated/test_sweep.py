@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import BODIES, Timebase, Walls, World, load_scene, maze, maze_scene, room
-from robosc_bridge.simulated.discs import Discs
-from robosc_bridge.simulated.sweep import BEAMS, Sweep
-from robosc_bridge.simulated.walls import Floats
+from robosc_simulated import BODIES, Timebase, Walls, World, load_scene, maze, maze_scene, room
+from robosc_simulated.discs import Discs
+from robosc_simulated.sweep import BEAMS, Sweep
+from robosc_simulated.walls import Floats
 from support.effort import examples
 
 NOTHING = Discs(())

@@ -6,8 +6,8 @@ import pytest
 from dynamixel_sdk import GroupSyncWrite, PacketHandler
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import BASES, BODIES, LIDARS, SimulatedTurtleBot3, VirtualHost, Walls
-from robosc_bridge.simulated.servo import Servo
+from robosc_simulated import BASES, BODIES, LIDARS, SimulatedTurtleBot3, VirtualHost, Walls
+from robosc_simulated.servo import Servo
 from support.wire import Host, SdkPort
 
 

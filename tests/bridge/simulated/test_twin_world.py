@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import (
+from robosc_bridge.skills.line import line_offset
+from robosc_bridge.skills.settings import LineSettings
+from robosc_simulated import (
     BODIES,
     Goal,
     Mount,
@@ -26,11 +28,9 @@ from robosc_bridge.simulated import (
     maze_scene,
     room,
 )
-from robosc_bridge.simulated.commands import UnknownCommandError, obey
-from robosc_bridge.simulated.discs import Discs
-from robosc_bridge.simulated.world import STEP_S, WorldEvent
-from robosc_bridge.skills.line import line_offset
-from robosc_bridge.skills.settings import LineSettings
+from robosc_simulated.commands import UnknownCommandError, obey
+from robosc_simulated.discs import Discs
+from robosc_simulated.world import STEP_S, WorldEvent
 from support.effort import examples
 
 SIZES = st.floats(-5, 5, allow_nan=False)

@@ -10,7 +10,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import (
+from robosc_bridge.skills.line import line_offset
+from robosc_bridge.skills.settings import LineSettings
+from robosc_simulated import (
     BODIES,
     Mount,
     Noise,
@@ -25,11 +27,9 @@ from robosc_bridge.simulated import (
     maze,
     room,
 )
-from robosc_bridge.simulated.pinhole_camera import DISTANCE
-from robosc_bridge.simulated.scene import parse_scene
-from robosc_bridge.simulated.textures import PLAIN, Shades
-from robosc_bridge.skills.line import line_offset
-from robosc_bridge.skills.settings import LineSettings
+from robosc_simulated.pinhole_camera import DISTANCE
+from robosc_simulated.scene import parse_scene
+from robosc_simulated.textures import PLAIN, Shades
 
 WALL, FLOOR = 130, PLAIN.shade
 # Of the way to a thing and of its edges: within it, rounding decides.

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc_bridge.simulated.values import coordinate, number, option, seed, together, voltage, whole
+from robosc_simulated.values import coordinate, number, option, seed, together, voltage, whole
 
 
 @given(st.floats())

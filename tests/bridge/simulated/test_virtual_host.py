@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc_bridge.errors import LineBusyError, LineLostError, LineMissingError
-from robosc_bridge.simulated import VirtualHost, VirtualTimeError
+from robosc_simulated import VirtualHost, VirtualTimeError
 from support.effort import examples
 
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from robosc_bridge.errors import LineBusyError, LineLostError, LineMissingError
-from robosc_bridge.simulated import VirtualHost
+from robosc_simulated import VirtualHost
 
 
 def test_datagrams_come_whole_and_in_order_to_who_listens() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_bridge.simulated import SimulatedTurtleBot3
+from robosc_simulated import SimulatedTurtleBot3
 from support.wire import Host
 
 OK_200 = "ff ff fd 00 c8 04 00 55 00 19 2d"

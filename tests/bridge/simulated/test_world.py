@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc.execution.runtime.clock import ManualClock, SystemClock
-from robosc_bridge.simulated import BODIES, Timebase, Walls, World, maze, parse_walls, room
-from robosc_bridge.simulated.world import STEP_S
+from robosc_simulated import BODIES, Timebase, Walls, World, maze, parse_walls, room
+from robosc_simulated.world import STEP_S
 
 SIZES = st.floats(-5, 5, allow_nan=False)
 MILLIMETRES = SIZES.map(lambda size: round(size, 3))

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from robosc_bridge.host import Thread
-from robosc_bridge.simulated import VirtualHost
 from robosc_bridge.terminal.client import DriveTopic, RefusedError, RequestedCommand, UnreachableError
 from robosc_bridge.terminal.teleop import (
     ANGULAR_RAD_S,
@@ -21,6 +20,7 @@ from robosc_bridge.terminal.teleop import (
     drive,
     keys_of,
 )
+from robosc_simulated import VirtualHost
 
 
 class TestKeys:

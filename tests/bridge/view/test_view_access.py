@@ -13,13 +13,14 @@ import pytest
 
 from robosc_api.security import ServerSecurity
 from robosc_bridge.daemon.states import Command
-from robosc_bridge.view import ViewEndpoint, ViewError, ViewSettings
-from robosc_bridge.view import broadcaster as hub_module
-from robosc_bridge.view import server as server_module
-from robosc_bridge.view.access import Access
-from robosc_bridge.view.page_files import FOLDER, TOKEN_PLACE, read_page
-from robosc_bridge.view.requests import MAXIMUM_BYTES
-from robosc_bridge.view.server import BURST, MAXIMUM_VIEWERS, answer_headers
+from robosc_bridge.daemon.view_settings import ViewSettings
+from robosc_view import ViewEndpoint, ViewError
+from robosc_view import broadcaster as hub_module
+from robosc_view import server as server_module
+from robosc_view.access import Access
+from robosc_view.page_files import FOLDER, TOKEN_PLACE, read_page
+from robosc_view.requests import MAXIMUM_BYTES
+from robosc_view.server import BURST, MAXIMUM_VIEWERS, answer_headers
 from support.certificates import Authority
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
 from support.pages_open import LIMIT_S, opened, token_of

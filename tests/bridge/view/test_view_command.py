@@ -16,7 +16,8 @@ from robosc.execution.runtime.event_log import json_line
 from robosc_api.security import add_client_arguments
 from robosc_bridge.configuration import parse
 from robosc_bridge.daemon.endpoints import is_remote, is_startable
-from robosc_bridge.view import ADDRESS, command, settings_of
+from robosc_bridge.daemon.view_settings import ADDRESS, settings_of
+from robosc_view import command
 from support.hostile_models import products
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
 from support.pages_open import opened
@@ -122,7 +123,7 @@ def test_a_bridge_is_reached_as_by_the_commands_of_a_terminal() -> None:
 
 
 def test_help_loads_no_server() -> None:
-    code = "import sys, robosc_bridge.view.command; print({'grpc', 'aiohttp', 'igraph', 'rclpy'} & set(sys.modules))"
+    code = "import sys, robosc_view.command; print({'grpc', 'aiohttp', 'igraph', 'rclpy'} & set(sys.modules))"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "set()"
 

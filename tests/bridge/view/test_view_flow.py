@@ -11,8 +11,8 @@ import pytest
 
 from robosc.execution.runtime.event_log import plain
 from robosc_bridge.remote import RemoteSettings, serve
-from robosc_bridge.view import server as server_module
-from robosc_bridge.view.broadcaster import MAXIMUM_EVENTS
+from robosc_view import server as server_module
+from robosc_view.broadcaster import MAXIMUM_EVENTS
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
 from support.pages_open import LIMIT_S, OpenPage, opened
 from support.view_servers import remotely_viewed

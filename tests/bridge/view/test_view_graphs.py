@@ -7,7 +7,7 @@ from typing import Any
 import hypothesis.strategies as st
 from hypothesis import given, settings
 
-from robosc_bridge.view.graphs import (
+from robosc_view.graphs import (
     CHARACTER,
     LINE,
     MAXIMUM_EDGES,

@@ -3,8 +3,9 @@
 from pathlib import Path
 
 from robosc.explanation.blocked import MAXIMUM_REASONS
+from robosc_bridge.daemon.view_settings import ADDRESS
 from robosc_bridge.remote.convert import MAXIMUM_SUPERVISOR_BYTES
-from robosc_bridge.view import ADDRESS, broadcaster, graphs, remote_bridge, requests, ros2_topic, server
+from robosc_view import broadcaster, graphs, remote_bridge, requests, ros2_topic, server
 
 DOCS = Path(__file__).parents[3] / "docs"
 PAGE = (DOCS / "live-view.md").read_text(encoding="utf-8")

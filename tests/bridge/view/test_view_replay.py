@@ -13,11 +13,11 @@ from hypothesis import given, settings
 
 from robosc.event_logs import LoggedRun, read_log
 from robosc.execution.runtime.event_log import json_line, plain
-from robosc_bridge.view import ViewError
-from robosc_bridge.view.broadcaster import Viewer
-from robosc_bridge.view.messages import events_text
-from robosc_bridge.view.replay import HISTORY, MAXIMUM_STOPS, Player, Recording, Replay
-from robosc_bridge.view.sources import Pause, Play, Seek
+from robosc_view import ViewError
+from robosc_view.broadcaster import Viewer
+from robosc_view.messages import events_text
+from robosc_view.replay import HISTORY, MAXIMUM_STOPS, Player, Recording, Replay
+from robosc_view.sources import Pause, Play, Seek
 from support.effort import examples
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
 from support.pages_open import opened

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from robosc.supervisor import Supervisor
-from robosc_bridge.view.definition import DefinitionError
-from robosc_bridge.view.messages import MessageBuilder, PreparedRobot
-from robosc_bridge.view.ros2_topic import MAXIMUM_CHARACTERS, StateReader
+from robosc_view.definition import DefinitionError
+from robosc_view.messages import MessageBuilder, PreparedRobot
+from robosc_view.ros2_topic import MAXIMUM_CHARACTERS, StateReader
 from support.live import large_model, supervisor_without_synthesis
 from support.view_nodes import Node
 

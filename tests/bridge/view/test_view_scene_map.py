@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from robosc_bridge.simulated import World, load_scene
-from robosc_bridge.simulated.robots import BODIES
-from robosc_bridge.simulated.timebase import Timebase
-from robosc_bridge.view.scene_map import scene_map
-from robosc_bridge.view.sources import ViewError
+from robosc_simulated import World, load_scene
+from robosc_simulated.robots import BODIES
+from robosc_simulated.timebase import Timebase
+from robosc_view.scene_map import scene_map
+from robosc_view.sources import ViewError
 
 SCENE = """
 start: {x_m: 1.0, y_m: 2.0, heading_deg: 90}

@@ -20,9 +20,9 @@ import pytest
 
 from robosc_bridge.daemon import served_endpoint
 from robosc_bridge.daemon.states import Command
-from robosc_bridge.view import ViewEndpoint
-from robosc_bridge.view import server as server_module
-from robosc_bridge.view.server import BURST
+from robosc_view import ViewEndpoint
+from robosc_view import server as server_module
+from robosc_view.server import BURST
 from support.held_time import HeldLoop
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
 from support.pages_open import LIMIT_S, opened

@@ -10,13 +10,13 @@ from robosc.execution.interpreter import InterpretedSystem
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.daemon.states import Command, State
 from robosc_bridge.remote import RemoteSettings, convert, serve
-from robosc_bridge.view import broadcaster as hub_module
-from robosc_bridge.view.definition import DefinitionError
-from robosc_bridge.view.messages import NOT_EXECUTED, NOT_KNOWN, MessageBuilder, PreparedRobot, entry_text
-from robosc_bridge.view.remote_bridge import robot_told
-from robosc_bridge.view.reports import EventBatch, Status
-from robosc_bridge.view.running import RunningBridge
-from robosc_bridge.view.sources import RefusedError
+from robosc_view import broadcaster as hub_module
+from robosc_view.definition import DefinitionError
+from robosc_view.messages import NOT_EXECUTED, NOT_KNOWN, MessageBuilder, PreparedRobot, entry_text
+from robosc_view.remote_bridge import robot_told
+from robosc_view.reports import EventBatch, Status
+from robosc_view.running import RunningBridge
+from robosc_view.sources import RefusedError
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
 from support.pages_open import opened, token_of
 from support.view_servers import remotely_viewed, served

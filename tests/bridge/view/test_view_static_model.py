@@ -13,10 +13,10 @@ import pytest
 from robosc.cli.arguments import Parser
 from robosc.supervisor import Supervisor, encode
 from robosc_bridge.daemon.states import Command
-from robosc_bridge.view import command, static_model
-from robosc_bridge.view.reports import SourceKind
-from robosc_bridge.view.sources import Pause, RefusedError
-from robosc_bridge.view.static_model import NoSupervisorError, StaticModel, file_digest, read, synthesized
+from robosc_view import command, static_model
+from robosc_view.reports import SourceKind
+from robosc_view.sources import Pause, RefusedError
+from robosc_view.static_model import NoSupervisorError, StaticModel, file_digest, read, synthesized
 from support.live import large_model, supervisor_without_synthesis
 from support.models import EXAMPLES
 from support.pages_open import opened

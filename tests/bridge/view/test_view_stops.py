@@ -10,7 +10,7 @@ import pytest
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.remote import RemoteSettings, serve
 from robosc_bridge.terminal import client
-from robosc_bridge.view import remote_bridge
+from robosc_view import remote_bridge
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
 from support.pages_open import LIMIT_S, OpenPage, opened
 from support.view_servers import remotely_viewed

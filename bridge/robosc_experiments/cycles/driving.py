@@ -1,0 +1,118 @@
+"""Cycles of a generated controller that drives: what it publishes goes through real middleware to another process."""
+
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from robosc.model.structure import Communication, CommunicationKind, Model
+from robosc.supervisor import Supervisor
+from robosc.targets.c99.layout import make_layout
+from robosc.targets.cpp.model import fill_name
+from robosc_experiments.cycles.isolated import SCRIPTS, write_unit
+from robosc_experiments.cycles.times import LIMIT_S, OTHER, Samples, free_way
+from robosc_experiments.processes import Program
+from robosc_experiments.ros import Middleware
+from robosc_experiments.ros1 import Ros1
+from robosc_experiments.ros2 import Ros2
+from robosc_experiments.scenario import ScenarioError
+
+VELOCITIES = "/cmd_vel"
+TOPIC = "/robosc_evaluation/cmd_vel"
+"""Topic of its own: no robot listens there."""
+
+_HEADER = Path("/usr/include/ros/ros.h")
+_LIBRARIES = ("roscpp", "rosconsole", "roscpp_serialization", "rostime", "xmlrpcpp", "boost_system", "pthread", "m")
+_FLAGS = ("-O2", "-ffp-contract=off")
+
+
+def measured_driving(middleware: str, experiment: str, supervisor: Supervisor, runs: int, cycles: int) -> Samples | str:
+    """Measure a controller that publishes velocities.
+
+    Args:
+        middleware: `rclpy`, `rospy` or `roscpp`.
+        experiment: `maze` or `line`.
+        supervisor: Supervisor of the controller.
+        runs: Number of runs.
+        cycles: Number of cycles in each run.
+
+    Returns:
+        Seconds of each `cycle` and of each `publish` alone; or the reason why there are none.
+    """
+    move = _mover(supervisor.model)
+    if move is None:
+        return "its model sends no velocities"
+    ros = Ros2() if middleware == "rclpy" else Ros1()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        try:
+            if middleware == "roscpp":
+                command = _compiled(experiment, supervisor, move, folder)
+            else:
+                command = _interpreted(middleware, ros, experiment, supervisor, folder)
+            return _run(ros, middleware, [*command, str(runs), str(cycles)], folder)
+        except subprocess.CalledProcessError as error:
+            return f"it failed: {(error.stderr.strip().splitlines() or ['without a word'])[-1]}"[:300]
+        except (ScenarioError, OSError, ValueError, IndexError, subprocess.SubprocessError) as error:
+            return (str(error).splitlines() or ["it failed"])[0][:300]
+
+
+def _mover(model: Model) -> Communication | None:
+    """The first message that sets velocities."""
+    kind = CommunicationKind.INCOMING_MESSAGE
+    return next((item for item in model.communications if (item.kind, item.identifier) == (kind, VELOCITIES)), None)
+
+
+def _interpreted(
+    middleware: str, ros: Middleware, experiment: str, supervisor: Supervisor, folder: Path
+) -> Sequence[str]:
+    unit = write_unit(supervisor, "python", folder / "unit")
+    identifier, data, _ = OTHER[experiment]
+    comes = json.dumps({"first": [identifier, data], "ranges": free_way()})
+    return (ros.interpreter or sys.executable, str(SCRIPTS / "driving.py"), middleware, TOPIC, str(unit), comes)
+
+
+def _compiled(experiment: str, supervisor: Supervisor, move: Communication, folder: Path) -> Sequence[str]:
+    gcc, gxx = shutil.which("gcc"), shutil.which("g++")
+    if gcc is None or gxx is None or not _HEADER.exists():
+        raise ScenarioError("gcc, g++ or roscpp is not installed")
+    unit = write_unit(supervisor, "ros1-cpp", folder / "unit")
+    layout = make_layout(supervisor)
+    filled = {
+        "p": unit.stem,
+        "communication": layout.communications[move.name],
+        "fill": fill_name(layout, move),
+        "first": OTHER[experiment][2],
+        "topic": TOPIC,
+        "ranges": ", ".join(map(repr, free_way())),
+    }
+    text = (SCRIPTS / "driving.cpp").read_text(encoding="utf-8")
+    for place, other in filled.items():
+        text = text.replace(f"@{place}@", other)
+    (unit.parent / "driving.cpp").write_text(text, encoding="utf-8")
+    libraries = [f"-l{name}" for name in _LIBRARIES]
+    for command in (
+        [gcc, "-std=c99", *_FLAGS, "-c", unit.name, "-o", "unit.o"],
+        [gxx, "-std=c++17", *_FLAGS, "driving.cpp", "unit.o", *libraries, "-o", "driving"],
+    ):
+        subprocess.run(  # noqa: S603
+            command, cwd=unit.parent, check=True, capture_output=True, text=True, timeout=LIMIT_S
+        )
+    return (str(unit.parent / "driving"),)
+
+
+def _run(ros: Middleware, middleware: str, command: Sequence[str], folder: Path) -> Samples:
+    """Run the program with a subscriber beside it, and return the content of the last line that it prints."""
+    with ros.running(folder) as variables:
+        theirs: Mapping[str, str] = ros.of_nodes(variables)
+        kind = "rclpy" if middleware == "rclpy" else "rospy"
+        arguments = (str(SCRIPTS / "subscriber.py"), kind, TOPIC)
+        with Program("subscriber", arguments, folder, interpreter=ros.interpreter, variables=theirs):
+            done = subprocess.run(  # noqa: S603
+                command, env=dict(theirs), capture_output=True, text=True, timeout=LIMIT_S, check=True
+            )
+    found: Samples = json.loads(done.stdout.splitlines()[-1])
+    return found

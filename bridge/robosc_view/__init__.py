@@ -1,0 +1,25 @@
+"""The live view: a web page that shows a robot under its supervisor, as it works or as a log tells it.
+
+Sources (a bridge in this process or over gRPC, the topic `/state` of a ROS 2 node, an event log) tell what happens in
+one form; a server hands it to all pages that are open. The page itself lies in the folder `page`. aiohttp and igraph
+come with the extra `view`; they are imported only where a page is served. The names here are imported on use, so that
+the command line can tell of the command without loading any of it.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from robosc_view.endpoint import ViewEndpoint
+    from robosc_view.sources import ViewError
+
+_HOMES = {"ViewEndpoint": "endpoint", "ViewError": "sources"}
+
+__all__ = ["ViewEndpoint", "ViewError"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from its module on first use."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)

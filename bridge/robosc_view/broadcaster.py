@@ -1,0 +1,305 @@
+"""From one source to all who look: the latest state, and every entry once, however slowly somebody reads.
+
+All of it lives in the event loop of the server. A source runs as long as somebody looks; one that is lost is told, and
+tried again after a while that grows.
+"""
+
+import asyncio
+import contextlib
+import logging
+from collections import deque
+from collections.abc import Mapping
+
+from robosc_view.definition import Robot
+from robosc_view.messages import MessageBuilder, PreparedRobot, events_text, gone_text, position_text, scan_text
+from robosc_view.reports import EventBatch, LaserScan, Status
+from robosc_view.sources import Source, SourceLostError, SourceWrongError
+
+_log = logging.getLogger(__name__)
+
+MAXIMUM_EVENTS = 2000
+"""Entries that wait for one who looks."""
+
+MAXIMUM_BYTES = 2 * 1024 * 1024
+"""Maximum size of the entries that wait for a viewer, in bytes."""
+
+MAXIMUM_ANSWERS = 50
+"""Answers that wait for one who asks; the oldest are forgotten."""
+
+UPDATE_S, SIGN_OF_LIFE_S = 0.05, 1.0
+"""Least and longest time between two updates."""
+
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 10.0
+"""Before a source is tried again."""
+
+_GOOD_S = 5.0
+"""A source that lasted so long is tried again at once as if it were the first time."""
+
+
+class Viewer:
+    """Messages that one viewer has not been sent yet."""
+
+    def __init__(self) -> None:
+        self._news = asyncio.Event()
+        self._definition: str | None = None
+        self._gone: str | None = None
+        self._update: str | None = None
+        self._scan: str | None = None
+        self._position: str | None = None
+        self._answers: deque[str] = deque(maxlen=MAXIMUM_ANSWERS)
+        self._events: deque[str] = deque()
+        self._bytes = 0
+        self._lost = 0
+
+    def define(self, text: str) -> None:
+        """Another robot: what was told of the one before is of no use any more."""
+        self._lost += len(self._events)
+        self._events.clear()
+        self._bytes = 0
+        self._gone = self._update = self._scan = self._position = None
+        self._definition = text
+        self._news.set()
+
+    def lose(self, text: str) -> None:
+        """The source is lost, until there is a robot again."""
+        self._gone = text
+        self._news.set()
+
+    def jump(self) -> None:
+        """The replay is elsewhere: what waits was told of another place."""
+        self._events.clear()
+        self._bytes = self._lost = 0
+        self._update = self._scan = None
+
+    def show(self, text: str) -> None:
+        """The latest update."""
+        self._update = text
+        self._news.set()
+
+    def scanned(self, text: str) -> None:
+        """The latest scan."""
+        self._scan = text
+        self._news.set()
+
+    def moved(self, text: str) -> None:
+        """The latest position."""
+        self._position = text
+        self._news.set()
+
+    def answer(self, text: str) -> None:
+        """Something that is told this one alone."""
+        self._answers.append(text)
+        self._news.set()
+
+    def happened(self, entries: list[str], lost: int) -> None:
+        """Entries; the oldest are dropped and counted where too many wait."""
+        self._lost += lost
+        for entry in entries:
+            self._events.append(entry)
+            self._bytes += len(entry)
+        while len(self._events) > MAXIMUM_EVENTS or self._bytes > MAXIMUM_BYTES:
+            self._bytes -= len(self._events.popleft())
+            self._lost += 1
+        self._news.set()
+
+    async def take(self) -> list[str]:
+        """Wait for something, and take all of it: messages in the order in which they are to be sent."""
+        await self._news.wait()
+        self._news.clear()
+        found: list[str] = []
+        if self._definition is not None:
+            found.append(self._definition)
+        if self._gone is not None:
+            found.append(self._gone)
+        found.extend(self._answers)
+        if self._position is not None:
+            found.append(self._position)
+        if self._events or self._lost:
+            found.append(events_text(list(self._events), self._lost))
+        found += [text for text in (self._update, self._scan) if text is not None]
+        self._definition = self._gone = self._update = self._scan = self._position = None
+        self._answers.clear()
+        self._events.clear()
+        self._bytes = self._lost = 0
+        return found
+
+
+class RobotCache:
+    """Makes portraits, and keeps the last one: pages that are opened again need not wait for it.
+
+    Args:
+        robot: One that is known already; None: none is.
+    """
+
+    def __init__(self, robot: Robot | None = None) -> None:
+        self._kept = None if robot is None else PreparedRobot(robot)
+        self._lock = asyncio.Lock()
+
+    async def prepared(self, robot: Robot) -> PreparedRobot:
+        """The portrait of a robot."""
+        async with self._lock:
+            if self._kept is None or self._kept.robot != robot:
+                # In another thread, since the graphs of a large robot take their time.
+                self._kept = await asyncio.to_thread(PreparedRobot, robot)
+            return self._kept
+
+
+class Broadcaster:
+    """A source, and its viewers; it is the source's sink.
+
+    Args:
+        source: Source that reports.
+        robot_cache: Studio where portraits are made, and kept.
+    """
+
+    def __init__(self, source: Source, robot_cache: "RobotCache") -> None:
+        self.source = source
+        self._robot_cache = robot_cache
+        self._viewers: set[Viewer] = set()
+        self._tasks: list[asyncio.Task[None]] = []
+        self._prepared: PreparedRobot | None = None
+        self._builder: MessageBuilder | None = None
+        self._status: Status | None = None
+        self._told_s = 0.0
+        self._number = 0
+        self._update: str | None = None
+        self._position: str | None = None
+        self._gone: str | None = None
+        self._is_dirty = asyncio.Event()
+
+    @property
+    def is_watched(self) -> bool:
+        """True if anybody is watching."""
+        return bool(self._viewers)
+
+    def join(self) -> Viewer:
+        """One more who looks."""
+        viewer = Viewer()
+        if self._builder is not None and self._prepared is not None:
+            viewer.define(self._prepared.text)
+            for text, put in ((self._position, viewer.moved), (self._update, viewer.show)):
+                if text is not None:
+                    put(text)
+        elif self._gone is not None:
+            viewer.lose(self._gone)
+        self._viewers.add(viewer)
+        if not self._tasks:
+            self._tasks = [asyncio.create_task(self._keep()), asyncio.create_task(self._refresh())]
+        return viewer
+
+    async def leave(self, viewer: Viewer) -> None:
+        """One less; with the last one the source rests."""
+        self._viewers.discard(viewer)
+        if not self._viewers:
+            await self.close()
+
+    async def close(self) -> None:
+        """End the source's work; `join` begins it anew."""
+        tasks, self._tasks = self._tasks, []
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        # Whoever begins anew may have joined meanwhile.
+        if not self._tasks:
+            self._builder = self._status = self._update = self._position = self._gone = None
+
+    # The source
+
+    async def _keep(self) -> None:
+        loop = asyncio.get_running_loop()
+        pause_s = FIRST_PAUSE_S
+        while True:
+            begin_s = loop.time()
+            try:
+                await self.source.run(self)
+                why = "it has ended"
+            except (SourceLostError, SourceWrongError) as error:
+                why = str(error)
+                if isinstance(error, SourceWrongError):
+                    pause_s = LONGEST_PAUSE_S
+            except Exception as error:
+                _log.exception("a source of the live view has failed")
+                why = f"it has failed: {type(error).__name__}"
+            if loop.time() - begin_s > _GOOD_S:
+                pause_s = FIRST_PAUSE_S
+            self._lose(why)
+            await asyncio.sleep(pause_s)
+            pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+
+    def _lose(self, why: str) -> None:
+        self._builder = self._status = self._update = self._position = None
+        text = gone_text(why)
+        if text != self._gone:
+            _log.warning("the live view has lost its source: %s", why)
+        self._gone = text
+        for viewer in self._viewers:
+            viewer.lose(text)
+
+    async def define(self, robot: Robot) -> None:
+        """There is a robot."""
+        self._prepared = await self._robot_cache.prepared(robot)
+        self._builder = MessageBuilder(self._prepared)
+        self._status = self._update = self._position = self._gone = None
+        for viewer in self._viewers:
+            viewer.define(self._prepared.text)
+
+    def begin(self, components: Mapping[str, object]) -> None:
+        """Receive the known state in which what happens next begins."""
+        if self._builder is not None:
+            self._builder.begin(components)
+
+    def show(self, status: Status) -> None:
+        """Receive what the robot is doing."""
+        self._status = status
+        self._told_s = asyncio.get_running_loop().time()
+        self._is_dirty.set()
+
+    def happened(self, batch: EventBatch, first: int | None = None) -> None:
+        """Entries of the event log."""
+        if self._builder is None:
+            return
+        entries = self._builder.entries(batch, first)
+        for viewer in self._viewers:
+            viewer.happened(entries, batch.lost)
+
+    def scanned(self, scan: LaserScan) -> None:
+        """A revolution of the LiDAR."""
+        text = scan_text(scan)
+        for viewer in self._viewers:
+            viewer.scanned(text)
+
+    def jumped(self) -> None:
+        """The replay is elsewhere: all of the place follows."""
+        for viewer in self._viewers:
+            viewer.jump()
+
+    def moved(self, time_s: float, speed: float, *, is_playing: bool) -> None:
+        """Receive the position of the replay."""
+        self._position = position_text(time_s, speed, is_playing=is_playing)
+        for viewer in self._viewers:
+            viewer.moved(self._position)
+
+    async def _refresh(self) -> None:
+        """Send updates: soon after there is something new, not too often, and at least now and then."""
+        while True:
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(SIGN_OF_LIFE_S):
+                    await self._is_dirty.wait()
+            self._is_dirty.clear()
+            try:
+                self._send_update()
+            except Exception:
+                _log.exception("an update of the live view cannot be told")
+            await asyncio.sleep(UPDATE_S)
+
+    def _send_update(self) -> None:
+        if self._builder is None or self._status is None:
+            if self._gone is not None:
+                for viewer in self._viewers:
+                    viewer.lose(self._gone)
+            return
+        self._number += 1
+        age_s = self._status.age_s + asyncio.get_running_loop().time() - self._told_s
+        self._update = self._builder.update(self._status, self._number, age_s)
+        for viewer in self._viewers:
+            viewer.show(self._update)

@@ -1,0 +1,349 @@
+"""`robosc view`: the live view of a bridge, of a ROS 2 node, or of an event log."""
+
+import argparse
+import contextlib
+import os
+import re
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robosc.cli.arguments import add_given_supervisor_options
+from robosc.cli.output import CommandError, ExitCode, UsageError
+
+if TYPE_CHECKING:
+    from robosc.supervisor import Supervisor
+    from robosc_bridge.daemon.view_settings import ViewSettings
+    from robosc_view.definition import Robot
+    from robosc_view.sources import Source
+    from robosc_view.static_model import StaticModel
+
+_ADDRESS = "127.0.0.1:8066"
+
+_DESCRIPTION = """\
+Serve a web page that shows a robot under its supervisor: the automata with the states that they are in, variables,
+services and actions, which requests are enabled and why the others are not, and every event. The address to open is
+printed, with a token that lets its page command the robot; stopping it needs none.
+"""
+
+_EPILOG = """\
+exit status:
+  0  ended by Ctrl-C or a signal
+  1  there is no supervisor of the model
+  2  wrong use; a file that cannot be read; an address that cannot be served
+"""
+
+
+def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "view",
+        help="show a robot in a web page, live or from its event log",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    source = parser.add_argument_group("what is shown").add_mutually_exclusive_group()
+    source.add_argument("--bridge", type=_address, metavar="HOST:PORT", help="a bridge, by its gRPC service")
+    source.add_argument("--ros2", action="store_true", help="a generated ROS 2 node, by its topic /state")
+    source.add_argument("--log", type=Path, metavar="FILE", help="an event log, which is replayed; needs --model")
+    parser.add_argument("--namespace", default="", metavar="NAME", help="with --ros2: what stands before /state")
+    parser.add_argument(
+        "--model",
+        type=Path,
+        metavar="FILE",
+        help="with --log or --ros2: the model (.rscd), which is synthesized, or its supervisor (.rsup); without it the "
+        "page of a node cannot tell which requests are enabled. Alone: what is shown is this model in its initial "
+        "state, and again whenever its files change",
+    )
+    add_given_supervisor_options(parser, "stands")
+    parser.add_argument(
+        "--scene",
+        metavar="NAME|FILE",
+        help="a scene of the simulator, whose walls and line the map shows, from where the robot began",
+    )
+    parser.add_argument(
+        "--scene-seed", type=int, default=0, metavar="N", help="of what the scene leaves to chance (default: 0)"
+    )
+    _add_serving(parser)
+    _add_client(parser)
+    parser.set_defaults(run=run)
+
+
+def _add_serving(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("the page")
+    group.add_argument(
+        "--address",
+        type=_address,
+        default=_ADDRESS,
+        metavar="HOST:PORT",
+        help="address that it is served at (default: %(default)s)",
+    )
+    group.add_argument(
+        "--name",
+        action="append",
+        default=[],
+        metavar="HOST",
+        help="a further name by which browsers reach it (may be repeated)",
+    )
+    group.add_argument(
+        "--framed-by",
+        type=_framing,
+        action="append",
+        default=[],
+        metavar="SOURCE",
+        help="pages that may show this one in a frame: an origin, such as https://site:8443, or vscode-webview: or "
+        "vscode-file:, those of an editor (may be repeated; default: none)",
+    )
+    group.add_argument(
+        "--end-with-input",
+        action="store_true",
+        help="end when standard input ends, too: with the program that has started this one, however that ends",
+    )
+    group.add_argument("--open", action="store_true", help="open it in a browser")
+    group.add_argument("--tls-certificate", type=Path, metavar="FILE", help="certificate chain (PEM): serve with TLS")
+    group.add_argument("--tls-key", type=Path, metavar="FILE", help="private key of the certificate (PEM)")
+    group.add_argument(
+        "--insecure-beyond-loopback",
+        action="store_true",
+        help="serve without TLS where other machines reach it, on a network that you trust",
+    )
+
+
+def _add_client(parser: argparse.ArgumentParser) -> None:
+    """Add the options for reaching the bridge, as `robosc_api.security.add_client_arguments` does.
+
+    Written again, since that function would load gRPC for the help of every command.
+    """
+    group = parser.add_argument_group("security")
+    group.add_argument("--tls", action="store_true", help="use TLS, and trust the system's certificate authorities")
+    group.add_argument(
+        "--ca",
+        type=Path,
+        metavar="FILE",
+        default=_from_environment("ROBOSC_CA"),
+        help="use TLS, and trust only these certificates (PEM; default: $ROBOSC_CA)",
+    )
+    group.add_argument("--certificate", type=Path, metavar="FILE", help="client certificate chain (PEM)")
+    group.add_argument("--key", type=Path, metavar="FILE", help="private key of the certificate (PEM)")
+    group.add_argument(
+        "--token-file",
+        type=Path,
+        metavar="FILE",
+        default=_from_environment("ROBOSC_TOKEN_FILE"),
+        help="file with the own token (default: $ROBOSC_TOKEN_FILE)",
+    )
+
+
+def _from_environment(name: str) -> Path | None:
+    value = os.environ.get(name)
+    return Path(value) if value else None
+
+
+_ADDRESS_PATTERN = re.compile(r"(\[[0-9A-Fa-f:.%]+\]|[A-Za-z0-9._-]+):([0-9]{1,5})\Z")
+
+
+def _address(text: str) -> str:
+    match = _ADDRESS_PATTERN.match(text)
+    if not match or int(match[2]) > 65535:
+        raise argparse.ArgumentTypeError(f"not HOST:PORT: '{text}'")
+    return text
+
+
+_ORIGIN = re.compile(r"https?://(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(:[0-9]{1,5})?\Z")
+_EDITORS = ("vscode-webview:", "vscode-file:")
+"""Schemes of pages that editors have made. Of others anybody may have pages: `file:` is whatever was downloaded."""
+
+
+def _framing(text: str) -> str:
+    if _ORIGIN.match(text) or text in _EDITORS:
+        return text
+    schemes = " or ".join(_EDITORS)
+    raise argparse.ArgumentTypeError(
+        f"neither an origin, such as https://site:8443, nor a scheme of an editor ({schemes}): '{text}'"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve the page until a signal comes.
+
+    Raises:
+        CommandError: It cannot be served, or there is nothing to show.
+    """
+    from robosc_view.extra import require_view
+    from robosc_view.sources import ViewError
+
+    if not (arguments.bridge or arguments.ros2 or arguments.log or arguments.model):
+        raise UsageError("what is shown? --bridge HOST:PORT, --ros2, --log FILE --model FILE, or --model FILE alone")
+    if arguments.log is not None and arguments.model is None:
+        raise UsageError("--log needs --model: the model that the log is of")
+    if arguments.model is not None and arguments.bridge is not None:
+        raise UsageError("--model goes with --log or --ros2, or alone: a bridge tells its model itself")
+    if arguments.namespace and not arguments.ros2:
+        raise UsageError("--namespace goes with --ros2")
+    try:
+        require_view()
+        input_end = _InputEnd() if arguments.end_with_input else None
+        make, is_shared, robot = _source(arguments)
+        return _serve(arguments, make, robot, input_end, is_shared=is_shared)
+    except ViewError as error:
+        raise CommandError(str(error), ExitCode.USAGE) from error
+
+
+def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool, Robot | None]":
+    """Return a function that makes the source, whether all pages share one, and the robot where it is known."""
+    from robosc_view.scene_map import scene_map
+
+    scene = scene_map(arguments.scene, arguments.scene_seed)
+    if arguments.bridge is not None:
+        from robosc_api.security import SecurityError, check_credentials, credentials_of
+        from robosc_view.remote_bridge import RemoteBridge
+
+        credentials = credentials_of(arguments)
+        try:
+            check_credentials(credentials)
+        except SecurityError as error:
+            raise UsageError(str(error)) from error
+        return lambda: RemoteBridge(arguments.bridge, credentials, scene), True, None
+    supervisor = None if arguments.model is None else _supervisor(arguments)
+    if arguments.ros2:
+        from robosc_view.ros2_topic import StateTopic
+
+        _require_ros2()
+        return lambda: StateTopic(arguments.namespace, supervisor, scene), True, None
+    if arguments.log is None:
+        alone = _alone(arguments, supervisor, scene)
+        return lambda: alone, True, alone.robot
+    from robosc_view.replay import Recording, Replay
+
+    assert supervisor is not None  # noqa: S101  # `run` has seen to that.
+    recording = Recording(_log(arguments.log), supervisor, scene)
+    return lambda: Replay(recording), False, recording.robot
+
+
+def _alone(arguments: argparse.Namespace, supervisor: "Supervisor | None", scene: Any) -> "StaticModel":
+    """The source for a model alone, which looks at its files again and again."""
+    from robosc.cli.arguments import read_bundle
+    from robosc.errors import RoboscError
+    from robosc_view.static_model import NoSupervisorError, StaticModel, file_digest, read, synthesized
+
+    assert supervisor is not None  # noqa: S101  # `run` has seen to that.
+    model: Path = arguments.model
+    if model.suffix == ".rsup":
+
+        async def read_again() -> "Supervisor":
+            return read(model)
+
+        return StaticModel(supervisor, file_digest(model), lambda: file_digest(model), read_again, scene)
+
+    def digest() -> str:
+        try:
+            return read_bundle(arguments).digest
+        except (UsageError, RoboscError) as error:
+            raise NoSupervisorError(str(error)) from error
+
+    words = ["--deployment", arguments.deployment or "controller", "--engine", arguments.engine, "--allow-livelock"]
+    words += [word for folder in arguments.library_path for word in ("--library-path", str(folder))]
+    words += [word for folder in arguments.interface_path for word in ("--interface-path", str(folder))]
+    words += ["--reorder"] if arguments.reorder else []
+    words += [] if arguments.max_nodes is None else ["--max-nodes", str(arguments.max_nodes)]
+    seen = supervisor.certificate.bundle_sha256
+    return StaticModel(supervisor, seen, digest, lambda: synthesized((*words, "--", str(model))), scene)
+
+
+def _require_ros2() -> None:
+    try:
+        import rclpy  # noqa: F401
+    except ImportError as error:
+        raise UsageError("there is no ROS 2 here: install one and source it, or install robosc[ros2]") from error
+
+
+def _log(path: Path) -> Any:
+    from robosc.event_logs import LogError, read_log
+
+    try:
+        found = read_log(path)
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
+    except LogError as error:
+        raise UsageError(str(error)) from error
+    for note in found.notes():
+        sys.stderr.write(f"robosc: {note}\n")
+    return found
+
+
+def _supervisor(arguments: argparse.Namespace) -> "Supervisor":
+    from robosc.cli.given import given_supervisor
+
+    found = given_supervisor(arguments)
+    if found is None:
+        raise CommandError(f"there is no supervisor of {arguments.model}", ExitCode.FAILED)
+    return found
+
+
+def _settings(arguments: argparse.Namespace) -> "ViewSettings":
+    from robosc_api.security import ServerSecurity
+    from robosc_bridge.daemon.view_settings import ViewSettings
+
+    security = ServerSecurity(
+        certificate=arguments.tls_certificate,
+        key=arguments.tls_key,
+        insecure_beyond_loopback=arguments.insecure_beyond_loopback,
+    )
+    return ViewSettings(arguments.address, security, tuple(arguments.name), tuple(arguments.framed_by))
+
+
+class _InputEnd:
+    """Ends the page when standard input ends, and before there is one, while a model is synthesized, the process."""
+
+    def __init__(self) -> None:
+        self.end: Callable[[], object] = lambda: os._exit(ExitCode.OK)
+        threading.Thread(target=self._follow, daemon=True).start()
+
+    def _follow(self) -> None:
+        # Not by `sys.stdin`, which nobody may hold when the interpreter ends.
+        with contextlib.suppress(OSError):
+            while os.read(0, 4096):
+                pass
+        # The loop may have ended before.
+        with contextlib.suppress(RuntimeError):
+            self.end()
+
+
+def _serve(
+    arguments: argparse.Namespace,
+    make: "Callable[[], Source]",
+    robot: "Robot | None",
+    input_end: _InputEnd | None,
+    *,
+    is_shared: bool,
+) -> int:
+    import asyncio
+    import signal
+
+    from robosc_view.server import ViewServer
+
+    async def serve() -> None:
+        end = asyncio.Event()
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            loop.add_signal_handler(number, end.set)
+        if input_end is not None:
+            input_end.end = lambda: loop.call_soon_threadsafe(end.set)
+        server = ViewServer(_settings(arguments), make, is_shared=is_shared, robot=robot)
+        await server.start()
+        try:
+            sys.stdout.write(f"{server.url}\n")
+            sys.stdout.flush()
+            if arguments.open:
+                import webbrowser
+
+                await asyncio.to_thread(webbrowser.open, server.url)
+            await end.wait()
+        finally:
+            await server.stop()
+
+    asyncio.run(serve())
+    return ExitCode.OK

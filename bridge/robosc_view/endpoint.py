@@ -1,0 +1,57 @@
+"""The page of a bridge, served in a thread of its own."""
+
+import logging
+
+from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.served_endpoint import ServedEndpoint
+from robosc_bridge.daemon.view_settings import ViewSettings
+from robosc_view.sources import ViewError
+
+_log = logging.getLogger(__name__)
+
+
+class ViewEndpoint(ServedEndpoint):
+    """The live view of a bridge; a `Endpoint` of the daemon.
+
+    Args:
+        operations: The daemon.
+        settings: Settings of where and how it is served.
+
+    Raises:
+        ViewError: The extra `view` is not installed, or there is no such scene.
+
+    Attributes:
+        url: URL to open in a browser, with the token; empty: it does not listen yet.
+    """
+
+    def __init__(self, operations: Operations, settings: ViewSettings) -> None:
+        from robosc_view.extra import require_view
+
+        require_view()
+        from robosc_view.running import RunningBridge
+        from robosc_view.scene_map import scene_map
+        from robosc_view.server import ViewServer
+
+        super().__init__("live view", "the live view", ViewError)
+        self.url = ""
+        source = RunningBridge(operations, scene_map(settings.scene, settings.scene_seed))
+        # Laid out before the robot moves: a large automaton would hold up everything for a while.
+        self._server = ViewServer(settings, lambda: source, is_shared=True, robot=source.robot)
+
+    def start(self) -> None:
+        """Listen.
+
+        Raises:
+            ViewError: It cannot.
+        """
+        super().start()
+        _log.info("the live view: %s", self.url)
+
+    async def _serve(self) -> None:
+        await self._server.start()
+        self.address, self.url = self._server.address, self._server.url
+        self._is_listening()
+        try:
+            await self._end.wait()
+        finally:
+            await self._server.stop()

@@ -1,0 +1,317 @@
+"""Messages of the page from what a source reports: updates, and entries with the transitions that they lit."""
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from robosc.execution.runtime.event_log import Entry, plain
+from robosc.explanation.blocked import Judged, Requests, StateError
+from robosc_view.definition import Robot, definition_text
+from robosc_view.reports import EventBatch, LaserScan, Notice, Status
+
+MAXIMUM_TEXT = 300
+"""Characters of an entry's text."""
+
+MAXIMUM_NAME = 600
+"""Characters of an entry's kind or event."""
+
+NOT_EXECUTED = "nothing is executed now"
+NOT_KNOWN = "the executor does not allow it; why is not known here"
+
+_MAXIMUM_DEPTH = 20
+"""Maximum depth of the values in an entry; deeper ones are not reported."""
+
+_SHOWN_APART = ("time", "kind", "event", "controllable", "state", "decision_us", "transitions")
+
+
+class PreparedRobot:
+    """Data made of a robot once, since it takes its time: laid out graphs, and what its requests need.
+
+    Args:
+        robot: Robot as the source defines it.
+
+    Attributes:
+        robot: The same.
+        text: The message `definition`.
+        requests: Judge of its requests; None: nobody knows its supervisor.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.text = definition_text(robot)
+        made = robot.supervisor
+        self.requests = None if made is None else Requests(made.executable, made.added)
+
+
+class MessageBuilder:
+    """Reporter of what one robot does.
+
+    Args:
+        prepared: Portrait that was made of it.
+    """
+
+    def __init__(self, prepared: PreparedRobot) -> None:
+        self._robot = prepared.robot
+        self._requests = prepared.requests
+        self._judged: tuple[Any, Any, Judged | str] | None = None
+        self._tracker = TransitionTracker(prepared.robot)
+        self._number = 0
+
+    def update(self, status: Status, number: int, age_s: float) -> str:
+        """Return the message `update`.
+
+        Args:
+            status: Status of the robot.
+            number: Number of the message.
+            age_s: Age of the status, in seconds.
+        """
+        enabled, disabled, warnings = self._permitted(status)
+        drive = status.drive
+        message = {
+            "type": "update",
+            "number": number,
+            "time_s": status.time_s,
+            "state": status.state,
+            "problem": status.problem,
+            "reasons": [_notice(item) for item in status.reasons],
+            "warnings": [_notice(item) for item in (*status.warnings, *warnings)],
+            "stops": list(status.stops),
+            "devices": dict(status.devices),
+            "components": plain(dict(status.components)),
+            "communications": dict(status.communications),
+            "enabled": enabled,
+            "disabled": disabled,
+            "drive": None
+            if drive is None
+            else {
+                "pose": [_number(value) for value in drive.pose],
+                "linear_m_s": _number(drive.linear_m_s),
+                "angular_rad_s": _number(drive.angular_rad_s),
+                "battery_v": None if drive.battery_v is None else _number(drive.battery_v),
+                "is_torque_on": drive.is_torque_on,
+            },
+            "age_s": round(age_s, 3),
+            "last": None if status.last is None else dict(status.last),
+        }
+        return _text(message)
+
+    def entries(self, batch: EventBatch, first: int | None = None) -> list[str]:
+        """Return entries of the event log, each as the JSON text that stands in the message `events`.
+
+        Args:
+            batch: Entries that happened.
+            first: Number of its first entry; None: the next one.
+        """
+        if first is not None:
+            self._number = first - 1
+        elif batch.lost:
+            self._number += batch.lost
+            self._tracker.forget()
+        return [self._entry(entry) for entry in batch.entries]
+
+    def begin(self, components: Mapping[str, Any]) -> None:
+        """The entries that follow begin in a state that is known."""
+        self._tracker.begin(components)
+
+    def _entry(self, entry: Entry) -> str:
+        self._number += 1
+        return _text(
+            {
+                "number": self._number,
+                "time_s": _time(entry),
+                "kind": str(entry.get("kind"))[:MAXIMUM_NAME],
+                "event": str(entry.get("event", ""))[:MAXIMUM_NAME],
+                "controllable": entry.get("controllable") is True,
+                "text": entry_text(entry),
+                "transitions": [{"component": name, "id": number} for name, number in self._tracker.of(entry)],
+            }
+        )
+
+    def _permitted(self, status: Status) -> tuple[list[str], list[dict[str, Any]], list[Notice]]:
+        """Return the events that may be requested, those that may not and why, and any notices about that."""
+        events = self._robot.requests
+        if not status.components:
+            # A robot without any behaviour has no components to tell of, executed or not.
+            has_behaviour = any(item.behaviour for item in self._robot.shape.components)
+            if has_behaviour:
+                return [], [{"event": event, "why": [NOT_EXECUTED]} for event in events], []
+        available = self._availability(status)
+        if isinstance(available, str):
+            warnings = [Notice("STATE_UNKNOWN", available)] if available else []
+            known = None if status.enabled is None else {f"{name}.request" for name in status.enabled}
+            if known is None:
+                return [], [], warnings
+            why = {event: [NOT_KNOWN] for event in events}
+        else:
+            told = available.enabled if status.enabled is None else [f"{name}.request" for name in status.enabled]
+            known = set(told)
+            why = {item.event: list(item.why) for item in available.blocked}
+            if status.enabled is not None:
+                why = {event: why.get(event) or [NOT_KNOWN] for event in events}
+            warnings = []
+        disabled = [{"event": event, "why": why[event]} for event in events if event not in known and event in why]
+        return [event for event in events if event in known], disabled, warnings
+
+    def _availability(self, status: Status) -> RequestAvailability | str:
+        """The requests judged; or why they cannot be, which is empty where nobody knows the supervisor."""
+        if self._requests is None:
+            return ""
+        state = status.components, status.communications
+        if self._available is None or (self._available[0], self._available[1]) != state:
+            try:
+                found: RequestAvailability | str = self._requests.availability(*state)
+            except StateError as error:
+                found = f"The model is not that of this robot: {error}."
+            self._available = (*state, found)
+        return self._available[2]
+
+
+class TransitionTracker:
+    """Transitions that an event takes: those of the states that its components were in before it.
+
+    The states before it may not be known: then the state after the event decides, where it can only come from one
+    state.
+
+    Args:
+        robot: Robot as the source defines it.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._table = robot.table
+        self._next = {
+            (component.name, transition.id): transition.next
+            for component in robot.shape.components
+            if component.behaviour
+            for state in component.behaviour.states
+            for transition in state.transitions
+        }
+        self._component = {number: name for name, number in self._next}
+        self._initial = {
+            component.name: next((state.name for state in component.behaviour.states if state.initial), None)
+            for component in robot.shape.components
+            if component.behaviour
+        }
+        self._before: Mapping[str, str | None] = {}
+
+    def forget(self) -> None:
+        """The state is not known any more."""
+        self._before = {}
+
+    def begin(self, components: Mapping[str, Any]) -> None:
+        """The state is this one; an empty one is the initial state."""
+        self._before = _states(components) or dict(self._initial)
+
+    def of(self, entry: Mapping[str, Any]) -> Iterator[tuple[str, int]]:
+        """Components and numbers of the transitions of an entry."""
+        kind = entry.get("kind")
+        if "transitions" in entry:
+            # Told with the entry: only the bridge's own sources do that; in a log anything may stand.
+            told = entry["transitions"]
+            for number in told if isinstance(told, list | tuple) else ():
+                if isinstance(number, int) and number in self._component:
+                    yield self._component[number], number
+        elif kind == "restart":
+            self._before = dict(self._initial)
+        elif kind == "state":
+            # A run has ended or begun.
+            self.forget()
+        elif kind == "event":
+            after = _states(entry.get("state"))
+            for component, numbers in self._table.get(str(entry.get("event")), {}).items():
+                number = self._taken(component, numbers, after.get(component))
+                if number is not None:
+                    yield component, number
+            self._before = after
+
+    def _taken(self, component: str, numbers: Mapping[str, int], after: str | None) -> int | None:
+        number = numbers.get(self._before.get(component) or "")
+        if number is not None and self._next.get((component, number)) == after:
+            return number
+        if number is None and component in self._before:
+            return None  # It was in a state where the event changes nothing.
+        fitting = {item for item in numbers.values() if self._next.get((component, item)) == after}
+        return fitting.pop() if len(fitting) == 1 else None
+
+
+def _states(components: Any) -> dict[str, str | None]:
+    if not isinstance(components, Mapping):
+        return {}
+    return {name: part.get("state") for name, part in components.items() if isinstance(part, Mapping)}
+
+
+def entry_text(entry: Entry) -> str:
+    """Return the text of an entry beside its event, for a person."""
+    told = [_word(entry[name]) for name in ("identifier", "what") if name in entry]
+    rest = {name: value for name, value in entry.items() if name not in (*_SHOWN_APART, "identifier", "what")}
+    told += [
+        _word(value) if name == "data" else f"{name}: {_word(value)}"
+        for name, value in sorted(rest.items())
+        if value not in (None, {}, [])
+    ]
+    text = "; ".join(told)
+    return text if len(text) <= MAXIMUM_TEXT else f"{text[: MAXIMUM_TEXT - 4]} ..."
+
+
+def _word(value: Any, depth: int = 0) -> str:
+    if depth > _MAXIMUM_DEPTH:
+        return "..."
+    if isinstance(value, str):
+        return value[: MAXIMUM_TEXT + 1]
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, dict):
+        items = list(value.items())[:20]
+        return ", ".join(f"{str(name)[:MAXIMUM_TEXT]} = {_word(item, depth + 1)}" for name, item in items)
+    if isinstance(value, Sequence):
+        return ", ".join(_word(item, depth + 1) for item in value[:20]) + (", ..." if len(value) > 20 else "")
+    return str(plain(value))
+
+
+def scan_text(scan: LaserScan) -> str:
+    """The message `scan`."""
+    ranges = [round(value, 3) if math.isfinite(value) else None for value in scan.ranges_m]
+    pose = None if scan.pose is None else [_number(value) for value in scan.pose]
+    return _text({"type": "scan", "ranges_m": ranges, "pose": pose})
+
+
+def events_text(entries: Sequence[str], lost: int) -> str:
+    """The message `events`, of entries as `MessageBuilder.entries` made them."""
+    return f'{{"type":"events","entries":[{",".join(entries)}],"lost":{lost}}}'
+
+
+def position_text(time_s: float, speed: float, *, is_playing: bool) -> str:
+    """The message `position`."""
+    return _text({"type": "position", "time_s": time_s, "is_playing": is_playing, "speed": speed})
+
+
+def refused_text(what: str, why: str) -> str:
+    """The message `refused`."""
+    return _text({"type": "refused", "what": what, "why": why})
+
+
+def done_text(what: str) -> str:
+    """The message `done`."""
+    return _text({"type": "done", "what": what})
+
+
+def gone_text(why: str) -> str:
+    """The message `gone`."""
+    return _text({"type": "gone", "why": why})
+
+
+def _text(message: Mapping[str, Any]) -> str:
+    return json.dumps(message, allow_nan=False, separators=(",", ":"))
+
+
+def _notice(item: Notice) -> dict[str, Any]:
+    return {"code": item.code, "text": item.text, "holds_until_reset": item.holds_until_reset}
+
+
+def _number(value: float) -> float | None:
+    return round(value, 4) if math.isfinite(value) else None
+
+
+def _time(entry: Entry) -> float:
+    time_s = entry.get("time")
+    return float(time_s) if isinstance(time_s, int | float) and math.isfinite(time_s) else 0.0

@@ -1,0 +1,315 @@
+"""The source for an event log: any of its moments, and all of it again as it happened, at any speed.
+
+The log tells the state of the components after each event. Where services and actions are follows from the events:
+each leads to one location of its protocol, wherever it comes from.
+"""
+
+import asyncio
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Any
+
+from robosc.automata.plants import communication_plant
+from robosc.event_logs import LoggedRun
+from robosc.event_logs.stops import is_ended
+from robosc.model.structure import CommunicationKind, Model
+from robosc.supervisor import Supervisor
+from robosc_bridge.daemon.states import Command
+from robosc_view.definition import robot_of
+from robosc_view.messages import TransitionTracker
+from robosc_view.reports import EventBatch, LogSpan, SourceKind, Status
+from robosc_view.sources import Pause, Play, RefusedError, ReplayCommand, Seek, Sink, ViewError
+
+HISTORY = 200
+"""Entries before the place that is gone to which are told again."""
+
+MAXIMUM_STOPS = 50
+"""Stops that hold at the same time; of more the oldest are forgotten. A robot has as many as it has sensors."""
+
+MOST_AT_ONCE = 2000
+"""Entries that are told in one step of a replay; those before them count as lost."""
+
+STEP_S = 0.04
+"""Between two steps of a replay."""
+
+_CALLED = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """The state after some entries.
+
+    Attributes:
+        components: State and variables of each component.
+        communications: Location of each service and action.
+        problem: The fault that was reported last, until a restart.
+        stops: Reasons why nothing was requested, each until it ended.
+    """
+
+    components: Mapping[str, Any]
+    communications: Mapping[str, str]
+    problem: str = ""
+    stops: tuple[str, ...] = ()
+
+
+class Recording:
+    """A log with the state at each of its moments; many may replay it at once.
+
+    Args:
+        run: The log.
+        supervisor: It was written under, with its model.
+        scene: For the map.
+
+    Raises:
+        ViewError: The log is empty, or one of another model.
+    """
+
+    def __init__(self, run: LoggedRun, supervisor: Supervisor, scene: Any = None) -> None:
+        if not run.entries:
+            raise ViewError("the log has no entries")
+        self.documents = [entry.document for entry in run.entries]
+        # A clock that was set back would hide what came after it.
+        self.times_s = list(accumulate((entry.time_s for entry in run.entries), max))
+        self._frames = _frames(run, supervisor.model)
+        span = LogSpan(self.begin_s, self.end_s, len(self.documents))
+        self.robot = robot_of(supervisor, SourceKind.LOG, version="", can_command=False, log=span, scene=scene)
+        self._last = LastTaken(TransitionTracker(self.robot), self.documents)
+
+    @property
+    def begin_s(self) -> float:
+        """Time of the first entry."""
+        return self.times_s[0]
+
+    @property
+    def end_s(self) -> float:
+        """Time of the last entry."""
+        return self.times_s[-1]
+
+    def count(self, time_s: float) -> int:
+        """Return the number of entries that have happened by a time."""
+        return bisect_right(self.times_s, time_s)
+
+    def frame(self, number: int) -> Frame:
+        """The state after so many entries."""
+        return self._frames[number]
+
+    def last(self, number: int) -> Mapping[str, int]:
+        """The last transition of each component that has taken one, after so many entries."""
+        return self._last.after(number)
+
+
+class LastTaken:
+    """Transition that each component took last, after any number of entries, since the model began.
+
+    Args:
+        tracker: Lights that report which transitions an entry takes; in the initial state.
+        documents: The entries.
+    """
+
+    def __init__(self, tracker: TransitionTracker, documents: Iterable[Mapping[str, Any]]) -> None:
+        # How many entries there are after which a component has taken something, and what.
+        self._taken: dict[str, tuple[list[int], list[int]]] = {}
+        self._begins = [0]
+        tracker.begin({})
+        for count, document in enumerate(documents, 1):
+            if document.get("kind") == "restart":
+                self._begins.append(count)
+            for component, transition in tracker.of(document):
+                counts, transitions = self._taken.setdefault(component, ([], []))
+                counts.append(count)
+                transitions.append(transition)
+
+    def after(self, count: int) -> dict[str, int]:
+        """Numbers of the transitions by component, after so many entries."""
+        begin = self._begins[bisect_right(self._begins, count) - 1]
+        found = {}
+        for component, (counts, transitions) in self._taken.items():
+            place = bisect_right(counts, count) - 1
+            if place >= 0 and counts[place] > begin:
+                found[component] = transitions[place]
+        return found
+
+
+def _frames(run: LoggedRun, model: Model) -> list[Frame]:
+    known = {event for item in model.communications for event in item.events} | set(model.taus)
+    leads_to = {
+        edge.event: (item.name, edge.target)
+        for item in model.communications
+        if item.kind in _CALLED
+        for edge in communication_plant(item).edges
+    }
+    names = {component.name for component in model.components if component.behaviour}
+    first = first_frame(model)
+    frames, frame = [first], first
+    for entry in run.entries:
+        match entry.kind:
+            case "event":
+                if entry.event not in known or entry.state.keys() != names:
+                    raise ViewError(
+                        f"line {entry.line}: the model has no such event or state: give the log's own model"
+                    )
+                places = frame.communications
+                if entry.event in leads_to:
+                    name, location = leads_to[entry.event]
+                    places = places if places[name] == location else {**places, name: location}
+                frame = Frame(entry.state, places, frame.problem, frame.stops)
+            case "restart":
+                frame = first
+            case "fault":
+                frame = Frame(frame.components, frame.communications, entry.text("what"), frame.stops)
+            case "stop":
+                what = entry.text("what")
+                stops = (*(item for item in frame.stops if item != what), what)[-MAXIMUM_STOPS:]
+                frame = Frame(frame.components, frame.communications, frame.problem, stops)
+            case "resume":
+                stops = tuple(item for item in frame.stops if not is_ended(item, entry.text("what")))
+                frame = Frame(frame.components, frame.communications, frame.problem, stops)
+        frames.append(frame)
+    return frames
+
+
+def first_frame(model: Model) -> Frame:
+    """The state before anything has happened."""
+    components = {
+        component.name: {
+            "state": component.behaviour.initial,
+            "variables": {variable.name: variable.initial for variable in component.behaviour.variables},
+        }
+        for component in model.components
+        if component.behaviour
+    }
+    return Frame(components, {item.name: "idle" for item in model.communications if item.kind in _CALLED})
+
+
+class Player:
+    """Position of a replay; knows no clock.
+
+    Args:
+        recording: Recording that is replayed.
+
+    Attributes:
+        time_s: Position in the log's time.
+        speed: Seconds of the log in a second.
+        is_playing: True if it goes on by itself.
+    """
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self.time_s = recording.begin_s
+        self.speed = 1.0
+        self.is_playing = False
+
+    def control_replay(self, command: ReplayCommand) -> None:
+        """Move, go on or stand still."""
+        recording = self._recording
+        match command:
+            case Seek(time_s=time_s):
+                self.time_s = min(max(time_s, recording.begin_s), recording.end_s)
+            case Play(speed=speed):
+                self.speed, self.is_playing = speed, True
+                if self.time_s >= recording.end_s:
+                    self.time_s = recording.begin_s
+            case Pause():
+                self.is_playing = False
+
+    def advance(self, passed_s: float) -> None:
+        """Some time has passed."""
+        if self.is_playing:
+            self.time_s = min(self.time_s + passed_s * self.speed, self._recording.end_s)
+            self.is_playing = self.time_s < self._recording.end_s
+
+
+class Replay:
+    """A replay for one page.
+
+    Args:
+        recording: Recording that is replayed.
+    """
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self._player = Player(recording)
+        self._is_steered = asyncio.Event()
+        self._wishes: list[ReplayCommand] = []
+
+    async def run(self, sink: Sink) -> None:
+        """Tell where the log is, until cancelled."""
+        loop = asyncio.get_running_loop()
+        player = self._player
+        await sink.define(self._recording.robot)
+        told = self._go_to(sink)
+        last_s = loop.time()
+        while True:
+            if player.is_playing:
+                await asyncio.sleep(STEP_S)
+            else:
+                await self._is_steered.wait()
+                last_s = loop.time()
+            now_s = loop.time()
+            player.advance(now_s - last_s)
+            last_s = now_s
+            wishes, self._wishes = self._wishes, []
+            self._is_steered.clear()
+            before_s = player.time_s
+            for command in wishes:
+                player.control_replay(command)
+            if player.time_s != before_s or any(isinstance(command, Seek) for command in wishes):
+                told = self._go_to(sink)
+            else:
+                told = self._go_on(sink, told)
+
+    async def order(self, command: Command, by: str) -> None:
+        """Not here: it is over.
+
+        Raises:
+            RefusedError: Always.
+        """
+        raise RefusedError("what is replayed cannot be commanded")
+
+    def control_replay(self, command: ReplayCommand) -> None:
+        """Move in the log; done with the next step."""
+        if len(self._wishes) >= MOST_AT_ONCE:
+            del self._wishes[0]
+        self._wishes.append(command)
+        self._is_steered.set()
+
+    def _go_to(self, sink: Sink) -> int:
+        """Tell a place anew, with what came before it; returns how many entries were told."""
+        count = self._recording.count(self._player.time_s)
+        first = max(count - HISTORY, 0)
+        sink.jumped()
+        self._tell_position(sink)
+        sink.begin(self._recording.frame(first).components)
+        entries: Sequence[Any] = self._recording.documents[first:count]
+        if entries:
+            sink.happened(EventBatch(entries), first + 1)
+        sink.show(self._status(count))
+        return count
+
+    def _go_on(self, sink: Sink, told: int) -> int:
+        """Tell what happened since the last step."""
+        count = self._recording.count(self._player.time_s)
+        if count > told:
+            first = max(told, count - MOST_AT_ONCE)
+            sink.begin(self._recording.frame(first).components)
+            entries: Sequence[Any] = self._recording.documents[first:count]
+            sink.happened(EventBatch(entries, first - told), first + 1)
+        self._tell_position(sink)
+        sink.show(self._status(count))
+        return max(count, told)
+
+    def _tell_position(self, sink: Sink) -> None:
+        sink.moved(self._player.time_s, self._player.speed, is_playing=self._player.is_playing)
+
+    def _status(self, count: int) -> Status:
+        frame = self._recording.frame(count)
+        return Status(
+            time_s=self._player.time_s,
+            problem=frame.problem,
+            stops=frame.stops,
+            components=frame.components,
+            communications=frame.communications,
+            last=self._recording.last(count),
+        )

@@ -1,0 +1,114 @@
+"""Sources of what is shown, behind one narrow protocol: a source reports to a sink, and may be steered."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from robosc_bridge.daemon.states import Command
+from robosc_bridge.errors import BridgeError
+from robosc_view.definition import Robot
+from robosc_view.reports import EventBatch, LaserScan, Status
+
+
+class ViewError(BridgeError):
+    """The live view cannot be served as it is asked for; one sentence."""
+
+
+class SourceLostError(Exception):
+    """A source tells nothing any more; one sentence for a person. It is tried again."""
+
+
+class SourceWrongError(Exception):
+    """A source cannot be used, and trying again would not help before somebody changed something; one sentence."""
+
+
+class RefusedError(Exception):
+    """Refusal of what was asked for; one sentence for a person."""
+
+
+class Sink(Protocol):
+    """Is told what a source has; used in the event loop of the server alone."""
+
+    async def define(self, robot: Robot) -> None:
+        """There is a robot; told first, and again where it has become another."""
+
+    def begin(self, components: Mapping[str, object]) -> None:
+        """Receive the known state in which what happens next begins; an empty one is the initial state."""
+
+    def show(self, status: Status) -> None:
+        """Receive what the robot is doing; the latest alone counts."""
+
+    def happened(self, batch: EventBatch, first: int | None = None) -> None:
+        """Entries of the event log; `first` is the number of the first of them, where they have one of their own."""
+
+    def scanned(self, scan: LaserScan) -> None:
+        """A revolution of the LiDAR; the latest alone counts."""
+
+    def jumped(self) -> None:
+        """The replay of a log is elsewhere; all there is to tell of the place follows."""
+
+    def moved(self, time_s: float, speed: float, *, is_playing: bool) -> None:
+        """Receive the position of the replay of a log."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seek:
+    """Go to a time of the log.
+
+    Attributes:
+        time_s: In seconds since 1970-01-01 UTC.
+    """
+
+    time_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Play:
+    """Play the log on.
+
+    Attributes:
+        speed: Seconds of the log in a second.
+    """
+
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """Stand still in the log."""
+
+
+ReplayCommand = Seek | Play | Pause
+
+
+class Source(Protocol):
+    """Tells what a robot does. Lives in the event loop of the server; what waits does so elsewhere."""
+
+    async def run(self, sink: Sink) -> None:
+        """Tell all there is, until cancelled.
+
+        Raises:
+            SourceLostError: It is gone.
+            SourceWrongError: It cannot be used as it is.
+        """
+
+    async def order(self, command: Command, by: str) -> None:
+        """Want something of the robot; returns once it is done.
+
+        A stop is certain as soon as this first waits: it is carried out even if nobody awaits its answer any more.
+
+        Raises:
+            RefusedError: It is not done.
+        """
+
+    def control_replay(self, command: ReplayCommand) -> None:
+        """Move in what is replayed.
+
+        Raises:
+            RefusedError: Nothing is replayed.
+        """
+
+
+def not_replayed() -> RefusedError:
+    """Return the answer of a live source to those who would move in time."""
+    return RefusedError("this robot is shown live: only a log can be replayed")

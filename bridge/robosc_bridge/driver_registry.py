@@ -12,9 +12,12 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from enum import StrEnum
 from importlib.metadata import entry_points
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 from robosc_bridge.errors import BridgeError
+
+if TYPE_CHECKING:
+    from robosc_bridge.devices.interface import DriveBase, RangeScanner
 
 ENTRY_POINT_GROUP = "robosc_bridge.devices"
 
@@ -192,6 +195,32 @@ def find_driver(kind: Kind, name: str) -> Driver:
     close = get_close_matches(name, names, n=1)
     hint = f"; did you mean '{close[0]}'?" if close else f"; there is {', '.join(names) or 'none'}"
     raise UnknownDriverError(f"unknown {kind} '{name}'{hint}")
+
+
+def make_drive_base(name: str, **arguments: Any) -> "DriveBase":
+    """A drive base, not opened yet.
+
+    Args:
+        name: Of its driver.
+        arguments: Of the driver.
+
+    Raises:
+        UnknownDriverError: There is none of that name; the message says what there is.
+    """
+    return cast("DriveBase", find_driver(Kind.DRIVE_BASE, name).make(**arguments))
+
+
+def make_range_scanner(name: str, **arguments: Any) -> "RangeScanner":
+    """A range scanner, not opened yet.
+
+    Args:
+        name: Of its driver.
+        arguments: Of the driver.
+
+    Raises:
+        UnknownDriverError: There is none of that name; the message says what there is.
+    """
+    return cast("RangeScanner", find_driver(Kind.RANGE_SCANNER, name).make(**arguments))
 
 
 def _plug_in(name: str, load: Callable[[], object]) -> Driver:

@@ -172,8 +172,7 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         CommandError: It cannot be served, or there is nothing to show.
     """
-    from robosc_view.extra import require_view
-    from robosc_view.sources import ViewError
+    from robosc_view.sources import ViewError, require_view
 
     if not (arguments.bridge or arguments.ros2 or arguments.log or arguments.model):
         raise UsageError("what is shown? --bridge HOST:PORT, --ros2, --log FILE --model FILE, or --model FILE alone")

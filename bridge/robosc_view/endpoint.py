@@ -5,7 +5,7 @@ import logging
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.served_endpoint import ServedEndpoint
 from robosc_bridge.daemon.view_settings import ViewSettings
-from robosc_view.sources import ViewError
+from robosc_view.sources import ViewError, require_view
 
 _log = logging.getLogger(__name__)
 
@@ -25,8 +25,6 @@ class ViewEndpoint(ServedEndpoint):
     """
 
     def __init__(self, operations: Operations, settings: ViewSettings) -> None:
-        from robosc_view.extra import require_view
-
         require_view()
         from robosc_view.running import RunningBridge
         from robosc_view.scene_map import scene_map

@@ -1,5 +1,6 @@
 """Sources of what is shown, behind one narrow protocol: a source reports to a sink, and may be steered."""
 
+import importlib.util
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
@@ -112,3 +113,14 @@ class Source(Protocol):
 def not_replayed() -> RefusedError:
     """Return the answer of a live source to those who would move in time."""
     return RefusedError("this robot is shown live: only a log can be replayed")
+
+
+def require_view() -> None:
+    """Raise where the extra `view` is missing.
+
+    Raises:
+        ViewError: It is, with what to do about it.
+    """
+    missing = [name for name in ("aiohttp", "igraph") if importlib.util.find_spec(name) is None]
+    if missing:
+        raise ViewError(f"the live view needs {' and '.join(missing)}: install robosc[view]")

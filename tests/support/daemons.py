@@ -11,8 +11,8 @@ from robosc.execution.runtime.event_log import MemoryLog
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc_bridge.configuration import map_channels, parse
+from robosc_bridge.daemon.execution import Job
 from robosc_bridge.daemon.feed import Feed
-from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.programs import Attached, Detached, FromProgram, Program, ToProgram
 from robosc_bridge.daemon.reports import Device, DeviceUp, ResetDone

@@ -5,7 +5,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from robosc_bridge.devices.factory import make_drive_base
 from robosc_bridge.devices.interface import (
     STANDSTILL,
     DriveReading,
@@ -13,6 +12,7 @@ from robosc_bridge.devices.interface import (
 )
 from robosc_bridge.devices.mavlink_rover import MavlinkRover
 from robosc_bridge.devices.robots import Body
+from robosc_bridge.driver_registry import make_drive_base
 from robosc_bridge.host import Host, Thread
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 from robosc_simulated import BODIES, DatagramLine, Rover, SimulatedLine, Timebase, World, room

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from robosc_bridge.devices.factory import make_range_scanner
+from robosc_bridge.driver_registry import make_range_scanner
 from support.rovers import rig
 
 pytestmark = pytest.mark.real_time

@@ -20,19 +20,25 @@ from robosc_bridge.configuration.structure import Configuration, Scanner
 from robosc_bridge.daemon.camera_setup import camera_problems, camera_worker, needs_camera
 from robosc_bridge.daemon.device_thread import DeviceThread
 from robosc_bridge.daemon.endpoints import Endpoint, LivenessMonitor, is_remote, is_startable
+from robosc_bridge.daemon.execution import Job
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.files import file_problems
-from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.states import Command
 from robosc_bridge.daemon.view_settings import settings_of as view_settings
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
-from robosc_bridge.devices.factory import make_drive_base, make_range_scanner
 from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
 from robosc_bridge.devices.options import checked_options
 from robosc_bridge.devices.robots import ROBOTS, Body, Robot
-from robosc_bridge.driver_registry import DriverFeatures, Kind, features_of, find_driver
+from robosc_bridge.driver_registry import (
+    DriverFeatures,
+    Kind,
+    features_of,
+    find_driver,
+    make_drive_base,
+    make_range_scanner,
+)
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.host import Host
 from robosc_bridge.protocol.mavlink_signing import SigningError

@@ -8,8 +8,7 @@ from collections.abc import Callable
 from typing import assert_never
 
 from robosc.execution.runtime.clock import Clock
-from robosc_bridge.daemon.execution import Execution
-from robosc_bridge.daemon.jobs import Job
+from robosc_bridge.daemon.execution import Execution, Job
 from robosc_bridge.daemon.latches import Latches
 from robosc_bridge.daemon.motion import Motion
 from robosc_bridge.daemon.orders import Orders, Until, answer

@@ -14,9 +14,8 @@ from robosc.execution.runtime.clock import Clock
 from robosc.execution.runtime.event_log import EventLog
 from robosc_bridge.daemon.clients import Clients
 from robosc_bridge.daemon.exchange import Exchange
-from robosc_bridge.daemon.execution import Execution
+from robosc_bridge.daemon.execution import Execution, Job
 from robosc_bridge.daemon.feed import Feed, WatchedLog
-from robosc_bridge.daemon.jobs import Job
 from robosc_bridge.daemon.lifecycle import OVER, Lifecycle
 from robosc_bridge.daemon.motion import Motion
 from robosc_bridge.daemon.orders import HALTS, Orders, answer, unanswered

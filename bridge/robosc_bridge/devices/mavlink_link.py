@@ -27,8 +27,7 @@ from robosc_bridge.protocol.mavlink_messages import (
     vehicle_message,
 )
 from robosc_bridge.protocol.mavlink_signing import Signing
-from robosc_bridge.transport.lines import open_line
-from robosc_bridge.transport.system_host import SYSTEM_HOST
+from robosc_bridge.transport.system_host import SYSTEM_HOST, open_line
 
 BAUD = 57_600
 HEARTBEAT_S = 1.0

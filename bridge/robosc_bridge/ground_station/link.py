@@ -10,8 +10,7 @@ from robosc_bridge.errors import BridgeError
 from robosc_bridge.ground_station.session import STATION_LIMIT_S, Session
 from robosc_bridge.ground_station.settings import GroundSettings
 from robosc_bridge.host import Host, NetworkPort
-from robosc_bridge.transport.lines import Line, open_line
-from robosc_bridge.transport.system_host import SYSTEM_HOST
+from robosc_bridge.transport.system_host import SYSTEM_HOST, Line, open_line
 
 _log = logging.getLogger(__name__)
 

@@ -7,8 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 from robosc.execution.runtime.clock import SystemClock
-from robosc_bridge.transport.network_line import NetworkLine
+from robosc_bridge.host import Host, NetworkPort, Port
+from robosc_bridge.transport.network_line import NetworkLine, is_network_address
 from robosc_bridge.transport.serial_line import SerialLine
+
+type Line = Port | NetworkPort
 
 
 class SystemHost(SystemClock):
@@ -47,3 +50,17 @@ class SystemHost(SystemClock):
 
 SYSTEM_HOST = SystemHost()
 """This computer: what is used where nothing else is said."""
+
+
+def open_line(address: str, baud: int, host: Host = SYSTEM_HOST) -> Line:
+    """Open a line.
+
+    Args:
+        address: Of `transport.network_line`, or a serial port's path.
+        baud: Of a serial port.
+        host: Host with these serial ports and this network.
+
+    Raises:
+        LineError: It cannot be used.
+    """
+    return host.open_network(address) if is_network_address(address) else host.open_port(address, baud)

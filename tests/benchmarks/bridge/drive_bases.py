@@ -20,9 +20,9 @@ sys.path[:0] = [str(ROOT), str(ROOT / "bridge"), str(ROOT / "tests" / "benchmark
 
 from figures import text_table  # noqa: E402  # found through the path above
 from robosc_bridge.devices.dynamixel_bus import DynamixelBus  # noqa: E402
-from robosc_bridge.devices.factory import make_drive_base  # noqa: E402
 from robosc_bridge.devices.interface import Velocity  # noqa: E402
 from robosc_bridge.devices.robots import BURGER  # noqa: E402
+from robosc_bridge.driver_registry import make_drive_base  # noqa: E402
 from robosc_bridge.errors import DeviceSilentError  # noqa: E402
 from robosc_bridge.transport.serial_line import SerialLine  # noqa: E402
 

@@ -10,10 +10,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from robosc_bridge.devices.factory import make_drive_base
 from robosc_bridge.devices.interface import DriveBase, DriveReading, Velocity
 from robosc_bridge.devices.kinematics import wheel_speeds
 from robosc_bridge.devices.robots import ROBOTS
+from robosc_bridge.driver_registry import make_drive_base
 from robosc_bridge.errors import DeviceError, DeviceSilentError, LineLostError, LineMissingError
 from support.drive import PERIOD_S, Rig, rig
 

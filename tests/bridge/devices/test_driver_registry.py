@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from robosc_bridge import driver_registry
-from robosc_bridge.devices.factory import make_drive_base, make_range_scanner
 from robosc_bridge.driver_registry import (
     PANEL,
     Driver,
@@ -19,6 +18,8 @@ from robosc_bridge.driver_registry import (
     UnknownDriverError,
     available_drivers,
     features_of,
+    make_drive_base,
+    make_range_scanner,
     register,
 )
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from robosc_bridge.devices.factory import make_range_scanner
 from robosc_bridge.devices.interface import BINS, RangeScanner, Scan, ScannerCounters
 from robosc_bridge.devices.lidar import (
     BAUD_TRIAL_S,
@@ -22,7 +21,7 @@ from robosc_bridge.devices.lidar import (
     make_lds02,
     make_lds03,
 )
-from robosc_bridge.driver_registry import Kind, available_drivers
+from robosc_bridge.driver_registry import Kind, available_drivers, make_range_scanner
 from robosc_bridge.errors import LineError, LineLostError, LineMissingError
 from robosc_bridge.transport.serial_line import SerialLine
 from support.lidar_frames import lds01_frame, lds02_frame, lds03_frame

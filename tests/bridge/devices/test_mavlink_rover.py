@@ -2,13 +2,13 @@
 
 import pytest
 
-from robosc_bridge.devices.factory import make_drive_base
 from robosc_bridge.devices.interface import (
     STANDSTILL,
     DriveBase,
     Velocity,
 )
 from robosc_bridge.devices.mavlink_odometry import estimate
+from robosc_bridge.driver_registry import make_drive_base
 from robosc_bridge.errors import (
     DeviceError,
     DeviceSilentError,

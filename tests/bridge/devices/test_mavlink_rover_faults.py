@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from robosc_bridge.devices import mavlink_rover
-from robosc_bridge.devices.factory import make_drive_base, make_range_scanner
 from robosc_bridge.devices.robots import Body
+from robosc_bridge.driver_registry import make_drive_base, make_range_scanner
 from robosc_bridge.errors import (
     DeviceError,
     DeviceSilentError,

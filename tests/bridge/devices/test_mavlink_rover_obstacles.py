@@ -4,12 +4,12 @@ import math
 
 import pytest
 
-from robosc_bridge.devices.factory import make_range_scanner
 from robosc_bridge.devices.interface import (
     RangeScanner,
     Scan,
     Velocity,
 )
+from robosc_bridge.driver_registry import make_range_scanner
 from robosc_bridge.errors import (
     LineError,
     LineLostError,

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 import pytest
 
 from robosc_bridge.errors import LineBusyError, LineError, LineLostError, LineMissingError
-from robosc_bridge.transport.lines import open_line
 from robosc_bridge.transport.network_line import NetworkLine, is_network_address
 from robosc_bridge.transport.serial_line import SerialLine
+from robosc_bridge.transport.system_host import open_line
 from support.descriptors import open_descriptors
 from support.pty_end import PtyEnd
 

@@ -18,7 +18,7 @@ from types import FrameType
 
 from robosc_bridge.configuration.document import MAXIMUM_BYTES, read_file
 from robosc_bridge.configuration.problems import ConfigurationError
-from robosc_simulated.commands import UnknownCommandError, obey
+from robosc_simulated.commands import UnknownCommandError, execute
 from robosc_simulated.error_monitor import ErrorMonitor
 from robosc_simulated.floor import Track, oval, parse_track
 from robosc_simulated.lidar import LIDARS
@@ -118,7 +118,7 @@ def _listen(robot: SimulatedTurtleBot3) -> None:
     with contextlib.suppress(ValueError, OSError):
         for line in sys.stdin:
             try:
-                answer = obey(robot, line)
+                answer = execute(robot, line)
             except UnknownCommandError as error:
                 answer = f"error: {error}"
             if answer:

@@ -46,7 +46,7 @@ class UnknownCommandError(ValueError):
     """There is no such command, or not with such values."""
 
 
-def obey(robot: SimulatedTurtleBot3, line: str) -> str:
+def execute(robot: SimulatedTurtleBot3, line: str) -> str:
     """Do what a line says.
 
     Args:
@@ -71,7 +71,7 @@ def obey(robot: SimulatedTurtleBot3, line: str) -> str:
         raise UnknownCommandError(str(error)) from error
 
 
-def obey_world(world: World, words: list[str]) -> str:
+def execute_in_world(world: World, words: list[str]) -> str:
     """Do to the world what words say.
 
     Args:
@@ -116,7 +116,7 @@ def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
                 world=WORLD_HELP,
             )
         case ["pose" | "collisions" | "goal" | "obstacle", *_]:
-            return obey_world(robot.world, words)
+            return execute_in_world(robot.world, words)
         case ["left" | "right" as side, *what] if robot.rover is None:
             _to_servo(robot.left if side == "left" else robot.right, what)
         case ["battery", text] if robot.opencr is not None:

@@ -13,7 +13,7 @@ from google.protobuf.json_format import MessageToDict
 from robosc.errors import RoboscError
 from robosc.supervisor import Supervisor, decode
 from robosc_api.security import Credentials
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.terminal.client import (
     BridgeClient,
     DriveState,
@@ -85,14 +85,14 @@ class RemoteBridge:
         finally:
             watch.close()
 
-    async def order(self, command: Command, by: str) -> None:
+    async def order(self, command: OperatorCommand, by: str) -> None:
         """Want something of the bridge.
 
         Raises:
             RefusedError: It does not do it.
         """
         try:
-            if command is Command.STOP:
+            if command is OperatorCommand.STOP:
                 # It is sent, whether or not anybody waits for the answer.
                 await asyncio.shield(self._stop())
             else:

@@ -16,7 +16,7 @@ from robosc.event_logs import LoggedRun
 from robosc.event_logs.stops import is_ended
 from robosc.model.structure import CommunicationKind, Model
 from robosc.supervisor import Supervisor
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.definition import robot_of
 from robosc_view.messages import TransitionTracker
 from robosc_view.reports import EventBatch, LogSpan, SourceKind, Status
@@ -260,7 +260,7 @@ class Replay:
             else:
                 told = self._go_on(sink, told)
 
-    async def order(self, command: Command, by: str) -> None:
+    async def order(self, command: OperatorCommand, by: str) -> None:
         """Not here: it is over.
 
         Raises:

@@ -4,7 +4,7 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.sources import Pause, Play, RefusedError, ReplayCommand, Seek
 
 MAXIMUM_BYTES = 4096
@@ -13,7 +13,10 @@ MAXIMUM_BYTES = 4096
 SLOWEST, FASTEST = 0.01, 1000.0
 """Speeds of a replay."""
 
-_COMMANDS = {str(item): item for item in (Command.START, Command.STANDBY, Command.RESUME, Command.RESET)}
+_COMMANDS = {
+    str(item): item
+    for item in (OperatorCommand.START, OperatorCommand.STANDBY, OperatorCommand.RESUME, OperatorCommand.RESET)
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +33,7 @@ class Order:
         token: Token that is shown for it.
     """
 
-    command: Command
+    command: OperatorCommand
     token: object
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 from robosc.supervisor import Supervisor
 from robosc.targets.c99.layout import PLANT_LOCATIONS
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.definition import (
     DefinitionError,
     Robot,
@@ -282,7 +282,7 @@ class StateTopic:
         finally:
             listener.close()
 
-    async def order(self, command: Command, by: str) -> None:
+    async def order(self, command: OperatorCommand, by: str) -> None:
         """Not here: a node hears its own topics alone.
 
         Raises:

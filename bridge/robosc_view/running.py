@@ -11,7 +11,7 @@ from robosc._version import __version__
 from robosc_bridge.configuration.channels import channel_name
 from robosc_bridge.daemon.feed import Snapshot
 from robosc_bridge.daemon.operations import UNDONE_BY, Operations
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.safety import LATCHING, Caution, Reason
 from robosc_view.definition import Robot, robot_of
 from robosc_view.reports import Drive, EventBatch, LaserScan, Notice, SourceKind, Status
@@ -63,14 +63,14 @@ class RunningBridge:
         finally:
             subscription.close()
 
-    async def order(self, command: Command, by: str) -> None:
+    async def order(self, command: OperatorCommand, by: str) -> None:
         """Want something; a stop takes effect before this returns.
 
         Raises:
             RefusedError: It is not done.
         """
         future = self._operations.order(command, by)
-        if command is Command.STOP:
+        if command is OperatorCommand.STOP:
             return
         answered = asyncio.Event()
         loop = asyncio.get_running_loop()

@@ -17,7 +17,7 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from robosc_api.security import SecurityError, ServerSecurity, check_files, check_listening, joined
 from robosc_api.security.addresses import split
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.daemon.view_settings import ViewSettings
 from robosc_view.access import Access
 from robosc_view.broadcaster import Broadcaster, RobotCache, Viewer
@@ -358,7 +358,7 @@ class _Session:
                     self._viewer.answer(refused_text(type(command).__name__.lower(), str(error)))
         return self._is_in_time()
 
-    def _order(self, command: Command, token: object) -> None:
+    def _order(self, command: OperatorCommand, token: object) -> None:
         if self._access is None or not self._access.is_token(token):
             why = "this needs the token of this start: open the page by the address that the server has printed"
         elif len(self._tasks) >= MAXIMUM_WAITING:
@@ -370,17 +370,17 @@ class _Session:
 
     def _stop(self) -> None:
         # Handed over before anything else is looked at: also of a page that is closed at once.
-        task = asyncio.Task(self._do(Command.STOP), loop=asyncio.get_running_loop(), eager_start=True)
+        task = asyncio.Task(self._do(OperatorCommand.STOP), loop=asyncio.get_running_loop(), eager_start=True)
         if not task.done():
             self._stops.add(task)
             task.add_done_callback(self._stops.discard)
 
-    def _start(self, command: Command) -> None:
+    def _start(self, command: OperatorCommand) -> None:
         task = asyncio.create_task(self._do(command))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    async def _do(self, command: Command) -> None:
+    async def _do(self, command: OperatorCommand) -> None:
         try:
             await self._source.order(command, self._by)
         except RefusedError as error:

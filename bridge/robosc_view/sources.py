@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.errors import BridgeError
 from robosc_view.definition import Robot
 from robosc_view.reports import EventBatch, LaserScan, Status
@@ -93,7 +93,7 @@ class Source(Protocol):
             SourceWrongError: It cannot be used as it is.
         """
 
-    async def order(self, command: Command, by: str) -> None:
+    async def order(self, command: OperatorCommand, by: str) -> None:
         """Want something of the robot; returns once it is done.
 
         A stop is certain as soon as this first waits: it is carried out even if nobody awaits its answer any more.

@@ -18,7 +18,7 @@ import msgspec
 
 from robosc.errors import RoboscError
 from robosc.supervisor import Supervisor, decode
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.definition import Robot, robot_of
 from robosc_view.replay import first_frame
 from robosc_view.reports import Notice, SourceKind, Status
@@ -91,7 +91,7 @@ class StaticModel:
         finally:
             await _ended(making)
 
-    async def order(self, command: Command, by: str) -> None:
+    async def order(self, command: OperatorCommand, by: str) -> None:
         """Not here: nothing is executed.
 
         Raises:

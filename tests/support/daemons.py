@@ -152,12 +152,12 @@ class Scene:
             self.out.linear_m_s + self.out.angular_rad_s * 0.08,
         )
         reading = DriveReading(now_s, pose, self.out, wheels, self.torque, buttons=dict(self.buttons))
-        self.safety.saw_drive(reading)
+        self.safety.on_drive_reading(reading)
         self.daemon.post(reading)
 
     def scan(self, distance_m: float) -> None:
         now_s = self.clock.monotonic()
-        self.safety.saw_scan(now_s)
+        self.safety.on_scan(now_s)
         self.daemon.post(Scan(now_s, (distance_m,) * BINS, RawScan((), (), ()), 5.0))
 
     def live(self, seconds: float, distance_m: float | None = None) -> None:

@@ -17,7 +17,7 @@ from robosc_bridge.daemon.feed import Feed, Snapshot
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.programs import FromProgram
 from robosc_bridge.daemon.reports import Device
-from robosc_bridge.daemon.states import Command, Order, State
+from robosc_bridge.daemon.states import OperatorCommand, Order, State
 from robosc_bridge.devices.interface import BINS, DriveReading, Pose, RawScan, Scan, Velocity
 from support.models import bundle_of
 from support.random_supervisors import CERTIFICATE
@@ -106,7 +106,7 @@ class PlayedDaemon:
     orders: list[Order] = field(default_factory=list)
     told: list[FromProgram] = field(default_factory=list)
     seen: int = 0
-    answers: dict[Command, str] = field(default_factory=dict)
+    answers: dict[OperatorCommand, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         checked = check(bundle_of(self.model))
@@ -135,7 +135,7 @@ class PlayedDaemon:
         self.seen += 1
 
     @property
-    def commands(self) -> list[Command]:
+    def commands(self) -> list[OperatorCommand]:
         """Commands that were ordered."""
         return [order.command for order in self.orders]
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from robosc_bridge.daemon.states import State
 from robosc_bridge.devices.interface import Velocity
-from robosc_bridge.ground_station.session import Session
+from robosc_bridge.ground_station.session import StationSession
 from robosc_bridge.ground_station.settings import GroundSettings
 from support.ground import PlayedDaemon, Station, of_type
 
@@ -24,7 +24,7 @@ class Talk:
     now_s: float = BEGIN_S
 
     def __post_init__(self) -> None:
-        self.session = Session(self.daemon.operations, self.settings, self.now_s)
+        self.session = StationSession(self.daemon.operations, self.settings, self.now_s)
 
     def say(self, data: bytes = b"", after_s: float = 0.0) -> list[Any]:
         """Return the answers."""

@@ -24,7 +24,7 @@ from robosc_bridge.daemon.feed import Feed, Snapshot
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.programs import FromProgram
 from robosc_bridge.daemon.reports import Device
-from robosc_bridge.daemon.states import Command, Order, State
+from robosc_bridge.daemon.states import OperatorCommand, Order, State
 from robosc_bridge.daemon.view_settings import ViewSettings
 from robosc_bridge.devices.interface import BINS, DriveReading, Pose, RawScan, Scan, Velocity
 from robosc_bridge.safety import Caution, Reason
@@ -201,13 +201,13 @@ class LiveRobot:
             return
         self.orders.append(item)
         match item.command:
-            case Command.STOP:
+            case OperatorCommand.STOP:
                 self.reasons = (Reason.OPERATOR_STOP,)
-            case Command.RESUME:
+            case OperatorCommand.RESUME:
                 self.reasons = ()
-            case Command.STANDBY | Command.RESET:
+            case OperatorCommand.STANDBY | OperatorCommand.RESET:
                 self.state, self.reasons = State.STANDBY, (Reason.STANDBY,)
-            case Command.START:
+            case OperatorCommand.START:
                 self.system.restart()
                 self.state, self.reasons = State.RUNNING, ()
         if self.refusal is not None:

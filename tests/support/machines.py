@@ -7,7 +7,7 @@ from robosc.execution.runtime.event_log import NullLog
 from robosc.supervisor import Supervisor
 from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.daemon.assembly import Machine, assemble
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.host import Host
 from robosc_bridge.transport.system_host import SYSTEM_HOST
@@ -46,7 +46,7 @@ class RecordedEndpoint:
             raise BridgeError(self.problem)
         self.told.append(f"start {self.made.drive.is_alive}")
         self.switch_s = sys.getswitchinterval()
-        self.made.operations.order(Command.QUIT, "a test")
+        self.made.operations.order(OperatorCommand.QUIT, "a test")
 
     def stop(self) -> None:
         snapshot = self.made.operations.feed.snapshot

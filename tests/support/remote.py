@@ -21,7 +21,7 @@ from robosc_bridge.daemon.feed import Feed, Snapshot
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.programs import FromProgram, Program
 from robosc_bridge.daemon.reports import Device
-from robosc_bridge.daemon.states import Command, Order, State
+from robosc_bridge.daemon.states import OperatorCommand, Order, State
 from robosc_bridge.devices.interface import BINS, DriveReading, MotorFault, Pose, RawScan, Scan, Velocity
 from robosc_bridge.remote import RemoteEndpoint, RemoteSettings, serve
 from robosc_bridge.safety import Caution, Reason
@@ -161,7 +161,7 @@ class FakeDaemon:
         """Number of items that are posted and not handled."""
         return self._inbox.qsize()
 
-    def commands(self) -> list[Command]:
+    def commands(self) -> list[OperatorCommand]:
         """Return the commands that were ordered."""
         return [order.command for order in self.orders]
 
@@ -174,7 +174,7 @@ class FakeDaemon:
         return [item for item in self.told if isinstance(item, kind)]
 
     def _post(self, item: Order | FromProgram) -> None:
-        if isinstance(item, Order) and item.command is Command.STOP:
+        if isinstance(item, Order) and item.command is OperatorCommand.STOP:
             # It does not wait for the loop's turn.
             self.orders.append(item)
             return

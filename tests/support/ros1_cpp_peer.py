@@ -88,7 +88,7 @@ class Action:
         tell(kind="cancel", name=self._name)
 
 
-def obey(order: dict[str, Any]) -> None:
+def execute(order: dict[str, Any]) -> None:
     what, name = order["do"], order["name"]
     if what == "subscribe":
         # Bound to the topic by a default: the callback is called later.
@@ -132,7 +132,7 @@ def main() -> None:
     tell(kind="ready")
     for line in sys.stdin:
         try:
-            obey(json.loads(line))
+            execute(json.loads(line))
         except Exception as error:
             tell(kind="error", data=f"{line.strip()}: {error}")
 

@@ -60,7 +60,7 @@ class Bench:
     def report(self) -> None:
         """Make the reports of the other threads at this time."""
         facts: dict[str, Callable[[float], None]] = {
-            "scan": lambda now_s: self.layer.saw_scan(now_s, self.ranges_m),
+            "scan": lambda now_s: self.layer.on_scan(now_s, self.ranges_m),
             "loop": self.layer.loop_cycled,
             "operator": self.layer.operator_seen,
         }
@@ -74,7 +74,7 @@ class Bench:
         """The next exchange."""
         if "drive" not in self.silent:
             v, turn = self.last.velocity.linear_m_s, self.last.velocity.angular_rad_s * self.limits.separation_m / 2
-            self.layer.saw_drive(
+            self.layer.on_drive_reading(
                 reading(
                     self.now_s + STEP_S / 2,
                     wheels_m_s=self.wheels_m_s or (v - turn, v + turn),

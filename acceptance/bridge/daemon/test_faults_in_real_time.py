@@ -8,7 +8,7 @@ import os
 
 import pytest
 
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 from robosc_simulated import SimulatedTurtleBot3
 from support.driven import PATIENT, driven
@@ -43,7 +43,7 @@ def test_a_loop_that_hangs_stops_the_wheels_until_it_turns_again() -> None:
 
 def test_an_operators_stop_holds() -> None:
     with driven("opencr", host=SYSTEM_HOST) as bridge:
-        bridge.stopped_after(lambda: bridge.machine.daemon.post(Command.STOP), STATED_S["an operator stops it"])
+        bridge.stopped_after(lambda: bridge.machine.daemon.post(OperatorCommand.STOP), STATED_S["an operator stops it"])
         bridge.stays(WHILE_S)
 
 

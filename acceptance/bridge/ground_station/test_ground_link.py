@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.devices.interface import Velocity
 from robosc_bridge.ground_station.link import GroundLink
 from robosc_bridge.ground_station.settings import GroundSettings
@@ -20,7 +20,7 @@ FASTEST = Velocity(0.2, 2.0)
 @pytest.mark.real_time
 def test_a_station_is_called_arms_the_robot_and_the_link_is_soon_stopped() -> None:
     daemon = PlayedDaemon()
-    daemon.answers[Command.START] = ""
+    daemon.answers[OperatorCommand.START] = ""
     station = Station()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as there:
         there.bind(("127.0.0.1", 0))
@@ -33,7 +33,7 @@ def test_a_station_is_called_arms_the_robot_and_the_link_is_soon_stopped() -> No
         there.sendto(station.heartbeat() + station.command(400, 1.0), robot)
         while not of_type("COMMAND_ACK", station.heard):
             station.hear(there.recv(65535))
-        assert daemon.commands == [Command.START]
+        assert daemon.commands == [OperatorCommand.START]
         link.stop()
     link = GroundLink(daemon.operations, GroundSettings("tcp:127.0.0.1:1", FASTEST))
     link.start()

@@ -12,7 +12,7 @@ from playwright.sync_api import Browser
 
 from robosc.event_logs import read_log
 from robosc.execution.runtime.event_log import json_line, plain
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.replay import Recording, Replay
 from support.browser import visit
 from support.generated import example_supervisor
@@ -54,10 +54,10 @@ def test_a_stop_reaches_the_robot_and_commands_follow(browser: Browser) -> None:
         seen.wait("() => !document.querySelector('#stop').hidden")
         seen.page.keyboard.press("Escape")
         seen.wait(answer, "STOP was heard")
-        assert [order.command for order in robot.orders] == [Command.STOP]
+        assert [order.command for order in robot.orders] == [OperatorCommand.STOP]
         seen.wait("() => document.querySelector('#causes').textContent.includes('An operator has stopped the robot.')")
         seen.page.goto(endpoint.url)
-        for command in (Command.RESUME, Command.STANDBY, Command.START, Command.RESET):
+        for command in (OperatorCommand.RESUME, OperatorCommand.STANDBY, OperatorCommand.START, OperatorCommand.RESET):
             seen.page.get_by_role("button", name=command.capitalize(), exact=True).click()
             seen.wait(answer, f"{command}: done.")
         assert [order.command for order in robot.orders[1:]] == ["resume", "standby", "start", "reset"]

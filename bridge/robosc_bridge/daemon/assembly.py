@@ -25,7 +25,7 @@ from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.files import file_problems
 from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.operations import Operations
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.daemon.view_settings import settings_of as view_settings
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
@@ -247,7 +247,7 @@ class Machine:
 
     def quit(self) -> None:
         """Let `run` end; from any thread or signal handler."""
-        self.daemon.post(Command.QUIT)
+        self.daemon.post(OperatorCommand.QUIT)
 
 
 def _require_endpoints(configuration: Configuration, mapping: ChannelMapping) -> None:

@@ -12,7 +12,7 @@ from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.daemon.requesters import Requesters
-from robosc_bridge.daemon.robot import Robot
+from robosc_bridge.daemon.robot_adapter import RobotAdapter
 
 _CALLED = (str(CommunicationKind.SERVICE), str(CommunicationKind.ACTION))
 
@@ -62,7 +62,7 @@ class Execution:
         overruns: Number of decisions that were left out because the one before took too long.
     """
 
-    def __init__(self, job: Job, robot: Robot, requesters: Requesters, clock: Clock, log: EventLog) -> None:
+    def __init__(self, job: Job, robot: RobotAdapter, requesters: Requesters, clock: Clock, log: EventLog) -> None:
         self.executor: Executor | Layer | None = None
         self.due_s = clock.monotonic()
         self.overruns = 0
@@ -118,7 +118,7 @@ class Execution:
             if self.layer is not None:
                 self._requesters.release_silent(self.layer)
             self.executor.tick()
-            self._robot.settle(self.executor)
+            self._robot.deliver_pending(self.executor)
             self._robot.report_rotation(self.executor)
         period_s = self._job.settings.period_s
         self.due_s += period_s

@@ -25,7 +25,7 @@ class Latches:
         self._orders = orders
 
     @property
-    def grave(self) -> tuple[Reason, ...]:
+    def latched(self) -> tuple[Reason, ...]:
         """Those that only a reset ends."""
         return tuple(reason for reason in self.notice.reasons if reason in _GRAVE)
 

@@ -10,12 +10,12 @@ from typing import assert_never
 from robosc.execution.runtime.clock import Clock
 from robosc_bridge.daemon.execution import Execution, Job
 from robosc_bridge.daemon.latches import Latches
-from robosc_bridge.daemon.motion import Motion
+from robosc_bridge.daemon.motion import MotionTarget
 from robosc_bridge.daemon.orders import Orders, Until, answer
 from robosc_bridge.daemon.readiness import Readiness
 from robosc_bridge.daemon.reports import Device, DeviceDown, SafetyNotice
-from robosc_bridge.daemon.robot import Robot
-from robosc_bridge.daemon.states import Command, Order, State
+from robosc_bridge.daemon.robot_adapter import RobotAdapter
+from robosc_bridge.daemon.states import OperatorCommand, Order, State
 from robosc_bridge.daemon.stop_switch import STOP_HELD, StopSwitch
 from robosc_bridge.safety import Reason, SafetyLayer
 
@@ -67,7 +67,12 @@ class Lifecycle:
         self._are_alive: Callable[[], bool] = lambda: True
 
     def attach(
-        self, execution: Execution, robot: Robot, motion: Motion, switch: StopSwitch, note: Callable[[str, str], None]
+        self,
+        execution: Execution,
+        robot: RobotAdapter,
+        motion: MotionTarget,
+        switch: StopSwitch,
+        note: Callable[[str, str], None],
     ) -> None:
         """Set the parts that it brings to work and to rest, and the function that notes what watchers want to see."""
         self._execution = execution
@@ -99,7 +104,7 @@ class Lifecycle:
         if is_news:
             self._note("device", f"the {device} is there")
         if executor is not None and is_news:
-            self._robot.saw_device(device, f"the {device} is back", executor, is_lost=False)
+            self._robot.on_device_change(device, f"the {device} is back", executor, is_lost=False)
 
     def device_down(self, report: DeviceDown) -> None:
         """A device does not work."""
@@ -110,7 +115,7 @@ class Lifecycle:
         executor = self._execution.executor
         if executor is None or not is_news:
             return
-        self._robot.saw_device(report.device, report.problem, executor, is_lost=True)
+        self._robot.on_device_change(report.device, report.problem, executor, is_lost=True)
         if report.device is Device.DRIVE:
             # A fault that was there before does not end with the drive base's return.
             self._is_drive_lost = not self.problem
@@ -126,9 +131,9 @@ class Lifecycle:
             # Before the start, nothing has told anything yet.
             is_news = self.state is State.RUNNING and reason not in _ORDINARY
             _log.log(logging.WARNING if is_news else logging.DEBUG, "%s", reason)
-        grave = self._latches.grave
-        if grave and self.state is State.RUNNING:
-            self._fault(" ".join(grave))
+        latched = self._latches.latched
+        if latched and self.state is State.RUNNING:
+            self._fault(" ".join(latched))
 
     # Commands.
 
@@ -143,23 +148,23 @@ class Lifecycle:
             answer(order, OVER)
             return
         match command:
-            case Command.START:
+            case OperatorCommand.START:
                 self._order_start(order)
-            case Command.STOP:
+            case OperatorCommand.STOP:
                 # A reset that is under way would forget this stop, which came after it.
-                self._orders.settle(Until.RESET, str(Reason.OPERATOR_STOP))
+                self._orders.resolve(Until.RESET, str(Reason.OPERATOR_STOP))
                 self._switch.stop(self._execution.executor)
-                self._settle()
+                self._deliver_pending()
                 answer(order, "")
-            case Command.STANDBY:
+            case OperatorCommand.STANDBY:
                 self._order_standby(order)
-            case Command.RESUME:
+            case OperatorCommand.RESUME:
                 why = self._switch.resume(self._execution.executor)
-                self._settle()
+                self._deliver_pending()
                 answer(order, why)
-            case Command.RESET:
+            case OperatorCommand.RESET:
                 self._order_reset(order)
-            case Command.QUIT:
+            case OperatorCommand.QUIT:
                 if self.state is State.FAULT:
                     # It was told when it came; whoever wanted the end gets an orderly one.
                     self.problem = ""
@@ -170,9 +175,9 @@ class Lifecycle:
             case _:
                 assert_never(command)
 
-    def _settle(self) -> None:
+    def _deliver_pending(self) -> None:
         if self._execution.executor is not None:
-            self._robot.settle(self._execution.executor)
+            self._robot.deliver_pending(self._execution.executor)
 
     def _order_start(self, order: Order) -> None:
         self._look_for_devices()
@@ -240,7 +245,7 @@ class Lifecycle:
         why = why or (STOP_HELD if self._switch.is_held else "")
         if why:
             _log.error("reset: %s", why)
-            self._orders.settle(Until.RESET, why)
+            self._orders.resolve(Until.RESET, why)
             return
         self._reset_end_s = self._clock.monotonic() + RESET_LIMIT_S
         self._reset_drive()
@@ -254,7 +259,7 @@ class Lifecycle:
             if not problem and self.state is State.FAULT:
                 self.state, self.problem = State.STANDBY, ""
         _log.log(logging.ERROR if problem else logging.INFO, "reset: %s", problem or "done")
-        self._orders.settle(Until.RESET, problem)
+        self._orders.resolve(Until.RESET, problem)
 
     # Runs.
 
@@ -267,7 +272,7 @@ class Lifecycle:
         self._switch.begin(executor)
         if self._readiness.scan is not None:
             # It must not decide on nothing while the last one is at hand.
-            self._robot.saw_scan(self._readiness.scan, executor)
+            self._robot.on_scan(self._readiness.scan, executor)
         _log.info("running")
 
     def _enable(self) -> None:
@@ -306,7 +311,7 @@ class Lifecycle:
         if self.state is State.RUNNING and executor is not None and executor.is_faulty:
             self._safety.supervisor_fault()
             self._fault("; ".join(executor.reasons))
-        self._orders.settle(Until.STARTED, "" if self.state is State.RUNNING else self.problem or "it was stopped")
+        self._orders.resolve(Until.STARTED, "" if self.state is State.RUNNING else self.problem or "it was stopped")
         match self.state:
             case State.STARTING if self._look_for_devices() and self._starts_itself:
                 if not self._orders.is_waiting(Until.RESET):
@@ -319,7 +324,7 @@ class Lifecycle:
                 self.problem = ""
                 self.state = State.STANDBY
         if self._orders.is_waiting(Until.RESET) and self.state is not State.STOPPING and now_s >= self._reset_end_s:
-            self._orders.settle(Until.RESET, f"the motors were not reset within {RESET_LIMIT_S:g} s")
+            self._orders.resolve(Until.RESET, f"the motors were not reset within {RESET_LIMIT_S:g} s")
 
     def _look_for_devices(self) -> bool:
         """Leave the start once all devices are there; whether it does now."""
@@ -344,13 +349,13 @@ class Lifecycle:
         if self.state is State.STANDBY and not has_let_go:
             self.state = State.FAULT
         _log.info("%s", self.state)
-        self._orders.settle(Until.RESTING, "" if has_let_go and self.state is not State.FAULT else self.problem)
+        self._orders.resolve(Until.RESTING, "" if has_let_go and self.state is not State.FAULT else self.problem)
         if self._orders.is_waiting(Until.RESET) and self.state is not State.OVER:
             self._reset()
 
     def operator_stop(self) -> None:
         """The operator stops the robot."""
-        self._orders.settle(Until.RESET, str(Reason.OPERATOR_STOP))
+        self._orders.resolve(Until.RESET, str(Reason.OPERATOR_STOP))
         self._safety.operator_stop()
         self._hurry()
         # What was wanted before does not move the robot afterwards.
@@ -362,8 +367,8 @@ class Lifecycle:
             return "the robot is being stopped"
         if self.state is State.FAULT:
             return f"the robot is in fault: {self.problem}; reset it first"
-        grave = self._latches.grave
-        why = f"{' '.join(grave)} Reset it first." if grave else self._latches.release()
+        latched = self._latches.latched
+        why = f"{' '.join(latched)} Reset it first." if latched else self._latches.release()
         if why:
             _log.error("the robot cannot go on: %s", why)
         elif self.state is State.RUNNING:

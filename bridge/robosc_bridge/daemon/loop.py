@@ -13,12 +13,12 @@ from typing import assert_never
 from robosc.execution.runtime.clock import Clock
 from robosc.execution.runtime.event_log import EventLog
 from robosc_bridge.daemon.clients import Clients
-from robosc_bridge.daemon.exchange import Exchange
 from robosc_bridge.daemon.execution import Execution, Job
 from robosc_bridge.daemon.feed import Feed, WatchedLog
 from robosc_bridge.daemon.lifecycle import OVER, Lifecycle
-from robosc_bridge.daemon.motion import Motion
+from robosc_bridge.daemon.motion import MotionTarget
 from robosc_bridge.daemon.orders import HALTS, Orders, answer, unanswered
+from robosc_bridge.daemon.program_channel import ProgramChannel
 from robosc_bridge.daemon.program_dispatcher import ProgramDispatcher
 from robosc_bridge.daemon.program_inbox import ProgramInbox
 from robosc_bridge.daemon.programs import FromProgram
@@ -26,9 +26,9 @@ from robosc_bridge.daemon.readiness import Readiness
 from robosc_bridge.daemon.reports import DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice, Sighting
 from robosc_bridge.daemon.request_checker import RequestChecker
 from robosc_bridge.daemon.requesters import Requesters
-from robosc_bridge.daemon.robot import Robot
+from robosc_bridge.daemon.robot_adapter import RobotAdapter
 from robosc_bridge.daemon.snapshots import Snapshots
-from robosc_bridge.daemon.states import Command, Order, State
+from robosc_bridge.daemon.states import OperatorCommand, Order, State
 from robosc_bridge.daemon.stop_switch import StopSwitch
 from robosc_bridge.daemon.supervised import Listeners
 from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Scan, Velocity
@@ -95,15 +95,15 @@ class Daemon:
         self._readiness = Readiness(needs_scanner=job.needs_scanner, needs_camera=job.needs_camera)
         self._lifecycle = lifecycle = Lifecycle(job, safety, self._readiness, self._orders, clock)
         listeners, clients = Listeners(job.mapping), Clients()
-        exchange = Exchange(job.mapping, listeners, clients)
+        program_channel = ProgramChannel(job.mapping, listeners, clients)
         self._switch = StopSwitch(emergency_stop, listeners, lifecycle.operator_stop, lifecycle.operator_resume)
-        self._motion = Motion(rotate, self._command)
-        self._robot = Robot(
+        self._motion = MotionTarget(rotate, self._command)
+        self._robot = RobotAdapter(
             job.mapping,
             listeners,
             self._motion,
             self._switch,
-            exchange,
+            program_channel,
             lifecycle.rotation_failed,
             job.settings.service_timeout_s,
             clock.monotonic,
@@ -116,7 +116,7 @@ class Daemon:
             clock.monotonic,
         )
         self._execution = Execution(job, self._robot, requesters, clock, WatchedLog(log, feed))
-        self._programs = ProgramDispatcher(clients, exchange, requesters, self._execution, self._robot)
+        self._programs = ProgramDispatcher(clients, program_channel, requesters, self._execution, self._robot)
         self._snapshots = Snapshots(feed, self._execution, self._readiness, clock)
         lifecycle.attach(self._execution, self._robot, self._motion, self._switch, self._snapshots.note)
         self._wish = Velocity()
@@ -146,17 +146,17 @@ class Daemon:
         self._hurry = hurry
         self._lifecycle.connect(hurry, reset_drive, are_alive)
 
-    def post(self, item: Report | Key | Command | Order | FromProgram) -> None:
+    def post(self, item: Report | Key | OperatorCommand | Order | FromProgram) -> None:
         """Tell the loop something; from any thread or signal handler, never waits."""
         if isinstance(item, FromProgram):
             self._from_programs.put(item)
             return
-        if isinstance(item, Command):
+        if isinstance(item, OperatorCommand):
             item = Order(item, "", unanswered)
         if isinstance(item, Order) and item.command in HALTS:
             # These do not wait for the loop, and what came before them does not undo them.
             self._orders.halting(item)
-            self._safety.operator_stop() if item.command is Command.STOP else self._safety.disable()
+            self._safety.operator_stop() if item.command is OperatorCommand.STOP else self._safety.disable()
             self._hurry()
         self._inbox.put(item)
         if self.state is State.OVER:
@@ -235,16 +235,16 @@ class Daemon:
             case DriveReading():
                 self._readiness.reading = item
                 if executor is not None:
-                    self._robot.saw_drive(item, executor)
+                    self._robot.on_drive_reading(item, executor)
                 else:
                     self._robot.watch_buttons(item.buttons)
             case Scan():
                 self._readiness.scan = item
                 if executor is not None:
-                    self._robot.saw_scan(item, executor)
+                    self._robot.on_scan(item, executor)
             case Sighting():
                 if executor is not None:
-                    self._robot.saw_line(item, executor)
+                    self._robot.on_line(item, executor)
             case DeviceUp(device):
                 self._lifecycle.device_up(device)
             case DeviceDown():
@@ -254,9 +254,9 @@ class Daemon:
             case ResetDone(problem):
                 self._lifecycle.reset_done(problem)
             case Key(key):
-                self._switch.saw_key(key, executor)
+                self._switch.on_key(key, executor)
                 if executor is not None:
-                    self._robot.saw_key(key, executor)
+                    self._robot.on_key(key, executor)
             case Order():
                 self._in_hand = (item,)
                 self._lifecycle.execute(item)
@@ -279,4 +279,4 @@ class Daemon:
 def _refuse(item: Item) -> None:
     """Nobody takes it up any more."""
     if isinstance(item, Order):
-        answer(item, "" if item.command is Command.QUIT else OVER)
+        answer(item, "" if item.command is OperatorCommand.QUIT else OVER)

@@ -11,7 +11,7 @@ from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Velocity
 from robosc_bridge.skills import Rotate, RotateState
 
 
-class Motion:
+class MotionTarget:
     """One wish at a time; the last one counts.
 
     Args:
@@ -65,7 +65,7 @@ class Motion:
             self._is_paused = is_paused
             self._pass(self._wish, now_s)
 
-    def saw(self, reading: DriveReading) -> None:
+    def on_drive_reading(self, reading: DriveReading) -> None:
         """The drive base told where it is: a rotation goes on."""
         if self._rotate.is_rotating:
             self._pass(self._rotate.update(reading.pose.heading_rad, reading.time_s), reading.time_s)

@@ -8,9 +8,12 @@ from robosc.supervisor import Supervisor
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.programs import FromProgram
-from robosc_bridge.daemon.states import Command, Order
+from robosc_bridge.daemon.states import OperatorCommand, Order
 
-UNDONE_BY: Mapping[Command, Command] = {Command.START: Command.STANDBY, Command.RESUME: Command.STOP}
+UNDONE_BY: Mapping[OperatorCommand, OperatorCommand] = {
+    OperatorCommand.START: OperatorCommand.STANDBY,
+    OperatorCommand.RESUME: OperatorCommand.STOP,
+}
 """Commands that let the robot move, each with the command that takes it back.
 
 A command that was reported to a person as failed does not take effect later.
@@ -61,7 +64,7 @@ class Operations:
         self._post = post
         self._operator_seen = operator_seen
 
-    def order(self, command: Command, by: str) -> "Future[str]":
+    def order(self, command: OperatorCommand, by: str) -> "Future[str]":
         """Want something; a stop takes effect before this returns.
 
         Returns:

@@ -4,11 +4,11 @@ import logging
 from collections import deque
 from enum import StrEnum
 
-from robosc_bridge.daemon.states import Command, Order
+from robosc_bridge.daemon.states import OperatorCommand, Order
 
 _log = logging.getLogger(__name__)
 
-HALTS = frozenset({Command.STOP, Command.STANDBY, Command.QUIT})
+HALTS = frozenset({OperatorCommand.STOP, OperatorCommand.STANDBY, OperatorCommand.QUIT})
 """They take effect before the loop hears of them."""
 
 
@@ -50,7 +50,7 @@ class Orders:
     def is_stop_coming(self) -> bool:
         """True if one of these orders is an operator's stop, which holds until an operator ends it."""
         # Another thread may append meanwhile.
-        return any(order.command is Command.STOP for order in tuple(self._halting))
+        return any(order.command is OperatorCommand.STOP for order in tuple(self._halting))
 
     def wait(self, until: Until, order: Order) -> None:
         """An order is answered later."""
@@ -60,7 +60,7 @@ class Orders:
         """Return True if an order waits for a condition."""
         return any(item is until for item, _ in self._open)
 
-    def settle(self, until: Until, why: str = "") -> None:
+    def resolve(self, until: Until, why: str = "") -> None:
         """Answer the orders that wait for a condition: it is there, or a reason says why it never will be."""
         settled = [order for item, order in self._open if item is until]
         self._open = [(item, order) for item, order in self._open if item is not until]
@@ -70,7 +70,7 @@ class Orders:
     def close(self, why: str) -> None:
         """Nothing comes any more."""
         for until in Until:
-            self.settle(until, why)
+            self.resolve(until, why)
 
 
 def answer(order: Order, why: str) -> None:

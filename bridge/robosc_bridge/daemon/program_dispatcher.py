@@ -3,8 +3,8 @@
 from typing import assert_never
 
 from robosc_bridge.daemon.clients import Clients
-from robosc_bridge.daemon.exchange import Exchange
 from robosc_bridge.daemon.execution import Execution
+from robosc_bridge.daemon.program_channel import ProgramChannel
 from robosc_bridge.daemon.program_inbox import Arrived, Overflowed, Unreadable
 from robosc_bridge.daemon.programs import (
     Attached,
@@ -22,7 +22,7 @@ from robosc_bridge.daemon.programs import (
     Replied,
 )
 from robosc_bridge.daemon.requesters import Requesters
-from robosc_bridge.daemon.robot import Robot
+from robosc_bridge.daemon.robot_adapter import RobotAdapter
 
 
 class ProgramDispatcher:
@@ -30,7 +30,7 @@ class ProgramDispatcher:
 
     Args:
         clients: Programs that are there.
-        exchange: The model's other side.
+        program_channel: The model's other side.
         requesters: The caller's side of a layer.
         execution: The supervisor at work.
         robot: Tells the executor what has become of its requests.
@@ -39,13 +39,13 @@ class ProgramDispatcher:
     def __init__(
         self,
         clients: Clients,
-        exchange: Exchange,
+        program_channel: ProgramChannel,
         requesters: Requesters,
         execution: Execution,
-        robot: Robot,
+        robot: RobotAdapter,
     ) -> None:
         self._clients = clients
-        self._exchange = exchange
+        self._program_channel = program_channel
         self._requesters = requesters
         self._execution = execution
         self._robot = robot
@@ -59,14 +59,14 @@ class ProgramDispatcher:
             # What comes from others is too late: they are gone.
             self._take(item)
         if self._execution.executor is not None:
-            self._robot.settle(self._execution.executor)
+            self._robot.deliver_pending(self._execution.executor)
 
     def _attach(self, program: Program) -> None:
         if program in self._clients:
             self._clients.refuse(program, "this program is there already")
             return
         self._clients.add(program)
-        self._exchange.attach(program)
+        self._program_channel.attach(program)
 
     def _take(self, item: Arrived) -> None:
         program, executor, layer = item.program, self._execution.executor, self._execution.layer
@@ -75,7 +75,7 @@ class ProgramDispatcher:
                 pass
             case Detached():
                 self._clients.remove(program)
-                self._exchange.detach(program, executor)
+                self._program_channel.detach(program, executor)
                 self._requesters.detach(program, layer)
             case Unreadable(why=why):
                 self._clients.refuse(program, why)
@@ -84,9 +84,9 @@ class ProgramDispatcher:
                 if layer is not None:
                     self._requesters.overflow(program, layer)
             case MessageReceived():
-                self._exchange.receive(item, executor)
+                self._program_channel.receive(item, executor)
             case Replied() | CallFailed() | GoalAccepted() | FeedbackGiven() | GoalEnded():
-                self._exchange.take(item, executor)
+                self._program_channel.take(item, executor)
             case MessageRequested() | CallRequested() | GoalRequested() | CancelRequested():
                 self._requesters.take(item, layer)
             case _:

@@ -7,7 +7,7 @@ from typing import Any
 
 from robosc.model.structure import Communication, CommunicationKind
 from robosc_bridge.configuration.channels import RotateChannel, RotatedChannel
-from robosc_bridge.daemon.motion import Motion
+from robosc_bridge.daemon.motion import MotionTarget
 from robosc_bridge.daemon.supervised import Listeners, Supervised
 from robosc_bridge.daemon.wheel_messages import angle_of
 
@@ -41,7 +41,7 @@ class Rotations:
 
     def __init__(
         self,
-        motion: Motion,
+        motion: MotionTarget,
         listeners: Listeners,
         owe: Callable[[Callable[[Supervised], None]], None],
         on_failed: Callable[[str], None],

@@ -16,7 +16,7 @@ class State(StrEnum):
     OVER = "over"
 
 
-class Command(StrEnum):
+class OperatorCommand(StrEnum):
     """Command that an operator may give."""
 
     START = "start"
@@ -39,6 +39,6 @@ class Order:
             raises.
     """
 
-    command: Command
+    command: OperatorCommand
     by: str
     answer: Callable[[str], None]

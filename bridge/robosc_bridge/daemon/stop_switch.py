@@ -38,11 +38,11 @@ class StopSwitch:
         """True if a button that stops the robot is pressed."""
         return self._skill.is_held
 
-    def saw_buttons(self, held: Collection[str], executor: Supervised | None) -> None:
+    def on_buttons(self, held: Collection[str], executor: Supervised | None) -> None:
         """Take the buttons that are pressed now."""
         self._take(self._skill.update(held_buttons=held), executor)
 
-    def saw_key(self, key: str, executor: Supervised | None) -> None:
+    def on_key(self, key: str, executor: Supervised | None) -> None:
         """A key was typed in the terminal."""
         self._take(self._skill.update(keys=(key,)), executor)
 

@@ -42,7 +42,7 @@ VALID_LIMIT = 8
 """A revolution with fewer valid ranges shows nothing: the LiDAR is covered, or something is too near."""
 
 
-class Command(Protocol):
+class DriveCommand(Protocol):
     """Command for the drive base."""
 
     @property
@@ -65,19 +65,19 @@ class Command(Protocol):
 class Gate(Protocol):
     """Part of the safety layer that a worker needs; its methods neither raise nor wait."""
 
-    def output(self, now_s: float) -> Command:
+    def output(self, now_s: float) -> DriveCommand:
         """Return the command for the drive base now."""
 
-    def saw_drive(self, reading: DriveReading) -> None:
+    def on_drive_reading(self, reading: DriveReading) -> None:
         """The drive base told something."""
 
     def drive_failed(self) -> None:
         """The drive base did not answer."""
 
-    def saw_scan(self, now_s: float, ranges_m: Sequence[float]) -> None:
+    def on_scan(self, now_s: float, ranges_m: Sequence[float]) -> None:
         """A full revolution came, with a range for each degree."""
 
-    def saw_noise(self, is_noisy: bool) -> None:
+    def on_noise(self, is_noisy: bool) -> None:
         """Take the report whether many frames of the scanner are damaged."""
 
 
@@ -189,7 +189,7 @@ class DriveWorker:
         if news := reading.faults - self._told:
             _log.warning("the motors tell: %s", ", ".join(sorted(news)))
             self._told |= news
-        self._gate.saw_drive(reading)
+        self._gate.on_drive_reading(reading)
         self._report(reading)
         if is_reset:
             # Now it is known how the motors are.
@@ -200,7 +200,7 @@ class DriveWorker:
             # Too late for one cycle or more: they are left out.
             self._due_s = now_s + self._period_s
 
-    def _ask(self, now_s: float) -> Command:
+    def _ask(self, now_s: float) -> DriveCommand:
         """Return the command of the safety layer; new reasons and warnings in it are reported."""
         command = self._gate.output(now_s)
         notice = SafetyNotice(command.reasons, command.warnings)
@@ -322,12 +322,12 @@ class ScannerWorker:
     def _look_at_frames(self) -> None:
         found = self._frames.poll(self._clock())
         if found is not None:
-            self._gate.saw_noise(found.is_noisy)
+            self._gate.on_noise(found.is_noisy)
             _log.warning("scanner: %s", found.text)
 
     def _heard(self, scan: Scan) -> None:
         self._backoff.succeeded()
-        self._gate.saw_scan(scan.time_s, scan.ranges_m)
+        self._gate.on_scan(scan.time_s, scan.ranges_m)
         if not self._is_rotating:
             self._is_rotating = True
             self._report(DeviceUp(Device.SCANNER))

@@ -18,7 +18,7 @@ from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, INST_PING, INST_REBOOT
 from robosc_bridge.devices.dynamixel_port import DynamixelPort
 from robosc_bridge.errors import DeviceError, DeviceSilentError
 from robosc_bridge.host import Host, Port
-from robosc_bridge.protocol.dynamixel import DAMAGED_REQUEST, PING_DATA, PacketHandler, Status, status_of
+from robosc_bridge.protocol.dynamixel import DAMAGED_REQUEST, PING_DATA, PacketHandler, StatusPacket, status_of
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 ANSWER_LIMIT_S = 0.034
@@ -57,7 +57,7 @@ class RefusedError(DeviceError):
         status: Its answer.
     """
 
-    def __init__(self, problem: str, status: Status) -> None:
+    def __init__(self, problem: str, status: StatusPacket) -> None:
         super().__init__(f"{problem}: {status.refusal}")
         self.number = status.number
 
@@ -144,7 +144,7 @@ class DynamixelBus:
         """
         address, length = next(_revolutions)
 
-        def fits(status: Status) -> bool:
+        def fits(status: StatusPacket) -> bool:
             # A refusal has no length to know it by: it may be that of an older request.
             return not status.number and len(status.data) == length
 
@@ -161,7 +161,7 @@ class DynamixelBus:
         status = self._asked(device, lambda: self._plain(device, INST_PING), PING_DATA)
         return int.from_bytes(status.data[:2], "little"), status.data[2]
 
-    def read(self, device: int, address: int, length: int) -> Status:
+    def read(self, device: int, address: int, length: int) -> StatusPacket:
         """Read the data at an address.
 
         Raises:
@@ -174,7 +174,7 @@ class DynamixelBus:
             f"does not let {length} bytes at {address} be read",
         )
 
-    def write(self, device: int, address: int, data: bytes, limit_s: float | None = None) -> Status:
+    def write(self, device: int, address: int, data: bytes, limit_s: float | None = None) -> StatusPacket:
         """Write to an address.
 
         Args:
@@ -229,7 +229,7 @@ class DynamixelBus:
         parameters = [byte for device, value in data.items() for byte in (device, *value)]
         self._sent(self._handler.syncWriteTxOnly(self._port, address, length, parameters, len(parameters)))
 
-    def sync_read(self, address: int, length: int, devices: Collection[int]) -> dict[int, Status]:
+    def sync_read(self, address: int, length: int, devices: Collection[int]) -> dict[int, StatusPacket]:
         """Read the data at the same address of several devices.
 
         Returns:
@@ -244,8 +244,8 @@ class DynamixelBus:
             found = self._sync_read(address, length, devices) or found
         return found
 
-    def _sync_read(self, address: int, length: int, devices: Collection[int]) -> dict[int, Status]:
-        found: dict[int, Status] = {}
+    def _sync_read(self, address: int, length: int, devices: Collection[int]) -> dict[int, StatusPacket]:
+        found: dict[int, StatusPacket] = {}
         # One that stays silent is left out, and does not make the others look so.
         asked = [device for device in devices if device not in self._unsettled or self._has_settled(device)]
         if not asked or self._port.is_late:
@@ -275,7 +275,9 @@ class DynamixelBus:
             return False
         return True
 
-    def _asked(self, device: int, transmit: Callable[[], int], length: int, limit_s: float | None = None) -> Status:
+    def _asked(
+        self, device: int, transmit: Callable[[], int], length: int, limit_s: float | None = None
+    ) -> StatusPacket:
         """The answer to a request, which is made again if there is none; never that to an older one."""
         try:
             return self._asked_once(device, transmit, length, limit_s)
@@ -284,7 +286,7 @@ class DynamixelBus:
                 raise
             return self._asked_once(device, transmit, length, limit_s)
 
-    def _asked_once(self, device: int, transmit: Callable[[], int], length: int, limit_s: float | None) -> Status:
+    def _asked_once(self, device: int, transmit: Callable[[], int], length: int, limit_s: float | None) -> StatusPacket:
         if device in self._unsettled:
             self.settle(device)
         status = self._answered(device, transmit, lambda status: _fits(status, length), length, limit_s)
@@ -296,10 +298,10 @@ class DynamixelBus:
         self,
         device: int,
         transmit: Callable[[], int],
-        fits: Callable[[Status], bool],
+        fits: Callable[[StatusPacket], bool],
         length: int,
         limit_s: float | None = None,
-    ) -> Status:
+    ) -> StatusPacket:
         self._begin_request()
         self._unsettled.add(device)
         self._sent(transmit())
@@ -312,7 +314,7 @@ class DynamixelBus:
         self.counters.unanswered += 1
         raise self.silence_of(self._name_of(device), "does")
 
-    def _is_foreign(self, status: Status, devices: Collection[int]) -> None:
+    def _is_foreign(self, status: StatusPacket, devices: Collection[int]) -> None:
         """It is no answer to what these were asked."""
         self.counters.foreign += 1
         if status.device not in devices:
@@ -330,7 +332,7 @@ class DynamixelBus:
         self.counters.repeated += 1
         return True
 
-    def _received(self) -> Status | None:
+    def _received(self) -> StatusPacket | None:
         """The next sound packet in time; None: there is none, or a damaged one, after which it is best to ask again."""
         while not self._port.isPacketTimeout():
             packet, result = self._handler.rxPacket(self._port, False)
@@ -343,7 +345,7 @@ class DynamixelBus:
             self.counters.damaged += 1
         return None
 
-    def _accepted(self, status: Status, problem: str) -> Status:
+    def _accepted(self, status: StatusPacket, problem: str) -> StatusPacket:
         if status.number:
             raise RefusedError(f"{self._name_of(status.device)} {problem}", status)
         return status
@@ -362,6 +364,6 @@ class DynamixelBus:
             raise ValueError(f"dynamixel-sdk does not send this packet: {result}")
 
 
-def _fits(status: Status, length: int) -> bool:
+def _fits(status: StatusPacket, length: int) -> bool:
     """Return True if an answer can be one to a request for so many bytes: these, or an error and none."""
     return len(status.data) == length or (status.number != 0 and not status.data)

@@ -17,7 +17,7 @@ from robosc_bridge.host import Host, NetworkPort
 from robosc_bridge.protocol.framing import FrameCounts
 from robosc_bridge.protocol.mavlink import Codec, Decoder
 from robosc_bridge.protocol.mavlink_messages import (
-    Command,
+    MavCommand,
     Message,
     ObstacleRing,
     SectorDistance,
@@ -185,7 +185,9 @@ class VehicleLink:
             return
         for number in telemetry:
             self.send(
-                command(state.system, state.component, Command.SET_MESSAGE_INTERVAL, 0, float(number), interval_s * 1e6)
+                command(
+                    state.system, state.component, MavCommand.SET_MESSAGE_INTERVAL, 0, float(number), interval_s * 1e6
+                )
             )
 
     def close(self) -> None:

@@ -9,14 +9,14 @@ from dataclasses import dataclass, field, replace
 
 from robosc_bridge.devices.interface import Pose, Velocity
 from robosc_bridge.devices.mavlink_state import Timestamped, VehicleState
-from robosc_bridge.protocol.mavlink_messages import Motion
+from robosc_bridge.protocol.mavlink_messages import MotionEstimate
 
 _NO_LONGER_S = 0.5
 # No vehicle counts its resets so: going from one source to the other is a jump.
 _NO_ODOMETRY = -1
 
 
-def estimate(state: VehicleState) -> Timestamped[Motion] | None:
+def estimate(state: VehicleState) -> Timestamped[MotionEstimate] | None:
     """The newest estimate, and when the older of its parts came; None: there is none yet.
 
     Place and attitude stand in where ODOMETRY does not come, or comes no longer.
@@ -27,12 +27,12 @@ def estimate(state: VehicleState) -> Timestamped[Motion] | None:
     return state.motion
 
 
-def _of_place_and_attitude(state: VehicleState) -> Timestamped[Motion] | None:
+def _of_place_and_attitude(state: VehicleState) -> Timestamped[MotionEstimate] | None:
     if state.position is None or state.attitude is None:
         return None
     place, attitude = state.position.content, state.attitude.content
     cosine, sine = math.cos(attitude.heading_rad), math.sin(attitude.heading_rad)
-    motion = Motion(
+    motion = MotionEstimate(
         place.x_m,
         place.y_m,
         attitude.heading_rad,
@@ -56,10 +56,10 @@ class VehicleOdometry:
 
     pose: Pose = field(default_factory=Pose)
     velocity: Velocity = field(default_factory=Velocity)
-    last: Motion | None = None
+    last: MotionEstimate | None = None
     rebases: int = 0
 
-    def advanced(self, motion: Motion) -> "VehicleOdometry":
+    def advanced(self, motion: MotionEstimate) -> "VehicleOdometry":
         """The odometry after another estimate."""
         velocity = Velocity(motion.linear_m_s, motion.angular_rad_s)
         last = self.last

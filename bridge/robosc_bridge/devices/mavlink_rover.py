@@ -26,10 +26,10 @@ from robosc_bridge.errors import (
 )
 from robosc_bridge.host import Host
 from robosc_bridge.protocol.mavlink_messages import (
-    Command,
     Heartbeat,
+    MavCommand,
     Mode,
-    Motion,
+    MotionEstimate,
     Result,
     Telemetry,
     arming,
@@ -167,11 +167,11 @@ class MavlinkRover:
             return
         self._check_ours(heartbeat)
         if heartbeat.mode != Mode.GUIDED:
-            self._command(Command.SET_MODE, entering(Mode.GUIDED), "go to mode GUIDED")
+            self._command(MavCommand.SET_MODE, entering(Mode.GUIDED), "go to mode GUIDED")
             self._must_show(lambda heartbeat: heartbeat.mode == Mode.GUIDED, "show mode GUIDED")
         self._send_target(STANDSTILL)
         if not self._heartbeat(link.state).is_armed:
-            self._command(Command.ARM_DISARM, arming(True), "arm")
+            self._command(MavCommand.ARM_DISARM, arming(True), "arm")
             try:
                 self._must_show(lambda heartbeat: heartbeat.is_armed, "show that it is armed")
             except DeviceError:
@@ -273,7 +273,7 @@ class MavlinkRover:
             raise DeviceSilentError(f"{self._path}: no heartbeat of the rover for {HEARTBEAT_LIMIT_S:g} s")
         return told.content
 
-    def _fresh(self, state: VehicleState) -> Timestamped[Motion] | None:
+    def _fresh(self, state: VehicleState) -> Timestamped[MotionEstimate] | None:
         told = estimate(state)
         is_fresh = told is not None and self._host.monotonic() - told.time_s <= self._motion_limit_s
         return told if is_fresh else None
@@ -297,9 +297,9 @@ class MavlinkRover:
     def _disarm(self, trials: int) -> None:
         """Stopping is not refused: what a polite command does not reach, a forced one does."""
         try:
-            self._command(Command.ARM_DISARM, arming(False), "disarm", trials)
+            self._command(MavCommand.ARM_DISARM, arming(False), "disarm", trials)
         except DeviceFaultError:
-            self._command(Command.ARM_DISARM, arming(False, is_forced=True), "disarm by force", trials)
+            self._command(MavCommand.ARM_DISARM, arming(False, is_forced=True), "disarm by force", trials)
         self._must_show(lambda heartbeat: not heartbeat.is_armed, "show that it is disarmed")
 
     def _comes_to_rest(self) -> bool:
@@ -312,7 +312,7 @@ class MavlinkRover:
 
         return self._waits(is_at_rest, _REST_LIMIT_S)
 
-    def _command(self, number: Command, parameters: tuple[float, ...], action: str, trials: int = _TRIALS) -> None:
+    def _command(self, number: MavCommand, parameters: tuple[float, ...], action: str, trials: int = _TRIALS) -> None:
         """Send a command until it is answered.
 
         Raises:
@@ -337,7 +337,7 @@ class MavlinkRover:
                 return
         raise DeviceSilentError(f"{self._path}: the rover does not answer when told to {action}")
 
-    def _check_answer(self, state: VehicleState, number: Command, began_s: float, action: str) -> None:
+    def _check_answer(self, state: VehicleState, number: MavCommand, began_s: float, action: str) -> None:
         result = state.answers[number].content.result
         if result == Result.ACCEPTED:
             return
@@ -393,7 +393,7 @@ class MavlinkRover:
         boot_ms = int((self._target_s - self._began_s) * 1000) % 2**32
         link.send(velocity_target(state.system, state.component, boot_ms, target.linear_m_s, target.angular_rad_s))
 
-    def _reading(self, state: VehicleState, told: Timestamped[Motion], is_obeying: bool) -> DriveReading:
+    def _reading(self, state: VehicleState, told: Timestamped[MotionEstimate], is_obeying: bool) -> DriveReading:
         if told.content is not self._odometry.last:
             self._odometry = self._odometry.advanced(told.content)
         velocity = self._odometry.velocity

@@ -13,7 +13,7 @@ from robosc_bridge.protocol.mavlink_messages import (
     Heartbeat,
     LocalPosition,
     Message,
-    Motion,
+    MotionEstimate,
     Text,
 )
 
@@ -63,7 +63,7 @@ class VehicleState:
     stranger: Heartbeat | None = None
     attitude: Timestamped[Attitude] | None = None
     position: Timestamped[LocalPosition] | None = None
-    motion: Timestamped[Motion] | None = None
+    motion: Timestamped[MotionEstimate] | None = None
     battery: BatteryState | None = None
     pack: BatteryState | None = None
     answers: Mapping[int, Timestamped[Answer]] = field(default_factory=dict)
@@ -95,7 +95,7 @@ class VehicleState:
                 return replace(self._at(attitude.boot_s), attitude=Timestamped(time_s, attitude))
             case LocalPosition() as position:
                 return replace(self._at(position.boot_s), position=Timestamped(time_s, position))
-            case Motion() as motion:
+            case MotionEstimate() as motion:
                 return replace(self, motion=Timestamped(time_s, motion))
             case BatteryState(is_main=True) as battery:
                 return replace(self, battery=battery)

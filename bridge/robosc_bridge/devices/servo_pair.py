@@ -9,7 +9,7 @@ from robosc_bridge.devices.servo_settings import ServoSettings, read_settings
 from robosc_bridge.errors import DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
 from robosc_bridge.host import Host
 from robosc_bridge.protocol import servo
-from robosc_bridge.protocol.dynamixel import Status
+from robosc_bridge.protocol.dynamixel import StatusPacket
 from robosc_bridge.protocol.servo import Measurement, decode_measurement, encode_velocity
 
 _FAULTS = {
@@ -258,7 +258,7 @@ class ServoPair:
                 return
         raise DeviceFaultError(f"{self._names[wrong[0]]} {problem}")
 
-    def _read_both(self, address: int, length: int) -> dict[int, Status]:
+    def _read_both(self, address: int, length: int) -> dict[int, StatusPacket]:
         found = self._bus.sync_read(address, length, self.motors)
         silent = [self._names[motor] for motor in self.motors if motor not in found]
         if silent:

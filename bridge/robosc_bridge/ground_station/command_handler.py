@@ -12,7 +12,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 
 from robosc_bridge.daemon.operations import UNDONE_BY, Operations
-from robosc_bridge.daemon.states import Command as OperatorCommand
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.ground_station.commands import Change, Checks, Interval, Meaning, Once, Parameters, Refusal, Stop
 from robosc_bridge.ground_station.notices import standing
 from robosc_bridge.ground_station.status import is_held, run_mode

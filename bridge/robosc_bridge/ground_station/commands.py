@@ -8,9 +8,9 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from robosc_bridge.daemon.states import Command as OperatorCommand
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.ground_station.status import AUTO, GUIDED
-from robosc_bridge.protocol.mavlink_messages import CUSTOM_MODE, FORCE, Command, Mode, Result
+from robosc_bridge.protocol.mavlink_messages import CUSTOM_MODE, FORCE, MavCommand, Mode, Result
 
 SHORTEST_INTERVAL_S = 0.02
 LONGEST_INTERVAL_S = 3600.0
@@ -100,25 +100,25 @@ def meaning(number: int, parameters: Parameters) -> Meaning:
     """
     first, second = parameters[0], parameters[1]
     match number:
-        case Command.ARM_DISARM:
+        case MavCommand.ARM_DISARM:
             return _arming(first, second)
-        case Command.SET_MODE:
+        case MavCommand.SET_MODE:
             return mode_meaning(first, second)
-        case Command.PAUSE_CONTINUE:
+        case MavCommand.PAUSE_CONTINUE:
             return _choice(first, {0.0: Stop.OPERATOR, 1.0: Change(OperatorCommand.RESUME)})
-        case Command.FLIGHT_TERMINATION:
+        case MavCommand.FLIGHT_TERMINATION:
             # What cannot be read is taken for a stop, too.
             why = "A termination is ended by a mode or by going on, not by this command."
             return Refusal(Result.DENIED, why) if first <= 0.5 else Stop.OPERATOR
-        case Command.REBOOT_SHUTDOWN:
+        case MavCommand.REBOOT_SHUTDOWN:
             return _reboot(first, second)
-        case Command.RUN_PREARM_CHECKS:
+        case MavCommand.RUN_PREARM_CHECKS:
             return Checks()
-        case Command.SET_MESSAGE_INTERVAL:
+        case MavCommand.SET_MESSAGE_INTERVAL:
             return _interval(first, second)
-        case Command.REQUEST_MESSAGE:
+        case MavCommand.REQUEST_MESSAGE:
             return Once(int(first)) if _is_number(first) else _denied(first)
-        case Command.REQUEST_CAPABILITIES:
+        case MavCommand.REQUEST_CAPABILITIES:
             return _choice(first, {1.0: Once(_CAPABILITIES)})
     return _UNSUPPORTED
 

@@ -7,7 +7,7 @@ import threading
 from robosc_bridge.daemon.backoff import Backoff
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.errors import BridgeError
-from robosc_bridge.ground_station.session import STATION_LIMIT_S, Session
+from robosc_bridge.ground_station.session import STATION_LIMIT_S, StationSession
 from robosc_bridge.ground_station.settings import GroundSettings
 from robosc_bridge.host import Host, NetworkPort
 from robosc_bridge.transport.system_host import SYSTEM_HOST, Line, open_line
@@ -49,7 +49,7 @@ class GroundLink:
         self._settings = settings
         self._host = host
         self._clock = host.monotonic
-        self._session = Session(operations, settings, self._clock())
+        self._session = StationSession(operations, settings, self._clock())
         self._backoff = Backoff()
         self._guard = threading.Lock()
         self._line: Line | None = None

@@ -55,7 +55,7 @@ _OLD = "This station speaks MAVLink 1: set it to MAVLink 2."
 _NOT_SIGNED = "Only stopping is obeyed here without a valid signature."
 
 
-class Session:
+class StationSession:
     """Conversation with a ground station.
 
     Args:

@@ -33,7 +33,7 @@ class SystemStatus(IntEnum):
 
 
 @dataclass(frozen=True)
-class Status:
+class VehicleStatus:
     """Content of a heartbeat.
 
     Attributes:
@@ -54,7 +54,7 @@ def is_held(snapshot: Snapshot) -> bool:
     return Reason.OPERATOR_STOP in snapshot.reasons
 
 
-def status_of(snapshot: Snapshot | None, *, is_layer: bool, is_stale: bool) -> Status:
+def status_of(snapshot: Snapshot | None, *, is_layer: bool, is_stale: bool) -> VehicleStatus:
     """Return the content of the heartbeat.
 
     Args:
@@ -64,13 +64,13 @@ def status_of(snapshot: Snapshot | None, *, is_layer: bool, is_stale: bool) -> S
     """
     if snapshot is None:
         state = SystemStatus.EMERGENCY if is_stale else SystemStatus.BOOT
-        return Status(False, Mode.INITIALISING, CUSTOM_MODE, state)
+        return VehicleStatus(False, Mode.INITIALISING, CUSTOM_MODE, state)
     has_torque = snapshot.reading is not None and snapshot.reading.is_torque_on
     is_armed = snapshot.state is State.RUNNING or has_torque
     mode = _mode(snapshot, is_layer)
     bits = {Mode.AUTO: AUTO, Mode.GUIDED: GUIDED | MANUAL_INPUT}.get(mode, 0)
     base_mode = CUSTOM_MODE | bits | (ARMED if is_armed else 0)
-    return Status(is_armed, mode, base_mode, SystemStatus.EMERGENCY if is_stale else _system_status(snapshot))
+    return VehicleStatus(is_armed, mode, base_mode, SystemStatus.EMERGENCY if is_stale else _system_status(snapshot))
 
 
 def run_mode(is_layer: bool) -> Mode:

@@ -12,7 +12,7 @@ from robosc_bridge.devices.interface import DriveReading, Scan
 from robosc_bridge.ground_station import telemetry, values
 from robosc_bridge.ground_station.schedule import Schedule
 from robosc_bridge.ground_station.settings import GroundSettings
-from robosc_bridge.ground_station.status import Status, status_of
+from robosc_bridge.ground_station.status import VehicleStatus, status_of
 from robosc_bridge.ground_station.telemetry import Make
 from robosc_bridge.protocol.mavlink_messages import Telemetry
 
@@ -88,7 +88,7 @@ class Stream:
         """Return True if the loop seems to hang."""
         return now_s - self._fresh_s > STALE_S
 
-    def status(self, now_s: float) -> Status:
+    def status(self, now_s: float) -> VehicleStatus:
         """Return the content of a heartbeat now."""
         return status_of(self.snapshot, is_layer=self._is_layer, is_stale=self.is_stale(now_s))
 

@@ -12,7 +12,7 @@ from typing import Any
 from robosc_bridge.daemon.feed import Snapshot
 from robosc_bridge.daemon.reports import Device
 from robosc_bridge.devices.interface import DriveReading, Scan
-from robosc_bridge.ground_station.status import Status
+from robosc_bridge.ground_station.status import VehicleStatus
 from robosc_bridge.protocol.mavlink_messages import BODY_FRD, GROUND_ROVER, LOCAL_FRD, UNKNOWN
 from robosc_bridge.protocol.mavlink_obstacles import RING_STEP_DEG, ring_distances_cm
 from robosc_bridge.safety import Caution, Reason
@@ -31,7 +31,7 @@ _WHEELS = 1  # Naive odometry.
 _LASER = 0
 
 
-def heartbeat(status: Status) -> Make:
+def heartbeat(status: VehicleStatus) -> Make:
     """Make the message that reports that it is there, and its status."""
     return lambda codec: codec.heartbeat_encode(
         GROUND_ROVER, _GENERIC, status.base_mode, int(status.mode), int(status.system_status)

@@ -6,7 +6,8 @@ as they are (dynamixel-sdk 4.1.0, `protocol2_packet_handler.py`):
 - `txPacket` drops what `addStuffing` returns, so that a payload with the header's bytes goes out unstuffed; here
   `addStuffing` changes the packet itself.
 - `removeStuffing` takes a byte of the payload FF FF FD FF FD FD for a stuffed one; here what was *un*stuffed decides.
-- its reads take the checksum of an answer without data for data; here an answer is a `Status` whose data may be empty.
+- its reads take the checksum of an answer without data for data; here an answer is a `StatusPacket` whose data may be
+  empty.
 
 Source: ROBOTIS e-Manual, "DYNAMIXEL Protocol 2.0".
 """
@@ -41,7 +42,7 @@ DAMAGED_REQUEST = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Status:
+class StatusPacket:
     """A device's answer.
 
     Attributes:
@@ -62,7 +63,7 @@ class Status:
         return _REFUSALS.get(self.number, f"error {self.number}")
 
 
-def status_of(packet: Sequence[int]) -> Status | None:
+def status_of(packet: Sequence[int]) -> StatusPacket | None:
     """Return the status in a well-formed packet without stuffing, or None where it is no status packet.
 
     Args:
@@ -71,7 +72,7 @@ def status_of(packet: Sequence[int]) -> Status | None:
     if len(packet) < _BODY + 4 or packet[_BODY] != INST_STATUS or packet[4] > MAX_DEVICE:
         return None
     error = packet[_BODY + 1]
-    return Status(packet[4], error & ~_ALERT, bool(error & _ALERT), bytes(packet[_BODY + 2 : -2]))
+    return StatusPacket(packet[4], error & ~_ALERT, bool(error & _ALERT), bytes(packet[_BODY + 2 : -2]))
 
 
 def stuffed(body: Sequence[int]) -> list[int]:

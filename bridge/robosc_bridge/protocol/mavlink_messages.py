@@ -47,7 +47,7 @@ class Mode(IntEnum):
     INITIALISING = 16
 
 
-class Command(IntEnum):
+class MavCommand(IntEnum):
     """Command that a vehicle can be given, with its number."""
 
     SET_MODE = 176
@@ -141,7 +141,7 @@ class LocalPosition:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class MotionEstimate:
     """Place and velocity as one estimate: x ahead of some first heading, y to its left.
 
     Attributes:
@@ -255,7 +255,16 @@ class SectorDistance:
 
 
 type Content = (
-    Heartbeat | Attitude | LocalPosition | Motion | BatteryState | Text | Answer | ObstacleRing | SectorDistance | None
+    Heartbeat
+    | Attitude
+    | LocalPosition
+    | MotionEstimate
+    | BatteryState
+    | Text
+    | Answer
+    | ObstacleRing
+    | SectorDistance
+    | None
 )
 
 
@@ -288,12 +297,12 @@ def _local_position(told: Any) -> LocalPosition:
     return LocalPosition(told.time_boot_ms / 1000, north_m, -east_m, north_m_s, -east_m_s)
 
 
-def _odometry(told: Any) -> Motion | None:
+def _odometry(told: Any) -> MotionEstimate | None:
     if told.frame_id not in (LOCAL_NED, LOCAL_FRD) or told.child_frame_id != BODY_FRD:
         return None
     w, x, y, z, *_ = _finite(*told.q, told.x, told.y, told.vx, told.yawspeed)
     yaw_rad = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return Motion(told.x, -told.y, -yaw_rad, told.vx, -told.yawspeed, told.reset_counter)
+    return MotionEstimate(told.x, -told.y, -yaw_rad, told.vx, -told.yawspeed, told.reset_counter)
 
 
 def _share(percent: int) -> float | None:
@@ -358,7 +367,7 @@ def own_heartbeat(codec: Any) -> Any:
 
 
 def command(
-    system: int, component: int, number: Command, confirmation: int, *parameters: float
+    system: int, component: int, number: MavCommand, confirmation: int, *parameters: float
 ) -> Callable[[Any], Any]:
     """Make a command.
 
@@ -374,12 +383,12 @@ def command(
 
 
 def arming(is_armed: bool, is_forced: bool = False) -> tuple[float, ...]:
-    """Parameters of `Command.ARM_DISARM`."""
+    """Parameters of `MavCommand.ARM_DISARM`."""
     return (float(is_armed), float(FORCE if is_forced else 0))
 
 
 def entering(mode: Mode) -> tuple[float, ...]:
-    """Parameters of `Command.SET_MODE`."""
+    """Parameters of `MavCommand.SET_MODE`."""
     return (float(CUSTOM_MODE), float(mode))
 
 

@@ -23,7 +23,7 @@ from robosc_bridge.configuration.channels import channel_name
 from robosc_bridge.daemon import programs
 from robosc_bridge.daemon.feed import Snapshot
 from robosc_bridge.daemon.operations import Operations
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.devices.interface import DriveReading, Scan
 from robosc_bridge.remote.data import DataError, plain_of, struct_of, text_of, value_of
 from robosc_bridge.safety import LATCHING, Caution, Reason
@@ -57,10 +57,10 @@ MAXIMUM_TEXT = 1000
 _KINDS = {kind: f"COMMUNICATION_KIND_{kind.name}" for kind in CommunicationKind}
 _STATES = {state: f"BRIDGE_STATE_{state.name}" for state in State}
 _COMMANDS = {
-    pb.COMMAND_KIND_START: Command.START,
-    pb.COMMAND_KIND_STANDBY: Command.STANDBY,
-    pb.COMMAND_KIND_RESUME: Command.RESUME,
-    pb.COMMAND_KIND_RESET: Command.RESET,
+    pb.COMMAND_KIND_START: OperatorCommand.START,
+    pb.COMMAND_KIND_STANDBY: OperatorCommand.STANDBY,
+    pb.COMMAND_KIND_RESUME: OperatorCommand.RESUME,
+    pb.COMMAND_KIND_RESET: OperatorCommand.RESET,
 }
 _OUTCOMES = {
     "succeeded": pb.GOAL_OUTCOME_SUCCEEDED,
@@ -117,7 +117,7 @@ def _fields(model: Model, item: Communication) -> list[str]:
     return [part.name for part in model.object(asked.name).properties] if isinstance(asked, ObjectType) else []
 
 
-def command_of(request: pb.CommandRequest) -> Command:
+def command_of(request: pb.CommandRequest) -> OperatorCommand:
     """Return the wanted command.
 
     Raises:

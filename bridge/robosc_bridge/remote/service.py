@@ -18,7 +18,7 @@ from robosc_bridge.daemon import states
 from robosc_bridge.daemon.operations import UNDONE_BY, Operations
 from robosc_bridge.remote import convert
 from robosc_bridge.remote.operator_presence import FloodError
-from robosc_bridge.remote.session import Session, TooSlowError
+from robosc_bridge.remote.session import ProgramSession, TooSlowError
 from robosc_bridge.remote.watchers import Watchers
 
 _log = logging.getLogger(__name__)
@@ -105,7 +105,7 @@ class BridgeService(convert.BridgeServiceServicer):
         """Stop the robot: it takes effect before the call returns, and waits for nobody."""
         by = _caller(context)
         # The stop first; whatever may fail comes later.
-        self._operations.order(states.Command.STOP, by)
+        self._operations.order(states.OperatorCommand.STOP, by)
         _log.warning("%s has stopped the robot", by)
         return convert.StopResponse()
 
@@ -119,7 +119,7 @@ class BridgeService(convert.BridgeServiceServicer):
             return convert.CommandResponse(refusal=await self._order(command, by))
         raise AssertionError("unreachable: a failed call is aborted")
 
-    async def _order(self, command: states.Command, by: str) -> str:
+    async def _order(self, command: states.OperatorCommand, by: str) -> str:
         """Return the reason why the command cannot be; empty: it is done.
 
         Without an answer, or with nobody to hear it, it is taken back.
@@ -152,7 +152,7 @@ class BridgeService(convert.BridgeServiceServicer):
             raise _ClosingError
         return future.result()
 
-    def _take_back(self, command: states.Command, by: str) -> None:
+    def _take_back(self, command: states.OperatorCommand, by: str) -> None:
         undone_by = UNDONE_BY.get(command)
         if undone_by is not None:
             self._operations.order(undone_by, by)
@@ -199,7 +199,7 @@ class BridgeService(convert.BridgeServiceServicer):
         async with self._translated(context), self._counted("programs", MAXIMUM_PROGRAMS, context):
             hello = await self._hello(requests)
             name = f"{hello.name} ({_caller(context)})"
-            session = Session(self._operations, hello, name, self._operator_timeout_s)
+            session = ProgramSession(self._operations, hello, name, self._operator_timeout_s)
             running = asyncio.ensure_future(session.run(requests, context.write))
             closing = asyncio.ensure_future(self._closing.wait())
             try:

@@ -36,7 +36,7 @@ class TooSlowError(Exception):
     """The program does not read what it is told."""
 
 
-class Session:
+class ProgramSession:
     """A program that is attached.
 
     Args:

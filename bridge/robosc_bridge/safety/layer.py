@@ -36,9 +36,9 @@ class SafetyLayer:
     """Safety layer that lets velocities pass that are safe, and zero otherwise; in standby until it is enabled.
 
     The thread of the drive base calls `output`, switches torque as it says, exchanges the velocity, and reports with
-    `saw_drive` or `drive_failed`; the others may be called from any thread, also from a signal handler. All times are
-    those of one monotonic clock, in seconds. Nothing raises, and nothing waits but for the lock, which is held for
-    some 40 microseconds.
+    `on_drive_reading` or `drive_failed`; the others may be called from any thread, also from a signal handler. All
+    times are those of one monotonic clock, in seconds. Nothing raises, and nothing waits but for the lock, which is
+    held for some 40 microseconds.
 
     A command counts only if it was given after an `output` without reasons, or ends the silence of commands: what was
     said before or during a stop never moves the robot afterwards. Motion begins with the ramp from standstill.
@@ -115,7 +115,7 @@ class SafetyLayer:
                 self._asked_m_s = self._wanted.linear_m_s
                 self._commands.update(now_s)
 
-    def saw_scan(self, now_s: float, ranges_m: Sequence[float] = ()) -> None:
+    def on_scan(self, now_s: float, ranges_m: Sequence[float] = ()) -> None:
         """Record that a full scan was complete.
 
         Args:
@@ -127,12 +127,12 @@ class SafetyLayer:
             if ranges_m:
                 self._sight.update(ranges_m)
 
-    def saw_noise(self, is_noisy: bool) -> None:
+    def on_noise(self, is_noisy: bool) -> None:
         """Record whether many frames of the scanner are damaged."""
         with self._lock:
             self._is_noisy = is_noisy
 
-    def saw_drive(self, reading: DriveReading) -> None:
+    def on_drive_reading(self, reading: DriveReading) -> None:
         """The drive base has answered."""
         with self._lock:
             self._failures = 0

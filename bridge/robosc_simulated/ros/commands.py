@@ -1,6 +1,6 @@
 """Commands, as lines of text, to the twin behind ROS."""
 
-from robosc_simulated.commands import WORLD_HELP, UnknownCommandError, obey_world
+from robosc_simulated.commands import WORLD_HELP, UnknownCommandError, execute_in_world
 from robosc_simulated.ros.robot import RosRobot
 from robosc_simulated.values import voltage
 
@@ -11,7 +11,7 @@ battery V                                   its supply
 {WORLD_HELP}"""
 
 
-def obey(robot: RosRobot, line: str) -> str:
+def execute(robot: RosRobot, line: str) -> str:
     """Do what a line says.
 
     Args:
@@ -40,5 +40,5 @@ def obey(robot: RosRobot, line: str) -> str:
             except ValueError as error:
                 raise UnknownCommandError(str(error)) from error
         case _:
-            return obey_world(robot.world, words)
+            return execute_in_world(robot.world, words)
     return ""

@@ -24,7 +24,7 @@ from robosc_simulated.lidar import LIDARS
 from robosc_simulated.motion import MotionRecorder
 from robosc_simulated.output import Output
 from robosc_simulated.robots import BODIES
-from robosc_simulated.ros.commands import obey
+from robosc_simulated.ros.commands import execute
 from robosc_simulated.ros.readings import Reading
 from robosc_simulated.ros.robot import COMMAND_TIMEOUT_S, ENCODINGS, RosRobot
 from robosc_simulated.scene import load_scene, scene_names
@@ -187,7 +187,7 @@ def _listen(robot: RosRobot) -> None:
     with contextlib.suppress(ValueError, OSError):
         for line in sys.stdin:
             try:
-                answer = obey(robot, line)
+                answer = execute(robot, line)
             except UnknownCommandError as error:
                 answer = f"error: {error}"
             if answer:

@@ -23,7 +23,7 @@ from robosc.model.structure import Deployment
 from robosc_bridge.configuration import load, map_channels
 from robosc_bridge.daemon.assembly import Machine, assemble
 from robosc_bridge.daemon.feed import Feed
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.daemon.supervisors import Source, obtain
 from robosc_view import ViewEndpoint, ViewSettings
 
@@ -125,7 +125,7 @@ def main() -> int:
     machine = assemble(loaded.configuration, mapping, supervisor, NullLog(), starts_itself=True)
     noted_s = _watch_decisions(machine)
     # As soon as the devices are there it would start.
-    machine.daemon.post(Command.STANDBY)
+    machine.daemon.post(OperatorCommand.STANDBY)
     loop = threading.Thread(target=machine.run)
     loop.start()
     endpoints = [_Watcher(machine.operations.feed) for _ in range(watchers)]
@@ -133,7 +133,7 @@ def main() -> int:
     try:
         _await(machine, State.STANDBY)
         in_standby = _share(standby_s)
-        machine.daemon.post(Command.START)
+        machine.daemon.post(OperatorCommand.START)
         _await(machine, State.RUNNING)
         noted_s.clear()
         overruns = machine.daemon.overruns

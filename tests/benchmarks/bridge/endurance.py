@@ -99,7 +99,7 @@ class Watch:
         self._first_due_s = self._last_due_s = math.nan
         self._late_s = 0.0
         watch = self
-        tick, saw_scan, step = Executor.tick, SafetyLayer.saw_scan, machine.drive._worker.step
+        tick, on_scan, step = Executor.tick, SafetyLayer.on_scan, machine.drive._worker.step
 
         def counted_tick(self: Executor) -> None:
             watch._decided()
@@ -107,14 +107,14 @@ class Watch:
 
         def counted_scan(self: SafetyLayer, *arguments: Any) -> None:
             watch._scans += 1
-            saw_scan(self, *arguments)
+            on_scan(self, *arguments)
 
         def counted_step(now_s: float) -> float:
             watch._exchanges += 1
             return step(now_s)
 
         Executor.tick = counted_tick  # type: ignore[method-assign]
-        SafetyLayer.saw_scan = counted_scan  # type: ignore[method-assign,assignment]
+        SafetyLayer.on_scan = counted_scan  # type: ignore[method-assign,assignment]
         machine.drive._worker.step = counted_step  # type: ignore[method-assign]
 
     def _decided(self) -> None:

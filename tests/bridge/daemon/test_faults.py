@@ -14,8 +14,8 @@ import pytest
 
 from robosc.execution.runtime.requests import Decisions
 from robosc_bridge.daemon.loop import Key
-from robosc_bridge.daemon.motion import Motion
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.motion import MotionTarget
+from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.errors import LineDeniedError
 from robosc_bridge.host import Port
 from robosc_simulated import SimulatedTurtleBot3
@@ -186,7 +186,7 @@ def test_an_exception_in_the_loop_stops_the_wheels(base: str, monkeypatch: pytes
         raise Bug("in the loop")
 
     with driven(base) as bridge:
-        bridge.stopped_after(lambda: monkeypatch.setattr(Motion, "refresh", fails), STATED_S["the loop fails"])
+        bridge.stopped_after(lambda: monkeypatch.setattr(MotionTarget, "refresh", fails), STATED_S["the loop fails"])
         bridge.thread.join(LIMIT_S)
         assert isinstance(bridge.error, Bug)
         bridge.stays(WHILE_S)
@@ -196,15 +196,15 @@ def test_an_exception_in_the_loop_stops_the_wheels(base: str, monkeypatch: pytes
 
 
 @pytest.mark.parametrize("base", BASES)
-@pytest.mark.parametrize("how", [Command.STOP, Key("space")], ids=["command", "key"])
-def test_an_operators_stop_holds_until_somebody_lets_it_go_on(base: str, how: Command | Key) -> None:
+@pytest.mark.parametrize("how", [OperatorCommand.STOP, Key("space")], ids=["command", "key"])
+def test_an_operators_stop_holds_until_somebody_lets_it_go_on(base: str, how: OperatorCommand | Key) -> None:
     with driven(base) as bridge:
         bridge.stopped_after(lambda: bridge.machine.daemon.post(how), STATED_S["an operator stops it"])
         bridge.stays(WHILE_S)
-        assert _ordered(bridge, Command.RESET) == ""
+        assert _ordered(bridge, OperatorCommand.RESET) == ""
         assert bridge.state is State.STANDBY
         bridge.stays(WHILE_S)
-        assert _ordered(bridge, Command.START) == ""
+        assert _ordered(bridge, OperatorCommand.START) == ""
         bridge.moves()
 
 
@@ -216,13 +216,13 @@ def test_a_resume_lets_it_go_on_also_where_the_motors_have_let_go(base: str, is_
         def has_torque() -> bool:
             return any(wheel.table["torque enable"] for wheel in (bridge.robot.left, bridge.robot.right))
 
-        bridge.stopped_after(lambda: bridge.machine.daemon.post(Command.STOP), STATED_S["an operator stops it"])
+        bridge.stopped_after(lambda: bridge.machine.daemon.post(OperatorCommand.STOP), STATED_S["an operator stops it"])
         if is_off:
             bridge.until(lambda: not has_torque(), "the motors to let go")
         bridge.stays(WHILE_S)
         assert has_torque() is not is_off
         assert bridge.state is State.RUNNING
-        assert _ordered(bridge, Command.RESUME) == ""
+        assert _ordered(bridge, OperatorCommand.RESUME) == ""
         bridge.moves()
 
 
@@ -257,7 +257,7 @@ def test_an_operator_who_is_lost_stops_the_wheels_until_he_is_back() -> None:
 # Where somebody can be told of it, the bridge stays; nothing moves before somebody says so.
 
 
-def _ordered(bridge: Driven, command: Command) -> str:
+def _ordered(bridge: Driven, command: OperatorCommand) -> str:
     """Give an order, and return the reason why it cannot be executed, or nothing."""
     answer = bridge.machine.operations.order(command, "test")
     bridge.until(answer.done, "an answer to the order", 2 * LIMIT_S)
@@ -274,7 +274,7 @@ def test_a_base_that_is_plugged_in_again_moves_when_somebody_says_so(base: str) 
         line.reconnect()
         bridge.until(lambda: bridge.state is State.STANDBY, "the standby with the base back")
         bridge.stays(2 * WHILE_S)
-        assert _ordered(bridge, Command.START) == ""
+        assert _ordered(bridge, OperatorCommand.START) == ""
         bridge.moves()
 
 
@@ -299,12 +299,12 @@ def test_a_motor_that_is_overloaded_is_restarted_by_a_reset_and_moves_after_a_st
     with driven("dynamixel", remote=REACHABLE) as bridge:
         bridge.stopped_after(bridge.robot.left.overload, STATED_S["a motor is overloaded"])
         bridge.until(lambda: bridge.state is State.FAULT, "the fault")
-        assert _ordered(bridge, Command.START) != ""
+        assert _ordered(bridge, OperatorCommand.START) != ""
         bridge.stays(WHILE_S)
-        assert _ordered(bridge, Command.RESET) == ""
+        assert _ordered(bridge, OperatorCommand.RESET) == ""
         assert bridge.state is State.STANDBY
         bridge.stays(WHILE_S)
-        assert _ordered(bridge, Command.START) == ""
+        assert _ordered(bridge, OperatorCommand.START) == ""
         bridge.moves()
 
 

@@ -31,7 +31,7 @@ from robosc_bridge.daemon.programs import (
     Replied,
 )
 from robosc_bridge.daemon.reports import Device, DeviceDown
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from support.daemons import Connected, Scene
 from support.effort import examples
@@ -137,11 +137,11 @@ def test_what_was_asked_for_during_an_operators_stop_does_not_move_it_afterwards
     scene = Scene(text=CONFIGURATION.replace("0.4", "0"), model=careless, is_layer=True, stays=True)
     scene.up()
     program = Connected(scene, "an operator")
-    scene.daemon.post(Command.STOP)
+    scene.daemon.post(OperatorCommand.STOP)
     scene.live(0.1, 2.0)
     program.say(MessageRequested, "/cmd_vel", FORWARD)
     scene.live(0.3, 2.0)
-    scene.daemon.post(Command.RESUME)
+    scene.daemon.post(OperatorCommand.RESUME)
     scene.live(0.5, 2.0)
     assert scene.out == STANDSTILL
     program.say(MessageRequested, "/cmd_vel", FORWARD)
@@ -253,7 +253,7 @@ def test_a_call_is_answered(scene: Scene, program: Connected) -> None:
 
 
 def test_a_call_that_is_held_back_is_answered_by_default_at_once(scene: Scene, program: Connected) -> None:
-    scene.daemon.post(Command.STOP)
+    scene.daemon.post(OperatorCommand.STOP)
     scene.live(0.1, 2.0)
     assert without_sensors(program.say(CallRequested, "turn", "a", {"angle": 20})) == [
         Answered("a", None, is_default=True),
@@ -293,7 +293,7 @@ def test_an_id_that_is_in_use_is_refused_and_free_again_afterwards(scene: Scene,
 def test_an_operators_stop_ends_a_goal_and_holds_everything_back(scene: Scene, program: Connected) -> None:
     program.say(GoalRequested, "face", "g", {"angle": 90})
     scene.live(0.3, 2.0)
-    scene.daemon.post(Command.STOP)
+    scene.daemon.post(OperatorCommand.STOP)
     scene.live(0.1, 2.0)
     assert scene.out == STANDSTILL
     assert [item.outcome for item in program.of(GoalOver)] == ["aborted"]
@@ -305,7 +305,7 @@ def test_in_standby_everything_is_held_back_and_what_was_awaited_is_answered(sce
     server.cycle()
     program.say(CallRequested, "think", "t", "about it")
     program.say(GoalRequested, "face", "g", {"angle": 90})
-    scene.daemon.post(Command.STANDBY)
+    scene.daemon.post(OperatorCommand.STANDBY)
     scene.live(0.3, 2.0)
     assert scene.daemon.state is State.STANDBY
     assert program.of(Answered) == [Answered("t", None, is_default=True)]
@@ -313,7 +313,7 @@ def test_in_standby_everything_is_held_back_and_what_was_awaited_is_answered(sce
     assert program.say(MessageRequested, "/cmd_vel", FORWARD) == [Blocked("/cmd_vel")]
     assert program.say(CallRequested, "turn", "a", None) == [Answered("a", None, is_default=True), Blocked("/turn")]
     assert program.say(GoalRequested, "face", "g", None) == [GoalRejected("g"), Blocked("/face")]
-    scene.daemon.post(Command.START)
+    scene.daemon.post(OperatorCommand.START)
     scene.live(0.3, 2.0)
     program.say(MessageRequested, "/cmd_vel", FORWARD)
     scene.live(0.3, 2.0)

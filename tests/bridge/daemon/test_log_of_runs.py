@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from robosc.event_logs import check_log
-from robosc_bridge.daemon.states import Command, Order
+from robosc_bridge.daemon.states import OperatorCommand, Order
 from support.daemons import MODEL, Scene, supervisor_of
 from support.random_logs import read
 
@@ -11,7 +11,7 @@ from support.random_logs import read
 def test_a_log_of_several_runs_is_one_that_the_supervisor_accounts_for(tmp_path: Path) -> None:
     scene = Scene(starts_itself=False, stays=True)
     scene.up()
-    for command in (Command.START, Command.STANDBY, Command.START):
+    for command in (OperatorCommand.START, OperatorCommand.STANDBY, OperatorCommand.START):
         scene.daemon.post(Order(command, "", lambda why: None))
         scene.live(1.0, 2.0)
     kinds = [entry["kind"] for entry in scene.log.entries]

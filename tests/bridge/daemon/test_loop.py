@@ -7,7 +7,7 @@ import pytest
 from robosc_bridge.daemon.lifecycle import STOP_LIMIT_S
 from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, SafetyNotice
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.safety import Caution, Reason
 from support.daemons import CONFIGURATION, MODEL, PERIOD_S, Scene
@@ -36,10 +36,10 @@ def test_in_standby_it_waits_with_torque_off_until_somebody_says_start() -> None
     scene = Scene(starts_itself=False)
     scene.up()
     assert (scene.daemon.state, scene.torque, scene.events()) == (State.STANDBY, False, [])
-    scene.daemon.post(Command.START)
+    scene.daemon.post(OperatorCommand.START)
     scene.live(1.0, 2.0)
     assert (scene.daemon.state, scene.out) == (State.RUNNING, Velocity(0.1, 0.0))
-    scene.daemon.post(Command.STANDBY)
+    scene.daemon.post(OperatorCommand.STANDBY)
     scene.live(0.5, 2.0)
     assert (scene.daemon.state, scene.torque, scene.out) == (State.STANDBY, False, STANDSTILL)
 
@@ -177,14 +177,14 @@ def test_where_somebody_can_start_it_again_it_waits_and_never_moves_by_itself() 
     scene.daemon.post(DeviceUp(Device.DRIVE))
     scene.live(1.0, 2.0)
     assert (scene.daemon.state, scene.out, scene.torque) == (State.STANDBY, STANDSTILL, False)
-    scene.daemon.post(Command.START)
+    scene.daemon.post(OperatorCommand.START)
     scene.live(1.0, 2.0)
     assert scene.out.linear_m_s == 0.1
 
 
 def test_quitting_stops_the_wheels_and_lets_go_first(scene: Scene) -> None:
     scene.up()
-    scene.daemon.post(Command.QUIT)
+    scene.daemon.post(OperatorCommand.QUIT)
     # The safety layer hears of it at once, without the loop.
     assert scene.safety.output(scene.clock.monotonic()).velocity == STANDSTILL
     scene.daemon.cycle()
@@ -195,7 +195,7 @@ def test_quitting_stops_the_wheels_and_lets_go_first(scene: Scene) -> None:
 
 def test_quitting_does_not_wait_for_ever_for_motors(scene: Scene) -> None:
     scene.up()
-    scene.daemon.post(Command.QUIT)
+    scene.daemon.post(OperatorCommand.QUIT)
     scene.daemon.cycle()
     scene.clock.advance(STOP_LIMIT_S)
     scene.daemon.cycle()
@@ -204,15 +204,15 @@ def test_quitting_does_not_wait_for_ever_for_motors(scene: Scene) -> None:
 
 def test_an_operators_stop_wins_over_everything_until_he_lets_it_go_on(scene: Scene) -> None:
     scene.up()
-    scene.daemon.post(Command.STOP)
+    scene.daemon.post(OperatorCommand.STOP)
     scene.exchange()
     assert scene.out == STANDSTILL
     scene.live(1.0, 2.0)
     assert scene.out == STANDSTILL
-    scene.daemon.post(Command.RESET)
+    scene.daemon.post(OperatorCommand.RESET)
     scene.live(0.5, 2.0)
     assert (scene.daemon.state, scene.resets) == (State.STANDBY, 1)
-    scene.daemon.post(Command.START)
+    scene.daemon.post(OperatorCommand.START)
     scene.live(1.0, 2.0)
     assert scene.out.linear_m_s == 0.1
 
@@ -266,7 +266,7 @@ def test_a_turn_that_fails_unheard_is_a_fault() -> None:
     scene = Scene(text=CONFIGURATION.replace("outcome: any", "outcome: done"))
     scene.up(0.3)
     scene.live(0.3, 0.3)
-    scene.daemon.post(Command.STOP)
+    scene.daemon.post(OperatorCommand.STOP)
     scene.live(0.2, 0.3)
     assert scene.daemon.problem.startswith("a rotation has failed, and no message of the model tells it so: ")
 

@@ -8,25 +8,25 @@ import pytest
 from robosc_bridge.daemon.lifecycle import RESET_LIMIT_S, STOP_LIMIT_S
 from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, ResetDone
-from robosc_bridge.daemon.states import Command, Order, State
+from robosc_bridge.daemon.states import OperatorCommand, Order, State
 from robosc_bridge.devices.interface import STANDSTILL
 from robosc_bridge.safety import Reason
 from support.daemons import Scene
 
 DONE = ""
-RESET_THEN_STANDBY = (Command.RESET, Command.STANDBY)
+RESET_THEN_STANDBY = (OperatorCommand.RESET, OperatorCommand.STANDBY)
 
 
 class Operated(Scene):
     """A scene with an operator who waits for answers."""
 
-    def order(self, command: Command) -> list[str]:
+    def order(self, command: OperatorCommand) -> list[str]:
         """Give an order, and return the list that will hold the answer."""
         answers: list[str] = []
         self.daemon.post(Order(command, "a test", answers.append))
         return answers
 
-    def ask(self, command: Command, seconds: float) -> list[str]:
+    def ask(self, command: OperatorCommand, seconds: float) -> list[str]:
         """Give an order, and return the answers within some time."""
         answers = self.order(command)
         self.live(seconds, 2.0)
@@ -48,28 +48,28 @@ def standby() -> Operated:
 
 def running() -> Operated:
     scene = standby()
-    scene.order(Command.START)
+    scene.order(OperatorCommand.START)
     scene.live(0.5, 2.0)
     return scene
 
 
 def stopped() -> Operated:
     scene = running()
-    scene.order(Command.STOP)
+    scene.order(OperatorCommand.STOP)
     scene.live(0.1, 2.0)
     return scene
 
 
 def stopping() -> Operated:
     scene = running()
-    scene.order(Command.STANDBY)
+    scene.order(OperatorCommand.STANDBY)
     scene.daemon.cycle()
     return scene
 
 
 def ending() -> Operated:
     scene = running()
-    scene.order(Command.QUIT)
+    scene.order(OperatorCommand.QUIT)
     scene.daemon.cycle()
     return scene
 
@@ -103,64 +103,66 @@ ENDED = "the bridge has ended"
 LATCHED = "An operator has stopped the robot. Resume or reset it first."
 
 # What each command is answered in each state, and the state some time later.
-TABLE: list[tuple[Callable[[], Operated], Command, str, State]] = [
-    (starting, Command.START, "the robot is starting: the scanner is not there", State.STARTING),
-    (starting, Command.STANDBY, DONE, State.STARTING),
-    (starting, Command.STOP, DONE, State.STARTING),
-    (starting, Command.RESUME, NOT_STOPPED, State.STARTING),
-    (starting, Command.RESET, DONE, State.STARTING),
-    (starting, Command.QUIT, DONE, State.OVER),
-    (standby, Command.START, DONE, State.RUNNING),
-    (standby, Command.STANDBY, DONE, State.STANDBY),
-    (standby, Command.STOP, DONE, State.STANDBY),
-    (standby, Command.RESUME, NOT_STOPPED, State.STANDBY),
-    (standby, Command.RESET, DONE, State.STANDBY),
-    (standby, Command.QUIT, DONE, State.OVER),
-    (running, Command.START, DONE, State.RUNNING),
-    (running, Command.STANDBY, DONE, State.STANDBY),
-    (running, Command.STOP, DONE, State.RUNNING),
-    (running, Command.RESUME, NOT_STOPPED, State.RUNNING),
-    (running, Command.RESET, DONE, State.STANDBY),
-    (running, Command.QUIT, DONE, State.OVER),
-    (stopped, Command.START, LATCHED, State.RUNNING),
-    (stopped, Command.STANDBY, DONE, State.STANDBY),
-    (stopped, Command.STOP, DONE, State.RUNNING),
-    (stopped, Command.RESUME, DONE, State.RUNNING),
-    (stopped, Command.RESET, DONE, State.STANDBY),
-    (stopped, Command.QUIT, DONE, State.OVER),
-    (stopping, Command.START, "the robot is being stopped", State.STANDBY),
-    (stopping, Command.STANDBY, DONE, State.STANDBY),
-    (stopping, Command.STOP, DONE, State.STANDBY),
-    (stopping, Command.RESUME, NOT_STOPPED, State.STANDBY),
-    (stopping, Command.RESET, "the robot is being stopped", State.STANDBY),
-    (stopping, Command.QUIT, DONE, State.OVER),
-    (ending, Command.START, "the robot is being stopped", State.OVER),
-    (ending, Command.STANDBY, DONE, State.OVER),
-    (ending, Command.STOP, DONE, State.OVER),
-    (ending, Command.RESUME, NOT_STOPPED, State.OVER),
-    (ending, Command.RESET, "the robot is being stopped", State.OVER),
-    (ending, Command.QUIT, DONE, State.OVER),
-    (fault, Command.START, FAULTY, State.FAULT),
-    (fault, Command.STANDBY, FAULTY, State.FAULT),
-    (fault, Command.STOP, DONE, State.FAULT),
-    (fault, Command.RESUME, NOT_STOPPED, State.FAULT),
-    (fault, Command.RESET, "the drive base is not there", State.FAULT),
-    (fault, Command.QUIT, DONE, State.OVER),
-    (over, Command.START, ENDED, State.OVER),
-    (over, Command.STANDBY, ENDED, State.OVER),
-    (over, Command.STOP, ENDED, State.OVER),
-    (over, Command.RESUME, ENDED, State.OVER),
-    (over, Command.RESET, ENDED, State.OVER),
-    (over, Command.QUIT, DONE, State.OVER),
+TABLE: list[tuple[Callable[[], Operated], OperatorCommand, str, State]] = [
+    (starting, OperatorCommand.START, "the robot is starting: the scanner is not there", State.STARTING),
+    (starting, OperatorCommand.STANDBY, DONE, State.STARTING),
+    (starting, OperatorCommand.STOP, DONE, State.STARTING),
+    (starting, OperatorCommand.RESUME, NOT_STOPPED, State.STARTING),
+    (starting, OperatorCommand.RESET, DONE, State.STARTING),
+    (starting, OperatorCommand.QUIT, DONE, State.OVER),
+    (standby, OperatorCommand.START, DONE, State.RUNNING),
+    (standby, OperatorCommand.STANDBY, DONE, State.STANDBY),
+    (standby, OperatorCommand.STOP, DONE, State.STANDBY),
+    (standby, OperatorCommand.RESUME, NOT_STOPPED, State.STANDBY),
+    (standby, OperatorCommand.RESET, DONE, State.STANDBY),
+    (standby, OperatorCommand.QUIT, DONE, State.OVER),
+    (running, OperatorCommand.START, DONE, State.RUNNING),
+    (running, OperatorCommand.STANDBY, DONE, State.STANDBY),
+    (running, OperatorCommand.STOP, DONE, State.RUNNING),
+    (running, OperatorCommand.RESUME, NOT_STOPPED, State.RUNNING),
+    (running, OperatorCommand.RESET, DONE, State.STANDBY),
+    (running, OperatorCommand.QUIT, DONE, State.OVER),
+    (stopped, OperatorCommand.START, LATCHED, State.RUNNING),
+    (stopped, OperatorCommand.STANDBY, DONE, State.STANDBY),
+    (stopped, OperatorCommand.STOP, DONE, State.RUNNING),
+    (stopped, OperatorCommand.RESUME, DONE, State.RUNNING),
+    (stopped, OperatorCommand.RESET, DONE, State.STANDBY),
+    (stopped, OperatorCommand.QUIT, DONE, State.OVER),
+    (stopping, OperatorCommand.START, "the robot is being stopped", State.STANDBY),
+    (stopping, OperatorCommand.STANDBY, DONE, State.STANDBY),
+    (stopping, OperatorCommand.STOP, DONE, State.STANDBY),
+    (stopping, OperatorCommand.RESUME, NOT_STOPPED, State.STANDBY),
+    (stopping, OperatorCommand.RESET, "the robot is being stopped", State.STANDBY),
+    (stopping, OperatorCommand.QUIT, DONE, State.OVER),
+    (ending, OperatorCommand.START, "the robot is being stopped", State.OVER),
+    (ending, OperatorCommand.STANDBY, DONE, State.OVER),
+    (ending, OperatorCommand.STOP, DONE, State.OVER),
+    (ending, OperatorCommand.RESUME, NOT_STOPPED, State.OVER),
+    (ending, OperatorCommand.RESET, "the robot is being stopped", State.OVER),
+    (ending, OperatorCommand.QUIT, DONE, State.OVER),
+    (fault, OperatorCommand.START, FAULTY, State.FAULT),
+    (fault, OperatorCommand.STANDBY, FAULTY, State.FAULT),
+    (fault, OperatorCommand.STOP, DONE, State.FAULT),
+    (fault, OperatorCommand.RESUME, NOT_STOPPED, State.FAULT),
+    (fault, OperatorCommand.RESET, "the drive base is not there", State.FAULT),
+    (fault, OperatorCommand.QUIT, DONE, State.OVER),
+    (over, OperatorCommand.START, ENDED, State.OVER),
+    (over, OperatorCommand.STANDBY, ENDED, State.OVER),
+    (over, OperatorCommand.STOP, ENDED, State.OVER),
+    (over, OperatorCommand.RESUME, ENDED, State.OVER),
+    (over, OperatorCommand.RESET, ENDED, State.OVER),
+    (over, OperatorCommand.QUIT, DONE, State.OVER),
 ]
 
 
 def test_the_table_is_complete() -> None:
-    assert {(maker, command) for maker, command, _, _ in TABLE} == {(m, c) for m in MAKERS for c in Command}
+    assert {(maker, command) for maker, command, _, _ in TABLE} == {(m, c) for m in MAKERS for c in OperatorCommand}
 
 
 @pytest.mark.parametrize(("make", "command", "answer", "state"), TABLE)
-def test_each_command_in_each_state(make: Callable[[], Operated], command: Command, answer: str, state: State) -> None:
+def test_each_command_in_each_state(
+    make: Callable[[], Operated], command: OperatorCommand, answer: str, state: State
+) -> None:
     scene = make()
     assert scene.daemon.state is MAKERS[make]
     answers = scene.order(command)
@@ -170,8 +172,8 @@ def test_each_command_in_each_state(make: Callable[[], Operated], command: Comma
         assert scene.out == STANDSTILL
 
 
-@pytest.mark.parametrize("command", [Command.STOP, Command.STANDBY, Command.QUIT])
-def test_what_stops_has_its_effect_before_the_loop_hears_of_it(command: Command) -> None:
+@pytest.mark.parametrize("command", [OperatorCommand.STOP, OperatorCommand.STANDBY, OperatorCommand.QUIT])
+def test_what_stops_has_its_effect_before_the_loop_hears_of_it(command: OperatorCommand) -> None:
     scene = running()
     assert scene.out != STANDSTILL
     hurries = scene.hurries
@@ -181,10 +183,10 @@ def test_what_stops_has_its_effect_before_the_loop_hears_of_it(command: Command)
     assert scene.out == STANDSTILL
 
 
-@pytest.mark.parametrize("command", [Command.STOP, Command.STANDBY, Command.QUIT])
-@pytest.mark.parametrize("before", [Command.START, Command.RESUME, Command.RESET])
-def test_a_stop_wins_over_what_was_ordered_before_it(command: Command, before: Command) -> None:
-    scene = standby() if before is Command.START else stopped()
+@pytest.mark.parametrize("command", [OperatorCommand.STOP, OperatorCommand.STANDBY, OperatorCommand.QUIT])
+@pytest.mark.parametrize("before", [OperatorCommand.START, OperatorCommand.RESUME, OperatorCommand.RESET])
+def test_a_stop_wins_over_what_was_ordered_before_it(command: OperatorCommand, before: OperatorCommand) -> None:
+    scene = standby() if before is OperatorCommand.START else stopped()
     answers = scene.order(before)
     scene.order(command)
     moved = []
@@ -193,37 +195,41 @@ def test_a_stop_wins_over_what_was_ordered_before_it(command: Command, before: C
         moved.append(scene.out)
     assert set(moved) == {STANDSTILL}
     # Who may go on, or is reset, may be put to rest as well; only an operator's stop says otherwise.
-    is_done = command is not Command.STOP if before is Command.RESUME else (before, command) == RESET_THEN_STANDBY
+    is_done = (
+        command is not OperatorCommand.STOP
+        if before is OperatorCommand.RESUME
+        else (before, command) == RESET_THEN_STANDBY
+    )
     assert (len(answers), answers == [DONE]) == (1, is_done)
 
 
 def test_an_operators_stop_and_resume_are_told_to_the_model() -> None:
     scene = running()
-    scene.order(Command.STOP)
+    scene.order(OperatorCommand.STOP)
     scene.live(0.1, 2.0)
     assert (scene.component("Eyes")["state"], scene.out) == ("stopped", STANDSTILL)
-    scene.order(Command.RESUME)
+    scene.order(OperatorCommand.RESUME)
     scene.live(0.5, 2.0)
     assert (scene.component("Eyes")["state"], scene.out.linear_m_s) == ("calm", 0.1)
 
 
 def test_a_stop_from_before_the_start_forbids_it_until_somebody_resumes() -> None:
     scene = standby()
-    scene.order(Command.STOP)
+    scene.order(OperatorCommand.STOP)
     scene.live(0.1, 2.0)
-    assert scene.ask(Command.START, 0.1) == [LATCHED]
-    assert scene.ask(Command.RESUME, 0.1) == [DONE]
-    assert scene.ask(Command.START, 1.0) == [DONE]
+    assert scene.ask(OperatorCommand.START, 0.1) == [LATCHED]
+    assert scene.ask(OperatorCommand.RESUME, 0.1) == [DONE]
+    assert scene.ask(OperatorCommand.START, 1.0) == [DONE]
     assert scene.out.linear_m_s == 0.1
 
 
 def test_a_robot_that_starts_itself_begins_stopped_and_the_model_knows() -> None:
     scene = Operated()
-    scene.order(Command.STOP)
+    scene.order(OperatorCommand.STOP)
     scene.up()
     assert (scene.daemon.state, scene.out) == (State.RUNNING, STANDSTILL)
     assert scene.component("Eyes")["state"] == "stopped"
-    assert scene.ask(Command.RESUME, 0.5) == [DONE]
+    assert scene.ask(OperatorCommand.RESUME, 0.5) == [DONE]
     assert scene.out.linear_m_s == 0.1
 
 
@@ -232,12 +238,12 @@ def test_nothing_goes_on_while_a_stop_button_is_pressed() -> None:
     scene.buttons["button_1"] = True
     scene.live(0.1, 2.0)
     held = "a button that stops the robot is pressed"
-    assert scene.ask(Command.RESUME, 0.1) == [held]
-    assert scene.ask(Command.RESET, 0.3) == [held]
+    assert scene.ask(OperatorCommand.RESUME, 0.1) == [held]
+    assert scene.ask(OperatorCommand.RESET, 0.3) == [held]
     assert scene.out == STANDSTILL
     scene.buttons["button_1"] = False
     scene.live(0.1, 2.0)
-    assert scene.ask(Command.RESET, 0.1) == [DONE]
+    assert scene.ask(OperatorCommand.RESET, 0.1) == [DONE]
 
 
 def test_keys_and_buttons_stop_and_let_go_on_in_standby_too() -> None:
@@ -246,17 +252,17 @@ def test_keys_and_buttons_stop_and_let_go_on_in_standby_too() -> None:
     scene.live(0.1, 2.0)
     scene.buttons["button_1"] = False
     scene.live(0.1, 2.0)
-    assert scene.ask(Command.START, 0.1) == [LATCHED]
+    assert scene.ask(OperatorCommand.START, 0.1) == [LATCHED]
     scene.buttons["button_2"] = True
     scene.live(0.1, 2.0)
-    assert scene.ask(Command.START, 1.0) == [DONE]
+    assert scene.ask(OperatorCommand.START, 1.0) == [DONE]
     assert scene.out.linear_m_s == 0.1
 
 
 def test_a_resume_before_the_stop_was_put_out_is_refused() -> None:
     scene = running()
-    scene.order(Command.STOP)
-    answers = scene.order(Command.RESUME)
+    scene.order(OperatorCommand.STOP)
+    answers = scene.order(OperatorCommand.RESUME)
     scene.daemon.cycle()
     assert answers == [str(Reason.OPERATOR_STOP)]
     scene.live(0.1, 2.0)
@@ -268,7 +274,7 @@ def test_a_lost_drive_that_is_back_leaves_the_fault_and_can_be_started() -> None
     scene.daemon.post(DeviceUp(Device.DRIVE))
     scene.live(0.2, 2.0)
     assert (scene.daemon.state, scene.daemon.problem) == (State.STANDBY, "")
-    assert scene.ask(Command.START, 1.0) == [DONE]
+    assert scene.ask(OperatorCommand.START, 1.0) == [DONE]
     assert scene.out.linear_m_s == 0.1
 
 
@@ -284,7 +290,7 @@ def test_a_drive_that_is_lost_and_back_within_a_turn_is_no_lasting_fault() -> No
 def test_nothing_starts_without_a_device(device: Device) -> None:
     scene = standby()
     scene.daemon.post(DeviceDown(device, "gone", 0.25, True))
-    answers = scene.order(Command.START)
+    answers = scene.order(OperatorCommand.START)
     scene.daemon.cycle()
     name = "drive base" if device is Device.DRIVE else "scanner"
     assert answers == [f"the {name} is not there"]
@@ -304,24 +310,24 @@ def supervisor_fault() -> Operated:
 def test_a_fault_is_left_by_a_reset_that_is_done_and_not_before() -> None:
     scene = supervisor_fault()
     scene.answers_reset = False
-    answers = scene.order(Command.RESET)
+    answers = scene.order(OperatorCommand.RESET)
     scene.live(0.2, 2.0)
     assert (answers, scene.daemon.state) == ([], State.FAULT)
-    start = scene.order(Command.START)
+    start = scene.order(OperatorCommand.START)
     scene.live(0.1, 2.0)
     assert start[0].startswith("the robot is in fault: ")
     scene.daemon.post(ResetDone())
     scene.live(0.1, 2.0)
     assert (answers, scene.daemon.state, scene.daemon.problem) == ([DONE], State.STANDBY, "")
-    assert scene.ask(Command.START, 1.0) == [DONE]
+    assert scene.ask(OperatorCommand.START, 1.0) == [DONE]
     assert scene.out.linear_m_s == 0.1
 
 
 def test_a_reset_that_is_overtaken_by_a_stop_forgets_nothing() -> None:
     scene = supervisor_fault()
     scene.live(0.1)
-    answers = scene.order(Command.RESET)
-    scene.order(Command.STOP)
+    answers = scene.order(OperatorCommand.RESET)
+    scene.order(OperatorCommand.STOP)
     scene.live(0.1)
     assert answers == [str(Reason.OPERATOR_STOP)]
     reasons = scene.safety.output(scene.clock.monotonic()).reasons
@@ -332,7 +338,7 @@ def test_a_reset_that_is_overtaken_by_a_stop_forgets_nothing() -> None:
 def test_a_reset_that_fails_or_never_ends_is_answered_and_the_fault_stays(problem: str | None) -> None:
     scene = supervisor_fault()
     scene.answers_reset = False
-    answers = scene.order(Command.RESET)
+    answers = scene.order(OperatorCommand.RESET)
     scene.live(0.2, 2.0)
     if problem is not None:
         scene.daemon.post(ResetDone(problem))
@@ -345,7 +351,7 @@ def test_a_reset_that_fails_or_never_ends_is_answered_and_the_fault_stays(proble
 
 def test_motors_that_do_not_let_go_are_a_fault_that_the_order_is_told() -> None:
     scene = running()
-    answers = scene.order(Command.STANDBY)
+    answers = scene.order(OperatorCommand.STANDBY)
     scene.daemon.cycle()
     scene.clock.advance(STOP_LIMIT_S)
     scene.daemon.cycle()
@@ -362,7 +368,7 @@ def test_an_end_that_is_ordered_comes_though_the_drive_is_lost_on_the_way() -> N
 
 def test_who_wants_standby_before_the_start_gets_it() -> None:
     scene = Operated()
-    scene.order(Command.STANDBY)
+    scene.order(OperatorCommand.STANDBY)
     scene.up()
     assert (scene.daemon.state, scene.torque) == (State.STANDBY, False)
 
@@ -370,26 +376,26 @@ def test_who_wants_standby_before_the_start_gets_it() -> None:
 def test_all_that_waits_is_answered_at_the_end_and_after_it() -> None:
     scene = supervisor_fault()
     scene.answers_reset = False
-    waiting = scene.order(Command.RESET)
+    waiting = scene.order(OperatorCommand.RESET)
     scene.live(0.1)
-    end, late = scene.order(Command.QUIT), scene.order(Command.START)
+    end, late = scene.order(OperatorCommand.QUIT), scene.order(OperatorCommand.START)
     scene.live(0.1)
     assert scene.daemon.state is State.OVER
     assert (waiting, end, late) == ([ENDED], [DONE], ["the robot is being stopped"])
-    assert scene.order(Command.START) == [ENDED]
+    assert scene.order(OperatorCommand.START) == [ENDED]
 
 
-@pytest.mark.parametrize("command", [Command.RESUME, Command.RESET])
-def test_a_stop_in_the_middle_of_a_reset_holds(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("command", [OperatorCommand.RESUME, OperatorCommand.RESET])
+def test_a_stop_in_the_middle_of_a_reset_holds(command: OperatorCommand, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = stopped()
-    if command is Command.RESET:
-        scene.order(Command.STANDBY)
+    if command is OperatorCommand.RESET:
+        scene.order(OperatorCommand.STANDBY)
         scene.live(0.3, 2.0)
     reset = scene.safety.reset
 
     def overtaken() -> tuple[Reason, ...]:
         # From another thread, when the loop has looked whether a stop is coming, and nothing of it is left then.
-        scene.order(Command.STOP)
+        scene.order(OperatorCommand.STOP)
         scene.exchange()
         return reset()
 
@@ -404,7 +410,7 @@ def test_a_stop_in_the_middle_of_a_reset_holds(command: Command, monkeypatch: py
 @pytest.mark.parametrize("how", ["button", "key"])
 def test_a_stop_at_the_robot_while_a_reset_waits_for_the_standstill_holds(how: str) -> None:
     scene = running()
-    answers = scene.order(Command.RESET)
+    answers = scene.order(OperatorCommand.RESET)
     scene.daemon.cycle()
     assert scene.daemon.state is State.STOPPING
     if how == "key":
@@ -416,22 +422,22 @@ def test_a_stop_at_the_robot_while_a_reset_waits_for_the_standstill_holds(how: s
     scene.buttons["button_1"] = False
     scene.live(1.0, 2.0)
     assert answers == [str(Reason.OPERATOR_STOP)]
-    assert scene.ask(Command.START, 0.1) == [LATCHED]
+    assert scene.ask(OperatorCommand.START, 0.1) == [LATCHED]
 
 
-@pytest.mark.parametrize("command", [Command.RESUME, Command.RESET])
+@pytest.mark.parametrize("command", [OperatorCommand.RESUME, OperatorCommand.RESET])
 def test_a_standby_in_the_middle_of_a_reset_is_no_operators_stop(
-    command: Command, monkeypatch: pytest.MonkeyPatch
+    command: OperatorCommand, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = stopped()
-    if command is Command.RESET:
-        scene.order(Command.STANDBY)
+    if command is OperatorCommand.RESET:
+        scene.order(OperatorCommand.STANDBY)
         scene.live(0.3, 2.0)
     reset = scene.safety.reset
 
     def overtaken() -> tuple[Reason, ...]:
         remaining = reset()
-        scene.order(Command.STANDBY)
+        scene.order(OperatorCommand.STANDBY)
         return remaining
 
     monkeypatch.setattr(scene.safety, "reset", overtaken)
@@ -439,7 +445,7 @@ def test_a_standby_in_the_middle_of_a_reset_is_no_operators_stop(
     assert (scene.daemon.state, scene.out) == (State.STANDBY, STANDSTILL)
     assert scene.safety.output(scene.clock.monotonic()).reasons == (Reason.STANDBY,)
     monkeypatch.undo()
-    assert scene.ask(Command.START, 1.0) == [DONE]
+    assert scene.ask(OperatorCommand.START, 1.0) == [DONE]
     assert scene.out.linear_m_s == 0.1
 
 
@@ -448,11 +454,11 @@ def test_a_standby_in_the_middle_of_a_start_is_not_undone(monkeypatch: pytest.Mo
     enable = scene.safety.enable
 
     def overtaken() -> None:
-        scene.order(Command.STANDBY)
+        scene.order(OperatorCommand.STANDBY)
         enable()
 
     monkeypatch.setattr(scene.safety, "enable", overtaken)
-    scene.order(Command.START)
+    scene.order(OperatorCommand.START)
     scene.daemon.cycle()
     assert Reason.STANDBY in scene.safety.output(scene.clock.monotonic()).reasons
     scene.live(0.3, 2.0)
@@ -464,7 +470,7 @@ def test_nothing_starts_by_itself_while_a_reset_is_under_way() -> None:
     scene.answers_reset = False
     scene.daemon.post(DeviceUp(Device.DRIVE))
     scene.live(0.1)
-    answers = scene.order(Command.RESET)
+    answers = scene.order(OperatorCommand.RESET)
     scene.daemon.cycle()
     scene.daemon.post(DeviceUp(Device.SCANNER))
     scene.live(0.3, 2.0)
@@ -472,7 +478,7 @@ def test_nothing_starts_by_itself_while_a_reset_is_under_way() -> None:
     scene.daemon.post(ResetDone())
     scene.live(0.1, 2.0)
     assert answers == [DONE]
-    assert scene.ask(Command.START, 1.0) == [DONE]
+    assert scene.ask(OperatorCommand.START, 1.0) == [DONE]
 
 
 def test_a_fault_outlives_a_drive_that_is_lost_and_back() -> None:
@@ -488,32 +494,32 @@ def test_a_fault_outlives_a_drive_that_is_lost_and_back() -> None:
     scene.live(0.3, 2.0)
     assert scene.daemon.state is State.FAULT
     assert scene.daemon.problem.endswith("; the drive base is lost: no answer")
-    assert scene.ask(Command.RESET, 0.2) == [DONE]
+    assert scene.ask(OperatorCommand.RESET, 0.2) == [DONE]
     assert (scene.daemon.state, scene.daemon.problem) == (State.STANDBY, "")
 
 
 def test_an_end_that_is_ordered_in_a_fault_is_an_orderly_one() -> None:
     scene = fault()
-    assert scene.ask(Command.QUIT, 0.1) == [DONE]
+    assert scene.ask(OperatorCommand.QUIT, 0.1) == [DONE]
     assert (scene.daemon.state, scene.daemon.problem) == (State.OVER, "")
 
 
 def test_a_loop_that_breaks_answers_what_is_open(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = supervisor_fault()
     scene.answers_reset = False
-    waiting = scene.order(Command.RESET)
+    waiting = scene.order(OperatorCommand.RESET)
     scene.live(0.1)
 
     def broken(now_s: float) -> None:
         raise RuntimeError(now_s)
 
     monkeypatch.setattr(scene.safety, "loop_cycled", broken)
-    late = scene.order(Command.START)
+    late = scene.order(OperatorCommand.START)
     with pytest.raises(RuntimeError):
         scene.daemon.run()
     assert waiting == [ENDED]
     # It had been taken out of the inbox when the loop broke.
-    assert (late, scene.order(Command.START)) == ([ENDED], [ENDED])
+    assert (late, scene.order(OperatorCommand.START)) == ([ENDED], [ENDED])
 
 
 def test_an_order_that_breaks_the_loop_is_answered(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -523,7 +529,7 @@ def test_an_order_that_breaks_the_loop_is_answered(monkeypatch: pytest.MonkeyPat
         raise RuntimeError
 
     monkeypatch.setattr(scene.safety, "enable", broken)
-    answers = scene.order(Command.START)
+    answers = scene.order(OperatorCommand.START)
     with pytest.raises(RuntimeError):
         scene.daemon.run()
     assert answers == [ENDED]
@@ -535,7 +541,7 @@ def test_an_answer_that_raises_harms_nobody() -> None:
     def hostile(why: str) -> None:
         raise ValueError(why)
 
-    scene.daemon.post(Order(Command.START, "a test", hostile))
+    scene.daemon.post(Order(OperatorCommand.START, "a test", hostile))
     scene.live(0.1, 2.0)
     assert scene.daemon.state is State.RUNNING
 
@@ -545,12 +551,12 @@ def test_orders_from_many_threads_while_the_loop_ends_are_all_answered() -> None
     found: list[list[str]] = []
 
     def ask() -> None:
-        found.extend(scene.order(Command.START) for _ in range(200))
+        found.extend(scene.order(OperatorCommand.START) for _ in range(200))
 
     threads = [threading.Thread(target=ask) for _ in range(4)]
     for thread in threads:
         thread.start()
-    scene.order(Command.QUIT)
+    scene.order(OperatorCommand.QUIT)
     while scene.daemon.state is not State.OVER:
         scene.live(0.02, 2.0)
     for thread in threads:

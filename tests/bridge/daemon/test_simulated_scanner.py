@@ -65,7 +65,7 @@ class Scene:
             found = self.safety.output(now_s)
             self.time.sleep(0.002)
             v = found.velocity.linear_m_s
-            self.safety.saw_drive(
+            self.safety.on_drive_reading(
                 reading(self.time.monotonic(), wheels_m_s=(v, v), is_torque_on=found.is_torque_wanted)
             )
         return found.velocity, found.reasons, found.warnings

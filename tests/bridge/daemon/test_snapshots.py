@@ -2,7 +2,7 @@
 
 from robosc_bridge.daemon.feed import Snapshot
 from robosc_bridge.daemon.reports import Device, DeviceDown, SafetyNotice
-from robosc_bridge.daemon.states import Command, Order, State
+from robosc_bridge.daemon.states import OperatorCommand, Order, State
 from robosc_bridge.safety import Caution, Reason
 from support.daemons import PERIOD_S, Scene
 
@@ -70,7 +70,7 @@ def test_each_change_is_shown_in_its_turn_and_measurements_now_and_then() -> Non
     scene.daemon.cycle()
     assert scene.latest.devices[Device.SCANNER] is False
     assert scene.latest.scan is None
-    scene.daemon.post(Command.STANDBY)
+    scene.daemon.post(OperatorCommand.STANDBY)
     scene.daemon.cycle()
     assert (scene.latest.state, scene.latest.stops) == (State.STOPPING, ("standby",))
 
@@ -79,10 +79,10 @@ def test_a_new_run_is_shown_though_its_counts_begin_anew() -> None:
     scene = Watched()
     scene.up()
     for _ in range(2):
-        scene.daemon.post(Command.STANDBY)
+        scene.daemon.post(OperatorCommand.STANDBY)
         scene.live(0.3, 2.0)
         assert scene.latest.components == {}
-        scene.daemon.post(Command.START)
+        scene.daemon.post(OperatorCommand.START)
         scene.live(0.3, 2.0)
         assert scene.latest.components["Eyes"]["variables"]["way"] == "free"
 
@@ -100,7 +100,7 @@ def test_entries_of_the_log_and_of_the_bridge_are_told_and_the_log_knows_only_it
     scene = Watched()
     scene.up()
     assert {("event", "scan.response"), ("event", "drive.request"), ("state", "running")} <= set(scene.told())
-    scene.daemon.post(Order(Command.STOP, "Ada", lambda why: None))
+    scene.daemon.post(Order(OperatorCommand.STOP, "Ada", lambda why: None))
     scene.live(0.1, 2.0)
     assert {("order", "stop (Ada)"), ("event", "stop.response")} <= set(scene.told())
     scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))

@@ -61,17 +61,17 @@ class Gate:
         self.asked.append(now_s)
         return self.next
 
-    def saw_drive(self, reading: DriveReading) -> None:
+    def on_drive_reading(self, reading: DriveReading) -> None:
         self.readings.append(reading)
 
     def drive_failed(self) -> None:
         self.failures += 1
 
-    def saw_scan(self, now_s: float, ranges_m: Sequence[float]) -> None:
+    def on_scan(self, now_s: float, ranges_m: Sequence[float]) -> None:
         self.scans.append(now_s)
         self.ranges_m = ranges_m
 
-    def saw_noise(self, is_noisy: bool) -> None:
+    def on_noise(self, is_noisy: bool) -> None:
         self.noises.append(is_noisy)
 
 

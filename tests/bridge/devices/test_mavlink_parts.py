@@ -18,7 +18,7 @@ from robosc_bridge.protocol.mavlink_messages import (
     Heartbeat,
     LocalPosition,
     Message,
-    Motion,
+    MotionEstimate,
     Text,
 )
 from robosc_bridge.protocol.mavlink_signing import Signing, SigningError
@@ -89,7 +89,7 @@ def test_an_estimate_is_as_old_as_its_older_part() -> None:
     assert told is not None
     assert told.time_s == 0.0
     assert (told.content.linear_m_s, told.content.angular_rad_s) == pytest.approx((0.4, 0.3))
-    motion = Motion(1.0, 2.0, 0.0, 0.0, 0.0)
+    motion = MotionEstimate(1.0, 2.0, 0.0, 0.0, 0.0)
     place = LocalPosition(1.0, 2.0, 3.0, 0.1, 0.4)
     both = _after(None, motion, place, state=state)
     assert estimate(both) == Timestamped(1.0, motion)
@@ -108,10 +108,10 @@ headings = st.floats(-3.1, 3.1)
 def test_it_is_where_it_is_seen_from_its_first_place(
     x_m: float, y_m: float, heading_rad: float, way: list[tuple[float, float, float]]
 ) -> None:
-    odometry = VehicleOdometry().advanced(Motion(x_m, y_m, heading_rad, 0.0, 0.0))
+    odometry = VehicleOdometry().advanced(MotionEstimate(x_m, y_m, heading_rad, 0.0, 0.0))
     assert odometry.pose == Pose()
     for place in way:
-        odometry = odometry.advanced(Motion(*place, 0.1, 0.2))
+        odometry = odometry.advanced(MotionEstimate(*place, 0.1, 0.2))
     last_x_m, last_y_m, last_heading_rad = way[-1]
     cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
     east_m, north_m = last_x_m - x_m, last_y_m - y_m
@@ -125,13 +125,13 @@ def test_it_is_where_it_is_seen_from_its_first_place(
 
 
 def test_a_reset_and_a_new_beginning_are_no_motion() -> None:
-    odometry = VehicleOdometry().advanced(Motion(0, 0, 0, 0, 0)).advanced(Motion(1, 0, 0, 0, 0))
-    jumped = odometry.advanced(Motion(50, 50, 2.0, 0, 0, resets=1))
+    odometry = VehicleOdometry().advanced(MotionEstimate(0, 0, 0, 0, 0)).advanced(MotionEstimate(1, 0, 0, 0, 0))
+    jumped = odometry.advanced(MotionEstimate(50, 50, 2.0, 0, 0, resets=1))
     assert jumped.pose == odometry.pose
     assert jumped.rebases == 1
-    assert odometry.rebased().advanced(Motion(50, 50, 2.0, 0, 0)).pose == odometry.pose
+    assert odometry.rebased().advanced(MotionEstimate(50, 50, 2.0, 0, 0)).pose == odometry.pose
     # Ahead is where it looks now.
-    moved = jumped.advanced(Motion(50 + math.cos(2.0), 50 + math.sin(2.0), 2.0, 0, 0, resets=1))
+    moved = jumped.advanced(MotionEstimate(50 + math.cos(2.0), 50 + math.sin(2.0), 2.0, 0, 0, resets=1))
     assert (moved.pose.x_m, moved.pose.y_m) == pytest.approx((2.0, 0.0))
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from robosc_bridge.daemon.reports import Device
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.safety import Reason
 from support.ground import Station, joined_texts, of_type
 from support.ground_talk import Talk
@@ -11,7 +11,7 @@ from support.ground_talk import Talk
 
 def test_arming_is_answered_when_it_is_done(talk: Talk) -> None:
     assert talk.results(400, 1.0) == []
-    assert talk.daemon.commands == [Command.START]
+    assert talk.daemon.commands == [OperatorCommand.START]
     assert talk.daemon.orders[0].by == "MAVLink 255/190"
     assert of_type("COMMAND_ACK", talk.live(0.5)) == []
     talk.daemon.orders[0].answer("")
@@ -20,7 +20,7 @@ def test_arming_is_answered_when_it_is_done(talk: Talk) -> None:
 
 
 def test_a_refusal_comes_after_its_reason(talk: Talk) -> None:
-    talk.daemon.answers[Command.START] = "the robot is starting: no scanner"
+    talk.daemon.answers[OperatorCommand.START] = "the robot is starting: no scanner"
     found = talk.ask(400, 1.0)
     assert [item.get_type() for item in found if item.get_type() in ("STATUSTEXT", "COMMAND_ACK")] == [
         "STATUSTEXT",
@@ -38,7 +38,7 @@ def test_a_repeated_command_is_done_once(talk: Talk) -> None:
     talk.daemon.orders[0].answer("")
     assert [ack.result for ack in of_type("COMMAND_ACK", talk.say())] == [0]
     assert talk.results(400, 1.0, confirmation=2) == [0]
-    assert talk.daemon.commands == [Command.START]
+    assert talk.daemon.commands == [OperatorCommand.START]
     # A new one is new, and so is one after a long time.
     assert talk.results(400, 1.0) == []
     talk.daemon.orders[1].answer("")
@@ -53,7 +53,7 @@ def test_an_arming_that_is_not_answered_is_undone(talk: Talk) -> None:
     found = talk.live(5.2)
     assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [4]
     assert "Not armed: the bridge's loop does not answer." in joined_texts(found)
-    assert talk.daemon.commands == [Command.START, Command.STANDBY]
+    assert talk.daemon.commands == [OperatorCommand.START, OperatorCommand.STANDBY]
     # A late answer concerns nobody.
     talk.daemon.orders[0].answer("")
     assert of_type("COMMAND_ACK", talk.live(1.0)) == []
@@ -62,15 +62,15 @@ def test_an_arming_that_is_not_answered_is_undone(talk: Talk) -> None:
 @pytest.mark.parametrize(
     ("number", "parameters", "expected"),
     [
-        (400, (0.0,), Command.STANDBY),
-        (400, (0.0, 21196.0), Command.STANDBY),
-        (176, (1.0, 4.0), Command.STOP),
-        (193, (0.0,), Command.STOP),
-        (185, (1.0,), Command.STOP),
+        (400, (0.0,), OperatorCommand.STANDBY),
+        (400, (0.0, 21196.0), OperatorCommand.STANDBY),
+        (176, (1.0, 4.0), OperatorCommand.STOP),
+        (193, (0.0,), OperatorCommand.STOP),
+        (185, (1.0,), OperatorCommand.STOP),
     ],
 )
 def test_stopping_is_done_before_it_is_answered(
-    talk: Talk, number: int, parameters: tuple[float, ...], expected: Command
+    talk: Talk, number: int, parameters: tuple[float, ...], expected: OperatorCommand
 ) -> None:
     talk.daemon.show(state=State.RUNNING)
     talk.say()
@@ -88,16 +88,16 @@ def test_stopping_is_done_before_it_is_answered(
 def test_a_flood_of_stops_is_answered_each_and_ordered_seldom(talk: Talk) -> None:
     found = talk.say(b"".join(talk.station.command(400, 0.0) for _ in range(300)))
     assert len(of_type("COMMAND_ACK", found)) == 300
-    assert talk.daemon.commands == [Command.STANDBY]
+    assert talk.daemon.commands == [OperatorCommand.STANDBY]
     # What starts in between is stopped all the same.
     talk.ask(400, 1.0)
     talk.ask(400, 0.0)
-    assert talk.daemon.commands == [Command.STANDBY, Command.START, Command.STANDBY]
+    assert talk.daemon.commands == [OperatorCommand.STANDBY, OperatorCommand.START, OperatorCommand.STANDBY]
     talk.daemon.orders[1].answer("")
     talk.say()
     found = talk.say(b"".join(talk.station.command(400, wanted) for wanted in (0.0, 0.0, 1.0, 0.0, 0.0)))
     assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [0] * 4
-    assert talk.daemon.commands[3:] == [Command.STANDBY, Command.START, Command.STANDBY]
+    assert talk.daemon.commands[3:] == [OperatorCommand.STANDBY, OperatorCommand.START, OperatorCommand.STANDBY]
 
 
 @pytest.mark.parametrize(("number", "parameters"), [(400, (0.0,)), (193, (0.0,)), (185, (1.0,)), (176, (1.0, 4.0))])
@@ -140,7 +140,7 @@ def test_what_was_accepted_before_a_stop_is_not_accepted_again(
 
 
 def test_what_others_have_stopped_is_not_accepted_again(talk: Talk) -> None:
-    talk.daemon.answers = {Command.START: "", Command.RESUME: ""}
+    talk.daemon.answers = {OperatorCommand.START: "", OperatorCommand.RESUME: ""}
     assert talk.results(400, 1.0) == [0]
     talk.daemon.show(state=State.RUNNING)
     talk.live(1.5)
@@ -157,7 +157,7 @@ def test_what_others_have_stopped_is_not_accepted_again(talk: Talk) -> None:
     talk.daemon.show(reasons=(Reason.OPERATOR_STOP,))
     talk.live(0.1)
     assert talk.results(193, 1.0, confirmation=1) == [1]
-    assert talk.daemon.commands == [Command.START, Command.RESUME]
+    assert talk.daemon.commands == [OperatorCommand.START, OperatorCommand.RESUME]
 
 
 def test_a_stop_does_not_wait_behind_a_packet_that_was_cut(talk: Talk) -> None:
@@ -166,7 +166,7 @@ def test_a_stop_does_not_wait_behind_a_packet_that_was_cut(talk: Talk) -> None:
         talk.daemon.orders.clear()
         found = talk.say(cut + talk.station.command(400, 0.0)) + talk.say(after_s=0.02) + talk.say(after_s=0.04)
         assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [0]
-        assert talk.daemon.commands == [Command.STANDBY]
+        assert talk.daemon.commands == [OperatorCommand.STANDBY]
 
 
 def test_a_packet_that_comes_slowly_comes(talk: Talk) -> None:
@@ -174,11 +174,11 @@ def test_a_packet_that_comes_slowly_comes(talk: Talk) -> None:
         assert talk.daemon.orders == []
         talk.say(bytes((byte,)))
         talk.say(after_s=0.06)
-    assert talk.daemon.commands == [Command.STANDBY]
+    assert talk.daemon.commands == [OperatorCommand.STANDBY]
 
 
 def test_a_flood_of_others_is_bounded(talk: Talk) -> None:
-    talk.daemon.answers[Command.START] = "no"
+    talk.daemon.answers[OperatorCommand.START] = "no"
     found = talk.say(b"".join(talk.station.command(410) for _ in range(1000)))
     assert len(of_type("COMMAND_ACK", found)) == 200
     assert talk.results(400, 1.0) == []
@@ -194,7 +194,7 @@ def test_modes(talk: Talk) -> None:
     talk.daemon.show(state=State.RUNNING, reasons=(Reason.OPERATOR_STOP,))
     assert {beat.custom_mode for beat in of_type("HEARTBEAT", talk.live(1.1))} == {4}
     assert talk.results(176, 1.0, 10.0) == []
-    assert talk.daemon.commands == [Command.RESUME]
+    assert talk.daemon.commands == [OperatorCommand.RESUME]
     talk.daemon.orders[0].answer("")
     talk.daemon.show(reasons=())
     found = talk.live(1.1)
@@ -212,14 +212,14 @@ def test_modes(talk: Talk) -> None:
 def test_going_on_right_after_a_stop_is_ordered_though_it_does_not_show_yet(talk: Talk) -> None:
     assert talk.results(193, 0.0) == [0]
     assert talk.results(193, 1.0) == []
-    assert talk.daemon.commands == [Command.STOP, Command.RESUME]
+    assert talk.daemon.commands == [OperatorCommand.STOP, OperatorCommand.RESUME]
     talk.daemon.orders[1].answer("the stop has not reached the motors yet")
     assert [ack.result for ack in of_type("COMMAND_ACK", talk.say())] == [1]
 
 
 def test_a_stop_that_must_hold_is_told(talk: Talk) -> None:
     talk.daemon.show(state=State.RUNNING, reasons=(Reason.OPERATOR_STOP,))
-    talk.daemon.answers[Command.RESUME] = "the stop button is held"
+    talk.daemon.answers[OperatorCommand.RESUME] = "the stop button is held"
     talk.say()
     found = talk.ask(193, 1.0)
     assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [1]
@@ -230,7 +230,7 @@ def test_the_old_message_for_modes(talk: Talk) -> None:
     library = talk.station.codec
     found = talk.say(talk.station.pack(library.set_mode_encode(1, 1, 4)))
     assert [(ack.command, ack.result) for ack in of_type("COMMAND_ACK", found)] == [(11, 0)]
-    assert talk.daemon.commands == [Command.STOP]
+    assert talk.daemon.commands == [OperatorCommand.STOP]
     assert of_type("COMMAND_ACK", talk.say(talk.station.pack(library.set_mode_encode(2, 1, 4)))) == []
     found = talk.say(talk.station.pack(library.set_mode_encode(1, 1, 11)))
     assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [2]
@@ -246,7 +246,7 @@ def test_a_reset_is_for_a_robot_at_rest(talk: Talk) -> None:
     talk.daemon.show(state=State.FAULT, problem="hot")
     talk.say()
     assert talk.results(246, 1.0) == []
-    assert talk.daemon.commands == [Command.RESET]
+    assert talk.daemon.commands == [OperatorCommand.RESET]
     assert of_type("COMMAND_ACK", talk.live(15.0)) == []
     talk.daemon.orders[0].answer("")
     assert [ack.result for ack in of_type("COMMAND_ACK", talk.say())] == [0]

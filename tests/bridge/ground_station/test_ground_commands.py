@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc_bridge.daemon.states import Command as OperatorCommand
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.ground_station.commands import (
     Change,

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from robosc_bridge.daemon.programs import Detached
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.devices.interface import Velocity
 from robosc_bridge.ground_station.link import LASTING_S, REST, TURN_S, GroundLink
 from robosc_bridge.ground_station.session import STATION_LIMIT_S
@@ -96,11 +96,11 @@ def test_a_station_that_is_called_sees_the_robot_and_arms_it(host: VirtualHost) 
     with linked(host, CALLING) as (daemon, _):
         beat = station.until("HEARTBEAT", 0.1)
         assert (beat.type, beat.get_srcSystem(), beat.get_srcComponent()) == (10, 1, 1)
-        daemon.answers[Command.START] = ""
+        daemon.answers[OperatorCommand.START] = ""
         station.send(station.station.heartbeat())
         station.send(station.station.command(400, 1.0))
         assert station.until("COMMAND_ACK", 0.1).result == 0
-        assert daemon.commands == [Command.START]
+        assert daemon.commands == [OperatorCommand.START]
         assert daemon.seen == 1
         daemon.show(state=State.RUNNING)
         assert station.until("HEARTBEAT", 1.1, lambda beat: bool(beat.base_mode & 128)).custom_mode == 10
@@ -125,7 +125,7 @@ def test_one_station_is_answered_and_another_may_stop(host: VirtualHost) -> None
         second.send(second.station.command(400, 1.0))
         second.send(second.station.command(400, 0.0))
         assert second.until("COMMAND_ACK").result == 0
-        assert daemon.commands == [Command.STANDBY]
+        assert daemon.commands == [OperatorCommand.STANDBY]
         assert {item.get_type() for item in second.station.heard} == {"COMMAND_ACK"}
         first.until("HEARTBEAT")
 
@@ -198,7 +198,7 @@ def test_signed(host: VirtualHost, tmp_path: Path) -> None:
         station.station.codec.signing.timestamp = signing.begin().timestamp()
         station.send(station.station.heartbeat())
         assert station.until("HEARTBEAT").get_signed()
-        daemon.answers[Command.START] = ""
+        daemon.answers[OperatorCommand.START] = ""
         station.send(station.station.command(400, 1.0))
         assert station.until("COMMAND_ACK").result == 0
         assert stranger.receive() == []
@@ -218,7 +218,7 @@ def test_who_sends_our_own_packets_back_takes_nobodys_place(host: VirtualHost, t
             host.sleep(STATION_LIMIT_S + 1.0)
             thief.send(packets)
         assert thief.receive() == []
-        daemon.answers[Command.START] = ""
+        daemon.answers[OperatorCommand.START] = ""
         station.send(station.station.command(400, 1.0))
         assert station.until("COMMAND_ACK").result == 0
         assert thief.station.heard == []
@@ -282,7 +282,7 @@ def test_a_serial_line(host: VirtualHost) -> None:
         host.sleep(TURN_S)
         station.hear(bytes(end.read()))
         assert len(of_type("COMMAND_ACK", station.heard)) == 2
-        assert daemon.commands == [Command.STANDBY]
+        assert daemon.commands == [OperatorCommand.STANDBY]
 
 
 def test_a_lost_line_ends_driving_at_once(host: VirtualHost) -> None:

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from robosc_bridge.configuration import parse
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.devices.interface import Velocity
-from robosc_bridge.ground_station.session import Session
+from robosc_bridge.ground_station.session import StationSession
 from robosc_bridge.ground_station.settings import GroundSettings, GroundSettingsError, ground_settings, is_loopback
 from robosc_bridge.protocol.mavlink_signing import Signing, SigningError
 from support.ground import CONFIGURATION, KEY, PlayedDaemon, Station, joined_texts, of_type, reading_of
@@ -28,9 +28,9 @@ def key_file(tmp_path: Path) -> Path:
     return found
 
 
-def _session(settings: GroundSettings) -> tuple[PlayedDaemon, Session]:
+def _session(settings: GroundSettings) -> tuple[PlayedDaemon, StationSession]:
     daemon = PlayedDaemon(is_layer=True)
-    session = Session(daemon.operations, settings, BEGIN_S)
+    session = StationSession(daemon.operations, settings, BEGIN_S)
     session.step(BEGIN_S)
     return daemon, session
 
@@ -53,7 +53,7 @@ def test_stopping_is_obeyed_whoever_asks(key_file: Path, number: int, parameters
             before = len(daemon.orders)
             session.step(BEGIN_S + before, station.command(number, *parameters))
             assert len(daemon.orders) == before + 1
-        assert set(daemon.commands) <= {Command.STOP, Command.STANDBY}
+        assert set(daemon.commands) <= {OperatorCommand.STOP, OperatorCommand.STANDBY}
 
 
 @pytest.mark.parametrize("is_datagram", [True, False])
@@ -86,10 +86,10 @@ def test_without_a_key_mavlink_1_is_heard_like_mavlink_2() -> None:
     station = Station()
     beat = station.old(station.codec.heartbeat_encode(6, 8, 0, 0, 4))
     session.step(BEGIN_S, beat + station.old_command(400, 1.0), is_datagram=True)
-    assert (daemon.commands, daemon.seen, session.claims) == ([Command.START], 1, 2)
+    assert (daemon.commands, daemon.seen, session.claims) == ([OperatorCommand.START], 1, 2)
     stick = station.old(station.codec.manual_control_encode(1, 500, 0, 0, 0, 0))
     session.step(BEGIN_S, stick + b"\xfe" + station.old_command(400, 0.0))
-    assert daemon.commands == [Command.START, Command.STANDBY]
+    assert daemon.commands == [OperatorCommand.START, OperatorCommand.STANDBY]
     assert session.claims == 3
     damaged = bytearray(station.old_command(400, 0.0))
     damaged[10] ^= 1
@@ -113,9 +113,9 @@ def test_without_the_key_nothing_changes(
 def test_with_the_key_everything_works_and_is_signed(key_file: Path) -> None:
     daemon, session = _session(_signed(key_file))
     station = _fresh(Station(KEY), key_file)
-    daemon.answers[Command.START] = ""
+    daemon.answers[OperatorCommand.START] = ""
     data = session.step(BEGIN_S + 1.0, station.command(400, 1.0) + station.heartbeat())
-    assert daemon.commands == [Command.START]
+    assert daemon.commands == [OperatorCommand.START]
     assert daemon.seen == 1
     found = station.hear(data)
     assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [0]
@@ -130,10 +130,10 @@ def test_what_was_recorded_does_not_work_again(key_file: Path) -> None:
     station = _fresh(Station(KEY), key_file)
     packet = station.command(400, 1.0)
     session.step(BEGIN_S, packet)
-    assert daemon.commands == [Command.START]
+    assert daemon.commands == [OperatorCommand.START]
     daemon.orders[0].answer("")
     session.step(BEGIN_S, packet)
-    assert daemon.commands == [Command.START]
+    assert daemon.commands == [OperatorCommand.START]
     # Nor after the bridge was started anew, beyond the minute of the protocol.
     daemon, session = _session(_signed(key_file))
     old = Station(KEY, system=7)
@@ -177,9 +177,9 @@ def test_a_forged_stop_from_the_future_shuts_nobody_out(key_file: Path) -> None:
     forged = Station(bytes(32))
     forged.codec.signing.timestamp = 2**47
     session.step(BEGIN_S, forged.command(400, 0.0))
-    assert daemon.commands == [Command.STANDBY]
+    assert daemon.commands == [OperatorCommand.STANDBY]
     session.step(BEGIN_S, station.command(400, 1.0))
-    assert daemon.commands == [Command.STANDBY, Command.START]
+    assert daemon.commands == [OperatorCommand.STANDBY, OperatorCommand.START]
 
 
 def test_who_does_not_sign_is_not_the_operator_and_learns_nothing(key_file: Path) -> None:
@@ -221,7 +221,7 @@ def test_another_station_may_stop_and_nothing_more() -> None:
     assert found == []
     found = other.hear(session.overheard(BEGIN_S, other.command(400, 0.0)))
     assert [(ack.result, ack.target_system) for ack in of_type("COMMAND_ACK", found)] == [(0, 254)]
-    assert daemon.commands == [Command.STANDBY]
+    assert daemon.commands == [OperatorCommand.STANDBY]
 
 
 def test_only_a_station_claims_the_line(key_file: Path) -> None:
@@ -243,7 +243,7 @@ def test_only_a_station_claims_the_line(key_file: Path) -> None:
     session.step(BEGIN_S + 1.0, station.heartbeat())
     session.step(BEGIN_S + 1.0, station.command(410))
     assert (session.accepted, session.claims) == (3, 2)
-    assert daemon.commands == [Command.STANDBY]
+    assert daemon.commands == [OperatorCommand.STANDBY]
 
 
 def test_a_key_that_cannot_be_used_is_told_before_anything_starts(tmp_path: Path) -> None:

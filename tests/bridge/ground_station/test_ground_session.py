@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from robosc_bridge.daemon.programs import MessageRequested
 from robosc_bridge.daemon.reports import Device
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.ground_station.settings import GroundSettings
 from robosc_bridge.safety import Reason
 from support.effort import examples
@@ -266,7 +266,7 @@ def test_only_ground_stations_are_operators(talk: Talk) -> None:
 
 def test_the_worked_arming_is_answered_byte_for_byte() -> None:
     talk = Talk(settings=GroundSettings("udpin:127.0.0.1:0", FASTEST, component=191, obeys_unsigned=True))
-    talk.daemon.answers[Command.START] = ""
+    talk.daemon.answers[OperatorCommand.START] = ""
     for _ in range(7):
         talk.session._codec.encode(lambda library: library.heartbeat_encode(10, 0, 0, 0, 0))
     arm = bytes.fromhex("fd 20 00 00 00 ff be 4c 00 00 00 00 80 3f" + " 00" * 24 + " 90 01 01 bf e0 ee")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc_bridge.protocol.dynamixel import PacketHandler, Status, status_of, stuffed, unstuffed
+from robosc_bridge.protocol.dynamixel import PacketHandler, StatusPacket, status_of, stuffed, unstuffed
 from support import peer
 
 HEADERS = st.lists(st.sampled_from((0xFF, 0xFD, 0x00, 0x55)), max_size=12)
@@ -39,7 +39,7 @@ class _Port:
         return not self._incoming
 
 
-def _received(data: bytes) -> Status | None:
+def _received(data: bytes) -> StatusPacket | None:
     packet, result = PacketHandler().rxPacket(_Port(data), False)
     return status_of(packet) if result == 0 else None
 
@@ -52,14 +52,14 @@ def test_a_payload_with_a_header_goes_out_stuffed() -> None:
 
 def test_an_answer_with_a_header_is_unstuffed() -> None:
     found = _received(bytes.fromhex("ff ff fd 00 01 0d 00 55 00 ff ff ff ff fd fd 00 00 00 0f 3e"))
-    assert found == Status(1, 0, False, bytes.fromhex("ff ff ff ff fd 00 00 00"))
+    assert found == StatusPacket(1, 0, False, bytes.fromhex("ff ff ff ff fd 00 00 00"))
 
 
 @pytest.mark.parametrize("length", [4, 5, 6])
 def test_every_payload_of_header_bytes_comes_back_as_it_was_sent(length: int) -> None:
     for payload in itertools.product((0xFF, 0xFD, 0x00), repeat=length):
         found = _received(peer.status(1, bytes(payload)))
-        assert found == Status(1, 0, False, bytes(payload)), bytes(payload).hex(" ")
+        assert found == StatusPacket(1, 0, False, bytes(payload)), bytes(payload).hex(" ")
 
 
 @given(HEADERS)
@@ -71,7 +71,7 @@ def test_a_stuffed_body_has_no_header_and_can_be_unstuffed(body: list[int]) -> N
 
 @given(st.integers(0, 252), st.integers(0, 255), st.binary(max_size=64))
 def test_any_answer_is_read_as_it_was_sent(device: int, error: int, data: bytes) -> None:
-    assert _received(peer.status(device, data, error)) == Status(device, error & 0x7F, error >= 0x80, data)
+    assert _received(peer.status(device, data, error)) == StatusPacket(device, error & 0x7F, error >= 0x80, data)
 
 
 @pytest.mark.parametrize(
@@ -86,12 +86,12 @@ def test_any_answer_is_read_as_it_was_sent(device: int, error: int, data: bytes)
     ],
 )
 def test_an_empty_answer_has_no_data(answer: str, number: int, is_alert: bool) -> None:
-    assert _received(bytes.fromhex(answer)) == Status(1, number, is_alert, b"")
+    assert _received(bytes.fromhex(answer)) == StatusPacket(1, number, is_alert, b"")
 
 
 def test_refusals_are_told_in_words() -> None:
-    assert Status(1, 7, False, b"").refusal == "no access to this address"
-    assert Status(1, 99, False, b"").refusal == "error 99"
+    assert StatusPacket(1, 7, False, b"").refusal == "no access to this address"
+    assert StatusPacket(1, 99, False, b"").refusal == "error 99"
 
 
 @given(st.binary(max_size=60))

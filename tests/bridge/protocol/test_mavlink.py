@@ -13,12 +13,12 @@ from robosc_bridge.protocol.mavlink_messages import (
     Answer,
     Attitude,
     BatteryState,
-    Command,
     Heartbeat,
     LocalPosition,
+    MavCommand,
     Message,
     Mode,
-    Motion,
+    MotionEstimate,
     ObstacleRing,
     SectorDistance,
     Text,
@@ -52,7 +52,7 @@ def _said(make: Any) -> Any:
 
 def test_the_worked_packets_are_made() -> None:
     assert Codec(1, 191).encode(own_heartbeat).hex(" ") == HEARTBEAT
-    assert Codec(255, 190).encode(command(1, 191, Command.ARM_DISARM, 0, *arming(True))).hex(" ") == ARM
+    assert Codec(255, 190).encode(command(1, 191, MavCommand.ARM_DISARM, 0, *arming(True))).hex(" ") == ARM
     # Turning left, which is a negative rate there.
     assert Codec(255, 190).encode(velocity_target(1, 1, 0, 0.1, -0.5)).hex(" ") == TARGET
 
@@ -64,9 +64,13 @@ def test_standing_still_has_no_negative_zero() -> None:
 
 def test_modes_and_forced_disarming_are_asked_for_with_their_numbers() -> None:
     codec = dialect.MAVLink(None)
-    told = codec.decode(bytearray(Codec(255, 190).encode(command(1, 1, Command.SET_MODE, 2, *entering(Mode.GUIDED)))))
+    told = codec.decode(
+        bytearray(Codec(255, 190).encode(command(1, 1, MavCommand.SET_MODE, 2, *entering(Mode.GUIDED))))
+    )
     assert (told.command, told.confirmation, told.param1, told.param2) == (176, 2, 1.0, 15.0)
-    told = codec.decode(bytearray(Codec(255, 190).encode(command(1, 1, Command.ARM_DISARM, 0, *arming(False, True)))))
+    told = codec.decode(
+        bytearray(Codec(255, 190).encode(command(1, 1, MavCommand.ARM_DISARM, 0, *arming(False, True))))
+    )
     assert (told.command, told.param1, told.param2) == (400, 0.0, 21196.0)
 
 
@@ -99,7 +103,7 @@ def test_axes_are_those_of_the_robot() -> None:
 
     told = _said(odometry)
     assert told.heading_rad == pytest.approx(-math.pi / 2)
-    assert told == Motion(1, -2, told.heading_rad, 0.5, -0.25, 7)
+    assert told == MotionEstimate(1, -2, told.heading_rad, 0.5, -0.25, 7)
     assert _said(lambda codec: odometry(codec, 1)) is not None
     assert _said(lambda codec: odometry(codec, 21)) is None
     assert _said(lambda codec: odometry(codec, 20, 8)) is None
@@ -315,7 +319,7 @@ def test_what_may_come_unsigned_does_and_says_so() -> None:
 
     codec = Codec(1, 1, KEY, timestamp=1000, unsigned=frozenset({76}))
     decoder = Decoder(codec, note)
-    stop = command(1, 1, Command.ARM_DISARM, 0, *arming(False))
+    stop = command(1, 1, MavCommand.ARM_DISARM, 0, *arming(False))
     for key in (None, bytes(32)):
         assert decoder.feed(Codec(255, 190, key, timestamp=2**47).encode(stop)) == [True]
         assert decoder.feed(Codec(255, 190, key, timestamp=2**47).encode(own_heartbeat)) == []

@@ -402,10 +402,10 @@ class TestHostilePrograms:
         program.end()
 
     def test_memory_of_what_waits_for_a_program_is_bounded(self, daemon: FakeDaemon) -> None:
-        waiting: list[session.Session] = []
+        waiting: list[session.ProgramSession] = []
 
         async def fill(data: list[float], times: int) -> int:
-            made = session.Session(daemon.operations, pb.Hello(name="arm"), "arm", None)
+            made = session.ProgramSession(daemon.operations, pb.Hello(name="arm"), "arm", None)
             waiting.append(made)
             for _ in range(times):
                 made._tell(programs.PassedOn("/scan", list(data)))

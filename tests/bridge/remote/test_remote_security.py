@@ -10,7 +10,7 @@ import pytest
 
 from robosc_api.security import Credentials, Guard, Scope, ServerSecurity, make_token
 from robosc_api.v1 import bridge_pb2 as pb
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.remote import RemoteSettings
 from robosc_bridge.remote.service import RULES
 from support.certificates import Authority
@@ -109,7 +109,7 @@ def test_who_ordered_stands_in_the_log_by_name(tmp_path: Path) -> None:
     with bridge(ServerSecurity(tokens=tokens)) as (daemon, address):
         with connected(address, Credentials(token_file=operate)) as stub:
             stub.Stop(pb.StopRequest(), timeout=PATIENCE_S)
-        assert daemon.orders[0].command is Command.STOP
+        assert daemon.orders[0].command is OperatorCommand.STOP
         assert daemon.orders[0].by.startswith("'caller-0' at ipv4:127.0.0.1:")
 
 
@@ -134,4 +134,4 @@ def test_without_tokens_other_machines_may_watch_and_stop(monkeypatch: pytest.Mo
     with bridge(ServerSecurity()) as (daemon, address):
         denied = "PERMISSION_DENIED"
         assert outcomes(address) == {**ALL, "Command": denied, "Attach": denied}
-        assert wait_until(lambda: daemon.commands()) == [Command.STOP]
+        assert wait_until(lambda: daemon.commands()) == [OperatorCommand.STOP]

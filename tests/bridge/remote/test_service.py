@@ -14,7 +14,7 @@ from grpc_health.v1 import health_pb2, health_pb2_grpc
 from robosc.targets.ros.state_topic import state_topic
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.configuration import parse
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.remote import RemoteEndpoint, RemoteError, RemoteSettings, serve, service, settings_of
 from robosc_bridge.remote import endpoint as endpoint_module
 from robosc_bridge.remote.endpoint import MAXIMUM_CONNECTIONS, MAXIMUM_REQUEST_BYTES
@@ -142,7 +142,7 @@ class TestCommands:
     @pytest.mark.parametrize("name", ["START", "STANDBY", "RESUME", "RESET"])
     def test_it_is_ordered_and_answered(self, name: str, daemon: FakeDaemon, stub: Any) -> None:
         assert command(stub, pb.CommandKind.Value(f"COMMAND_KIND_{name}")) == ""
-        assert daemon.commands() == [Command[name]]
+        assert daemon.commands() == [OperatorCommand[name]]
         assert daemon.orders[0].by.startswith("ipv4:127.0.0.1:")
 
     def test_a_refusal_is_a_value(self, daemon: FakeDaemon, stub: Any) -> None:
@@ -168,25 +168,25 @@ class TestCommands:
 
     @pytest.mark.parametrize(
         ("name", "undone_by"),
-        [("START", [Command.STANDBY]), ("RESUME", [Command.STOP]), ("RESET", []), ("STANDBY", [])],
+        [("START", [OperatorCommand.STANDBY]), ("RESUME", [OperatorCommand.STOP]), ("RESET", []), ("STANDBY", [])],
     )
     def test_what_has_failed_for_its_caller_does_not_happen_later(
-        self, name: str, undone_by: list[Command], daemon: FakeDaemon, stub: Any
+        self, name: str, undone_by: list[OperatorCommand], daemon: FakeDaemon, stub: Any
     ) -> None:
         daemon.refusal = None
         kind: Any = pb.CommandKind.Value(f"COMMAND_KIND_{name}")
         call = stub.Command.future(pb.CommandRequest(command=kind))
         wait_until(lambda: daemon.orders)
         call.cancel()
-        wait_until(lambda: daemon.commands() == [Command[name], *undone_by])
+        wait_until(lambda: daemon.commands() == [OperatorCommand[name], *undone_by])
         daemon.refusal = ""
         assert command(stub, pb.COMMAND_KIND_RESET) == ""
-        assert daemon.commands() == [Command[name], *undone_by, Command.RESET]
+        assert daemon.commands() == [OperatorCommand[name], *undone_by, OperatorCommand.RESET]
 
     def test_a_callers_own_deadline_takes_it_back_too(self, daemon: FakeDaemon, stub: Any) -> None:
         daemon.refusal = None
         assert failure(lambda: command(stub, pb.COMMAND_KIND_START, 0.5))[0] is grpc.StatusCode.DEADLINE_EXCEEDED
-        wait_until(lambda: daemon.commands() == [Command.START, Command.STANDBY])
+        wait_until(lambda: daemon.commands() == [OperatorCommand.START, OperatorCommand.STANDBY])
 
     def test_a_loop_that_does_not_answer_is_told(
         self, daemon: FakeDaemon, stub: Any, monkeypatch: pytest.MonkeyPatch
@@ -196,7 +196,7 @@ class TestCommands:
         code, details = failure(lambda: command(stub, pb.COMMAND_KIND_START))
         assert code is grpc.StatusCode.DEADLINE_EXCEEDED
         assert "has not answered" in details
-        wait_until(lambda: daemon.commands() == [Command.START, Command.STANDBY])
+        wait_until(lambda: daemon.commands() == [OperatorCommand.START, OperatorCommand.STANDBY])
 
     def test_commands_that_wait_are_bounded_and_a_stop_is_not(self, daemon: FakeDaemon, stub: Any) -> None:
         daemon.refusal = None
@@ -207,7 +207,7 @@ class TestCommands:
         assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
         assert details == "there are 32 commands already"
         stub.Stop(pb.StopRequest(), timeout=PATIENCE_S)
-        assert daemon.commands()[-1] is Command.STOP
+        assert daemon.commands()[-1] is OperatorCommand.STOP
         for call in calls:
             call.cancel()
 
@@ -215,9 +215,9 @@ class TestCommands:
 class TestStop:
     def test_it_takes_effect_before_it_is_answered_whatever_the_loop_does(self, daemon: FakeDaemon, stub: Any) -> None:
         daemon.turns = False
-        daemon.operations.order(Command.START, "test")
+        daemon.operations.order(OperatorCommand.START, "test")
         stub.Stop(pb.StopRequest(), timeout=PATIENCE_S)
-        assert daemon.commands() == [Command.STOP]
+        assert daemon.commands() == [OperatorCommand.STOP]
         daemon.turns = True
 
     def test_it_wins_while_all_watchers_hang_and_all_programs_are_there(
@@ -244,7 +244,7 @@ class TestStop:
             assert details == "there are 100 watchers already"
             with connected(endpoint.address) as stub:
                 stub.Stop(pb.StopRequest(), timeout=PATIENCE_S)
-            assert daemon.commands() == [Command.STOP]
+            assert daemon.commands() == [OperatorCommand.STOP]
         finally:
             for call in calls:
                 call.cancel()
@@ -258,7 +258,7 @@ class TestStop:
         monkeypatch.setattr(endpoint_module, "_HANDSHAKE_LIMIT_S", 0.2)
         with served(daemon) as endpoint:
             self._crowd(endpoint)
-        assert daemon.commands()[-1] is Command.STOP
+        assert daemon.commands()[-1] is OperatorCommand.STOP
 
     def _crowd(self, endpoint: RemoteEndpoint) -> None:
         host, _, port = endpoint.address.rpartition(":")

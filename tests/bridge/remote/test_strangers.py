@@ -12,7 +12,7 @@ from grpc_reflection.v1alpha import reflection_pb2
 
 from robosc_api.request_timeouts import REFLECTION_METHODS
 from robosc_api.v1 import bridge_pb2 as pb
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.remote import RemoteEndpoint
 from robosc_bridge.remote import endpoint as endpoint_module
 from robosc_bridge.remote.connection_slots import ConnectionSlots
@@ -53,7 +53,7 @@ def test_idle_connections_are_ended_so_that_a_stop_comes_through(
         wait_until(lambda: not any(each.is_open for each in held))
         with connected(endpoint.address) as stub:
             stub.Stop(pb.StopRequest(), timeout=PATIENCE_S)
-    assert daemon.commands() == [Command.STOP]
+    assert daemon.commands() == [OperatorCommand.STOP]
 
 
 def test_that_all_places_are_taken_is_told_once(caplog: pytest.LogCaptureFixture) -> None:

@@ -46,7 +46,7 @@ def test_every_call_may_be_the_first() -> None:
 
 def test_before_the_first_command_there_is_nothing_to_warn_of() -> None:
     layer = Bench().layer
-    layer.saw_scan(100.0, (math.nan,) * 360)
+    layer.on_scan(100.0, (math.nan,) * 360)
     assert layer.output(100.0).warnings == ()
 
 
@@ -128,7 +128,7 @@ def test_a_time_without_readings_gives_no_acceleration() -> None:
     bench = Bench(command_timeout_s=1.0, loop_timeout_s=2.0, motor_timeout_s=0.05)
     bench.drive(0.01)
     bench.layer.command(Velocity(0.2), bench.now_s + 0.5)
-    bench.layer.saw_drive(reading(bench.now_s + 0.5, wheels_m_s=(0.01, 0.01)))
+    bench.layer.on_drive_reading(reading(bench.now_s + 0.5, wheels_m_s=(0.01, 0.01)))
     assert bench.layer.output(bench.now_s + 0.5).velocity == near(0.06)
 
 
@@ -185,7 +185,7 @@ def test_torque_goes_at_the_latest_after_its_time(wheels_m_s: tuple[float, float
     bench.layer.disable()
     bench.cycle()
     begin_s = bench.now_s
-    bench.layer.saw_drive(reading(begin_s + 0.1, wheels_m_s=wheels_m_s))
+    bench.layer.on_drive_reading(reading(begin_s + 0.1, wheels_m_s=wheels_m_s))
     assert bench.layer.output(begin_s + 0.499).is_torque_wanted
     assert not bench.layer.output(begin_s + 0.5).is_torque_wanted
 
@@ -196,11 +196,11 @@ def test_wheels_that_stood_still_before_do_not_count() -> None:
     bench.layer.disable()
     now_s = bench.now_s
     for time_s in (now_s - 0.01, now_s):
-        bench.layer.saw_drive(reading(time_s))
+        bench.layer.on_drive_reading(reading(time_s))
         assert bench.layer.output(now_s).is_torque_wanted
-    bench.layer.saw_drive(reading(now_s + 100))  # from the future: not after the stop either, as it is seen now
+    bench.layer.on_drive_reading(reading(now_s + 100))  # from the future: not after the stop either, as it is seen now
     assert bench.layer.output(now_s).is_torque_wanted
-    bench.layer.saw_drive(reading(now_s + 0.01))
+    bench.layer.on_drive_reading(reading(now_s + 0.01))
     assert not bench.layer.output(now_s + 0.02).is_torque_wanted
 
 
@@ -247,11 +247,11 @@ def test_all_threads_may_call_at_once() -> None:
     ended = threading.Event()
     beyond: list[Velocity] = []
     calls: list[Callable[[float], Any]] = [
-        layer.saw_scan,
+        layer.on_scan,
         layer.loop_cycled,
         layer.operator_seen,
         lambda now_s: layer.command(Velocity(1.0, 5.0), now_s),
-        lambda now_s: layer.saw_drive(reading(now_s, wheels_m_s=(0.1, 0.1))),
+        lambda now_s: layer.on_drive_reading(reading(now_s, wheels_m_s=(0.1, 0.1))),
     ]
 
     def call(function: Callable[[float], Any]) -> None:

@@ -20,7 +20,7 @@ END_BY_THEMSELVES = {
 
 
 def fault(bench: Bench) -> None:
-    bench.layer.saw_drive(reading(bench.now_s, faults=frozenset({MotorFault.OVERLOAD})))
+    bench.layer.on_drive_reading(reading(bench.now_s, faults=frozenset({MotorFault.OVERLOAD})))
 
 
 def lose_torque(bench: Bench) -> None:
@@ -130,7 +130,7 @@ def test_what_latches_stops_at_once_until_reset(reason: Reason) -> None:
 def test_every_fault_of_a_motor_but_its_voltage_stops(motor_fault: MotorFault) -> None:
     bench = Bench()
     bench.drive()
-    bench.layer.saw_drive(reading(bench.now_s, faults=frozenset({motor_fault, MotorFault.VOLTAGE})))
+    bench.layer.on_drive_reading(reading(bench.now_s, faults=frozenset({motor_fault, MotorFault.VOLTAGE})))
     found = bench.layer.output(bench.now_s)
     assert (found.velocity == STANDSTILL) is (motor_fault is not MotorFault.VOLTAGE)
     assert found.reasons == ((Reason.MOTOR_FAULT,) if motor_fault is not MotorFault.VOLTAGE else ())
@@ -148,7 +148,7 @@ def test_a_fault_that_remains_forbids_the_reset() -> None:
     assert not bench.last.is_torque_wanted
     assert bench.layer.reset() == (Reason.MOTOR_FAULT,)
     # The supply's bit alone does not.
-    bench.layer.saw_drive(reading(bench.now_s, faults=frozenset({MotorFault.VOLTAGE}), is_torque_on=False))
+    bench.layer.on_drive_reading(reading(bench.now_s, faults=frozenset({MotorFault.VOLTAGE}), is_torque_on=False))
     assert bench.layer.reset() == ()
 
 
@@ -219,7 +219,7 @@ def test_torque_is_late_only_beyond_its_time() -> None:
     bench = Bench(torque_on_s=0.5, operator_timeout_s=None, scan_timeout_s=None, motor_timeout_s=1.0, loop_timeout_s=2)
     layer = bench.layer
     layer.enable()
-    layer.saw_drive(reading(64.0, is_torque_on=False))
+    layer.on_drive_reading(reading(64.0, is_torque_on=False))
     layer.loop_cycled(64.0)
     assert layer.output(64.0).reasons == (Reason.TORQUE_AWAITED,)
     assert layer.output(64.5).reasons == (Reason.TORQUE_AWAITED,)
@@ -233,12 +233,12 @@ def test_a_reading_from_before_tells_nothing_about_torque() -> None:
     now_s = bench.now_s
     assert Reason.TORQUE_AWAITED in bench.layer.output(now_s).reasons
     for time_s in (now_s - 0.1, now_s, math.nan):
-        bench.layer.saw_drive(reading(time_s, is_torque_on=True))
+        bench.layer.on_drive_reading(reading(time_s, is_torque_on=True))
         assert Reason.TORQUE_AWAITED in bench.layer.output(now_s).reasons
-    bench.layer.saw_drive(reading(math.nextafter(now_s, math.inf), is_torque_on=True))
+    bench.layer.on_drive_reading(reading(math.nextafter(now_s, math.inf), is_torque_on=True))
     assert bench.layer.output(now_s).reasons == ()
     # It was on then; a late reading from before does not tell that it is off.
-    bench.layer.saw_drive(reading(now_s, is_torque_on=False))
+    bench.layer.on_drive_reading(reading(now_s, is_torque_on=False))
     assert bench.layer.output(now_s).reasons == ()
 
 
@@ -418,10 +418,10 @@ def test_a_reset_forgets_where_it_was_to_go() -> None:
 def test_damaged_frames_are_told() -> None:
     bench = Bench()
     bench.drive()
-    bench.layer.saw_noise(True)
+    bench.layer.on_noise(True)
     assert bench.cycle().warnings == (Caution.SCAN_NOISY,)
     assert bench.last.velocity == Velocity(0.1)
-    bench.layer.saw_noise(False)
+    bench.layer.on_noise(False)
     assert bench.cycle().warnings == ()
 
 

@@ -79,7 +79,7 @@ class Sequence(RuleBasedStateMachine):
         self._tell(name, self.now_s + shift_s)
 
     def _tell(self, name: str, time_s: float) -> None:
-        tell = {"scan": self.layer.saw_scan, "loop": self.layer.loop_cycled, "operator": self.layer.operator_seen}
+        tell = {"scan": self.layer.on_scan, "loop": self.layer.loop_cycled, "operator": self.layer.operator_seen}
         tell[name](time_s)
         self.twin.happens(name, None, time_s)
 
@@ -113,14 +113,14 @@ class Sequence(RuleBasedStateMachine):
         found = reading(
             time_s, wheels_m_s=wheels or told, is_torque_on=is_torque_on, faults=faults, battery_v=battery_v
         )
-        self.layer.saw_drive(found)
+        self.layer.on_drive_reading(found)
         self.twin.tells(found)
         if faults - {MotorFault.VOLTAGE}:
             self.stopped.add(Reason.MOTOR_FAULT)
 
     @rule(ranges_m=SCANS)
     def scan(self, ranges_m: tuple[float, ...]) -> None:
-        self.layer.saw_scan(self.now_s, ranges_m)
+        self.layer.on_scan(self.now_s, ranges_m)
         self.twin.happens("scan", ranges_m, self.now_s)
 
     @rule()

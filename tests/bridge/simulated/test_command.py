@@ -9,7 +9,7 @@ import pytest
 from robosc.execution.runtime.clock import ManualClock
 from robosc_simulated import Faults, SimulatedTurtleBot3, scene_names
 from robosc_simulated.__main__ import main
-from robosc_simulated.commands import UnknownCommandError, obey
+from robosc_simulated.commands import UnknownCommandError, execute
 
 
 def test_scenes_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
@@ -111,56 +111,56 @@ def test_every_fault_of_a_wire_can_be_told(robot: SimulatedTurtleBot3) -> None:
     }
     assert set(values) == set(vars(Faults()))
     for name, (text, _) in values.items():
-        assert obey(robot, f"scanner {name} {text}") == ""
+        assert execute(robot, f"scanner {name} {text}") == ""
     assert vars(robot.scanner_faults) == {name: value for name, (_, value) in values.items()}
-    obey(robot, "scanner split_s none")
+    execute(robot, "scanner split_s none")
     assert robot.scanner_faults.split_s is None
-    obey(robot, "scanner sound")
+    execute(robot, "scanner sound")
     assert robot.scanner_faults == Faults()
     assert robot.base_faults == Faults()
 
 
 def test_devices_are_told(robot: SimulatedTurtleBot3) -> None:
     assert robot.opencr is not None
-    obey(robot, "left overheat")
+    execute(robot, "left overheat")
     assert robot.left.table["hardware error status"] == 0x04
-    obey(robot, "left cool_down")
+    execute(robot, "left cool_down")
     assert robot.left.temperature_c == 33.0
-    obey(robot, "right trip overload")
+    execute(robot, "right trip overload")
     assert robot.right.table["hardware error status"] == 0x20
-    obey(robot, "right block")
+    execute(robot, "right block")
     assert robot.world.right.is_blocked
-    obey(robot, "right release")
+    execute(robot, "right release")
     assert not robot.world.right.is_blocked
-    obey(robot, "left voltage 7.5")
+    execute(robot, "left voltage 7.5")
     assert robot.left.voltage_v == 7.5
-    obey(robot, "battery 11.2")
+    execute(robot, "battery 11.2")
     assert robot.opencr.panel.battery_v == 11.2
-    obey(robot, "press bumper_1")
+    execute(robot, "press bumper_1")
     assert robot.opencr.panel.bumper_1
-    obey(robot, "let bumper_1")
+    execute(robot, "let bumper_1")
     assert not robot.opencr.panel.bumper_1
-    obey(robot, "scanner cover")
-    obey(robot, "scanner stall")
-    obey(robot, "scanner turn 0.5")
+    execute(robot, "scanner cover")
+    execute(robot, "scanner stall")
+    execute(robot, "scanner turn 0.5")
     assert (robot.scanner.is_covered, robot.scanner.is_stalled, robot.scanner.revolutions_per_s) == (True, True, 2.5)
-    obey(robot, "scanner uncover")
-    obey(robot, "scanner go")
+    execute(robot, "scanner uncover")
+    execute(robot, "scanner go")
     assert (robot.scanner.is_covered, robot.scanner.is_stalled) == (False, False)
-    obey(robot, "base answers_as 7")
+    execute(robot, "base answers_as 7")
     assert robot.opencr.answers_as == 7
-    obey(robot, "base answers_as own")
+    execute(robot, "base answers_as own")
     assert robot.opencr.answers_as is None
-    obey(robot, "scanner disconnect")
+    execute(robot, "scanner disconnect")
     assert not robot.scanner_line.is_connected
-    obey(robot, "scanner reconnect")
+    execute(robot, "scanner reconnect")
     assert robot.scanner_line.is_connected
-    obey(robot, "pose 1 0.5 3")
-    assert obey(robot, "pose") == "pose 1.0000 0.5000 3.0000"
-    assert obey(robot, "collisions") == "collisions 0"
-    assert obey(robot, "") == ""
-    assert "delay_s" in obey(robot, "help")
-    assert "shock" in obey(robot, "help")
+    execute(robot, "pose 1 0.5 3")
+    assert execute(robot, "pose") == "pose 1.0000 0.5000 3.0000"
+    assert execute(robot, "collisions") == "collisions 0"
+    assert execute(robot, "") == ""
+    assert "delay_s" in execute(robot, "help")
+    assert "shock" in execute(robot, "help")
 
 
 @pytest.mark.parametrize(
@@ -170,7 +170,7 @@ def test_devices_are_told(robot: SimulatedTurtleBot3) -> None:
 )  # fmt: skip
 def test_what_is_not_known_is_told(robot: SimulatedTurtleBot3, line: str) -> None:
     with pytest.raises(UnknownCommandError):
-        obey(robot, line)
+        execute(robot, line)
 
 
 @pytest.mark.parametrize(
@@ -183,7 +183,7 @@ def test_what_is_not_known_is_told(robot: SimulatedTurtleBot3, line: str) -> Non
 )  # fmt: skip
 def test_numbers_that_no_device_can_bear_are_refused(robot: SimulatedTurtleBot3, line: str) -> None:
     with pytest.raises(UnknownCommandError, match=r"is needed, not|at most"):
-        obey(robot, line)
+        execute(robot, line)
     # And nothing has changed.
     robot.advance(0.2)
     assert robot.base_faults == robot.scanner_faults == Faults()
@@ -193,12 +193,12 @@ def test_numbers_that_no_device_can_bear_are_refused(robot: SimulatedTurtleBot3,
 def test_a_port_whose_place_was_taken_is_told(tmp_path: Path) -> None:
     link = tmp_path / "base"
     with SimulatedTurtleBot3(clock=ManualClock(), base_link=link) as robot:
-        obey(robot, "base disconnect")
+        execute(robot, "base disconnect")
         link.touch()
         with pytest.raises(UnknownCommandError, match="exists"):
-            obey(robot, "base reconnect")
+            execute(robot, "base reconnect")
         link.unlink()
-        obey(robot, "base reconnect")
+        execute(robot, "base reconnect")
         assert robot.base_line.is_connected
 
 
@@ -206,30 +206,30 @@ def test_servos_have_no_buttons() -> None:
     with SimulatedTurtleBot3(base="dynamixel", clock=ManualClock()) as robot:
         for line in ("battery 11.0", "press button_1"):
             with pytest.raises(UnknownCommandError):
-                obey(robot, line)
+                execute(robot, line)
 
 
 def test_a_rover_is_told() -> None:
     with SimulatedTurtleBot3(base="mavlink-rover", clock=ManualClock()) as robot:
         rover = robot.rover
         assert rover is not None
-        obey(robot, "rover refuse no GPS")
+        execute(robot, "rover refuse no GPS")
         assert rover.refusal == "no GPS"
-        obey(robot, "rover accept")
+        execute(robot, "rover accept")
         assert rover.refusal == ""
-        obey(robot, "rover take_over 4")
+        execute(robot, "rover take_over 4")
         assert rover.mode == 4
         rover.is_armed = True
-        obey(robot, "rover disarm")
+        execute(robot, "rover disarm")
         assert not rover.is_armed
         rover.is_armed = True
-        obey(robot, "rover restart")
+        execute(robot, "rover restart")
         assert not rover.is_armed
-        obey(robot, "rover silent")
+        execute(robot, "rover silent")
         assert rover.is_silent
-        obey(robot, "rover heard")
+        execute(robot, "rover heard")
         assert not rover.is_silent
-        obey(robot, "battery 10.5")
+        execute(robot, "battery 10.5")
         assert rover.battery_v == 10.5
         for line in (
             "left overheat",
@@ -242,4 +242,4 @@ def test_a_rover_is_told() -> None:
             "rover",
         ):
             with pytest.raises(UnknownCommandError):
-                obey(robot, line)
+                execute(robot, line)

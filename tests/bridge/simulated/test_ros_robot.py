@@ -11,7 +11,7 @@ from robosc.execution.runtime.clock import ManualClock
 from robosc_simulated import BODIES, Timebase, Walls, World, oval, room
 from robosc_simulated.commands import UnknownCommandError
 from robosc_simulated.ros import ros1
-from robosc_simulated.ros.commands import HELP, obey
+from robosc_simulated.ros.commands import HELP, execute
 from robosc_simulated.ros.readings import Battery, Clock, Odometry, Picture, Reading, Scan
 from robosc_simulated.ros.robot import RosRobot
 from robosc_simulated.ros.serving import LONGEST_S, PacedClock, Pacer, make_robot, parser
@@ -105,9 +105,9 @@ def test_a_scan_has_as_many_beams_as_the_sensor(lidar: str, beams: int) -> None:
 
 def test_a_covered_scanner_sees_something_too_near_everywhere() -> None:
     robot = in_room()
-    obey(robot, "scanner cover")
+    execute(robot, "scanner cover")
     assert (last(Scan, lived(robot, 0.3)).ranges_m == -math.inf).all()
-    obey(robot, "scanner uncover")
+    execute(robot, "scanner uncover")
     assert np.isfinite(last(Scan, lived(robot, 0.3)).ranges_m).all()
 
 
@@ -210,7 +210,7 @@ def test_pictures_show_the_line_grey_or_coloured() -> None:
 
 def test_a_covered_camera_sees_nothing() -> None:
     robot = robot_in(Scene("oval", Walls(()), line=oval()))
-    obey(robot, "camera cover")
+    execute(robot, "camera cover")
     assert set(last(Picture, lived(robot, 0.2)).data) == {0}
 
 
@@ -218,13 +218,13 @@ def test_the_world_is_told_what_to_do_as_behind_serial_lines() -> None:
     scene = Scene("box", room(4.0, 3.0), obstacles=(Obstacle("box", 1.0, 0.0, 0.1, is_there=False),))
     robot = robot_in(scene)
     free_m = last(Scan, lived(robot, 0.3)).ranges_m[0]
-    assert obey(robot, "obstacle box back") == ""
+    assert execute(robot, "obstacle box back") == ""
     assert last(Scan, lived(robot, 0.3)).ranges_m[0] == pytest.approx(free_m - 1.1, abs=1e-6)
-    assert obey(robot, "pose") == "pose 0.0000 0.0000 0.0000"
-    assert obey(robot, "collisions") == "collisions 0"
-    assert obey(robot, "help") == HELP
-    assert obey(robot, "") == ""
-    obey(robot, "battery 10.9")
+    assert execute(robot, "pose") == "pose 0.0000 0.0000 0.0000"
+    assert execute(robot, "collisions") == "collisions 0"
+    assert execute(robot, "help") == HELP
+    assert execute(robot, "") == ""
+    execute(robot, "battery 10.9")
     assert last(Battery, lived(robot, 1.1)).voltage_v == 10.9
 
 
@@ -234,7 +234,7 @@ def test_the_world_is_told_what_to_do_as_behind_serial_lines() -> None:
 )
 def test_what_it_cannot_do_is_told(wrong: str) -> None:
     with pytest.raises(UnknownCommandError):
-        obey(in_room(), wrong)
+        execute(in_room(), wrong)
 
 
 @pytest.mark.parametrize("wrong", [{"lidar": "sonar"}, {"encoding": "jpeg"}])

@@ -21,7 +21,7 @@ from robosc_simulated import (
     World,
     oval,
 )
-from robosc_simulated.commands import UnknownCommandError, obey
+from robosc_simulated.commands import UnknownCommandError, execute
 from robosc_simulated.floor import SHADE as LINE
 from support.descriptors import open_descriptors
 
@@ -173,17 +173,17 @@ def test_it_is_told_what_to_do() -> None:
     with SimulatedTurtleBot3(line=oval(), clock=ManualClock()) as robot:
         camera = robot.camera
         assert camera is not None
-        obey(robot, "camera cover")
-        obey(robot, "camera freeze")
+        execute(robot, "camera cover")
+        execute(robot, "camera freeze")
         assert (camera.is_covered, camera.is_frozen) == (True, True)
-        obey(robot, "camera uncover")
-        obey(robot, "camera go")
+        execute(robot, "camera uncover")
+        execute(robot, "camera go")
         assert (camera.is_covered, camera.is_frozen) == (False, False)
-        obey(robot, "camera disconnect")
+        execute(robot, "camera disconnect")
         assert not camera.is_connected
-        obey(robot, "camera reconnect")
+        execute(robot, "camera reconnect")
         assert camera.is_connected
         with pytest.raises(UnknownCommandError, match="a camera does not know 'jump'"):
-            obey(robot, "camera jump")
+            execute(robot, "camera jump")
     with SimulatedTurtleBot3(clock=ManualClock()) as robot, pytest.raises(UnknownCommandError):
-        obey(robot, "camera cover")
+        execute(robot, "camera cover")

@@ -28,7 +28,7 @@ from robosc_simulated import (
     maze_scene,
     room,
 )
-from robosc_simulated.commands import UnknownCommandError, obey
+from robosc_simulated.commands import UnknownCommandError, execute
 from robosc_simulated.discs import Discs
 from robosc_simulated.world import STEP_S, WorldEvent
 from support.effort import examples
@@ -254,22 +254,22 @@ def test_noise_of_the_camera_is_as_large_as_told_and_seeded() -> None:
 def test_a_robot_in_a_scene_is_told_of_goal_and_obstacles() -> None:
     scene = load_scene("room")
     with SimulatedTurtleBot3(scene=scene, clock=ManualClock()) as robot:
-        assert obey(robot, "obstacle box 0.5 0") == ""
+        assert execute(robot, "obstacle box 0.5 0") == ""
         assert robot.world.obstacles[0].x_m == 0.5
-        assert obey(robot, "obstacle box away") == ""
+        assert execute(robot, "obstacle box away") == ""
         assert not robot.world.obstacles[0].is_there
-        assert obey(robot, "obstacle box back") == ""
+        assert execute(robot, "obstacle box back") == ""
         assert robot.world.obstacles[0].is_there
         for line in ("goal", "obstacle bin 1 1", "obstacle box", "obstacle box 1 x", "obstacle box inf 0"):
             with pytest.raises(UnknownCommandError):
-                obey(robot, line)
-        assert "obstacle NAME" in obey(robot, "help")
+                execute(robot, line)
+        assert "obstacle NAME" in execute(robot, "help")
         assert robot.camera is None
     with SimulatedTurtleBot3(scene=YARD, clock=ManualClock()) as robot:
-        assert obey(robot, "goal") == "not yet"
+        assert execute(robot, "goal") == "not yet"
         robot.advance(0.5)
         robot.world.place(1.0, 0.0, 0.0)
-        assert obey(robot, "goal") == "reached 0.500"
+        assert execute(robot, "goal") == "reached 0.500"
     with pytest.raises(ValueError, match="its own walls"):
         SimulatedTurtleBot3(scene=scene, walls=room(1.0, 1.0))
 

@@ -17,7 +17,7 @@ import pytest
 
 from robosc_api.security import Scope, ServerSecurity, make_token
 from robosc_api.v1 import bridge_pb2 as pb
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.main import main as robosc_bridge
 from robosc_bridge.remote import RemoteSettings
 from robosc_bridge.safety import Reason
@@ -65,7 +65,7 @@ class TestWishes:
         self, name: str, daemon: FakeDaemon, address: str, capsys: pytest.CaptureFixture[str]
     ) -> None:
         assert main([name, "--address", address]) == 0
-        assert daemon.commands() == [Command(name)]
+        assert daemon.commands() == [OperatorCommand(name)]
         assert capsys.readouterr().out in (f"{name}: done\n", "stopped\n")
 
     def test_a_refusal_is_one_line_and_status_1(
@@ -84,7 +84,7 @@ class TestWishes:
 
     def test_the_whole_program_knows_them(self, daemon: FakeDaemon, address: str) -> None:
         assert robosc_bridge(["stop", "--address", address]) == 0
-        assert daemon.commands() == [Command.STOP]
+        assert daemon.commands() == [OperatorCommand.STOP]
 
     @pytest.mark.parametrize("wrong", ["robot", "robot:0", "robot:70000", ":1", "a b:1"])
     def test_wrong_addresses_are_wrong_use(self, wrong: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -96,7 +96,7 @@ class TestWishes:
     def test_as_a_program_with_the_address_in_the_environment(self, daemon: FakeDaemon, address: str) -> None:
         done = bridge("stop", ROBOSC_BRIDGE=address)
         assert (done.returncode, done.stdout, done.stderr) == (0, "stopped\n", "")
-        assert daemon.commands() == [Command.STOP]
+        assert daemon.commands() == [OperatorCommand.STOP]
         assert bridge("stop", ROBOSC_BRIDGE="nonsense").returncode == 2
 
     def test_a_stop_loads_nothing_that_runs_a_robot(self) -> None:
@@ -133,7 +133,7 @@ class TestSecurity:
                 "stop", ROBOSC_BRIDGE=endpoint.address, ROBOSC_CA=str(authority.file), ROBOSC_TOKEN_FILE=str(token)
             )
             assert done.returncode == 0, done.stderr
-            assert daemon.commands() == [Command.STOP, Command.STOP]
+            assert daemon.commands() == [OperatorCommand.STOP, OperatorCommand.STOP]
 
     def test_files_that_cannot_be_used_are_wrong_use(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         empty = tmp_path / "empty"

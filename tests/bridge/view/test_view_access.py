@@ -12,7 +12,7 @@ import aiohttp
 import pytest
 
 from robosc_api.security import ServerSecurity
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.daemon.view_settings import ViewSettings
 from robosc_view import ViewEndpoint, ViewError
 from robosc_view import broadcaster as hub_module
@@ -149,7 +149,7 @@ def test_a_command_needs_the_token_and_a_stop_none(endpoint: ViewEndpoint, robot
             assert (await page.told("done"))["what"] == "stop"
 
     asyncio.run(look())
-    assert [order.command for order in robot.orders] == [Command.STOP]
+    assert [order.command for order in robot.orders] == [OperatorCommand.STOP]
 
 
 def test_with_the_token_the_robot_is_commanded(endpoint: ViewEndpoint, robot: LiveRobot) -> None:
@@ -179,7 +179,7 @@ def test_a_command_is_taken_back_when_its_page_leaves(endpoint: ViewEndpoint, ro
             await asyncio.sleep(0.002)
 
     asyncio.run(asyncio.wait_for(look(), 20))
-    assert [order.command for order in robot.orders] == [Command.RESUME, Command.STOP]
+    assert [order.command for order in robot.orders] == [OperatorCommand.RESUME, OperatorCommand.STOP]
 
 
 WRONG: list[Any] = [
@@ -239,7 +239,7 @@ def test_large_binary_and_too_many_requests_end_the_stream(
     # Each stop of one who hammers on the button counts, as long as the stream is open.
     assert asyncio.run(code(*['{"type":"stop"}'] * (3 * BURST))) == aiohttp.WSCloseCode.POLICY_VIOLATION
     assert len(robot.orders) >= BURST
-    assert {order.command for order in robot.orders} == {Command.STOP}
+    assert {order.command for order in robot.orders} == {OperatorCommand.STOP}
 
 
 def test_a_stop_of_a_page_that_closes_at_once_counts(endpoint: ViewEndpoint, robot: LiveRobot) -> None:

@@ -19,7 +19,7 @@ import aiohttp
 import pytest
 
 from robosc_bridge.daemon import served_endpoint
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view import ViewEndpoint
 from robosc_view import server as server_module
 from robosc_view.server import BURST
@@ -198,7 +198,7 @@ def test_those_who_take_nothing_are_heard(endpoint: ViewEndpoint, robot: LiveRob
         fill(endpoint, robot, 1, loop.advance)
         reader.sendall(frame(type="stop"))
         assert eventually(lambda: bool(robot.orders))
-        assert [order.command for order in robot.orders] == [Command.STOP]
+        assert [order.command for order in robot.orders] == [OperatorCommand.STOP]
         loop.advance(3 * server_module.PING_S)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from robosc.execution.interpreter import InterpretedSystem
 from robosc_api.v1 import bridge_pb2 as pb
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.remote import RemoteSettings, convert, serve
 from robosc_view import broadcaster as hub_module
 from robosc_view.definition import DefinitionError
@@ -96,7 +96,11 @@ def test_a_bridge_elsewhere_is_commanded(robot: LiveRobot) -> None:
         asyncio.run(look())
     finally:
         endpoint.stop()
-    assert [order.command for order in robot.orders] == [Command.STOP, Command.RESUME, Command.START]
+    assert [order.command for order in robot.orders] == [
+        OperatorCommand.STOP,
+        OperatorCommand.RESUME,
+        OperatorCommand.START,
+    ]
 
 
 def test_both_ways_to_a_bridge_define_and_tell_the_same(robot: LiveRobot) -> None:

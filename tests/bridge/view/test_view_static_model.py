@@ -12,7 +12,7 @@ import pytest
 
 from robosc.cli.arguments import Parser
 from robosc.supervisor import Supervisor, encode
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view import command, static_model
 from robosc_view.reports import SourceKind
 from robosc_view.sources import Pause, RefusedError
@@ -143,7 +143,7 @@ def test_nothing_is_commanded_or_replayed() -> None:
     async def run() -> None:
         source = Files().source
         with pytest.raises(RefusedError, match="nothing is executed"):
-            await source.order(Command.STOP, "somebody")
+            await source.order(OperatorCommand.STOP, "somebody")
         with pytest.raises(RefusedError, match="only a log"):
             source.control_replay(Pause())
 

@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Iterator
 
 import pytest
 
-from robosc_bridge.daemon.states import Command
+from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.remote import RemoteSettings, serve
 from robosc_bridge.terminal import client
 from robosc_view import remote_bridge
@@ -127,7 +127,7 @@ def test_who_comes_and_goes_and_hammers_on_the_button_starts_few_threads(robot: 
                 gate.is_open.set()
                 await until_stopped(robot, 1)
                 assert (await page.told("done"))["what"] == "stop"
-            assert {order.command for order in robot.orders} == {Command.STOP}
+            assert {order.command for order in robot.orders} == {OperatorCommand.STOP}
 
     asyncio.run(look())
 
@@ -149,7 +149,7 @@ def test_a_stop_that_is_wanted_while_one_is_under_way_follows_it(
                 for _ in range(31):
                     assert (await page.told("done"))["what"] == "stop"
             # One for the first, and one for all who came after it, also for who has left.
-            assert [order.command for order in robot.orders] == [Command.STOP] * 2
+            assert [order.command for order in robot.orders] == [OperatorCommand.STOP] * 2
             async with opened(server.url) as page:
                 await page.send(type="stop")
                 await until_stopped(robot, 3)

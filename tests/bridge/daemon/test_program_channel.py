@@ -23,7 +23,7 @@ from robosc_bridge.daemon.programs import (
     Refused,
     Replied,
 )
-from robosc_bridge.daemon.states import Command, State
+from robosc_bridge.daemon.states import OperatorCommand, State
 from support.daemons import Connected, Scene
 from support.effort import examples
 
@@ -180,7 +180,7 @@ def test_a_server_that_never_answers_makes_nothing_grow() -> None:
         server.say(MessageReceived, "/go", 2)
         scene.live(0.1, 2.0)
     assert len(server.of(CallMade)) == 1
-    assert len(scene.daemon._programs._exchange._open) == 1
+    assert len(scene.daemon._programs._program_channel._open) == 1
 
 
 @pytest.mark.parametrize("make", [Replied, CallFailed])
@@ -270,13 +270,13 @@ def test_what_is_served_already_is_not_served_by_another() -> None:
 def test_a_run_that_ends_takes_its_numbers_with_it() -> None:
     scene = helped()
     server, goal = fetching(scene)
-    scene.daemon.post(Command.STANDBY)
+    scene.daemon.post(OperatorCommand.STANDBY)
     server.told.clear()
     scene.live(0.3, 2.0)
     # It had not been accepted: the program is told all the same that nobody wants it any more.
     assert server.of(CancelMade) == [CancelMade("fetch", goal.number)]
     assert len(why(server.say(GoalAccepted, goal.number))) == 1
-    scene.daemon.post(Command.START)
+    scene.daemon.post(OperatorCommand.START)
     scene.live(0.1, 2.0)
     server.say(MessageReceived, "/go", 3)
     scene.live(0.1, 2.0)

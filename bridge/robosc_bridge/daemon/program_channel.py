@@ -57,7 +57,7 @@ class _Open:
     is_cancelled: bool = False
 
 
-class Exchange:
+class ProgramChannel:
     """Exchange between the model and programs.
 
     Args:

@@ -1,7 +1,7 @@
 """The robot as the executor sees it: requests go to channels, and what the devices tell comes from them.
 
-What follows from a request at once, such as that a rotation has failed, is told to the executor later, in `settle`: it
-must not be called while it is at work.
+What follows from a request at once, such as that a rotation has failed, is told to the executor later, in
+`deliver_pending`: it must not be called while it is at work.
 """
 
 import logging
@@ -12,8 +12,8 @@ from typing import Any
 from robosc_bridge.configuration import channels
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.daemon.channel_data import battery_data, imu_data, odometry_data, scan_data, shaped
-from robosc_bridge.daemon.exchange import Exchange
-from robosc_bridge.daemon.motion import Motion
+from robosc_bridge.daemon.motion import MotionTarget
+from robosc_bridge.daemon.program_channel import ProgramChannel
 from robosc_bridge.daemon.reports import Device, Sighting
 from robosc_bridge.daemon.rotations import Rotations, done
 from robosc_bridge.daemon.stop_switch import StopSwitch
@@ -26,7 +26,7 @@ _log = logging.getLogger(__name__)
 _BUMPERS = {"front": ("bumper_1",), "back": ("bumper_2",), "any": ("bumper_1", "bumper_2")}
 
 
-class Robot:
+class RobotAdapter:
     """The executor's middleware.
 
     Args:
@@ -34,7 +34,7 @@ class Robot:
         listeners: Identifiers that each kind of channel reports to.
         motion: Motion of the wheels.
         switch: The operator's stop.
-        exchange: Exchange with programs on the other side of a remote endpoint.
+        program_channel: Exchange with programs on the other side of a remote endpoint.
         on_failed_rotation: Called with the reason when a rotation has failed of which the model hears nothing.
         service_timeout_s: Time after which the executor takes a call for failed, in seconds; None: never.
         clock: Clock that returns the time, in seconds.
@@ -44,9 +44,9 @@ class Robot:
         self,
         mapping: ChannelMapping,
         listeners: Listeners,
-        motion: Motion,
+        motion: MotionTarget,
         switch: StopSwitch,
-        exchange: Exchange,
+        program_channel: ProgramChannel,
         on_failed_rotation: Callable[[str], None],
         service_timeout_s: float | None,
         clock: Callable[[], float],
@@ -55,19 +55,21 @@ class Robot:
         self._listeners = listeners
         self._motion = motion
         self._switch = switch
-        self._exchange = exchange
+        self._program_channel = program_channel
         self._clock = clock
         self._by_name = {item.name: item for item in mapping.communications}
         self._by_identifier = {item.identifier: item for item in reversed(mapping.communications)}
-        self._owed: deque[Callable[[Supervised], None]] = deque()
-        self._rotations = Rotations(motion, listeners, self._owed.append, on_failed_rotation, service_timeout_s, clock)
+        self._pending: deque[Callable[[Supervised], None]] = deque()
+        self._rotations = Rotations(
+            motion, listeners, self._pending.append, on_failed_rotation, service_timeout_s, clock
+        )
         self._buttons: Mapping[str, bool] = {}
 
     def forget(self) -> None:
         """A run of an executor begins or is over: what an earlier one asked for is none of its business."""
-        self._owed.clear()
+        self._pending.clear()
         self._rotations.forget()
-        self._exchange.forget()
+        self._program_channel.forget()
 
     # The executor's side.
 
@@ -96,7 +98,7 @@ class Robot:
                 self._rotations.end("another rotation was asked for", is_own=True)
                 self._rotations.begin(item, channel, None, message)
             case channels.GrpcChannel():
-                self._exchange.send(item, message)
+                self._program_channel.send(item, message)
             case channels.LogChannel():
                 _log.info("%s: %.1000r", item.identifier, message)
             case _:
@@ -112,7 +114,7 @@ class Robot:
             case channels.StopChannel() | channels.RotateChannel():
                 self._stop()
             case channels.GrpcChannel():
-                self._exchange.send(item, None)
+                self._program_channel.send(item, None)
             case channels.LogChannel():
                 _log.info("%s: default", identifier)
             case _:
@@ -124,32 +126,34 @@ class Robot:
         match self._channels[communication]:
             case channels.StopChannel():
                 self._stop()
-                self._owed.append(lambda executor: executor.on_reply(request_id, done("")))
+                self._pending.append(lambda executor: executor.on_reply(request_id, done("")))
             case channels.RotateChannel() as channel if not self._rotations.is_under_way:
                 self._rotations.begin(item, channel, request_id, message)
             case channels.GrpcChannel():
-                why = self._exchange.call(item, request_id, message)
+                why = self._program_channel.call(item, request_id, message)
                 if why:
-                    self._owed.append(lambda executor: executor.on_call_failed(request_id, why))
+                    self._pending.append(lambda executor: executor.on_call_failed(request_id, why))
             case _:
-                self._owed.append(lambda executor: executor.on_call_failed(request_id, "another rotation is under way"))
+                self._pending.append(
+                    lambda executor: executor.on_call_failed(request_id, "another rotation is under way")
+                )
 
     def send_goal(self, communication: str, goal_id: int, message: Any) -> None:
         """Begin what an action is asked for."""
         item = self._by_name[communication]
         match self._channels[communication]:
             case channels.RotateChannel() as channel if not self._rotations.is_under_way:
-                self._owed.append(lambda executor: executor.on_goal_accepted(goal_id))
+                self._pending.append(lambda executor: executor.on_goal_accepted(goal_id))
                 self._rotations.begin(item, channel, goal_id, message)
-            case channels.GrpcChannel() if self._exchange.send_goal(item, goal_id, message):
+            case channels.GrpcChannel() if self._program_channel.send_goal(item, goal_id, message):
                 pass
             case _:
-                self._owed.append(lambda executor: executor.on_goal_ended(goal_id, "rejected"))
+                self._pending.append(lambda executor: executor.on_goal_ended(goal_id, "rejected"))
 
     def cancel_goal(self, communication: str, goal_id: int) -> None:
         """End what an action asked for."""
         if isinstance(self._channels[communication], channels.GrpcChannel):
-            self._exchange.cancel(goal_id)
+            self._program_channel.cancel(goal_id)
         else:
             self._rotations.cancel(communication, goal_id)
 
@@ -169,9 +173,9 @@ class Robot:
 
     # The devices' side.
 
-    def saw_drive(self, reading: DriveReading, executor: Supervised) -> None:
+    def on_drive_reading(self, reading: DriveReading, executor: Supervised) -> None:
         """The drive base told something: buttons first, then where the robot is."""
-        self._motion.saw(reading)
+        self._motion.on_drive_reading(reading)
         self._saw_buttons(reading.buttons, executor)
         for identifier, _ in self._listeners.of(channels.OdometryChannel):
             executor.receive(identifier, odometry_data(reading))
@@ -179,29 +183,29 @@ class Robot:
             executor.receive(identifier, imu_data(reading))
         for identifier, battery in self._listeners.of(channels.BatteryChannel):
             executor.receive(identifier, battery_data(reading, is_percent=battery.unit == "percent"))
-        self.settle(executor)
+        self.deliver_pending(executor)
 
     def watch_buttons(self, buttons: Mapping[str, bool]) -> None:
         """Heed the operator's buttons while no supervisor is executed."""
-        self._switch.saw_buttons([name for name, is_held in buttons.items() if is_held], None)
+        self._switch.on_buttons([name for name, is_held in buttons.items() if is_held], None)
         # What was pressed meanwhile is no event for the next run, but bumpers are told at its start.
         self._buttons = {}
 
-    def saw_scan(self, scan: Scan, executor: Supervised) -> None:
+    def on_scan(self, scan: Scan, executor: Supervised) -> None:
         """A full revolution of the LiDAR."""
         for identifier, _ in self._listeners.of(channels.ScannerChannel):
             executor.receive(identifier, scan_data(scan))
-        self.settle(executor)
+        self.deliver_pending(executor)
 
-    def saw_line(self, sighting: Sighting, executor: Supervised) -> None:
+    def on_line(self, sighting: Sighting, executor: Supervised) -> None:
         """The camera shows the line, or none."""
         correction = sighting.correction_rad_s
         kind = channels.LineLostChannel if correction is None else channels.LineChannel
         for identifier, _ in self._listeners.of(kind):
             executor.receive(identifier, shaped(self._by_identifier[identifier], correction))
-        self.settle(executor)
+        self.deliver_pending(executor)
 
-    def saw_device(self, device: Device, text: str, executor: Supervised, *, is_lost: bool) -> None:
+    def on_device_change(self, device: Device, text: str, executor: Supervised, *, is_lost: bool) -> None:
         """A device is lost, or back again."""
         event = "lost" if is_lost else "back"
         for identifier, channel in self._listeners.of(channels.FaultChannel):
@@ -210,18 +214,18 @@ class Robot:
         if is_lost and device is Device.DRIVE:
             self._rotations.end("the drive base is lost")
 
-    def saw_key(self, key: str, executor: Supervised) -> None:
+    def on_key(self, key: str, executor: Supervised) -> None:
         """A key was typed in the terminal."""
         for identifier, channel in self._listeners.of(channels.KeyChannel):
             if channel.key == key:
                 executor.receive(identifier, None)
-        self.settle(executor)
+        self.deliver_pending(executor)
 
-    def settle(self, executor: Supervised) -> None:
+    def deliver_pending(self, executor: Supervised) -> None:
         """Tell the executor what has become of its requests."""
         self._rotations.poll()
-        while self._owed:
-            self._owed.popleft()(executor)
+        while self._pending:
+            self._pending.popleft()(executor)
             self._rotations.poll()
 
     def report_rotation(self, executor: Supervised) -> None:
@@ -230,7 +234,7 @@ class Robot:
 
     def _saw_buttons(self, buttons: Mapping[str, bool], executor: Supervised) -> None:
         before, self._buttons = self._buttons, dict(buttons)
-        self._switch.saw_buttons([name for name, is_held in buttons.items() if is_held], executor)
+        self._switch.on_buttons([name for name, is_held in buttons.items() if is_held], executor)
         for identifier, button in self._listeners.of(channels.ButtonChannel):
             was, is_held = before.get(button.name, False), buttons.get(button.name, False)
             is_meant = {"press": is_held, "release": not is_held, "change": True}[button.on]

@@ -349,7 +349,6 @@ def _supervisor(experiment: Experiment, deployment: Deployment) -> "tuple[Superv
     from robosc.certification import make_supervisor
     from robosc.language import load_bundle
     from robosc.language.interfaces import interface_folders
-    from robosc.supervisor import make_supervisor
     from robosc_experiments.lines_of_code import model_size
 
     model: Path = importlib.import_module(f"{_MODULES}.{experiment.serial_module}").MODEL

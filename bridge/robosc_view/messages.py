@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from robosc.execution.runtime.event_log import Entry, plain
-from robosc.explanation.blocked import Judged, Requests, StateError
+from robosc.explanation.blocked import RequestAvailability, Requests, StateError
 from robosc_view.definition import Robot, definition_text
 from robosc_view.reports import EventBatch, LaserScan, Notice, Status
 
@@ -54,7 +54,7 @@ class MessageBuilder:
     def __init__(self, prepared: PreparedRobot) -> None:
         self._robot = prepared.robot
         self._requests = prepared.requests
-        self._judged: tuple[Any, Any, Judged | str] | None = None
+        self._available: tuple[Any, Any, RequestAvailability | str] | None = None
         self._tracker = TransitionTracker(prepared.robot)
         self._number = 0
 

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.runtime.clock import Clock
+from robosc.execution.runtime.event_log import EventLog
+from robosc.execution.runtime.executor import Executor
 from robosc.execution.runtime.layer import Layer
 from robosc.execution.runtime.protocol import requesting
 from robosc.execution.runtime.settings import Settings

@@ -16,7 +16,7 @@ from grpc_reflection.v1alpha import reflection
 
 from robosc_api.layers import Layers
 from robosc_api.malformed import MalformedRequests
-from robosc_api.request_timeouts import REFLECTION_METHODS
+from robosc_api.request_timeouts import REFLECTION_METHODS, RequestTimeouts
 from robosc_api.security import Guard, SecurityError, ServerSecurity, TokenFile, add_port
 from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.daemon.operations import Operations
@@ -124,7 +124,7 @@ class RemoteEndpoint(ServedEndpoint):
             has_client_certificates=security.client_ca is not None,
         )
         shutdown = ShutdownLayer()
-        prompt = PromptRequests(REQUEST_LIMIT_S, dict.fromkeys(REFLECTION_METHODS, REFLECTION_IDLE_S))
+        prompt = RequestTimeouts(REQUEST_LIMIT_S, dict.fromkeys(REFLECTION_METHODS, REFLECTION_IDLE_S))
         # Whatever looks at a call sees it with its request.
         layers = Layers(shutdown, prompt, guard, MalformedRequests(convert.SERVICE_NAME))
         server = grpc.aio.server(interceptors=[layers], options=_options())

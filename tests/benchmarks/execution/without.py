@@ -18,6 +18,7 @@ from execution import c_cycles
 from execution.robots import LARGE, SMALL, WITHOUT, feed, supervisor
 from figures import micro
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.runtime.executor import Executor
 from robosc.execution.runtime.protocol import ControlledSystem
 from robosc_experiments.cycles.isolated import NullMiddleware
 from robosc_experiments.cycles.times import CYCLES, RUNS

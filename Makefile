@@ -9,14 +9,14 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 # Another environment: colcon wants older packages than ours.
 COLCON := .venv-colcon
-# What looks at the files of deploy/, and what its images are made of.
+# What looks at the files of deploy/ and makes the site of docs/, and what images are made of.
 CHECKERS := .venv-checkers
 WHEELS := out/wheels
 
 # Without bytecode on disk, every program that the tests start would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test acceptance smoke soak mutants faults fuzz lint format bindings lock benchmark environment colcon checkers images extension vscode clean help
+.PHONY: demo test acceptance smoke soak mutants faults fuzz lint format bindings lock benchmark environment colcon checkers docs images extension vscode clean help
 
 help:
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -32,11 +32,15 @@ colcon: $(COLCON)/.ready ## make .venv-colcon: builds ROS 2 packages without an 
 $(COLCON)/.ready: deploy/requirements-colcon.txt deploy/make_colcon_environment.sh deploy/install_lock.sh | $(READY)
 	BIN=$(BIN) sh deploy/make_colcon_environment.sh $(COLCON)
 
-checkers: $(CHECKERS)/.ready ## make .venv-checkers: linters of container files, Kubernetes, Prometheus
+checkers: $(CHECKERS)/.ready ## make .venv-checkers: linters of container files, Kubernetes, Prometheus; MkDocs
 
 $(CHECKERS)/.ready: deploy/requirements-checkers.txt deploy/make_checkers.sh deploy/install_lock.sh | $(READY)
 	BIN=$(BIN) sh deploy/make_checkers.sh $(CHECKERS)
 	@touch $@
+
+# The theme tells its successor's name in each build unless it is asked not to.
+docs: $(CHECKERS)/.ready ## build the site of the documentation, out/site; every warning is an error
+	NO_MKDOCS_2_WARNING=1 $(CHECKERS)/bin/mkdocs build --strict --quiet
 
 images: $(WHEELS)/.ready ## fetch what the images are made of, and build them without an engine, for their tests
 

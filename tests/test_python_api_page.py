@@ -64,6 +64,12 @@ def test_every_function_error_and_option_is_on_the_page() -> None:
     assert missing == []
 
 
+def test_every_name_is_on_the_page_that_is_made_from_docstrings() -> None:
+    page = (ROOT / "docs" / "python-reference.md").read_text(encoding="utf-8")
+    members = [name for found in re.findall(r"members: \[([^\]]*)\]", page) for name in re.findall(r"\w+", found)]
+    assert sorted(members) == sorted(set(robosc.__all__) - {"__version__"})
+
+
 def test_the_notebook_is_one_without_outputs() -> None:
     assert (NOTEBOOK["nbformat"], NOTEBOOK["nbformat_minor"]) == (4, 5)
     cells = NOTEBOOK["cells"]

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 import robosc
+import robosc_client
 from support.service import served
 
 ROOT = Path(__file__).parents[1]
@@ -66,8 +67,9 @@ def test_every_function_error_and_option_is_on_the_page() -> None:
 
 def test_every_name_is_on_the_page_that_is_made_from_docstrings() -> None:
     page = (ROOT / "docs" / "python-reference.md").read_text(encoding="utf-8")
-    members = [name for found in re.findall(r"members: \[([^\]]*)\]", page) for name in re.findall(r"\w+", found)]
-    assert sorted(members) == sorted(set(robosc.__all__) - {"__version__"})
+    for module in (robosc, robosc_client):
+        names = re.findall(rf"^::: {module.__name__}\.(\w+)$", page, re.MULTILINE)
+        assert sorted(names) == sorted(set(module.__all__) - {"__version__"})
 
 
 def test_the_notebook_is_one_without_outputs() -> None:

@@ -16,7 +16,7 @@ WHEELS := out/wheels
 # Without bytecode on disk, every program that the tests start would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test acceptance smoke soak mutants faults fuzz lint format bindings lock benchmark environment colcon checkers docs images extension vscode clean help
+.PHONY: demo test acceptance smoke soak mutants faults fuzz lint format bindings lock benchmark environment colcon checkers docs pictures images extension vscode clean help
 
 help:
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -41,6 +41,9 @@ $(CHECKERS)/.ready: deploy/requirements-checkers.txt deploy/make_checkers.sh dep
 # The theme tells its successor's name in each build unless it is asked not to.
 docs: $(CHECKERS)/.ready ## build the site of the documentation, out/site; every warning is an error
 	NO_MKDOCS_2_WARNING=1 $(CHECKERS)/bin/mkdocs build --strict --quiet
+
+pictures: $(READY) ## make the pictures of the README and of docs/ anew; needs Chromium
+	PYTHONPATH=tests $(BIN)/python deploy/make_pictures.py
 
 images: $(WHEELS)/.ready ## fetch what the images are made of, and build them without an engine, for their tests
 

@@ -26,7 +26,7 @@ robot R { }
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("site")
-    checked("mkdocs", "build", "--strict", "--quiet", "--site-dir", folder)
+    checked("mkdocs", "build", "--strict", "--site-dir", folder)
     return folder
 
 

@@ -70,6 +70,8 @@ def test_every_name_is_on_the_page_that_is_made_from_docstrings() -> None:
     for module in (robosc, robosc_client):
         names = re.findall(rf"^::: {module.__name__}\.(\w+)$", page, re.MULTILINE)
         assert sorted(names) == sorted(set(module.__all__) - {"__version__"})
+    methods = re.findall(r"^::: robosc_client\.operations\.(\w+?)_?$", page, re.MULTILINE)
+    assert sorted(methods) == sorted(name for name in vars(robosc_client.Client) if name[0] != "_" and name != "close")
 
 
 def test_the_notebook_is_one_without_outputs() -> None:

@@ -32,7 +32,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_site_has_every_page(site: Path) -> None:
     names = {path.stem for path in (TOP / "docs").glob("*.md")} - {"README"}
-    assert [name for name in sorted(names) if not (site / name / "index.html").exists()] == []
+    assert [name for name in sorted(names) if not (site / f"{name}.html").exists()] == []
     assert (site / "repository" / "bridge" / "index.html").exists()
 
 
@@ -70,5 +70,5 @@ def test_what_leads_nowhere_is_found(tmp_path: Path) -> None:
     assert said.count("WARNING -") == len(wanted), said
     text = (tmp_path / "site" / "index.html").read_text("utf-8")
     assert "Models (<code>examples/line_follower/line_follower.rscd</code>)" in text
-    assert 'href="repository/examples/"' in text and '<span class="filename">shop.rscd</span>' in text
+    assert 'href="repository/examples/index.html"' in text and '<span class="filename">shop.rscd</span>' in text
     assert '<span class="k">robot</span>' in text

@@ -16,7 +16,7 @@ from robosc_bridge.terminal.client import BridgeClient, RefusedError, RequestedC
 from robosc_experiments.processes import Program, finish
 from robosc_experiments.scenario import Outcome, Say, ScenarioError
 from robosc_experiments.serial import EXAMPLES, Rig, Setting, running, scene_of
-from robosc_experiments.tail import LineCount, Now, latest
+from robosc_experiments.tail import LineCount, MotionState, latest
 from robosc_simulated.motion import Motion
 from robosc_simulated.motion_checks import Halt, check_line
 from robosc_simulated.scene import Scene
@@ -131,12 +131,12 @@ class _Scenario:
             if driven_m >= FREE_M:
                 return
 
-    def _stand(self, what: str, let_go: Callable[[], object], *, is_at_once: bool = True) -> None:
+    def _stand(self, what: str, release: Callable[[], object], *, is_at_once: bool = True) -> None:
         """Wait until it has stood still for a while; then it may go on.
 
         Args:
             what: Reason why it stands.
-            let_go: Function that lets it go on.
+            release: Function that lets it go on.
             is_at_once: True if it has to stand from now on; else from when it does.
         """
         told_s = latest(self._rig.setting.motion).world_s
@@ -148,10 +148,10 @@ class _Scenario:
                 begin_s = now.world_s
             elif now.world_s - begin_s >= HELD_S:
                 self.halts.append(Halt(told_s if is_at_once else begin_s, now.world_s, what))
-                let_go()
+                release()
                 return
 
-    def _looks(self, fault: str, what: str) -> Iterator[Now]:
+    def _looks(self, fault: str, what: str) -> Iterator[MotionState]:
         """Yield the state of the robot again and again; if that takes too long, it is a fault."""
         end_s = time.monotonic() + LIMIT_S
         while time.monotonic() < end_s:

@@ -27,7 +27,7 @@ from robosc_experiments.processes import Program, finish
 from robosc_experiments.records import Recorded
 from robosc_experiments.scenario import Connection, Outcome, Say, ScenarioError
 from robosc_experiments.serial import EXAMPLES, scene_of
-from robosc_experiments.tail import LineCount, Now, latest
+from robosc_experiments.tail import LineCount, MotionState, latest
 from robosc_simulated.motion_checks import SETTLE_S, Halt, check_line, check_maze
 from robosc_simulated.scene import scene_names
 
@@ -84,12 +84,12 @@ class Middleware(ABC):
             ScenarioError: It is not installed, or does not start.
         """
 
-    def of_nodes(self, variables: Mapping[str, str]) -> Mapping[str, str]:
+    def node_environment(self, variables: Mapping[str, str]) -> Mapping[str, str]:
         """The environment of its nodes, where their interpreter is another one."""
         return variables
 
     @abstractmethod
-    def given(self, parameters: Mapping[str, object], remappings: Mapping[str, str]) -> list[str]:
+    def arguments(self, parameters: Mapping[str, object], remappings: Mapping[str, str]) -> list[str]:
         """The arguments of a node that has parameters and other names."""
 
 
@@ -134,9 +134,9 @@ class Stage:
         self.setting = setting
         self._package = package
         self._variables = variables
-        of_nodes = setting.middleware.of_nodes(variables)
-        paths = (str(package), str(HELPERS), of_nodes.get("PYTHONPATH", ""))
-        self._of_nodes = {**of_nodes, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+        node_environment = setting.middleware.node_environment(variables)
+        paths = (str(package), str(HELPERS), node_environment.get("PYTHONPATH", ""))
+        self._node_environment = {**node_environment, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
         self._stack = ExitStack()
         self._programs: list[Program] = []
         self.simulator = self._program("simulator", ["-m", setting.middleware.twin, *self._world()], is_node=False)
@@ -156,7 +156,7 @@ class Stage:
             is_preferred=not is_node,
             is_asked=is_asked or not is_node,
             interpreter=self.setting.middleware.interpreter if is_node else None,
-            variables=self._of_nodes if is_node else self._variables,
+            variables=self._node_environment if is_node else self._variables,
         )
 
     def _start(self, program: Program) -> Program:
@@ -174,8 +174,8 @@ class Stage:
     ) -> Program:
         """Start a helper node."""
         middleware = self.setting.middleware
-        given = middleware.given(parameters or {}, remappings or {})
-        return self._start(self._program(node, ["-m", f"{middleware.helpers}.{node}", *given], is_asked=is_asked))
+        arguments = middleware.arguments(parameters or {}, remappings or {})
+        return self._start(self._program(node, ["-m", f"{middleware.helpers}.{node}", *arguments], is_asked=is_asked))
 
     def supervisor_node(self, existing: str | None = None) -> Program:
         """Start the generated node.
@@ -187,7 +187,7 @@ class Stage:
         period_s = max(_PERIOD_S / setting.speed, _FINEST_PERIOD_S)
         parameters: dict[str, object] = {"log_folder": str(setting.events), "period": period_s}
         (module,) = (path.parent.name for path in self._package.glob("*/start.py"))
-        arguments = ["-m", f"{module}.start", *setting.middleware.given(parameters, {})]
+        arguments = ["-m", f"{module}.start", *setting.middleware.arguments(parameters, {})]
         if existing is not None:
             interpreter = setting.middleware.interpreter or sys.executable
             arguments += ["--controller", interpreter, "-m", f"{setting.middleware.helpers}.{existing}"]
@@ -228,7 +228,7 @@ class Stage:
 
 
 @contextmanager
-def staged(setting: Setting, say: Say) -> Iterator[Stage]:
+def prepared_stage(setting: Setting, say: Say) -> Iterator[Stage]:
     """A stage with nothing on it yet but a generated package; all has ended after the block.
 
     Raises:
@@ -291,12 +291,12 @@ def run_maze(
     setting = _setting(middleware, folder, model, Deployment.CONTROLLER, scene, seed, speed, MAZE_PATIENCE_S)
     if setting.scene.goal is None:
         raise ScenarioError(f"the scene {setting.scene.name} has no goal: there is no way out of it")
-    with staged(setting, say) as stage:
+    with prepared_stage(setting, say) as stage:
         stage.helper("rotator")
         stage.supervisor_node()
         stage.start_world()
         watch = _Watch(stage, say)
-        for now in watch.looks("in the maze", LIMIT_S):
+        for now in watch.samples("in the maze", LIMIT_S):
             if stage.simulator.ask("goal") != "not yet" or now.world_s > WORLD_LIMIT_S:
                 break
         figures = stage.finish()
@@ -338,7 +338,7 @@ def run_line(
     place = setting.scene
     if place.line is None or BOX not in {each.name for each in place.obstacles}:
         raise ScenarioError(f"the scene {place.name} needs a line, and an obstacle called {BOX}")
-    with staged(setting, say) as stage:
+    with prepared_stage(setting, say) as stage:
         stage.helper("line_detector", {}, {"/image": "/camera/image_raw"})
         panel = stage.helper("stop_panel", is_asked=True)
         stage.supervisor_node("careless_line_follower")
@@ -347,10 +347,10 @@ def run_line(
         box = f"obstacle {BOX}"
         watch.drive("along the line")
         stage.simulator.tell(f"{box} back")
-        watch.stand("the box on the line", lambda: stage.simulator.tell(f"{box} away"), is_told=False)
+        watch.wait_until_still("the box on the line", lambda: stage.simulator.tell(f"{box} away"), is_told=False)
         watch.drive("without the box")
         panel.tell("stop")
-        watch.stand("the stop button", lambda: panel.tell("resume"))
+        watch.wait_until_still("the stop button", lambda: panel.tell("resume"))
         watch.drive("after the resume button")
         figures = stage.finish()
     motion = setting.read_motion()
@@ -376,7 +376,7 @@ class _Watch:
         self._events: LineCount | None = None
         self._begin_s = time.monotonic()
 
-    def looks(self, what: str, limit_s: float) -> Iterator[Now]:
+    def samples(self, what: str, limit_s: float) -> Iterator[MotionState]:
         """Yield the state of the robot again and again, until the limit."""
         end_s = time.monotonic() + limit_s
         while time.monotonic() < end_s:
@@ -404,33 +404,33 @@ class _Watch:
             return
         before = latest(self._stage.setting.motion)
         driven_m = 0.0
-        for now in self.looks(what, STEP_LIMIT_S):
+        for now in self.samples(what, STEP_LIMIT_S):
             driven_m += math.dist((before.x_m, before.y_m), (now.x_m, now.y_m))
             before = now
             if driven_m >= FREE_M:
                 return
         self.faults.append(f"the robot did not drive {what} within {STEP_LIMIT_S:g} s")
 
-    def stand(self, why: str, let_go: Callable[[], object], *, is_told: bool = True) -> None:
+    def wait_until_still(self, why: str, release: Callable[[], object], *, is_told: bool = True) -> None:
         """Wait until it has stood still for a while; then it may go on.
 
         Args:
             why: Reason, for a person.
-            let_go: Function that lets it go on.
+            release: Function that lets it go on.
             is_told: True if it has just been told to stand still; else it is to see for itself.
         """
         if self.faults:
             return
         told_s = latest(self._stage.setting.motion).world_s
         begin_s: float | None = None
-        for now in self.looks(f"stands for {why}", STEP_LIMIT_S):
+        for now in self.samples(f"stands for {why}", STEP_LIMIT_S):
             if not now.is_standing:
                 begin_s = None
             elif begin_s is None:
                 begin_s = now.world_s
             elif now.world_s - begin_s >= self._stage.setting.settle_s + HELD_S:
                 self.halts.append(Halt(told_s if is_told else begin_s, now.world_s, why))
-                let_go()
+                release()
                 return
         self.faults.append(f"the robot did not stand still for {why} within {STEP_LIMIT_S:g} s")
 

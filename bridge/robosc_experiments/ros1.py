@@ -50,7 +50,7 @@ class Ros1(ros.Middleware):
     twin = "robosc_simulated.ros.ros1"
     interpreter = PYTHON
 
-    def of_nodes(self, variables: Mapping[str, str]) -> Mapping[str, str]:
+    def node_environment(self, variables: Mapping[str, str]) -> Mapping[str, str]:
         """Without what is of this process's Python."""
         return plain_environment(variables)
 
@@ -75,7 +75,7 @@ class Ros1(ros.Middleware):
                 (path, "--core", "-p", str(port)),
                 folder,
                 interpreter=PYTHON,
-                variables=self.of_nodes(variables),
+                variables=self.node_environment(variables),
             )
             with program as master:
                 while master.status is None and not _answers(variables["ROS_MASTER_URI"]):
@@ -89,7 +89,7 @@ class Ros1(ros.Middleware):
             if time.monotonic() > end_s:
                 raise ScenarioError(f"the master of ROS 1 does not start:\n{master.told()}")
 
-    def given(self, parameters: Mapping[str, object], remappings: Mapping[str, str]) -> list[str]:
+    def arguments(self, parameters: Mapping[str, object], remappings: Mapping[str, str]) -> list[str]:
         """Private parameters and names."""
         return [
             *(f"_{name}:={value}" for name, value in parameters.items()),

@@ -47,7 +47,7 @@ class Ros2(ros.Middleware):
                 "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile),
             }
 
-    def given(self, parameters: Mapping[str, object], remappings: Mapping[str, str]) -> list[str]:
+    def arguments(self, parameters: Mapping[str, object], remappings: Mapping[str, str]) -> list[str]:
         """After `--ros-args`."""
         words = [word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")]
         words += [word for name, other in remappings.items() for word in ("-r", f"{name}:={other}")]

@@ -10,7 +10,7 @@ _END_BYTES = 4096
 
 
 @dataclass(frozen=True)
-class Now:
+class MotionState:
     """Position and motion of the robot.
 
     Attributes:
@@ -35,10 +35,10 @@ class Now:
         return abs(self.linear_m_s) < 1e-3 and abs(self.angular_rad_s) < 1e-2
 
 
-_DECODER = msgspec.json.Decoder(Now)
+_DECODER = msgspec.json.Decoder(MotionState)
 
 
-def latest(motion: Path) -> Now:
+def latest(motion: Path) -> MotionState:
     """The last whole sample of a record of motion; before there is one, a robot at rest at the origin."""
     with contextlib.suppress(OSError), motion.open("rb") as file:
         file.seek(max(file.seek(0, 2) - _END_BYTES, 0))
@@ -48,7 +48,7 @@ def latest(motion: Path) -> Now:
             if line.startswith(b'{"time":') and b'"happening"' not in line:
                 with contextlib.suppress(msgspec.DecodeError):
                     return _DECODER.decode(line)
-    return Now()
+    return MotionState()
 
 
 class LineCount:

@@ -35,10 +35,10 @@ from robosc_simulated.values import (
     angle,
     coordinate,
     number,
+    number_tuple,
     option,
     seed,
-    together,
-    whole,
+    whole_number,
 )
 from robosc_simulated.walls import parse_walls, room
 
@@ -163,7 +163,7 @@ def _side(text: str) -> float:
 
 
 def _cells(text: str) -> int:
-    return whole(text, 1, MOST_CELLS)
+    return whole_number(text, 1, MOST_CELLS)
 
 
 def _deviation(text: str) -> float:
@@ -184,14 +184,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     place.add_argument(
         "--room",
-        type=option(together((_side, _side), "x")),
+        type=option(number_tuple((_side, _side), "x")),
         default=(4.0, 3.0),
         metavar="XxY",
         help="a room in metres; default: 4x3",
     )
     place.add_argument(
         "--maze",
-        type=option(together((_cells, _cells), "x")),
+        type=option(number_tuple((_cells, _cells), "x")),
         metavar="COLUMNSxROWS",
         help="a maze of 1 m cells from the first to its exit",
     )
@@ -203,7 +203,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--pose",
-        type=option(together((coordinate, coordinate, angle), ",")),
+        type=option(number_tuple((coordinate, coordinate, angle), ",")),
         metavar="X,Y,HEADING",
         help="start, in m and rad; default: the scene's, else 0,0,0",
     )

@@ -8,7 +8,7 @@ from robosc_simulated.line import Faults, SimulatedLine
 from robosc_simulated.rover import Rover
 from robosc_simulated.servo import HardwareError, Servo
 from robosc_simulated.turtlebot3 import SimulatedTurtleBot3
-from robosc_simulated.values import angle, coordinate, number, voltage, whole
+from robosc_simulated.values import angle, coordinate, number, voltage, whole_number
 from robosc_simulated.world import World
 
 WORLD_HELP = """\
@@ -136,7 +136,7 @@ def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
         case ["camera", what] if robot.camera is not None:
             _to_camera(robot.camera, what)
         case ["base", "answers_as", device_id] if robot.rover is None:
-            answers_as = None if device_id == "own" else whole(device_id, 0, 255)
+            answers_as = None if device_id == "own" else whole_number(device_id, 0, 255)
             # It has one of the two.
             if robot.opencr is not None:
                 robot.opencr.answers_as = answers_as
@@ -196,7 +196,7 @@ def _to_rover(rover: Rover, words: list[str]) -> None:
         case ["accept"]:
             rover.refusal = ""
         case ["take_over", mode]:
-            rover.take_over(whole(mode, 0, 255))
+            rover.take_over(whole_number(mode, 0, 255))
         case ["disarm"]:
             rover.disarm()
         case ["restart"]:
@@ -226,7 +226,7 @@ def _share(text: str) -> float:
 
 
 def _count(text: str) -> int:
-    return whole(text, 0, 1_000_000)
+    return whole_number(text, 0, 1_000_000)
 
 
 _READERS: dict[str, Callable[[str], object]] = {

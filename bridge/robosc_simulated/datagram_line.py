@@ -109,7 +109,7 @@ class DatagramLine:
 
     def _live(self) -> None:
         with self._time.lock:
-            self._send(self.device.live())
+            self._send(self.device.update())
 
     def _send(self, sendings: Iterable[Sending]) -> None:
         for sending in sendings:

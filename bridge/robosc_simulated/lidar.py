@@ -109,7 +109,7 @@ class Lidar(ABC):
             return math.inf
         return self._time.now_s() + (self._frame_world_s - self._time.world_s()) / self._time.factor
 
-    def live(self) -> Iterable[Sending]:
+    def update(self) -> Iterable[Sending]:
         """All frames that are complete; what they show is measured at once, where the robot is now."""
         now_s = self._time.world_s()
         self._frame_world_s = max(self._frame_world_s, now_s - _BACKLOG_S)

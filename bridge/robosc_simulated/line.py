@@ -51,11 +51,11 @@ class Device(Protocol):
     def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
         """Hear bytes at the host's speed and answer."""
 
-    def live(self) -> Iterable[Sending]:
+    def update(self) -> Iterable[Sending]:
         """Live until now, and send what is due by itself."""
 
     def due_s(self) -> float:
-        """Return the time, by the clock, when `live` is needed next; infinity: not until something comes."""
+        """Return the time, by the clock, when `update` is needed next; infinity: not until something comes."""
 
     def plug_in(self) -> None:
         """Begin after its line was plugged in again."""
@@ -206,7 +206,7 @@ class SimulatedLine:
         if self._tap is not None:
             self._tap(True, self._end.now_s(), data)
         self.received += len(data)
-        self._time.heard()
+        self._time.host_sent()
         if self.faults.echo:
             self._send([Sending(data)])
         if not self.faults.is_deaf:
@@ -220,14 +220,14 @@ class SimulatedLine:
 
     def _live(self) -> None:
         with self._time.lock:
-            if self._time.waits:
+            if self._time.waits_for_host:
                 self._look_at_the_host()
             # It lives on without a line, and what it sends then goes nowhere.
-            sendings = self.device.live()
+            sendings = self.device.update()
             if self._end.is_connected:
                 self._send(sendings)
             self._flush()
-            if self._time.waits:
+            if self._time.waits_for_host:
                 self._waiting = self._end.unread()
 
     def _look_at_the_host(self) -> None:

@@ -134,7 +134,7 @@ class OpenCr:
     def press(self, **changes: bool) -> None:
         """Press or release buttons and bumpers, by their names in `Panel`."""
         with self._time.lock:
-            self.live()
+            self.update()
             for name, value in changes.items():
                 if name not in ("button_1", "button_2", "bumper_1", "bumper_2"):
                     raise ValueError(f"there is no button or bumper {name!r}")
@@ -143,7 +143,7 @@ class OpenCr:
     def set_battery(self, voltage_v: float) -> None:
         """Let the battery have this voltage from now on."""
         with self._time.lock:
-            self.live()
+            self.update()
             self.panel.battery_v = voltage_v
             self._supply()
 
@@ -157,7 +157,7 @@ class OpenCr:
         """The next cycle, or the end of what keeps it busy."""
         return self._cycle_s if self._busy_until_s is None else self._busy_until_s
 
-    def live(self) -> Iterable[Sending]:
+    def update(self) -> Iterable[Sending]:
         """Do all cycles until now."""
         now_s = self._time.now_s()
         found: list[Sending] = []
@@ -172,7 +172,7 @@ class OpenCr:
 
     def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
         """Answer what is addressed to it; while it is busy, later."""
-        found = list(self.live())
+        found = list(self.update())
         self._waiting.extend(self._parser.feed(data, self._time.now_s()))
         return found + self._answer_waiting()
 
@@ -259,7 +259,7 @@ class OpenCr:
             case 174 | 178:
                 for servo, start in zip(self._servos, _PROFILES, strict=True):
                     if start == address and servo.answers and self._has_motors:
-                        servo.hear()
+                        servo.instruction_received()
                         servo.write(108, bytes(self._memory[start : start + 4]))
 
     def _end_calibration(self, ended_s: float) -> list[Sending]:
@@ -284,7 +284,7 @@ class OpenCr:
         wheels_m_s = (linear_m_s - angular_rad_s * half_m, linear_m_s + angular_rad_s * half_m)
         for servo, wheel_m_s in zip(self._servos, wheels_m_s, strict=True):
             if self._has_motors and servo.answers:
-                servo.hear()
+                servo.instruction_received()
                 servo.catch_up()
                 raw = int(max(-_RAW_LIMIT, min(_RAW_LIMIT, wheel_m_s * _RAW_PER_M_S)))
                 # As in a SYNC WRITE: nobody hears of what the servo refuses.

@@ -118,7 +118,7 @@ class Rover:
     def take_over(self, mode: int = MANUAL, linear_m_s: float = 0.0, angular_rad_s: float = 0.0) -> None:
         """An operator with a remote control changes the mode, and drives if it is MANUAL."""
         with self._time.lock:
-            self.live()
+            self.update()
             self._remote = (linear_m_s, angular_rad_s)
             self._enter(mode)
             self._drive()
@@ -126,14 +126,14 @@ class Rover:
     def disarm(self) -> None:
         """An operator, or a failsafe, takes the power from the motors."""
         with self._time.lock:
-            self.live()
+            self.update()
             self.is_armed = False
             self._drive()
 
     def restart(self) -> None:
         """The autopilot starts anew."""
         with self._time.lock:
-            self.live()
+            self.update()
             self._began_s = self._time.now_s()
             self.is_armed = False
             self._enter(HOLD)
@@ -145,7 +145,7 @@ class Rover:
 
     def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
         """Hear its host and answer."""
-        self.live()
+        self.update()
         answers: list[bytes] = []
         for packet in self.parser.feed(data):
             match packet.name:
@@ -158,7 +158,7 @@ class Rover:
         self._drive()
         return [] if self.is_silent else [Sending(answer) for answer in answers]
 
-    def live(self) -> Iterable[Sending]:
+    def update(self) -> Iterable[Sending]:
         """Drive until now, and tell what is due."""
         self._world.catch_up()
         now_s = self._time.now_s()

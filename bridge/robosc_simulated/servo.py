@@ -162,7 +162,7 @@ class Servo:
         """The alert bit, which is part of every status."""
         return ALERT if self.table["hardware error status"] else Error.NONE
 
-    def hear(self) -> None:
+    def instruction_received(self) -> None:
         """An instruction for it has come: its bus watchdog begins anew."""
         self._heard_s = self.time.now_s()
 

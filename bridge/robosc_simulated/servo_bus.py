@@ -37,7 +37,7 @@ class ServoBus:
         """The adapter is new; the servos have power of their own and notice nothing."""
         self._parser.clear()
 
-    def live(self) -> Iterable[Sending]:
+    def update(self) -> Iterable[Sending]:
         """They send nothing by themselves."""
         for servo in self.servos:
             servo.catch_up()
@@ -51,7 +51,7 @@ class ServoBus:
         """Return the answers of the servos that listen at this speed."""
         found: list[Sending] = []
         for request in self._parser.feed(data, self.servos[0].time.now_s()):
-            self.live()
+            self.update()
             listening = [servo for servo in self.servos if servo.answers and _BAUDS[servo.table["baud rate"]] == baud]
             # A bus takes its time for bytes (ten bits each), and an adapter hands on what is complete.
             byte_s = 10 / baud if baud else 0.0
@@ -84,7 +84,7 @@ def _answers(request: Request, servos: Sequence[Servo]) -> Iterator[Answer]:
     if not request.is_intact:
         return
     for servo in servos:
-        servo.hear()
+        servo.instruction_received()
     match request.instruction:
         case Instruction.PING:
             for servo in sorted(servos, key=lambda servo: servo.device_id):
@@ -118,7 +118,7 @@ def _own(request: Request, servo: Servo) -> Iterator[Answer]:
         if level == 2:
             yield servo, servo.device_id, Error.CRC, b""
         return
-    servo.hear()
+    servo.instruction_received()
     match request.instruction:
         case Instruction.PING:
             yield servo, servo.device_id, Error.NONE, _identity(servo)

@@ -70,14 +70,14 @@ class Timebase:
                 world_s = self._limit_s
             return world_s
 
-    def heard(self) -> None:
+    def host_sent(self) -> None:
         """The host has sent something: the world need not wait for it."""
         if self._patience_s is not None:
             with self.lock:
                 if not self._unread:
                     self._limit_s = self.world_s() + self._patience_s
 
-    def lived(self, seconds: float, since_s: float) -> None:
+    def record_work(self, seconds: float, since_s: float) -> None:
         """Somebody has lived a part of the world's time, and that has taken them time.
 
         Where it takes longer than that part does by the clock, nobody would ever be up to date: the rest is not lived.
@@ -92,7 +92,7 @@ class Timebase:
                 self._waited_s += max(took_s * self.factor - seconds, 0.0)
 
     @property
-    def waits(self) -> bool:
+    def waits_for_host(self) -> bool:
         """True if the world waits for its host at all."""
         return self._patience_s is not None
 
@@ -101,15 +101,15 @@ class Timebase:
         with self.lock:
             (self._unread.add if is_behind else self._unread.discard)(line)
 
-    def join(self, live: Callable[[], None]) -> None:
+    def join(self, update: Callable[[], None]) -> None:
         """Call this whenever `advance` has moved the clock by a step."""
         with self.lock:
-            self._members.append(live)
+            self._members.append(update)
 
-    def leave(self, live: Callable[[], None]) -> None:
+    def leave(self, update: Callable[[], None]) -> None:
         """Call it no more."""
         with self.lock:
-            self._members.remove(live)
+            self._members.remove(update)
 
     def advance(self, seconds: float) -> None:
         """Let time pass in small steps; when it returns, all devices have lived it.
@@ -130,5 +130,5 @@ class Timebase:
                 self.clock.advance(min(left_s, _STEP_S))
                 members = tuple(self._members)
             # Outside the lock of the devices: each takes what it needs, in its own order.
-            for live in members:
-                live()
+            for update in members:
+                update()

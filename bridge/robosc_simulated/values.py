@@ -32,7 +32,7 @@ def number(text: str, least: float, most: float) -> float:
     return found
 
 
-def whole(text: str, least: int, most: int) -> int:
+def whole_number(text: str, least: int, most: int) -> int:
     """A whole number within bounds; see `number`."""
     try:
         found = int(text)
@@ -60,7 +60,7 @@ def voltage(text: str) -> float:
 
 def seed(text: str) -> int:
     """Return the seed of all that comes by chance, within the bounds of a scene file."""
-    return whole(text, 0, MOST_SEED)
+    return whole_number(text, 0, MOST_SEED)
 
 
 def option[T](read: Callable[[str], T]) -> Callable[[str], T]:
@@ -75,7 +75,7 @@ def option[T](read: Callable[[str], T]) -> Callable[[str], T]:
     return read_option
 
 
-def together[T](reads: tuple[Callable[[str], T], ...], separator: str) -> Callable[[str], tuple[T, ...]]:
+def number_tuple[T](reads: tuple[Callable[[str], T], ...], separator: str) -> Callable[[str], tuple[T, ...]]:
     """A reader of several numbers with a separator between them."""
 
     def read_all(text: str) -> tuple[T, ...]:

@@ -253,7 +253,7 @@ class World:
                 self._step()
                 for on_step, _ in self._watchers:
                     on_step(self.lived_s)
-            self.time.lived(self.lived_s - before_s, began_s)
+            self.time.record_work(self.lived_s - before_s, began_s)
 
     def _step(self) -> None:
         left_rad, right_rad = self.left.step(STEP_S), self.right.step(STEP_S)

@@ -60,7 +60,7 @@ class Viewer:
         self._definition = text
         self._news.set()
 
-    def lose(self, text: str) -> None:
+    def source_lost(self, text: str) -> None:
         """The source is lost, until there is a robot again."""
         self._gone = text
         self._news.set()
@@ -76,12 +76,12 @@ class Viewer:
         self._update = text
         self._news.set()
 
-    def scanned(self, text: str) -> None:
+    def show_scan(self, text: str) -> None:
         """The latest scan."""
         self._scan = text
         self._news.set()
 
-    def moved(self, text: str) -> None:
+    def show_position(self, text: str) -> None:
         """The latest position."""
         self._position = text
         self._news.set()
@@ -91,7 +91,7 @@ class Viewer:
         self._answers.append(text)
         self._news.set()
 
-    def happened(self, entries: list[str], lost: int) -> None:
+    def append_events(self, entries: list[str], lost: int) -> None:
         """Entries; the oldest are dropped and counted where too many wait."""
         self._lost += lost
         for entry in entries:
@@ -177,11 +177,11 @@ class Broadcaster:
         viewer = Viewer()
         if self._builder is not None and self._prepared is not None:
             viewer.define(self._prepared.text)
-            for text, put in ((self._position, viewer.moved), (self._update, viewer.show)):
+            for text, put in ((self._position, viewer.show_position), (self._update, viewer.show)):
                 if text is not None:
                     put(text)
         elif self._gone is not None:
-            viewer.lose(self._gone)
+            viewer.source_lost(self._gone)
         self._viewers.add(viewer)
         if not self._tasks:
             self._tasks = [asyncio.create_task(self._keep()), asyncio.create_task(self._refresh())]
@@ -233,7 +233,7 @@ class Broadcaster:
             _log.warning("the live view has lost its source: %s", why)
         self._gone = text
         for viewer in self._viewers:
-            viewer.lose(text)
+            viewer.source_lost(text)
 
     async def define(self, robot: Robot) -> None:
         """There is a robot."""
@@ -254,30 +254,30 @@ class Broadcaster:
         self._told_s = asyncio.get_running_loop().time()
         self._is_dirty.set()
 
-    def happened(self, batch: EventBatch, first: int | None = None) -> None:
+    def append_events(self, batch: EventBatch, first: int | None = None) -> None:
         """Entries of the event log."""
         if self._builder is None:
             return
         entries = self._builder.entries(batch, first)
         for viewer in self._viewers:
-            viewer.happened(entries, batch.lost)
+            viewer.append_events(entries, batch.lost)
 
-    def scanned(self, scan: LaserScan) -> None:
+    def show_scan(self, scan: LaserScan) -> None:
         """A revolution of the LiDAR."""
         text = scan_text(scan)
         for viewer in self._viewers:
-            viewer.scanned(text)
+            viewer.show_scan(text)
 
-    def jumped(self) -> None:
+    def replay_jumped(self) -> None:
         """The replay is elsewhere: all of the place follows."""
         for viewer in self._viewers:
             viewer.jump()
 
-    def moved(self, time_s: float, speed: float, *, is_playing: bool) -> None:
+    def show_position(self, time_s: float, speed: float, *, is_playing: bool) -> None:
         """Receive the position of the replay."""
         self._position = position_text(time_s, speed, is_playing=is_playing)
         for viewer in self._viewers:
-            viewer.moved(self._position)
+            viewer.show_position(self._position)
 
     async def _refresh(self) -> None:
         """Send updates: soon after there is something new, not too often, and at least now and then."""
@@ -296,7 +296,7 @@ class Broadcaster:
         if self._builder is None or self._status is None:
             if self._gone is not None:
                 for viewer in self._viewers:
-                    viewer.lose(self._gone)
+                    viewer.source_lost(self._gone)
             return
         self._number += 1
         age_s = self._status.age_s + asyncio.get_running_loop().time() - self._told_s

@@ -14,8 +14,8 @@ from robosc.documentation.diagram import label
 from robosc.model.structure import CommunicationKind, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.ros.state_topic import state_topic
-from robosc_view.graphs import Arrow, Node, drawn
-from robosc_view.reports import LogSpan, SourceKind, Talk
+from robosc_view.graphs import Arrow, Node, layout
+from robosc_view.reports import CommunicationInfo, LogSpan, SourceKind
 
 MAXIMUM_COMPONENTS = 2000
 MAXIMUM_STATES = 100_000
@@ -100,7 +100,7 @@ class Robot:
         version: Version of the program that reports it; empty: not known.
         is_layer: True if its supervisor is a supervision layer.
         shape: Components and automata.
-        talks: Its communications.
+        communications: Its communications.
         table: Transitions that each event takes.
         supervisor: Supervisor with its model; None: not known.
         can_command: True if it can be stopped and commanded through the source.
@@ -112,7 +112,7 @@ class Robot:
     version: str
     is_layer: bool
     shape: Shape
-    talks: tuple[Talk, ...]
+    communications: tuple[CommunicationInfo, ...]
     table: Table
     supervisor: Supervisor | None
     can_command: bool
@@ -123,7 +123,7 @@ class Robot:
     def requests(self) -> tuple[str, ...]:
         """Every request, in the model's order."""
         told = str(CommunicationKind.OUTGOING_MESSAGE)
-        return tuple(f"{item.name}.request" for item in self.talks if item.kind != told)
+        return tuple(f"{item.name}.request" for item in self.communications if item.kind != told)
 
 
 def robot_of(
@@ -154,8 +154,10 @@ def robot_of(
         version=version,
         is_layer=supervisor.deployment == "layer",
         shape=shape_of(topic.definition),
-        talks=tuple(
-            Talk(item.name, item.component, str(item.kind), item.identifier, (channels or {}).get(item.name, ""))
+        communications=tuple(
+            CommunicationInfo(
+                item.name, item.component, str(item.kind), item.identifier, (channels or {}).get(item.name, "")
+            )
             for item in model.communications
         ),
         table={event: dict(parts) for event, parts in topic.transitions.items()},
@@ -166,7 +168,7 @@ def robot_of(
     )
 
 
-def talks_of(shape: Shape) -> tuple[Talk, ...]:
+def communications_of(shape: Shape) -> tuple[CommunicationInfo, ...]:
     """The communications that a definition names; which way messages go, its transitions tell."""
     received = {
         transition.communication
@@ -180,9 +182,13 @@ def talks_of(shape: Shape) -> tuple[Talk, ...]:
     for component in shape.components:
         for name in component.messages:
             kind = CommunicationKind.OUTGOING_MESSAGE if name in received else CommunicationKind.INCOMING_MESSAGE
-            found.append(Talk(name, component.name, str(kind), ""))
-        found += [Talk(name, component.name, str(CommunicationKind.SERVICE), "") for name in component.services]
-        found += [Talk(name, component.name, str(CommunicationKind.ACTION), "") for name in component.actions]
+            found.append(CommunicationInfo(name, component.name, str(kind), ""))
+        found += [
+            CommunicationInfo(name, component.name, str(CommunicationKind.SERVICE), "") for name in component.services
+        ]
+        found += [
+            CommunicationInfo(name, component.name, str(CommunicationKind.ACTION), "") for name in component.actions
+        ]
     return tuple(found)
 
 
@@ -226,7 +232,7 @@ def definition_text(robot: Robot) -> str:
                 "identifier": item.identifier,
                 "channel": item.channel,
             }
-            for item in robot.talks
+            for item in robot.communications
         ],
         "requests": list(robot.requests),
         "log": None
@@ -247,7 +253,7 @@ def _graph(component: str, behaviour: ShapeBehaviour, model: Model | None) -> di
         for place, item in enumerate(state.transitions)
         if item.next in names
     ]
-    return drawn(nodes, arrows)
+    return layout(nodes, arrows)
 
 
 def _kind(item: ShapeTransition) -> str:

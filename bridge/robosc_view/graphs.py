@@ -78,14 +78,14 @@ class _Box:
     below: list[int] = field(default_factory=list)
 
 
-def drawn(nodes: Sequence[Node], arrows: Sequence[Arrow]) -> dict[str, Any] | None:
+def layout(nodes: Sequence[Node], arrows: Sequence[Arrow]) -> dict[str, Any] | None:
     """The drawing, in pixels, as the page is told it; None: the automaton is too large for one.
 
     The place of a state or label is its middle; the points of an edge go from border to border.
     """
     if not nodes or len(nodes) > MAXIMUM_STATES or len(arrows) > MAXIMUM_EDGES:
         return None
-    return _Drawing(nodes, arrows).told()
+    return _Drawing(nodes, arrows).as_json()
 
 
 def layers_of(nodes: Sequence[Node], arrows: Sequence[Arrow]) -> dict[str, int]:
@@ -244,7 +244,7 @@ class _Drawing:
             top += height + _LAYER_GAP
         return found
 
-    def told(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """The drawing as JSON values."""
         states = [self._state(place, node) for place, node in enumerate(self._nodes)]
         edges = [self._edge(arrow, way) for arrow, way in zip(self._arrows, self._ways, strict=True)]
@@ -277,7 +277,7 @@ class _Drawing:
         points = [self._border(way[0], middles[0], middles[1]), *middles[1:-1]]
         points.append(self._border(way[-1], middles[-1], middles[-2]))
         label = next(point for place, point in zip(way, middles, strict=True) if self._is_label(place))
-        return _told(arrow, points, label)
+        return _edge_label(arrow, points, label)
 
     def _is_label(self, place: int) -> bool:
         return place >= len(self._nodes) and self._boxes[place].height > 0
@@ -300,10 +300,10 @@ class _Drawing:
         right = state["x"] + state["width"] / 2
         y = state["y"] + (row - (count - 1) / 2) * LINE
         points = [(right, y - 5.0), (right + _LOOP - 6.0, y - 6.0), (right + _LOOP - 6.0, y + 6.0), (right, y + 5.0)]
-        return _told(arrow, points, (right + _LOOP + _width(arrow) / 2, y))
+        return _edge_label(arrow, points, (right + _LOOP + _width(arrow) / 2, y))
 
 
-def _told(arrow: Arrow, points: Sequence[tuple[float, float]], label: tuple[float, float]) -> dict[str, Any]:
+def _edge_label(arrow: Arrow, points: Sequence[tuple[float, float]], label: tuple[float, float]) -> dict[str, Any]:
     return {
         "id": arrow.number,
         "from": arrow.source,

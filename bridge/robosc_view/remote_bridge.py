@@ -26,7 +26,7 @@ from robosc_bridge.terminal.client import (
 )
 from robosc_bridge.terminal.client import RefusedError as ClientRefusedError
 from robosc_view.definition import DefinitionError, Robot, robot_of, shape_of
-from robosc_view.reports import Drive, EventBatch, LaserScan, Notice, SourceKind, Status, Talk
+from robosc_view.reports import CommunicationInfo, Drive, EventBatch, LaserScan, Notice, SourceKind, Status
 from robosc_view.sources import (
     RefusedError,
     ReplayCommand,
@@ -72,7 +72,7 @@ class RemoteBridge:
             SourceWrongError: It refuses, or is none.
         """
         if self._defining is None or self._defining.done():
-            self._defining = _kept(self._asked(lambda client: robot_told(client.definition(), self._scene)))
+            self._defining = _kept(self._asked(lambda client: robot_from(client.definition(), self._scene)))
         # Those who come and go while a bridge does not answer ask it once.
         await sink.define(await asyncio.shield(self._defining))
         watch = _Watch(self._address, self._credentials, asyncio.get_running_loop())
@@ -228,16 +228,16 @@ class _Watch:
 
 def _pass_on(response: WatchResponse, sink: Sink) -> None:
     if response.events or response.lost_events:
-        sink.happened(EventBatch(events_of(response), response.lost_events))
+        sink.append_events(EventBatch(events_of(response), response.lost_events))
     if response.HasField("snapshot"):
         sink.show(status_of(response.snapshot))
     if response.HasField("scan"):
         pose = response.snapshot.drive.pose if response.snapshot.HasField("drive") else None
         told = None if pose is None else (pose.x_m, pose.y_m, pose.heading_rad)
-        sink.scanned(LaserScan(list(response.scan.ranges_m), told))
+        sink.show_scan(LaserScan(list(response.scan.ranges_m), told))
 
 
-def robot_told(told: Any, scene: Any = None) -> Robot:
+def robot_from(told: Any, scene: Any = None) -> Robot:
     """The robot that a bridge defines.
 
     Raises:
@@ -261,8 +261,8 @@ def robot_told(told: Any, scene: Any = None) -> Robot:
         version=told.version,
         is_layer=told.is_layer,
         shape=shape,
-        talks=tuple(
-            Talk(item.name, item.component, _KINDS.get(item.kind, ""), item.identifier, item.channel)
+        communications=tuple(
+            CommunicationInfo(item.name, item.component, _KINDS.get(item.kind, ""), item.identifier, item.channel)
             for item in told.communications
         ),
         table=table,

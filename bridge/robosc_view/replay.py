@@ -279,12 +279,12 @@ class Replay:
         """Tell a place anew, with what came before it; returns how many entries were told."""
         count = self._recording.count(self._player.time_s)
         first = max(count - HISTORY, 0)
-        sink.jumped()
+        sink.replay_jumped()
         self._tell_position(sink)
         sink.begin(self._recording.frame(first).components)
         entries: Sequence[Any] = self._recording.documents[first:count]
         if entries:
-            sink.happened(EventBatch(entries), first + 1)
+            sink.append_events(EventBatch(entries), first + 1)
         sink.show(self._status(count))
         return count
 
@@ -295,13 +295,13 @@ class Replay:
             first = max(told, count - MOST_AT_ONCE)
             sink.begin(self._recording.frame(first).components)
             entries: Sequence[Any] = self._recording.documents[first:count]
-            sink.happened(EventBatch(entries, first - told), first + 1)
+            sink.append_events(EventBatch(entries, first - told), first + 1)
         self._tell_position(sink)
         sink.show(self._status(count))
         return max(count, told)
 
     def _tell_position(self, sink: Sink) -> None:
-        sink.moved(self._player.time_s, self._player.speed, is_playing=self._player.is_playing)
+        sink.show_position(self._player.time_s, self._player.speed, is_playing=self._player.is_playing)
 
     def _status(self, count: int) -> Status:
         frame = self._recording.frame(count)

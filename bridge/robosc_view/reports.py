@@ -18,7 +18,7 @@ class SourceKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Talk:
+class CommunicationInfo:
     """A communication of the model.
 
     Attributes:

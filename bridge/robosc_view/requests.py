@@ -37,10 +37,10 @@ class Order:
     token: object
 
 
-Asked = Stop | Order | ReplayCommand
+PageRequest = Stop | Order | ReplayCommand
 
 
-def asked(text: str) -> Asked:
+def parse_request(text: str) -> PageRequest:
     """Return the request in a text.
 
     Raises:

@@ -25,10 +25,10 @@ from robosc_view.definition import (
     Robot,
     Shape,
     ShapeTransition,
+    communications_of,
     robot_of,
     shape_of,
     table_of,
-    talks_of,
 )
 from robosc_view.reports import EventBatch, SourceKind, Status
 from robosc_view.sources import (
@@ -134,7 +134,7 @@ class StateReader:
             version="",
             is_layer=False,
             shape=shape,
-            talks=talks_of(shape),
+            communications=communications_of(shape),
             table=table_of(shape),
             supervisor=None,
             can_command=False,
@@ -226,7 +226,7 @@ def _communications(told: object, robot: Robot) -> Mapping[str, str]:
         return {}
     if not isinstance(told, dict):
         raise DefinitionError("where services and actions are makes no sense on /state")
-    places = {talk.name: _PLACES.get(talk.kind, ()) for talk in robot.talks}
+    places = {info.name: _PLACES.get(info.kind, ()) for info in robot.communications}
     for name, place in told.items():
         if place not in places.get(name, ()):
             raise DefinitionError(f"where '{name[:100]}' is makes no sense on /state")
@@ -274,7 +274,7 @@ class StateTopic:
                     known = news.latest.robot
                     await sink.define(known)
                 if news.entries or news.lost:
-                    sink.happened(EventBatch(news.entries, news.lost))
+                    sink.append_events(EventBatch(news.entries, news.lost))
                 if news.latest is not None:
                     sink.show(news.latest.status)
                 if news.failure is not None:

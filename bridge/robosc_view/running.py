@@ -51,14 +51,14 @@ class RunningBridge:
             while True:
                 update = subscription.take()
                 if update.entries or update.lost:
-                    sink.happened(EventBatch(update.entries, update.lost))
+                    sink.append_events(EventBatch(update.entries, update.lost))
                 snapshot = update.snapshot
                 if snapshot is not None and snapshot.number != number:
                     number = snapshot.number
                     sink.show(status_of(snapshot))
                     if snapshot.scan is not None and snapshot.scan.time_s != scan_s:
                         scan_s = snapshot.scan.time_s
-                        sink.scanned(_scan(snapshot))
+                        sink.show_scan(_scan(snapshot))
                 await caller.wait()
         finally:
             subscription.close()

@@ -24,7 +24,7 @@ from robosc_view.broadcaster import Broadcaster, RobotCache, Viewer
 from robosc_view.definition import Robot
 from robosc_view.messages import done_text, refused_text
 from robosc_view.page_files import PageFiles, read_page
-from robosc_view.requests import MAXIMUM_BYTES, Order, Stop, asked
+from robosc_view.requests import MAXIMUM_BYTES, Order, Stop, parse_request
 from robosc_view.sources import RefusedError, Source, ViewError
 
 _log = logging.getLogger(__name__)
@@ -342,7 +342,7 @@ class _Session:
     def _take(self, text: str) -> bool:
         """Begin what is asked for; False: it asks for too much."""
         try:
-            wanted = asked(text)
+            wanted = parse_request(text)
         except RefusedError as error:
             self._viewer.answer(refused_text("request", str(error)))
             return self._is_in_time()

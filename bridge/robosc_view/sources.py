@@ -39,16 +39,16 @@ class Sink(Protocol):
     def show(self, status: Status) -> None:
         """Receive what the robot is doing; the latest alone counts."""
 
-    def happened(self, batch: EventBatch, first: int | None = None) -> None:
+    def append_events(self, batch: EventBatch, first: int | None = None) -> None:
         """Entries of the event log; `first` is the number of the first of them, where they have one of their own."""
 
-    def scanned(self, scan: LaserScan) -> None:
+    def show_scan(self, scan: LaserScan) -> None:
         """A revolution of the LiDAR; the latest alone counts."""
 
-    def jumped(self) -> None:
+    def replay_jumped(self) -> None:
         """The replay of a log is elsewhere; all there is to tell of the place follows."""
 
-    def moved(self, time_s: float, speed: float, *, is_playing: bool) -> None:
+    def show_position(self, time_s: float, speed: float, *, is_playing: bool) -> None:
         """Receive the position of the replay of a log."""
 
 

@@ -45,8 +45,8 @@ class Tap:
             self._rest = self._rest[length:]
         return self.device.receive(data, baud)
 
-    def live(self) -> Iterable[Sending]:
-        return self.device.live()
+    def update(self) -> Iterable[Sending]:
+        return self.device.update()
 
     def due_s(self) -> float:
         return self.device.due_s()

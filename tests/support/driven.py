@@ -83,8 +83,8 @@ class Recorded:
         self.heard_s.append(self._robot.time.now_s())
         return self._watched(list(self._device.receive(data, baud)))
 
-    def live(self) -> Iterable[Sending]:
-        return self._watched(list(self._device.live()))
+    def update(self) -> Iterable[Sending]:
+        return self._watched(list(self._device.update()))
 
     def due_s(self) -> float:
         return self._device.due_s()

@@ -15,7 +15,7 @@ from robosc_bridge.daemon.channel_data import battery_data, imu_data, odometry_d
 from robosc_bridge.daemon.motion import MotionTarget
 from robosc_bridge.daemon.program_channel import ProgramChannel
 from robosc_bridge.daemon.reports import Device, Sighting
-from robosc_bridge.daemon.rotations import Rotations, done
+from robosc_bridge.daemon.rotations import Rotations, service_response
 from robosc_bridge.daemon.stop_switch import StopSwitch
 from robosc_bridge.daemon.supervised import Listeners, Supervised
 from robosc_bridge.daemon.wheel_messages import finite, is_default, velocity_of
@@ -126,7 +126,7 @@ class RobotAdapter:
         match self._channels[communication]:
             case channels.StopChannel():
                 self._stop()
-                self._pending.append(lambda executor: executor.on_reply(request_id, done("")))
+                self._pending.append(lambda executor: executor.on_reply(request_id, service_response("")))
             case channels.RotateChannel() as channel if not self._rotations.is_under_way:
                 self._rotations.begin(item, channel, request_id, message)
             case channels.GrpcChannel():

@@ -115,9 +115,9 @@ class Rotations:
             self._tell_end(reason, has_arrived=has_arrived, is_own=is_own)
         elif rotation.asked.kind is CommunicationKind.ACTION:
             outcome = "succeeded" if has_arrived else "aborted"
-            self._owe(lambda executor: executor.on_goal_ended(number, outcome, done(reason)))
+            self._owe(lambda executor: executor.on_goal_ended(number, outcome, service_response(reason)))
         elif has_arrived:
-            self._owe(lambda executor: executor.on_reply(number, done("")))
+            self._owe(lambda executor: executor.on_reply(number, service_response("")))
         else:
             self._owe(lambda executor: executor.on_call_failed(number, reason))
 
@@ -140,6 +140,6 @@ class Rotations:
             executor.on_feedback(rotation.number, {"remaining": left} if hasattr(feedback, "name") else left)
 
 
-def done(reason: str) -> dict[str, Any]:
+def service_response(reason: str) -> dict[str, Any]:
     """The answer of the bridge's own services and actions: whether it is done, or why not."""
     return {"success": not reason, "message": reason}

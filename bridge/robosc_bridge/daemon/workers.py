@@ -62,7 +62,7 @@ class DriveCommand(Protocol):
         """Warnings that a person should know."""
 
 
-class Gate(Protocol):
+class SafetyGate(Protocol):
     """Part of the safety layer that a worker needs; its methods neither raise nor wait."""
 
     def output(self, now_s: float) -> DriveCommand:
@@ -115,7 +115,7 @@ class DriveWorker:
     def __init__(
         self,
         base: DriveBase,
-        gate: Gate,
+        gate: SafetyGate,
         report: Callable[[Report], None],
         period_s: float,
         clock: Callable[[], float],
@@ -257,7 +257,7 @@ class ScannerWorker:
     def __init__(
         self,
         scanner: RangeScanner,
-        gate: Gate,
+        gate: SafetyGate,
         report: Callable[[Report], None],
         silent_after_s: float,
         restart_after_s: float,

@@ -122,7 +122,7 @@ class DynamixelBase:
             self._pair = ServoPair(self._bus, self._names, self._exchange_limit_s, self._host)
             limits_raw = [settings.velocity_limit_raw for settings in self._pair.settings.values()]
             self._limits = self._robot.limits(min(limits_raw))
-            self._pair.let_go()
+            self._pair.release_torque()
             self._pair.set_up()
         except BaseException:
             self._release()
@@ -140,14 +140,14 @@ class DynamixelBase:
         pair, _ = self._opened()
         self._is_torque_wanted = self._is_torque_on = False
         if not is_on:
-            pair.let_go()
+            pair.release_torque()
             self._stops = frozenset()
             return
         try:
             pair.arm(self._acceleration_raw, self._watchdog)
         except BridgeError:
             with contextlib.suppress(BridgeError):
-                pair.let_go()
+                pair.release_torque()
             raise
         self._is_torque_wanted = self._is_torque_on = True
         self._stops = frozenset()
@@ -183,7 +183,7 @@ class DynamixelBase:
         pair.halt()
         is_left, is_right = pair.restart_faulty()
         self._odometry = self._odometry.rebased(is_left, is_right)
-        pair.let_go()
+        pair.release_torque()
         pair.set_up()
         self._stops = frozenset()
 
@@ -191,9 +191,9 @@ class DynamixelBase:
         """Stop, torque off, watchdogs off, and give the line back."""
         if self._pair is not None:
             with contextlib.suppress(BridgeError):
-                self._pair.let_go()
+                self._pair.release_torque()
             with contextlib.suppress(BridgeError):
-                self._pair.sign_off()
+                self._pair.switch_leds_off()
         self._release()
 
     def _release(self) -> None:

@@ -96,7 +96,7 @@ class ServoPair:
             if self.read_hardware(motor) - {MotorFault.VOLTAGE}:
                 raise DeviceFaultError(f"{self._hardware_text(motor)}; it must be reset")
         self.halt()
-        if not self.comes_to_rest():
+        if not self.stops_in_time():
             raise DeviceError(f"{self._names[self.motors[0]]} or {self._names[self.motors[1]]} still rotates")
         for motor in self.motors:
             self._bus.begin(self._limit_s)
@@ -108,7 +108,7 @@ class ServoPair:
         self._write_both(servo.TORQUE, 1, "does not hold")
         self._write_both(servo.BUS_WATCHDOG, watchdog, "does not arm its bus watchdog")
 
-    def let_go(self) -> None:
+    def release_torque(self) -> None:
         """Goal zero, wait for the wheels, watchdogs and torque off.
 
         Raises:
@@ -117,14 +117,14 @@ class ServoPair:
         """
         self.halt()
         try:
-            self.comes_to_rest()
+            self.stops_in_time()
             self._write_both(servo.BUS_WATCHDOG, 0, "does not disarm its bus watchdog")
             self._write_both(servo.TORQUE, 0, "does not let go")
         except DeviceError:
             self._bus.sync_write(servo.TORQUE, dict.fromkeys(self.motors, b"\0"))
             raise
 
-    def sign_off(self) -> None:
+    def switch_leds_off(self) -> None:
         """Switch off what tells a person that the bridge has them."""
         self._bus.sync_write(servo.LED, dict.fromkeys(self.motors, b"\0"))
 
@@ -138,7 +138,7 @@ class ServoPair:
         data = {motor: encode_velocity(settings.sign * goal) for (motor, settings), goal in goals}
         self._bus.sync_write(servo.GOAL_VELOCITY, data)
 
-    def comes_to_rest(self) -> bool:
+    def stops_in_time(self) -> bool:
         """Return True if both stand still in time."""
         end_s = self._host.monotonic() + _REST_LIMIT_S
         while True:

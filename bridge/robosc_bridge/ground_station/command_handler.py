@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from robosc_bridge.daemon.operations import UNDONE_BY, Operations
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.ground_station.commands import Change, Checks, Interval, Meaning, Once, Parameters, Refusal, Stop
-from robosc_bridge.ground_station.notices import standing
+from robosc_bridge.ground_station.notices import blocking_notices
 from robosc_bridge.ground_station.status import is_held, run_mode
 from robosc_bridge.ground_station.status_texts import Sender, Severity
 from robosc_bridge.ground_station.stream import HEARTBEAT, Stream
@@ -242,7 +242,7 @@ class CommandHandler:
         if snapshot is None or self._stream.is_stale(now_s):
             self._say(Severity.WARNING, LOOP_HANGS, received.sender)
             return Result.TEMPORARILY_REJECTED
-        found = [text for severity, text in standing(snapshot) if severity <= Severity.WARNING]
+        found = [text for severity, text in blocking_notices(snapshot) if severity <= Severity.WARNING]
         for text in found:
             # Each of them is to be told, and there are not more than there are.
             self._say(Severity.WARNING, text, None)

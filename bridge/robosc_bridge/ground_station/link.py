@@ -133,7 +133,7 @@ class GroundLink:
     def _datagram(self, line: NetworkPort, data: bytes, now_s: float) -> None:
         if data and line.is_stranger and now_s - self._peer_s < STATION_LIMIT_S:
             # One station at a time; another may stop the robot.
-            if answers := self._session.overheard(now_s, data):
+            if answers := self._session.receive_from_other(now_s, data):
                 line.reply(answers)
             data = b""
         is_stranger = line.is_stranger

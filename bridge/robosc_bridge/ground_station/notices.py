@@ -38,7 +38,7 @@ def happened(before: Snapshot | None, after: Snapshot) -> Iterator[Notice]:
         yield Severity.NOTICE, "It goes on"
 
 
-def standing(snapshot: Snapshot) -> Iterator[Notice]:
+def blocking_notices(snapshot: Snapshot) -> Iterator[Notice]:
     """Yield the notices of what stands in the way, or should be known, as long as it does."""
     if snapshot.problem:
         yield Severity.CRITICAL, snapshot.problem
@@ -61,7 +61,7 @@ def standing(snapshot: Snapshot) -> Iterator[Notice]:
             yield Severity.ERROR if device is Device.DRIVE else Severity.WARNING, f"The {device} is not there"
 
 
-def written(entry: Entry) -> Notice | None:
+def notice_of(entry: Entry) -> Notice | None:
     """Return the notice of an entry of the event log for a person; None: there is none."""
     match entry:
         case {"kind": "blocked", "identifier": identifier, "why": why}:

@@ -22,7 +22,7 @@ from robosc_bridge.ground_station.driving import (
     from_manual_control,
     from_position_target,
 )
-from robosc_bridge.ground_station.notices import happened, standing, written
+from robosc_bridge.ground_station.notices import blocking_notices, happened, notice_of
 from robosc_bridge.ground_station.received_messages import (
     OLD,
     STOPPING,
@@ -140,7 +140,7 @@ class StationSession:
         self._fed_s = math.inf
         return self._decoder.idle()
 
-    def overheard(self, now_s: float, data: bytes) -> bytes:
+    def receive_from_other(self, now_s: float, data: bytes) -> bytes:
         """A datagram of somebody else than the station in use, who may stop the robot and nothing more.
 
         Returns:
@@ -204,14 +204,14 @@ class StationSession:
                 self._texts.say(now_s, severity, text, again_s=0.0)
         for entry in update.entries:
             self._stream.held_back += entry.get("kind") == "blocked"
-            notice = written(entry)
+            notice = notice_of(entry)
             if notice is not None:
                 self._texts.say(now_s, *notice)
         if self._stream.is_stale(now_s):
             holding.append((Severity.CRITICAL, LOOP_HANGS))
         elif self._stream.snapshot is not None:
-            holding += standing(self._stream.snapshot)
-        self._texts.stand(now_s, holding)
+            holding += blocking_notices(self._stream.snapshot)
+        self._texts.repeat(now_s, holding)
         while self._told:
             told = self._told.popleft()
             if isinstance(told, Refused):

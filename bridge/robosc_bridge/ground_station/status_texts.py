@@ -175,12 +175,12 @@ class StatusTexts:
             del self._recent[next(iter(self._recent))]
         self._recent[text] = now_s
 
-    def stand(self, now_s: float, holding: Iterable[tuple[Severity, str]]) -> None:
+    def repeat(self, now_s: float, holding: Iterable[tuple[Severity, str]]) -> None:
         """Tell what holds now: when it begins, and again every `REPEAT_S`."""
-        standing = {plain_text(text): severity for severity, text in holding}
-        for text, severity in standing.items():
+        blocking_notices = {plain_text(text): severity for severity, text in holding}
+        for text, severity in blocking_notices.items():
             self.say(now_s, severity, text, again_s=REPEAT_S if text in self._standing else FLAPPING_S)
-        self._standing = frozenset(standing)
+        self._standing = frozenset(blocking_notices)
 
     def forget(self) -> None:
         """Somebody listens anew, to whom nothing was told yet."""

@@ -96,23 +96,23 @@ class RequestedVelocity:
     def __init__(self) -> None:
         self.linear_m_s = 0.0
         self.angular_rad_s = 0.0
-        self._lapse_s = 0.0
+        self._expiry_s = 0.0
 
     @property
     def is_motion(self) -> bool:
         """True if the robot is to move."""
         return bool(self.linear_m_s or self.angular_rad_s)
 
-    def lapse(self, now_s: float) -> None:
+    def expire(self, now_s: float) -> None:
         """Without a key for too long nothing is wished."""
-        if now_s >= self._lapse_s:
+        if now_s >= self._expiry_s:
             self.linear_m_s = self.angular_rad_s = 0.0
 
     def press(self, key: str, now_s: float) -> None:
         """Heed a key; any but those of the help changes nothing."""
-        self.lapse(now_s)
+        self.expire(now_s)
         if key in _DRIVING:
-            self._lapse_s = now_s + LAPSE_S
+            self._expiry_s = now_s + LAPSE_S
         match key:
             case "w" | "s":
                 step = STEP_M_S if key == "w" else -STEP_M_S
@@ -196,7 +196,7 @@ def _drive(
         now_s = terminal.monotonic()
         if now_s < next_s:
             continue
-        requested.lapse(now_s)
+        requested.expire(now_s)
         if requested.is_motion or zeros_left:
             zeros_left = _ZEROS if requested.is_motion else zeros_left - 1
             operator.drive(topic, requested.linear_m_s, requested.angular_rad_s)

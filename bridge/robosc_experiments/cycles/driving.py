@@ -13,7 +13,7 @@ from robosc.supervisor import Supervisor
 from robosc.targets.c99.layout import make_layout
 from robosc.targets.cpp.model import fill_name
 from robosc_experiments.cycles.isolated import SCRIPTS, write_unit
-from robosc_experiments.cycles.times import LIMIT_S, OTHER, Samples, free_way
+from robosc_experiments.cycles.times import LIMIT_S, OTHER, Samples, clear_scan
 from robosc_experiments.processes import Program
 from robosc_experiments.ros import Middleware
 from robosc_experiments.ros1 import Ros1
@@ -71,7 +71,7 @@ def _interpreted(
 ) -> Sequence[str]:
     unit = write_unit(supervisor, "python", folder / "unit")
     identifier, data, _ = OTHER[experiment]
-    comes = json.dumps({"first": [identifier, data], "ranges": free_way()})
+    comes = json.dumps({"first": [identifier, data], "ranges": clear_scan()})
     return (ros.interpreter or sys.executable, str(SCRIPTS / "driving.py"), middleware, TOPIC, str(unit), comes)
 
 
@@ -87,7 +87,7 @@ def _compiled(experiment: str, supervisor: Supervisor, move: Communication, fold
         "fill": fill_name(layout, move),
         "first": OTHER[experiment][2],
         "topic": TOPIC,
-        "ranges": ", ".join(map(repr, free_way())),
+        "ranges": ", ".join(map(repr, clear_scan())),
     }
     text = (SCRIPTS / "driving.cpp").read_text(encoding="utf-8")
     for place, other in filled.items():
@@ -107,7 +107,7 @@ def _compiled(experiment: str, supervisor: Supervisor, move: Communication, fold
 def _run(ros: Middleware, middleware: str, command: Sequence[str], folder: Path) -> Samples:
     """Run the program with a subscriber beside it, and return the content of the last line that it prints."""
     with ros.running(folder) as variables:
-        theirs: Mapping[str, str] = ros.of_nodes(variables)
+        theirs: Mapping[str, str] = ros.node_environment(variables)
         kind = "rclpy" if middleware == "rclpy" else "rospy"
         arguments = (str(SCRIPTS / "subscriber.py"), kind, TOPIC)
         with Program("subscriber", arguments, folder, interpreter=ros.interpreter, variables=theirs):

@@ -86,7 +86,7 @@ def feed(experiment: str, number: int) -> tuple[str, Any]:
     return "/scan", SimpleNamespace(ranges=[(FAR_M, NEAR_M)[number // _TURNS % 2]] * BEAMS)
 
 
-def free_way() -> list[float]:
+def clear_scan() -> list[float]:
     """A scan in a corridor that is free ahead, in metres: either robot drives on."""
     walls = (*range(60, 121), *range(240, 301))
     return [_ASIDE_M if beam in walls else FAR_M for beam in range(BEAMS)]

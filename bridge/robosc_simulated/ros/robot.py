@@ -186,10 +186,10 @@ class RosRobot:
 
     @property
     def due_s(self) -> float:
-        """The world's time at which `live` has something to do next."""
+        """The world's time at which `update` has something to do next."""
         return min(self._due_s)
 
-    def live(self) -> list[Reading]:
+    def update(self) -> list[Reading]:
         """Return the readings that are due now; missed ones are not made up for."""
         with self._time.lock:
             self.world.catch_up()

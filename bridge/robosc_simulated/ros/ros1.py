@@ -213,9 +213,9 @@ class Ros1Node:
             }
         )
         while not self._is_ready and not should_end():
-            self.attend(_STEP_S)
+            self.process_commands(_STEP_S)
 
-    def attend(self, longest_s: float) -> None:
+    def process_commands(self, longest_s: float) -> None:
         """Obey velocities; comes back after some, or after so long at most."""
         for frame in self._side.receive(longest_s):
             match frame.head:

@@ -106,7 +106,7 @@ class Ros2Node:
         self._node.destroy_node()
         self._rclpy.try_shutdown(context=self._context)
 
-    def attend(self, longest_s: float) -> None:
+    def process_commands(self, longest_s: float) -> None:
         """Obey velocities, all that have come; comes back after some, or after so long at most."""
         before = self._robot.commands
         self._executor.spin_once(timeout_sec=longest_s)

@@ -55,7 +55,7 @@ class RosNode(Protocol):
     def publish(self, reading: Reading) -> None:
         """Send what the robot shows."""
 
-    def attend(self, longest_s: float) -> None:
+    def process_commands(self, longest_s: float) -> None:
         """Obey velocities; comes back after some, or after so long at most.
 
         Raises:
@@ -158,9 +158,9 @@ def run(robot: RosRobot, pacer: Pacer, node: RosNode, should_end: Callable[[], b
     pacer.begin()
     while not should_end():
         pacer.catch_up()
-        for reading in robot.live():
+        for reading in robot.update():
             node.publish(reading)
-        node.attend(min(max(pacer.until_s(robot.due_s), 0.0), _TICK_S))
+        node.process_commands(min(max(pacer.until_s(robot.due_s), 0.0), _TICK_S))
 
 
 def make_robot(options: argparse.Namespace) -> tuple[RosRobot, Pacer]:

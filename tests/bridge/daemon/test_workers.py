@@ -45,7 +45,7 @@ class Output:
     warnings: tuple[Caution, ...] = ()
 
 
-class Gate:
+class SafetyGate:
     """A safety layer that lets through what a test says."""
 
     def __init__(self) -> None:
@@ -114,7 +114,7 @@ class Scene:
 
     def __init__(self) -> None:
         self.clock = Clock()
-        self.gate = Gate()
+        self.gate = SafetyGate()
         self.base = Base(self.clock)
         self.reports: list[Report] = []
         self.worker = DriveWorker(
@@ -357,7 +357,7 @@ class ScannerScene:
 
     def __init__(self) -> None:
         self.clock = Clock()
-        self.gate = Gate()
+        self.gate = SafetyGate()
         self.scanner = Scanner(self.clock)
         self.reports: list[Report] = []
         self.worker = ScannerWorker(

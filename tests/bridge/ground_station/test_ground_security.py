@@ -77,7 +77,7 @@ def test_a_station_that_speaks_mavlink_1_stops_the_robot_and_is_told(
     found = reader.hear(session.step(BEGIN_S, data, is_datagram=is_datagram))
     assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [2]
     assert (len(daemon.orders), daemon.seen, session.claims) == (len(stops), 0, 0)
-    found = reader.hear(session.overheard(BEGIN_S, stops[0]))
+    found = reader.hear(session.receive_from_other(BEGIN_S, stops[0]))
     assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [0]
 
 
@@ -217,9 +217,9 @@ def test_another_computer_without_a_key_may_look_and_stop(number: int, parameter
 def test_another_station_may_stop_and_nothing_more() -> None:
     daemon, session = _session(GroundSettings("udpin:127.0.0.1:0", FASTEST, obeys_unsigned=True))
     other = Station(system=254)
-    found = other.hear(session.overheard(BEGIN_S, other.command(400, 1.0) + other.command(512, 148)))
+    found = other.hear(session.receive_from_other(BEGIN_S, other.command(400, 1.0) + other.command(512, 148)))
     assert found == []
-    found = other.hear(session.overheard(BEGIN_S, other.command(400, 0.0)))
+    found = other.hear(session.receive_from_other(BEGIN_S, other.command(400, 0.0)))
     assert [(ack.result, ack.target_system) for ack in of_type("COMMAND_ACK", found)] == [(0, 254)]
     assert daemon.commands == [OperatorCommand.STANDBY]
 
@@ -234,7 +234,7 @@ def test_only_a_station_claims_the_line(key_file: Path) -> None:
     stranger = Station()
     session.step(BEGIN_S + 1.0, stranger.heartbeat() + stranger.command(400, 0.0))
     assert (session.accepted, session.claims) == (0, 0)
-    assert session.overheard(BEGIN_S + 1.0, Station(system=1, component=1).command(400, 0.0)) == b""
+    assert session.receive_from_other(BEGIN_S + 1.0, Station(system=1, component=1).command(400, 0.0)) == b""
     # Another robot with the same key is heard, and is no station.
     robot = _fresh(Station(KEY, system=2, component=1), key_file)
     session.step(BEGIN_S + 1.0, robot.pack(robot.codec.heartbeat_encode(10, 0, 0, 0, 4)))

@@ -282,7 +282,7 @@ def test_garbage_is_dropped(pieces: list[bytes], is_datagram: bool) -> None:
     talk = Talk()
     for piece in pieces:
         talk.session.step(talk.now_s, b"\xfd" + piece, is_datagram=is_datagram)
-        talk.session.overheard(talk.now_s, b"\xfd" + piece)
+        talk.session.receive_from_other(talk.now_s, b"\xfd" + piece)
     assert talk.daemon.orders == []
     talk.session.lost()
     found = talk.station.hear(talk.session.step(talk.now_s, talk.station.command(400, 0.0)))
@@ -303,7 +303,7 @@ def test_any_contents_of_any_message_are_survived(number: int, payload: bytes, i
     packet = head + payload + checksum.to_bytes(2, "little")
     talk.session.step(talk.now_s, packet, is_datagram=True)
     talk.session.step(talk.now_s, packet)
-    talk.session.overheard(talk.now_s, packet)
+    talk.session.receive_from_other(talk.now_s, packet)
     for item in talk.daemon.told:
         if isinstance(item, MessageRequested):
             assert all(map(math.isfinite, (item.data["linear"]["x"], item.data["angular"]["z"])))

@@ -85,7 +85,7 @@ def test_what_holds_is_told_every_twenty_seconds_and_when_it_comes_again() -> No
     told = {}
     for tick in range(450):
         holds = tick < 410 or 415 <= tick < 420 or tick >= 435
-        texts.stand(tick / 10, [(Severity.ERROR, "cold")] if holds else [])
+        texts.repeat(tick / 10, [(Severity.ERROR, "cold")] if holds else [])
         if found := _told(texts, tick / 10):
             told[tick / 10] = found
     assert list(told) == [0.0, 20.0, 40.0, 43.5]
@@ -105,10 +105,10 @@ def test_there_are_never_too_many_a_second() -> None:
 
 def test_who_listens_anew_is_told_again() -> None:
     texts = StatusTexts()
-    texts.stand(0.0, [(Severity.ERROR, "cold")])
+    texts.repeat(0.0, [(Severity.ERROR, "cold")])
     assert _told(texts, 0.0) == ["cold"]
     texts.forget()
-    texts.stand(1.0, [(Severity.ERROR, "cold")])
+    texts.repeat(1.0, [(Severity.ERROR, "cold")])
     assert _told(texts, 1.0) == ["cold"]
 
 
@@ -117,7 +117,7 @@ def test_nonsense_keeps_no_news_from_being_told() -> None:
     for number in range(500):
         texts.say(0.0, Severity.WARNING, f"A parameter cannot be {number}.", again_s=0.0, asked_by=(255, number % 250))
     texts.say(0.0, Severity.ERROR, "Fault: hot", again_s=0.0)
-    texts.stand(0.0, [(Severity.CRITICAL, "empty")])
+    texts.repeat(0.0, [(Severity.CRITICAL, "empty")])
     texts.say(0.0, Severity.NOTICE, "Standby")
     assert _told(texts, 0.0)[:3] == ["empty", "Fault: hot", "Standby"]
     assert sum(len(item.pieces) for item in texts._waiting) <= MOST_WAITING

@@ -27,7 +27,7 @@ class Echo:
         self.heard.append(data)
         return [Sending(data[::-1])]
 
-    def live(self) -> Iterable[Sending]:
+    def update(self) -> Iterable[Sending]:
         self.lives += 1
         if self._time.now_s() < self._next_s:
             return []

@@ -42,7 +42,7 @@ class Station:
         self.beats = self.beats % 255 + 1
         self.write(19, bytes((self.beats,)))
 
-    def live(self, seconds: float) -> None:
+    def update(self, seconds: float) -> None:
         """With a heartbeat every 100 ms."""
         for _ in range(round(seconds / 0.1)):
             self.beat()
@@ -69,10 +69,10 @@ def waffle() -> Iterator[Station]:
 
 
 def test_it_drives_while_it_hears_a_heartbeat(station: Station) -> None:
-    station.live(0.2)
+    station.update(0.2)
     assert station.read(15, "B") == 1
     station.command(10)
-    station.live(1.0)
+    station.update(1.0)
     assert station.robot.world.pose == pytest.approx((0.1, 0.0, 0.0), abs=0.004)
     # 0.10 m/s is 126 after the cast.
     assert station.wheels() == (126, 126)
@@ -87,7 +87,7 @@ def test_commands_without_a_heartbeat_are_void(station: Station) -> None:
 
 
 def test_a_heartbeat_that_does_not_change_is_none(station: Station) -> None:
-    station.live(0.2)
+    station.update(0.2)
     station.command(10)
     station.write(19, b"\x07")
     for _ in range(6):
@@ -97,9 +97,9 @@ def test_a_heartbeat_that_does_not_change_is_none(station: Station) -> None:
 
 
 def test_it_stops_half_a_second_after_the_last_heartbeat(station: Station) -> None:
-    station.live(0.3)
+    station.update(0.3)
     station.command(10)
-    station.live(0.3)
+    station.update(0.3)
     station.beat()
     station.robot.advance(0.48)
     assert station.wheels() == (126, 126)
@@ -107,11 +107,11 @@ def test_it_stops_half_a_second_after_the_last_heartbeat(station: Station) -> No
     assert station.wheels() == (0, 0)
     # Its torque stays on, and it does not go on by itself.
     assert station.read(149, "B") == 1
-    station.live(1.0)
+    station.update(1.0)
     assert station.read(15, "B") == 1
     assert station.wheels() == (0, 0)
     station.command(10)
-    station.live(0.2)
+    station.update(0.2)
     assert station.wheels() == (126, 126)
 
 
@@ -126,38 +126,38 @@ def test_after_a_change_of_state_the_half_second_begins_anew(station: Station) -
 
 
 def test_the_last_command_holds_for_ever(station: Station) -> None:
-    station.live(0.2)
+    station.update(0.2)
     station.command(5)
-    station.live(20.0)
+    station.update(20.0)
     assert station.robot.world.x_m == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_servo_keeps_its_speed_when_it_is_asked_for_more_than_its_limit(station: Station) -> None:
-    station.live(0.2)
+    station.update(0.2)
     station.command(10)
-    station.live(0.3)
+    station.update(0.3)
     # Clamped to 0.2108 m/s, 266 raw, and the servo's limit is 265.
     station.command(22)
-    station.live(0.5)
+    station.update(0.5)
     assert station.wheels() == (126, 126)
     # One wheel refuses, the other turns on.
     station.command(10, 150)
-    station.live(0.5)
+    station.update(0.5)
     assert station.wheels() == (-25, 126)
 
 
 def test_linear_and_angular_are_clamped_apart_and_each_wheel_at_337(waffle: Station) -> None:
-    waffle.live(0.2)
+    waffle.update(0.2)
     waffle.command(100)
-    waffle.live(0.5)
+    waffle.update(0.5)
     # 0.26609 m/s is 336 raw, above the XM430's limit of 330: refused.
     assert waffle.wheels() == (0, 0)
     for servo in (waffle.robot.left, waffle.robot.right):
         servo.table["velocity limit"] = 1023
-    waffle.live(0.5)
+    waffle.update(0.5)
     assert waffle.wheels() == (336, 336)
     waffle.command(100, 1000)
-    waffle.live(0.5)
+    waffle.update(0.5)
     # The left one stands: both clamps are the same speed of a wheel.
     # What 77 rpm at 12 V allow is 336 raw.
     assert waffle.wheels() == (0, 336)
@@ -203,9 +203,9 @@ def test_a_read_that_is_too_long_is_not_answered(station: Station) -> None:
 
 
 def test_a_recalibration_keeps_the_wheels_turning(station: Station) -> None:
-    station.live(0.2)
+    station.update(0.2)
     station.command(10)
-    station.live(0.2)
+    station.update(0.2)
     assert station.handler.writeTxRx(station.port, 200, 59, 1, [1])[0] == -3001
     before_m = station.robot.world.pose[0]
     station.robot.advance(4.9)
@@ -239,23 +239,23 @@ def station_in(noise: Noise, walls: Walls = OPEN_SPACE) -> Iterator[Station]:
 
 def test_the_gyroscope_feels_how_the_body_turns_and_not_the_wheels() -> None:
     with station_in(Noise(slip_share=0.5)) as station:
-        station.live(0.3)
+        station.update(0.3)
         station.command(0, 50)
-        station.live(1.0)
+        station.update(1.0)
         before_rad = station.robot.world.pose[2]
-        station.live(1.0)
+        station.update(1.0)
         turned_rad = station.robot.world.pose[2] - before_rad
         assert turned_rad == pytest.approx(0.25, rel=0.03)
         assert station.read(68, "f") == pytest.approx(turned_rad, rel=0.01)
         station.command(0, 0)
-        station.live(0.5)
+        station.update(0.5)
         assert station.read(68, "f") == 0.0
 
 
 def test_accelerations_are_those_of_the_body() -> None:
     """It is felt when it comes to a wall; and no more while its wheels turn there."""
     with station_in(Noise(), Walls([(0.205, -1.0, 0.205, 1.0)])) as station:
-        station.live(0.3)
+        station.update(0.3)
         station.command(20)
         felt_m_s2 = []
         for _ in range(8):
@@ -273,9 +273,9 @@ def test_accelerations_are_those_of_the_body() -> None:
 
 
 def test_who_drives_a_curve_is_pressed_outwards(station: Station) -> None:
-    station.live(0.3)
+    station.update(0.3)
     station.command(10, 50)
-    station.live(1.0)
+    station.update(1.0)
     assert station.read(68, "f") == pytest.approx(0.5, rel=0.03)
     # Towards the middle of the curve, which is on the left.
     assert station.read(76, "f") == pytest.approx(0.1 * 0.5, rel=0.05)
@@ -285,9 +285,9 @@ def test_profile_accelerations_reach_the_servos(station: Station) -> None:
     station.write(174, struct.pack("<2I", 5, 7))
     assert station.robot.left.table["profile acceleration"] == 5
     assert station.robot.right.table["profile acceleration"] == 7
-    station.live(0.2)
+    station.update(0.2)
     station.command(15)
-    station.live(0.5)
+    station.update(0.5)
     left, right = station.wheels()
     # 5 x 0.3745 rad/s2 for half a second is 39 raw, 7 x is 55.
     assert left == pytest.approx(39, abs=4)
@@ -295,17 +295,17 @@ def test_profile_accelerations_reach_the_servos(station: Station) -> None:
 
 
 def test_a_low_battery_cuts_the_motors_off(station: Station) -> None:
-    station.live(0.2)
+    station.update(0.2)
     station.opencr.set_battery(10.8)
-    station.live(5.5)
+    station.update(5.5)
     assert station.read(149, "B") == 1
     assert station.read(46, "I") == pytest.approx((10.8 - 10.5) / 1.8 * 10_000, abs=1)
     station.command(10)
-    station.live(1.0)
+    station.update(1.0)
     assert station.read(149, "B") == 0
     assert station.robot.world.speed_m_s == 0.0
     station.opencr.set_battery(12.0)
-    station.live(2.0)
+    station.update(2.0)
     # The servos have restarted; nobody switches their torque on.
     assert station.robot.left.answers
     assert station.read(149, "B") == 0
@@ -333,9 +333,9 @@ def test_buttons_and_bumpers_are_told(station: Station) -> None:
 
 
 def test_the_imu_tells_the_heading(station: Station) -> None:
-    station.live(0.2)
+    station.update(0.2)
     station.command(0, 50)
-    station.live(1.0)
+    station.update(1.0)
     assert station.read(68, "f") == pytest.approx(0.5, abs=0.02)
     w, x, y, z = (station.read(address, "f") for address in (96, 100, 104, 108))
     yaw = math.atan2(x * y + w * z, 0.5 - y * y - z * z)
@@ -347,9 +347,9 @@ def test_the_imu_tells_the_heading(station: Station) -> None:
 def test_without_motors_it_stands_and_says_so() -> None:
     with SimulatedTurtleBot3(has_motors=False, clock=ManualClock()) as robot:
         station = Station(robot)
-        station.live(0.2)
+        station.update(0.2)
         station.command(10)
-        station.live(0.5)
+        station.update(0.5)
         assert (station.read(18, "b"), station.read(148, "B"), station.read(149, "B")) == (-1, 0, 0)
         assert station.wheels() == (0, 0)
         assert robot.world.speed_m_s == 0.0

@@ -120,7 +120,7 @@ def test_a_servo_answers_whatever_it_is_asked(requests: list[tuple[int, int, byt
             assert [answer[0] for answer in answers] == [device_id] * sum(listening)
         assert all(answer[1] & 0x7F <= 7 for answer in answers)
         time.advance(pause_ms / 1000)
-        servos.live()
+        servos.update()
     # They live.
     time.advance(1.0)
     for servo in servos.servos:
@@ -148,7 +148,7 @@ def test_opencr_answers_three_instructions_and_no_others(requests: list[tuple[in
         found = list(opencr.receive(request(device_id, instruction, parameters), 0))
         world.time.advance(pause_ms / 1000)
         # The end of a calibration that was asked for.
-        found += opencr.live()
+        found += opencr.update()
         is_long = instruction == 2 and len(parameters) == 4 and int.from_bytes(parameters[2:], "little") > 2037
         is_answered = device_id == 200 and instruction in (1, 2, 3) and not is_long
         assert [well_formed(sending.data)[0] for sending in found] == [200] * is_answered

@@ -19,10 +19,10 @@ def test_time_passes_until_the_patience_is_over_and_goes_on_when_the_host_is_hea
     clock.advance(5.0)
     assert time.world_s() == pytest.approx(0.5)
     # What it has waited for is not made up for.
-    time.heard()
+    time.host_sent()
     clock.advance(0.03)
     assert time.world_s() == pytest.approx(0.8)
-    time.heard()
+    time.host_sent()
     clock.advance(0.04)
     assert time.world_s() == pytest.approx(1.2)
 
@@ -31,7 +31,7 @@ def test_without_patience_time_passes_whoever_is_heard() -> None:
     clock = ManualClock()
     time = Timebase(clock, factor=3.0)
     clock.advance(10.0)
-    time.heard()
+    time.host_sent()
     assert time.world_s() == pytest.approx(30.0)
 
 

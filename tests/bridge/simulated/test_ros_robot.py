@@ -36,7 +36,7 @@ def lived(robot: RosRobot, seconds: float, velocity: tuple[float, float] | None 
         if velocity is not None:
             robot.command(*velocity)
         robot.advance(STEP_S)
-        found += robot.live()
+        found += robot.update()
     return found
 
 
@@ -63,12 +63,12 @@ def test_a_fast_world_tells_its_time_a_hundred_times_a_second_of_the_clock() -> 
 
 def test_what_was_missed_is_not_made_up_for() -> None:
     robot = in_room()
-    robot.live()
+    robot.update()
     robot.advance(3.0)
-    found = robot.live()
+    found = robot.update()
     assert Counter(type(reading) for reading in found) == {Clock: 1, Odometry: 1, Scan: 1, Battery: 1}
     assert [reading.stamp_s for reading in found] == pytest.approx([3.0] * 4)
-    assert robot.live() == []
+    assert robot.update() == []
     assert robot.due_s > 3.0
 
 

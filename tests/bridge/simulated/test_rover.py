@@ -28,7 +28,7 @@ class Station:
         found = []
         for _ in range(round(seconds / 0.01)):
             self.clock.advance(0.01)
-            found += self.said(self.rover.live())
+            found += self.said(self.rover.update())
         return found
 
     def tell(self, name: str, **values: Any) -> list[Packet]:

@@ -65,7 +65,7 @@ def write(robot: SimulatedTurtleBot3, servo: Servo, *packets: tuple[int, bytes])
     """Write into a servo's table as its host does."""
     with robot.time.lock:
         for packet in packets:
-            servo.hear()
+            servo.instruction_received()
             assert servo.write(*packet) == 0
 
 

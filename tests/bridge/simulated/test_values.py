@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc_simulated.values import coordinate, number, option, seed, together, voltage, whole
+from robosc_simulated.values import coordinate, number, number_tuple, option, seed, voltage, whole_number
 
 
 @given(st.floats())
@@ -22,16 +22,16 @@ def test_a_number_is_finite_and_within_its_bounds(value: float) -> None:
 @given(st.integers())
 def test_a_whole_number_is_within_its_bounds(value: int) -> None:
     if -3 <= value <= 9:
-        assert whole(str(value), -3, 9) == value
+        assert whole_number(str(value), -3, 9) == value
     else:
         with pytest.raises(ValueError, match="a whole number from -3 to 9 is needed, not"):
-            whole(str(value), -3, 9)
+            whole_number(str(value), -3, 9)
 
 
 @pytest.mark.parametrize("text", ["", "x", "1.5", "1e3", "nan", "9" * 10_000, "--1", "²", "0x10"])
 def test_what_is_no_whole_number_is_told(text: str) -> None:
     with pytest.raises(ValueError, match="a whole number from 0 to 10000 is needed"):
-        whole(text, 0, 10_000)
+        whole_number(text, 0, 10_000)
 
 
 def test_what_has_a_unit_has_its_bounds() -> None:
@@ -42,7 +42,7 @@ def test_what_has_a_unit_has_its_bounds() -> None:
 
 
 def test_options_are_read_alike() -> None:
-    read = option(together((coordinate, voltage), ","))
+    read = option(number_tuple((coordinate, voltage), ","))
     assert read("1,2") == (1.0, 2.0)
     for text, problem in (("1", "2 numbers with `,` between them"), ("1,2,3", "2 numbers"), ("1,nan", "from 0 to 60")):
         with pytest.raises(argparse.ArgumentTypeError, match=problem):

@@ -72,9 +72,9 @@ class TestKeys:
         requested.press("w", 10.0)
         requested.press("k", 10.5)
         requested.press("?", 11.0)
-        requested.lapse(10.5 + LAPSE_S - 0.01)
+        requested.expire(10.5 + LAPSE_S - 0.01)
         assert requested.linear_m_s == 0.02
-        requested.lapse(10.5 + LAPSE_S)
+        requested.expire(10.5 + LAPSE_S)
         assert not requested.is_motion
 
     def test_a_key_after_that_begins_anew(self) -> None:

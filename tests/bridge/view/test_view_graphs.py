@@ -15,8 +15,8 @@ from robosc_view.graphs import (
     MAXIMUM_STATES,
     Arrow,
     Node,
-    drawn,
     layers_of,
+    layout,
     shortened,
 )
 from support.effort import examples
@@ -58,9 +58,9 @@ def boxes(graph: dict[str, Any]) -> list[tuple[float, float, float, float]]:
 @settings(max_examples=examples(100))
 def test_states_and_labels_lie_inside_and_apart(seed: int) -> None:
     nodes, arrows = automaton(seed)
-    graph = drawn(nodes, arrows)
+    graph = layout(nodes, arrows)
     assert graph is not None
-    assert graph == drawn(nodes, arrows)
+    assert graph == layout(nodes, arrows)
     found = boxes(graph)
     for left, top, right, bottom in found:
         assert left >= 0 and top >= 0 and right <= graph["width"] and bottom <= graph["height"]
@@ -72,7 +72,7 @@ def test_states_and_labels_lie_inside_and_apart(seed: int) -> None:
 @settings(max_examples=examples(100))
 def test_edges_go_from_border_to_border_over_their_label(seed: int) -> None:
     nodes, arrows = automaton(seed)
-    graph = drawn(nodes, arrows)
+    graph = layout(nodes, arrows)
     assert graph is not None
     assert [edge["id"] for edge in graph["edges"]] == [arrow.number for arrow in arrows]
     assert [item["name"] for item in graph["states"]] == [node.name for node in nodes]
@@ -120,7 +120,7 @@ def test_the_initial_state_is_on_top_and_what_it_leads_to_below(seed: int) -> No
 def test_a_chain_stands_upright() -> None:
     nodes = [Node(name, name == "a", False) for name in "abc"]
     arrows = [Arrow(k, one, two, "go", "silent") for k, (one, two) in enumerate(pairwise("abc"))]
-    graph = drawn(nodes, arrows)
+    graph = layout(nodes, arrows)
     assert graph is not None
     assert len({item["x"] for item in graph["states"]}) == 1
     heights = [item["y"] for item in graph["states"]]
@@ -128,9 +128,9 @@ def test_a_chain_stands_upright() -> None:
 
 
 def test_what_nobody_could_read_is_not_drawn() -> None:
-    assert drawn([], []) is None
+    assert layout([], []) is None
     many = [Node(f"s{n}", n == 0, False) for n in range(MAXIMUM_STATES + 1)]
-    assert drawn(many, []) is None
+    assert layout(many, []) is None
     arrows = [Arrow(n, "s0", "s0", "x", "silent") for n in range(MAXIMUM_EDGES + 1)]
-    assert drawn(many[:1], arrows) is None
-    assert drawn(many[:MAXIMUM_STATES], []) is not None
+    assert layout(many[:1], arrows) is None
+    assert layout(many[:MAXIMUM_STATES], []) is not None

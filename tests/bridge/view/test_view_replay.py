@@ -276,12 +276,12 @@ def test_the_last_transitions_are_those_of_a_run_from_the_beginning(seed: int, h
 def test_what_waits_of_another_place_is_not_told_after_a_jump() -> None:
     async def look() -> list[str]:
         viewer = Viewer()
-        viewer.happened(["of before"], 3)
+        viewer.append_events(["of before"], 3)
         viewer.show("update of before")
-        viewer.scanned("scan of before")
+        viewer.show_scan("scan of before")
         viewer.jump()
-        viewer.moved("position")
-        viewer.happened(["{}"], 0)
+        viewer.show_position("position")
+        viewer.append_events(["{}"], 0)
         viewer.show("update")
         return await viewer.take()
 

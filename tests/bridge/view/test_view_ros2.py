@@ -61,8 +61,8 @@ def test_without_the_model_the_automata_are_shown_all_the_same(large: Supervisor
     robot, _, _ = StateReader(None).read(text, 1.0)
     assert robot.shape == known.shape
     assert robot.table == known.table
-    assert [(item.name, item.component, item.kind) for item in robot.talks] == [
-        (item.name, item.component, item.kind) for item in known.talks
+    assert [(item.name, item.component, item.kind) for item in robot.communications] == [
+        (item.name, item.component, item.kind) for item in known.communications
     ]
 
 

@@ -13,7 +13,7 @@ from robosc_bridge.remote import RemoteSettings, convert, serve
 from robosc_view import broadcaster as hub_module
 from robosc_view.definition import DefinitionError
 from robosc_view.messages import NOT_EXECUTED, NOT_KNOWN, MessageBuilder, PreparedRobot, entry_text
-from robosc_view.remote_bridge import robot_told
+from robosc_view.remote_bridge import robot_from
 from robosc_view.reports import EventBatch, Status
 from robosc_view.running import RunningBridge
 from robosc_view.sources import RefusedError
@@ -64,12 +64,12 @@ def test_a_robot_that_is_there_again_is_not_told_as_lost() -> None:
         # Who has not read for a while is told what is so now, and every answer.
         viewer.answer("refused")
         for _ in range(2 * hub_module.MAXIMUM_ANSWERS):
-            viewer.lose("gone")
+            viewer.source_lost("gone")
         viewer.define("definition")
         viewer.show("update")
         assert await viewer.take() == ["definition", "refused", "update"]
         viewer.define("definition")
-        viewer.lose("gone")
+        viewer.source_lost("gone")
         assert await viewer.take() == ["definition", "gone"]
 
     asyncio.run(look())
@@ -105,24 +105,24 @@ def test_a_bridge_elsewhere_is_commanded(robot: LiveRobot) -> None:
 
 def test_both_ways_to_a_bridge_define_and_tell_the_same(robot: LiveRobot) -> None:
     told = convert.definition(robot.operations)
-    near, far = RunningBridge(robot.operations).robot, robot_told(told)
+    near, far = RunningBridge(robot.operations).robot, robot_from(told)
     assert near == far
     # As a bridge of before, which did not tell its supervisor.
     told.supervisor = b""
-    without = robot_told(told)
-    assert (without.shape, without.table, without.talks, without.requests) == (
+    without = robot_from(told)
+    assert (without.shape, without.table, without.communications, without.requests) == (
         near.shape,
         near.table,
-        near.talks,
+        near.communications,
         near.requests,
     )
     assert without.supervisor is None
     # As one of later, with another format.
     told.supervisor = b'{"format":"robosc-supervisor","version":99}'
-    assert robot_told(told).supervisor is None
+    assert robot_from(told).supervisor is None
     told.definition = "[" * 100_000
     with pytest.raises(DefinitionError):
-        robot_told(told)
+        robot_from(told)
     assert isinstance(told, pb.GetDefinitionResponse)
 
 

@@ -11,13 +11,13 @@ import time
 from pathlib import Path
 
 from PIL import Image
-from robosc_bridge.experiments.maze import CHANNELS
-from robosc_bridge.experiments.processes import Program, interruptible
-from robosc_bridge.experiments.scenario import ScenarioError
-from robosc_bridge.experiments.serial import EXAMPLES, Rig, Setting, running, scene_of
-from robosc_bridge.experiments.tail import latest
 
 from robosc.model.structure import Deployment
+from robosc_experiments.maze import CHANNELS
+from robosc_experiments.processes import Program, interruptible
+from robosc_experiments.scenario import ScenarioError
+from robosc_experiments.serial import EXAMPLES, Rig, Setting, running, scene_of
+from robosc_experiments.tail import latest
 from support.browser import CHROMIUM, running_browser, visit
 
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"

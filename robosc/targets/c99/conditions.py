@@ -2,7 +2,7 @@
 
 from robosc.expressions import conjuncts
 from robosc.supervisor import DecisionNode
-from robosc.targets.c99.expressions import code_text, number_code
+from robosc.targets.c99.expressions import number_code
 from robosc.targets.c99.text import comment
 from robosc.targets.c99.unit import Reading, Unit
 from robosc.targets.code.conditions import Conditions, node_words
@@ -22,6 +22,7 @@ class CConditions(Conditions):
 
     def __init__(self, unit: Unit) -> None:
         self._reading = Reading(unit)
+        self._unit = unit
         self._layout = unit.layout
         super().__init__(unit.layout.supervisor, unit.system, self._reading)
 
@@ -37,7 +38,7 @@ class CConditions(Conditions):
         body = []
         for number, requirement in enumerate(self._layout.model.requirements_on(communication)):
             body += comment(requirement_text(requirement))
-            body.append(f"holds[{number}] = {code_text(self._reading.truth(requirement.condition))};")
+            body.append(f"holds[{number}] = {self._unit.text(self._reading.truth(requirement.condition))};")
         return self._filling("requirements", communication, body)
 
     def conjuncts_function(self, communication: str) -> list[str]:
@@ -47,7 +48,7 @@ class CConditions(Conditions):
             for requirement in self._layout.model.requirements_on(communication)
             for part in conjuncts(requirement.condition)
         ]
-        body = [f"holds[{number}] = {code_text(self._reading.truth(part))};" for number, part in enumerate(parts)]
+        body = [f"holds[{number}] = {self._unit.text(self._reading.truth(part))};" for number, part in enumerate(parts)]
         return self._filling("conjuncts", communication, body)
 
     def _filling(self, purpose: str, communication: str, body: list[str]) -> list[str]:
@@ -59,10 +60,11 @@ class CConditions(Conditions):
 
     def _node_function(self, number: int, node: DecisionNode, branches: tuple[Code, ...]) -> list[str]:
         lines = [*comment(node_words(node)), f"static bool node_{number + 1}({_SIGNATURE})", "{", "    (void)s;"]
-        for end, branch in list(zip(node.starts[1:], branches, strict=False)):
-            test = code_text(self._is_before(node, end))
-            lines += indent([f"if ({test}) {{", f"    return {code_text(branch)};", "}"])
-        return [*lines, f"    return {code_text(branches[-1])};", "}"]
+        with self._unit.calls_apart() as self._unit.calls[f"node_{number + 1}"]:
+            for end, branch in list(zip(node.starts[1:], branches, strict=False)):
+                test = self._unit.text(self._is_before(node, end))
+                lines += indent([f"if ({test}) {{", f"    return {self._unit.text(branch)};", "}"])
+            return [*lines, f"    return {self._unit.text(branches[-1])};", "}"]
 
     def _is_before(self, node: DecisionNode, end: int) -> Code:
         """Return the code that tests whether the subject's value stands before place `end` of its domain."""

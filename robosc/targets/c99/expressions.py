@@ -106,11 +106,6 @@ def number_code(number: int) -> Code:
     return literal(low_text(number), Sort.INTEGER, number)
 
 
-def atom_text(code: Code) -> str:
-    """The text of an expression, in parentheses unless it needs none."""
-    return C.within(code, ATOM)
-
-
 def _tested(code: Code) -> tuple[Code, str, bool] | None:
     """Return the place, the constant and whether they are equal, if a condition tests that."""
     match code:

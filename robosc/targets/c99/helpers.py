@@ -172,3 +172,10 @@ HELPERS: dict[str, str] = dict(
     ]
 )
 """The text of each function by name, each after those that it calls."""
+
+HELPER_CALLS = {
+    **{f"{name}_i": {"whole"} for name in ("add", "subtract", "multiply", "negate", "abs")},
+    **{f"{name}_d": {"finite_d"} for name in ("add", "subtract", "multiply", "divide", "negate", "abs")},
+    **{f"clamp_{letter}": {f"min_{letter}", f"max_{letter}"} for letter in "id"},
+}
+"""The functions that each of them calls."""

@@ -4,7 +4,6 @@ from robosc.errors import InternalError
 from robosc.expressions.text import expression_text
 from robosc.model.received import received_paths
 from robosc.model.structure import Communication, CommunicationKind, EventKind
-from robosc.targets.c99.expressions import code_text
 from robosc.targets.c99.header import reply_head
 from robosc.targets.c99.layer import call_head, cancel_head, goal_head, request_head, request_parameters
 from robosc.targets.c99.layout import Layout, event_data, possible_messages, request_data, told_apart
@@ -71,7 +70,7 @@ def _match_function(unit: Unit, item: Communication) -> list[str]:
         "{",
         *indent(lines),
         *indent(comment(f"when: {expression_text(item.when)}")),
-        f"    *is_this = {code_text(reading.truth(item.when))};",
+        f"    *is_this = {unit.text(reading.truth(item.when))};",
         f"    return judge_notes(r, {layout.events[item.event(EventKind.REQUEST)]}, &notes);",
         "}",
     ]

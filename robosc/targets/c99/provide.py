@@ -11,10 +11,10 @@ from robosc.expressions import (
     Type,
 )
 from robosc.model.structure import Communication, ObjectValue, ProvidedValue
-from robosc.targets.c99.expressions import atom_text, code_text
+from robosc.targets.c99.expressions import ATOM
 from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.text import comment
-from robosc.targets.c99.unit import Reading, Unit, declared, local
+from robosc.targets.c99.unit import Reading, Unit, declared
 from robosc.targets.code.expressions import TRUE_CODE, Sort
 from robosc.targets.code.text import indent
 from robosc.targets.model_text import provide_text
@@ -102,7 +102,7 @@ def provide_function(unit: Unit, item: Communication) -> list[str]:
         result = _result(unit, item, root, statement.value)
         if condition == TRUE_CODE:
             return [*lines, *indent(result), "}"]
-        lines += [f"    if ({code_text(condition)}) {{", *indent(result, 2), "    }"]
+        lines += [f"    if ({unit.text(condition)}) {{", *indent(result, 2), "    }"]
     return [*lines, "    return true;", "}"]
 
 
@@ -134,10 +134,10 @@ def _store(
     code = reading.value(provided)
     if isinstance(found.type, DoubleType):
         code = reading.as_double(code)
-    text = code_text(code)
+    text = unit.text(code)
     if not code.is_known:
         text = f"data_{len(tests) + 1}"
-        lines.append(local(code, text))
+        lines.append(unit.local(code, text))
         tests.append(
             {
                 Sort.DOUBLE: f"!isfinite({text})",
@@ -147,7 +147,7 @@ def _store(
         )
     stores.append(f"{place}.{found.flag} = true;")
     stores.append(
-        f"{place}.{found.value} = {_stored(unit, found.type, text, atom_text(code) if code.is_known else text)};"
+        f"{place}.{found.value} = {_stored(unit, found.type, text, unit.text(code, ATOM) if code.is_known else text)};"
     )
 
 

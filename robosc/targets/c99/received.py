@@ -12,7 +12,7 @@ from robosc.expressions import (
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path
 from robosc.model.structure import EnumDefinition
-from robosc.targets.c99.expressions import c_type, code_text
+from robosc.targets.c99.expressions import c_type
 from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.text import comment
 from robosc.targets.c99.unit import Lvalue, Reading, Unit, declared
@@ -65,10 +65,11 @@ class Reader:
         held = f"const {self.unit.layout.raw(type_)} *" if is_array else c_type(code.sort)
         # The text itself is constant already; of everything else the local variable is.
         constant = "" if is_array or held.endswith("*") else "const "
-        self._lines.append(f"{constant}{declared(held, name)} = {code_text(code)};")
+        self._lines.append(f"{constant}{declared(held, name)} = {self.unit.text(code)};")
         if is_array:
             notable = note_function(self.unit, type_)
             if notable:
+                self.unit.called.add(notable)
                 self._lines.append(f"{notable}({name}, {self.notes});")
         return code.held_in(name)
 
@@ -77,7 +78,8 @@ def note_function(unit: Unit, type_: Type) -> str | None:
     """The function that notes what is unknown in an array's elements, or None if nothing can be noted."""
     if not isinstance(type_, ArrayType):
         return None
-    body = _notes_on(unit, Lvalue("array->items[k]"), type_.element)
+    with unit.calls_apart() as calls:
+        body = _notes_on(unit, Lvalue("array->items[k]"), type_.element)
     if not body:
         return None
     lines = [
@@ -89,13 +91,13 @@ def note_function(unit: Unit, type_: Type) -> str | None:
         "    }",
         "}",
     ]
-    return unit.function("note", "\n".join(lines))
+    return unit.function("note", "\n".join(lines), calls)
 
 
 def _notes_on(unit: Unit, lvalue: Lvalue, type_: Type) -> list[str]:
     match type_:
         case IntegerType(low=int(), high=int()) | EnumType():
-            return [f"(void){code_text(unit.conversion(lvalue, type_, 'notes'))};"]
+            return [f"(void){unit.text(unit.conversion(lvalue, type_, 'notes'))};"]
         case ObjectType(name=name):
             return [
                 line
@@ -104,7 +106,10 @@ def _notes_on(unit: Unit, lvalue: Lvalue, type_: Type) -> list[str]:
             ]
         case ArrayType():
             inner = note_function(unit, type_)
-            return [f"{inner}({lvalue.address}, notes);"] if inner else []
+            if not inner:
+                return []
+            unit.called.add(inner)
+            return [f"{inner}({lvalue.address}, notes);"]
         case _:
             return []
 
@@ -117,6 +122,11 @@ def converter_head(unit: Unit, enum: EnumDefinition) -> str:
 
 def converter(unit: Unit, enum: EnumDefinition) -> list[str]:
     """The function that makes an enum out of received data, as a readable chain of conditions."""
+    with unit.calls_apart() as unit.calls[unit.layout.converters[enum.name]]:
+        return [converter_head(unit, enum), "{", *indent(_conversion(unit, enum)), "}"]
+
+
+def _conversion(unit: Unit, enum: EnumDefinition) -> list[str]:
     lvalue = Lvalue("data", unit.layout.is_by_pointer(enum.source))
     reader = Reader(unit, enum.source, lvalue, "notes")
     reading = Reading(unit, None, reader.read, reader.type_at)
@@ -129,17 +139,16 @@ def converter(unit: Unit, enum: EnumDefinition) -> list[str]:
         # What only a later rule needs is not read before that rule's turn.
         body += _declared_and_used(reader)
         body += comment(f"{expression_text(rule.condition)} -> {rule.value}")
-        body += [f"if ({code_text(fires)}) {{", f"    return {values[enum.name, rule.value]};", "}"]
+        body += [f"if ({unit.text(fires)}) {{", f"    return {values[enum.name, rule.value]};", "}"]
     body += comment(f"default -> {enum.default}")
     if may_compute(rule.condition for rule in enum.rules):
         body += [
-            f"if (notes != NULL && !({code_text(all_false)})) {{",
+            f"if (notes != NULL && !({unit.text(all_false)})) {{",
             "    notes->is_unknown = true;",
             "    notes->is_enum_unknown = true;",
             "}",
         ]
-    body.append(f"return {values[enum.name, enum.default]};")
-    return [converter_head(unit, enum), "{", *indent(body), "}"]
+    return [*body, f"return {values[enum.name, enum.default]};"]
 
 
 def _declared_and_used(reader: Reader) -> list[str]:

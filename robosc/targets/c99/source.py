@@ -1,7 +1,5 @@
 """The generated C file: tables, the functions of the model, the engine, and the functions through which data comes."""
 
-import re
-
 from robosc.automata.plants import communication_plant_name
 from robosc.expressions import ArrayType, BooleanType, DoubleType, EnumType, IntegerType, NoneType, ObjectType, Type
 from robosc.model.received import converted_paths
@@ -9,7 +7,7 @@ from robosc.model.structure import CommunicationKind, EventKind, is_tau
 from robosc.targets.c99.conditions import CConditions
 from robosc.targets.c99.expressions import low_text
 from robosc.targets.c99.header import batch, batch_parameters, counts, head, receive_head, reply_head, runtime_text
-from robosc.targets.c99.helpers import HELPERS
+from robosc.targets.c99.helpers import HELPER_CALLS, HELPERS
 from robosc.targets.c99.layer_source import happen_call, reply_functions, request_functions
 from robosc.targets.c99.layout import Layout, data_that_comes, event_data
 from robosc.targets.c99.provide import default_function, provide_function
@@ -49,21 +47,22 @@ def source_file(unit: Unit) -> str:
         **dict(unit.functions.values()),
         **{name: "\n".join(lines) for name, lines in (*converters.items(), *conditions.nodes.items())},
     }
-    called = _called(functions, "\n".join(line for block in rest for line in block))
+    called = _called(unit.called, HELPER_CALLS | unit.calls)
     heads = [f"{converter_head(unit, enum)};" for enum in layout.model.enums if layout.converters[enum.name] in called]
     texts = [*heads, *(text for name, text in functions.items() if name in called)]
     return "\n\n".join([_prologue(layout), *texts, *("\n".join(block) for block in rest)]) + "\n"
 
 
-def _called(functions: dict[str, str], text: str) -> set[str]:
-    """The functions that a text calls, or that those call: a compiler warns about others."""
-    called: set[str] = set()
-    texts = [text]
-    while texts:
-        for name in set(re.findall(r"\w+(?=\()", texts.pop())) & functions.keys() - called:
-            called.add(name)
-            texts.append(functions[name])
-    return called
+def _called(called: set[str], calls: dict[str, set[str]]) -> set[str]:
+    """The functions that are called, or that those call: a compiler warns about others."""
+    found: set[str] = set()
+    to_do = [*called]
+    while to_do:
+        name = to_do.pop()
+        if name not in found:
+            found.add(name)
+            to_do += calls.get(name, ())
+    return found
 
 
 def _never_taken(layout: Layout, event: str) -> bool:

@@ -16,13 +16,13 @@ from robosc.expressions import (
 )
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
-from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
-from robosc.targets.c99.expressions import atom_text, c_type, code_text, low_text
+from robosc.model.structure import Behaviour, Transition, Update, Variable, is_tau
+from robosc.targets.c99.expressions import ATOM, c_type, low_text
 from robosc.targets.c99.layout import event_data, width
 from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.received import Reader
 from robosc.targets.c99.text import comment
-from robosc.targets.c99.unit import Lvalue, Reading, Unit, declared, local
+from robosc.targets.c99.unit import Lvalue, Reading, Unit, declared
 from robosc.targets.code.conditions import accepted
 from robosc.targets.code.expressions import Code, Sort
 from robosc.targets.code.text import indent
@@ -167,7 +167,7 @@ class Stepper:
                 lines += body
             elif body:
                 test = self._reading.in_one_of(component, states)
-                lines += [f"if ({code_text(test)}) {{", *indent(body), "}"]
+                lines += [f"if ({self.unit.text(test)}) {{", *indent(body), "}"]
         return lines
 
     def _transition(
@@ -190,12 +190,12 @@ class Stepper:
         fits = self._fits(variable.type, code)
         cast = stored_cast(variable.type)
         if fits is None:
-            return [*words, f"{place} = {cast}{atom_text(code) if cast else code_text(code)};"]
+            return [*words, f"{place} = {cast}{self.unit.text(code, ATOM if cast else 0)};"]
         self._may_skip = True
         new = self._namer.name(f"new_{variable.name}")
         return [
             *words,
-            local(code, new),
+            self.unit.local(code, new),
             f"if ({fits.replace('@', new)}) {{",
             f"    {place} = {cast}{f'({new} != 0)' if isinstance(variable.type, BooleanType) else new};",
             "} else {",

@@ -1,6 +1,7 @@
 """Things that all parts of one generated C file share, and the reading of expressions in it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 from robosc.automata import System
@@ -25,7 +26,7 @@ from robosc.expressions import (
 )
 from robosc.model.received import Path
 from robosc.supervisor import Supervisor
-from robosc.targets.c99.expressions import CWriter, c_type, code_text, number_code, unknown_as, unknown_text
+from robosc.targets.c99.expressions import C, CWriter, c_type, code_text, number_code, unknown_as, unknown_text
 from robosc.targets.c99.layout import Layout, make_layout
 from robosc.targets.code.expression_writer import read_nothing
 from robosc.targets.code.expressions import (
@@ -76,19 +77,43 @@ class Unit:
     Attributes:
         layout: Names.
         system: The automata, for the domains of decision diagrams.
-        functions: Text of each function made for an array, by its head and body without its name.
+        functions: Name and text of each function made for an array, by its head and body without its name.
+        calls: Functions that each function of these, of enums and of decision diagrams calls, by its name.
+        called: Functions that all other code calls.
     """
 
     layout: Layout
     system: System
     functions: dict[str, tuple[str, str]] = field(default_factory=dict)
+    calls: dict[str, set[str]] = field(default_factory=dict)
+    called: set[str] = field(default_factory=set)
 
-    def function(self, purpose: str, template: str) -> str:
+    def text(self, code: Code, level: int = 0) -> str:
+        """The text of an expression for a place that asks for a binding strength; what it calls is noted."""
+        self.called.update(piece.word for piece in code.pieces() if piece.kind is Kind.CALL)
+        return C.within(code, level)
+
+    @contextmanager
+    def calls_apart(self) -> Iterator[set[str]]:
+        """Note what is called inside apart from what all other code calls."""
+        outside, self.called = self.called, set()
+        try:
+            yield self.called
+        finally:
+            self.called = outside
+
+    def function(self, purpose: str, template: str, calls: set[str]) -> str:
         """The name of a function with this text, in which `@` stands for the name; equal ones are written once."""
         if template not in self.functions:
             name = f"{purpose}_{len(self.functions) + 1}"
             self.functions[template] = (name, template.replace("@", name))
+            self.calls[name] = calls
         return self.functions[template][0]
+
+    def local(self, code: Code, name: str) -> str:
+        """The declaration of a local variable that holds the value of an expression; a text is constant already."""
+        constant = "" if code.sort is Sort.TEXT else "const "
+        return f"{constant}{declared(c_type(code.sort), name)} = {self.text(code)};"
 
     def conversion(self, lvalue: Lvalue, type_: Type, notes: str) -> Code:
         """The value of a type that is made of received data; what must be noted goes to `notes`."""
@@ -140,12 +165,6 @@ def declared(c_type: str, name: str) -> str:
     return f"{c_type}{name}" if c_type.endswith("*") else f"{c_type} {name}"
 
 
-def local(code: Code, name: str) -> str:
-    """The declaration of a local variable that holds the value of an expression; a text is constant already."""
-    constant = "" if code.sort is Sort.TEXT else "const "
-    return f"{constant}{declared(c_type(code.sort), name)} = {code_text(code)};"
-
-
 def pointer_to(raw: str, name: str) -> str:
     """The declaration of a pointer to constant data."""
     return f"{raw}const *{name}" if raw.endswith("*") else f"const {raw} *{name}"
@@ -186,7 +205,7 @@ class Reading(CWriter):
 
     def unless(self, code: Code, statement: str) -> list[str]:
         """A statement that is executed where a known condition does not hold."""
-        return [f"if ({code_text(self.negated(code))}) {{", f"    {statement}", "}"]
+        return [f"if ({self.unit.text(self.negated(code))}) {{", f"    {statement}", "}"]
 
     def _received_code(self, path: tuple[PathStep, ...]) -> Code:
         return self.received(path)
@@ -211,16 +230,16 @@ class Reading(CWriter):
             raise InternalError(f"{code_text(code)} is no array")
         return code, type_
 
-    def _loop(self, part: ArrayPart) -> tuple[str, str]:
-        """Return the number of elements that are looked at, and the place of the one with number `k`."""
+    def _loop(self, part: ArrayPart) -> tuple[str, str, set[str]]:
+        """The number of elements that are looked at, the place of the one with number `k`, and what these call."""
         if part.low is None or part.high is None:
-            return "array->length", "k"
+            return "array->length", "k", set()
         bounds = f"array->length, {part.low}U"
-        return f"part_count({bounds}, {part.high}U)", f"part_index({bounds}, k)"
+        return f"part_count({bounds}, {part.high}U)", f"part_index({bounds}, k)", {"part_count", "part_index"}
 
     def _reduction_code(self, expression: Reduction) -> Code:
         array, type_ = self._array(expression.part)
-        count, index = self._loop(expression.part)
+        count, index, calls = self._loop(expression.part)
         raw = self.unit.layout.raw(type_)
         nothing = "array == NULL || array->items == NULL"
         if expression.function == "length":
@@ -228,9 +247,11 @@ class Reading(CWriter):
                 "length",
                 f"static int64_t @(const {raw} *array)\n{{\n"
                 f"    return ({nothing}) ? INT64_MIN : (int64_t)({count});\n}}",
+                calls,
             )
             return replace(call(name, array, sort=Sort.INTEGER, unknown=Unknown.VALUE), low=0)
-        element = self.unit.conversion(Lvalue("array->items[place]"), type_.element, "NULL")
+        with self.unit.calls_apart() as called:
+            element = self.unit.text(self.unit.conversion(Lvalue("array->items[place]"), type_.element, "NULL"))
         sort = sort_of(type_.element)
         unknown, held = unknown_text(sort), c_type(sort)
         skip = "isnan(item)" if isinstance(type_.element, DoubleType) else None
@@ -243,7 +264,7 @@ class Reading(CWriter):
             f"    const size_t count = ({nothing}) ? 0 : {count};",
             "    for (size_t k = 0; k < count; k++) {",
             f"        const size_t place = {index};",
-            f"        const {held} item = {code_text(element)};",
+            f"        const {held} item = {element};",
         ]
         if skip is None:
             lines += [f"        if (item == {unknown}) {{", f"            return {unknown};", "        }"]
@@ -259,12 +280,12 @@ class Reading(CWriter):
             "    return found;",
             "}",
         ]
-        name = self.unit.function(expression.function + "imum", "\n".join(lines))
+        name = self.unit.function(expression.function + "imum", "\n".join(lines), calls | called)
         return call(name, array).typed(type_.element, unknown_as(sort))
 
     def _quantifier_code(self, expression: Quantifier) -> Code:
         array, type_ = self._array(expression.part)
-        count, index = self._loop(expression.part)
+        count, index, calls = self._loop(expression.part)
         raw = self.unit.layout.raw
         parameters, arguments = [f"const {raw(type_)} *array"], [array]
         found = leaves(expression.condition)
@@ -285,7 +306,8 @@ class Reading(CWriter):
             arguments.append(Code(Kind.PLACE, lvalue.address))
             elements.append((Lvalue(f"outer_{number + 1}", True), outer_type))
         inner = Reading(self.unit, "s->", codes.__getitem__, self.received_type, tuple(elements))
-        condition = inner.value(expression.condition)
+        with self.unit.calls_apart() as called:
+            condition = self.unit.text(inner.value(expression.condition))
         ends = int(expression.word == "any")
         lines = [
             f"static int @({', '.join(parameters)})",
@@ -295,7 +317,7 @@ class Reading(CWriter):
             *(f"    (void){item.rpartition(' ')[2].lstrip('*')};" for item in parameters[1:]),
             "    for (size_t k = 0; k < count; k++) {",
             f"        {pointer_to(raw(type_.element), 'item')} = &array->items[{index}];",
-            f"        const int holds = {code_text(condition)};",
+            f"        const int holds = {condition};",
             "        (void)item;",
             f"        if (holds == {ends}) {{",
             f"            return {ends};",
@@ -307,7 +329,7 @@ class Reading(CWriter):
             "    return result;",
             "}",
         ]
-        name = self.unit.function(expression.word, "\n".join(lines))
+        name = self.unit.function(expression.word, "\n".join(lines), calls | called)
         return call(name, *arguments, unknown=Unknown.VALUE)
 
 

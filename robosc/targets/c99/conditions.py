@@ -60,7 +60,7 @@ class CConditions(Conditions):
 
     def _node_function(self, number: int, node: DecisionNode, branches: tuple[Code, ...]) -> list[str]:
         lines = [*comment(node_words(node)), f"static bool node_{number + 1}({_SIGNATURE})", "{", "    (void)s;"]
-        with self._unit.calls_apart() as self._unit.calls[f"node_{number + 1}"]:
+        with self._unit.uses_apart() as self._unit.uses[f"node_{number + 1}"]:
             for end, branch in list(zip(node.starts[1:], branches, strict=False)):
                 test = self._unit.text(self._is_before(node, end))
                 lines += indent([f"if ({test}) {{", f"    return {self._unit.text(branch)};", "}"])
@@ -71,8 +71,8 @@ class CConditions(Conditions):
         domain = self._formulas.domains[node.automaton, node.variable]
         if node.variable is None:
             # Locations are numbered in the order of their domain.
-            return operation("<", Code(Kind.PLACE, self._reading.location(node.automaton)), number_code(end))
+            return operation("below", Code(Kind.PLACE, self._reading.location(node.automaton)), number_code(end))
         subject = place(*self._reading.variable(node.automaton, node.variable))
         if isinstance(domain[0], bool):
             return self._scope.negated(subject)
-        return operation("<", subject, number_code(int(domain[end]) if subject.sort is Sort.INTEGER else end))
+        return operation("below", subject, number_code(int(domain[end]) if subject.sort is Sort.INTEGER else end))

@@ -42,6 +42,7 @@ C = Language(
         "negate": Shape("-{}", _OTHER, (ATOM,)),
         "=": _infix("=="),
         **{operator: _infix(operator) for operator in ("+", "-", "*", "/", "!=", "<", "<=", ">", ">=")},
+        "below": Shape("{} < {}", _OTHER, (ATOM, _OTHER)),
         "is true": Shape("{} == 1", _OTHER, (ATOM,)),
         "is false": Shape("{} == 0", _OTHER, (ATOM,)),
         "if": Shape("{} ? {} : {}", _OTHER, (ATOM,) * 3),

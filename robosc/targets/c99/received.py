@@ -69,7 +69,7 @@ class Reader:
         if is_array:
             notable = note_function(self.unit, type_)
             if notable:
-                self.unit.called.add(notable)
+                self.unit.used.add(notable)
                 self._lines.append(f"{notable}({name}, {self.notes});")
         return code.held_in(name)
 
@@ -78,7 +78,7 @@ def note_function(unit: Unit, type_: Type) -> str | None:
     """The function that notes what is unknown in an array's elements, or None if nothing can be noted."""
     if not isinstance(type_, ArrayType):
         return None
-    with unit.calls_apart() as calls:
+    with unit.uses_apart() as uses:
         body = _notes_on(unit, Lvalue("array->items[k]"), type_.element)
     if not body:
         return None
@@ -91,7 +91,7 @@ def note_function(unit: Unit, type_: Type) -> str | None:
         "    }",
         "}",
     ]
-    return unit.function("note", "\n".join(lines), calls)
+    return unit.function("note", "\n".join(lines), uses)
 
 
 def _notes_on(unit: Unit, lvalue: Lvalue, type_: Type) -> list[str]:
@@ -108,7 +108,7 @@ def _notes_on(unit: Unit, lvalue: Lvalue, type_: Type) -> list[str]:
             inner = note_function(unit, type_)
             if not inner:
                 return []
-            unit.called.add(inner)
+            unit.used.add(inner)
             return [f"{inner}({lvalue.address}, notes);"]
         case _:
             return []
@@ -122,7 +122,7 @@ def converter_head(unit: Unit, enum: EnumDefinition) -> str:
 
 def converter(unit: Unit, enum: EnumDefinition) -> list[str]:
     """The function that makes an enum out of received data, as a readable chain of conditions."""
-    with unit.calls_apart() as unit.calls[unit.layout.converters[enum.name]]:
+    with unit.uses_apart() as unit.uses[unit.layout.converters[enum.name]]:
         return [converter_head(unit, enum), "{", *indent(_conversion(unit, enum)), "}"]
 
 

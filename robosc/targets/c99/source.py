@@ -47,7 +47,7 @@ def source_file(unit: Unit) -> str:
         **dict(unit.functions.values()),
         **{name: "\n".join(lines) for name, lines in (*converters.items(), *conditions.nodes.items())},
     }
-    called = _called(unit.called, HELPER_CALLS | unit.calls)
+    called = _called(unit.used, HELPER_CALLS | unit.uses)
     heads = [f"{converter_head(unit, enum)};" for enum in layout.model.enums if layout.converters[enum.name] in called]
     texts = [*heads, *(text for name, text in functions.items() if name in called)]
     return "\n\n".join([_prologue(layout), *texts, *("\n".join(block) for block in rest)]) + "\n"

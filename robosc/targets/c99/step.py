@@ -62,16 +62,18 @@ class Stepper:
     def step_function(self) -> list[str]:
         """The function that takes the event: how many updates were skipped, or REFUSED."""
         parameters = self.parameters
-        body = [*self._refusals(), *self._plant()]
-        for component, behaviour, branches in branches_of(self.unit.layout.behaviours, self.event):
-            body += self._block(component, behaviour, branches)
-        text = "\n".join(body)
+        with self.unit.uses_apart() as used:
+            body = [*self._refusals(), *self._plant()]
+            for component, behaviour, branches in branches_of(self.unit.layout.behaviours, self.event):
+                body += self._block(component, behaviour, branches)
+        self.unit.used |= used
+        reads_old = any(word == "&old" or word.startswith("old.") for word in used)
         head = ", ".join(["state_t *s", *parameters])
         unused = [code.word for code in self._received.values()]
         return [
             f"static int {self.unit.layout.function('takes', self.event)}({head})",
             "{",
-            *(["    const state_t old = *s;"] if "old." in text or "&old" in text else []),
+            *(["    const state_t old = *s;"] if reads_old else []),
             *(["    int skipped = 0;"] if self._may_skip else []),
             "    (void)s;",
             *(f"    (void){name};" for name in unused),

@@ -78,36 +78,36 @@ class Unit:
         layout: Names.
         system: The automata, for the domains of decision diagrams.
         functions: Name and text of each function made for an array, by its head and body without its name.
-        calls: Functions that each function of these, of enums and of decision diagrams calls, by its name.
-        called: Functions that all other code calls.
+        uses: Places and functions that each function of these, of enums and of diagrams uses, by its name.
+        used: Those that all other code reads and calls.
     """
 
     layout: Layout
     system: System
     functions: dict[str, tuple[str, str]] = field(default_factory=dict)
-    calls: dict[str, set[str]] = field(default_factory=dict)
-    called: set[str] = field(default_factory=set)
+    uses: dict[str, set[str]] = field(default_factory=dict)
+    used: set[str] = field(default_factory=set)
 
     def text(self, code: Code, level: int = 0) -> str:
-        """The text of an expression for a place that asks for a binding strength; what it calls is noted."""
-        self.called.update(piece.word for piece in code.pieces() if piece.kind is Kind.CALL)
+        """The text of an expression for a place that asks for a binding strength; what it uses is noted."""
+        self.used.update(piece.word for piece in code.pieces() if piece.kind in (Kind.PLACE, Kind.CALL))
         return C.within(code, level)
 
     @contextmanager
-    def calls_apart(self) -> Iterator[set[str]]:
-        """Note what is called inside apart from what all other code calls."""
-        outside, self.called = self.called, set()
+    def uses_apart(self) -> Iterator[set[str]]:
+        """Note what is used inside apart from what all other code uses."""
+        outside, self.used = self.used, set()
         try:
-            yield self.called
+            yield self.used
         finally:
-            self.called = outside
+            self.used = outside
 
-    def function(self, purpose: str, template: str, calls: set[str]) -> str:
+    def function(self, purpose: str, template: str, uses: set[str]) -> str:
         """The name of a function with this text, in which `@` stands for the name; equal ones are written once."""
         if template not in self.functions:
             name = f"{purpose}_{len(self.functions) + 1}"
             self.functions[template] = (name, template.replace("@", name))
-            self.calls[name] = calls
+            self.uses[name] = uses
         return self.functions[template][0]
 
     def local(self, code: Code, name: str) -> str:
@@ -239,7 +239,7 @@ class Reading(CWriter):
 
     def _reduction_code(self, expression: Reduction) -> Code:
         array, type_ = self._array(expression.part)
-        count, index, calls = self._loop(expression.part)
+        count, index, uses = self._loop(expression.part)
         raw = self.unit.layout.raw(type_)
         nothing = "array == NULL || array->items == NULL"
         if expression.function == "length":
@@ -247,10 +247,10 @@ class Reading(CWriter):
                 "length",
                 f"static int64_t @(const {raw} *array)\n{{\n"
                 f"    return ({nothing}) ? INT64_MIN : (int64_t)({count});\n}}",
-                calls,
+                uses,
             )
             return replace(call(name, array, sort=Sort.INTEGER, unknown=Unknown.VALUE), low=0)
-        with self.unit.calls_apart() as called:
+        with self.unit.uses_apart() as used:
             element = self.unit.text(self.unit.conversion(Lvalue("array->items[place]"), type_.element, "NULL"))
         sort = sort_of(type_.element)
         unknown, held = unknown_text(sort), c_type(sort)
@@ -280,12 +280,12 @@ class Reading(CWriter):
             "    return found;",
             "}",
         ]
-        name = self.unit.function(expression.function + "imum", "\n".join(lines), calls | called)
+        name = self.unit.function(expression.function + "imum", "\n".join(lines), uses | used)
         return call(name, array).typed(type_.element, unknown_as(sort))
 
     def _quantifier_code(self, expression: Quantifier) -> Code:
         array, type_ = self._array(expression.part)
-        count, index, calls = self._loop(expression.part)
+        count, index, uses = self._loop(expression.part)
         raw = self.unit.layout.raw
         parameters, arguments = [f"const {raw(type_)} *array"], [array]
         found = leaves(expression.condition)
@@ -306,7 +306,7 @@ class Reading(CWriter):
             arguments.append(Code(Kind.PLACE, lvalue.address))
             elements.append((Lvalue(f"outer_{number + 1}", True), outer_type))
         inner = Reading(self.unit, "s->", codes.__getitem__, self.received_type, tuple(elements))
-        with self.unit.calls_apart() as called:
+        with self.unit.uses_apart() as used:
             condition = self.unit.text(inner.value(expression.condition))
         ends = int(expression.word == "any")
         lines = [
@@ -329,7 +329,7 @@ class Reading(CWriter):
             "    return result;",
             "}",
         ]
-        name = self.unit.function(expression.word, "\n".join(lines), calls | called)
+        name = self.unit.function(expression.word, "\n".join(lines), uses | used)
         return call(name, *arguments, unknown=Unknown.VALUE)
 
 

@@ -337,6 +337,23 @@ robot BelowZero {
 
 
 @needs_gcc
+def test_a_word_of_a_comment_is_no_reading_of_the_old_state(tmp_path: Path) -> None:
+    """A compiler warns about a copy that nothing reads."""
+    supervisor = supervisor_of_text("""robot R {
+        component Threshold {
+            outgoing message tick with type: none
+            behaviour {
+                variable level: integer(0..3)
+                variable other: integer(0..3)
+                on response from tick do other := if Threshold.level < 100 then 1 else 2
+                initial marked state s { }
+            }
+        }
+    }""")
+    compiled(supervisor, tmp_path)
+
+
+@needs_gcc
 def test_ranges_below_zero_are_kept(tmp_path: Path) -> None:
     supervisor = supervisor_of_text(BELOW_ZERO)
     lines = compare(supervisor, compiled(supervisor, tmp_path), Random(5), 5, 150)

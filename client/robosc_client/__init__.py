@@ -1,6 +1,6 @@
-"""A typed client of the RoboSC service, for threads (`Client`) and for asyncio (`AsyncClient`).
+"""Typed client of the RoboSC service, for threads (`Client`) and for asyncio (`AsyncClient`).
 
-The names are imported on use: the command must be able to answer Ctrl-C before gRPC is loaded.
+The names are imported on first use: the command must handle Ctrl-C before gRPC is loaded.
 """
 
 import importlib

@@ -1,4 +1,4 @@
-"""The service as a typed Python object, for programs on asyncio: what `robosc_client.client` is, awaited."""
+"""Client for programs on asyncio, with the same methods as `robosc_client.client`."""
 
 import asyncio
 from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Mapping
@@ -56,10 +56,10 @@ def _list_method[**P](describe: Callable[P, JobPages]) -> "Callable[Concatenate[
 class AsyncClient:
     """A connection to one server; use it with `async with`, or close it. Tasks of one event loop may share it.
 
-    Every method raises a kin of `ClientError` where there is no answer, and takes `deadline_s`, the seconds
-    that the caller is willing to wait in all; None leaves it to the server's own limit. Calls that found no server, or
-    one with too much to do, are made again as the retry policy says. `on_progress` is told where the work is; what it
-    raises ends the work, and so does cancelling the task that waits.
+    Every method raises a subclass of `ClientError` if it fails, and takes `deadline_s`, the total time limit in
+    seconds; None leaves the time to the server's own limit. The retry policy defines when a call is repeated because no
+    server answered or the server was overloaded. `on_progress` receives the progress; an exception of it cancels the
+    work, and so does cancelling the waiting task.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class AsyncClient:
         Args:
             address: `HOST:PORT`.
             credentials: Certificates and token; None: neither.
-            retries: Policy of how often and when calls are made again.
+            retries: Policy for repeating calls.
             sleep: Function that waits for so many seconds without holding up others.
             channel_options: More options of gRPC's channels, such as `grpc.use_local_subchannel_pool`.
 
@@ -103,7 +103,7 @@ class AsyncClient:
         await self.close()
 
     async def close(self) -> None:
-        """End the connection; requests under way are cancelled."""
+        """Close the connection; open calls are cancelled."""
         await self._channel.close()
 
     check = _unary_method(operations.check)
@@ -125,11 +125,11 @@ class AsyncClient:
     job_result = _unary_method(operations.job_result)
 
     async def _answer[Result](self, operation: Operation[Result]) -> Result:
-        """Make a call, as often as it is worth it."""
+        """Make a call, with retries."""
         call = RetriedCall(operation, self._retries, self._address)
         while True:
             try:
-                # Closed at once whatever happens, so that a caller who gives up ends the work, too.
+                # Closed at once in any case, so that the work of an abandoned call is cancelled.
                 async with aclosing(self._messages(operation, call.begin())) as messages:
                     async for message in messages:
                         call.take(message)
@@ -139,7 +139,7 @@ class AsyncClient:
             await self._sleep(delay_s)
 
     async def _follow(self, job_watch: JobWatch) -> AsyncGenerator[Job]:
-        """A job until it has ended."""
+        """Yield a job after each change until it has ended."""
         attempts = job_watch.attempts(self._retries, self._address)
         while not job_watch.is_over:
             failure = WATCH_INTERRUPTED
@@ -155,13 +155,13 @@ class AsyncClient:
             await self._sleep(attempts.delay_after(failure, has_answered=False))
 
     async def _list(self, pages: JobPages) -> AsyncGenerator[Job]:
-        """Jobs, page by page."""
+        """Yield jobs, page by page."""
         while not pages.is_over:
             for job in pages.take(await self._answer(pages.operation())):
                 yield job
 
     async def _messages(self, operation: Operation[Any], timeout_s: float | None) -> AsyncGenerator[Any]:
-        """The messages of one attempt; the call ends with their reader."""
+        """Yield the messages of one attempt; closing the generator cancels the call."""
         method = getattr(self._jobs if operation.is_about_jobs else self._tasks, operation.method)
         if not operation.is_stream:
             yield _parsed(await method(operation.request, timeout=timeout_s))
@@ -178,7 +178,7 @@ def _parsed[Message](message: Message | None) -> Message:
     """A message of an answer.
 
     Raises:
-        ServiceError: Its bytes are none: `grpc.aio` logs that, and gives None.
+        ServiceError: The message cannot be parsed: `grpc.aio` logs that and returns None.
     """
     if message is None:
         raise malformed("a message cannot be parsed")

@@ -21,28 +21,28 @@ from robosc_client.results import Progress
 from robosc_client.retry import Attempts, RetryPolicy
 
 KEEPALIVE_MS = 60_000
-"""A connection on which nothing comes is tried after so long: not more often than servers put up with."""
+"""Keepalive time of an idle connection; servers refuse more frequent pings."""
 
 CHANNEL_OPTIONS: tuple[tuple[str, int | str], ...] = (
-    # Behind one name there may be several servers: calls go to all of them by turns, and past one that is gone.
+    # One name may stand for several servers: distribute calls over the available ones.
     ("grpc.service_config", '{"loadBalancingConfig": [{"round_robin": {}}]}'),
-    # One message holds a whole supervisor; what surrounds it is little.
+    # One message holds a whole supervisor and little else.
     ("grpc.max_receive_message_length", MAXIMUM_BYTES + 2**20),
-    # The server knows its limit, and tells it.
+    # The server checks its limit and reports it.
     ("grpc.max_send_message_length", -1),
-    # A proxy for web pages, set in the environment, is none for a service in the next room.
+    # A web proxy in the environment must not be used for a service on the local network.
     ("grpc.enable_http_proxy", 0),
-    # Whoever calls again wants a new connection soon, not when gRPC's own patience has passed.
+    # Retries need a new connection soon, not after the long default backoff of gRPC.
     ("grpc.initial_reconnect_backoff_ms", 100),
     ("grpc.max_reconnect_backoff_ms", 5_000),
-    # A watch may wait for hours; a connection whose other end has gone without a word must not look like that.
+    # A watch may be idle for hours: keepalive detects a lost connection.
     ("grpc.keepalive_time_ms", KEEPALIVE_MS),
     ("grpc.keepalive_timeout_ms", 10_000),
     ("grpc.http2.max_pings_without_data", 0),
 )
 
 MAXIMUM_PAGE = 1000
-"""Jobs that one answer lists."""
+"""Maximum number of jobs on one page."""
 
 WATCH_INTERRUPTED = Failure(grpc.StatusCode.UNAVAILABLE, "the watch ended before the job")
 """Failure of a watch that ends without an error before its job does."""
@@ -53,12 +53,12 @@ type OnProgress = Callable[[Progress], None]
 
 
 def ignore_progress(progress: Progress) -> None:
-    """Nobody wants to know."""
+    """Ignore the progress."""
 
 
 @dataclass(frozen=True, slots=True)
 class Operation[Result]:
-    """One call, to be made until it is answered.
+    """Description of one call with its retries.
 
     Attributes:
         method: Name of the method.
@@ -87,7 +87,7 @@ class RetriedCall[Result]:
 
         Args:
             operation: Operation that is called.
-            policy: Policy of how often and when.
+            policy: Policy for retries.
             address: Address of the server that is called, for messages.
         """
         self._operation = operation
@@ -96,17 +96,17 @@ class RetriedCall[Result]:
         self._reader = operation.reader()
 
     def begin(self) -> float | None:
-        """An attempt is made: seconds that it may take; None: any number.
+        """Begin an attempt, and return its time limit in seconds; None: none.
 
         Raises:
-            DeadlineError: There are none left.
+            DeadlineError: The deadline has passed.
         """
         self._has_answered = False
         self._reader = self._operation.reader()
         return self._attempts.timeout_s()
 
     def take(self, message: Any) -> None:
-        """The next message of the attempt; raises ServiceError for what no RoboSC server sends here."""
+        """Take the next message of the attempt; raises ServiceError if it is invalid."""
         self._has_answered = True
         progress = self._reader.take(message)
         if progress is not None:
@@ -115,21 +115,21 @@ class RetriedCall[Result]:
     def result(self) -> Result:
         """Return the operation's result, once the attempt's messages have ended.
 
-        Raises ServiceError where it is not whole.
+        Raises ServiceError if it is incomplete.
         """
         return self._reader.result()
 
     def failed(self, error: grpc.RpcError) -> float:
-        """The attempt has failed: seconds until the next one.
+        """Return the delay before the next attempt after a failed one, in seconds.
 
         Raises:
-            ClientError: There is no next one.
+            ClientError: There is no next attempt.
         """
         return self._attempts.delay_after(failure_of(error), has_answered=self._has_answered)
 
 
 def job_reader(job_id: str) -> Callable[[Any], Job]:
-    """Reads the job in a message; it raises ServiceError for another job than this."""
+    """Return a function that reads a job from a message; it raises ServiceError for another job."""
 
     def convert(message: Any) -> Job:
         job = jobs.job_in(message)
@@ -168,7 +168,7 @@ class JobPages:
         self.is_over = False
 
     def operation(self) -> Operation[tuple[tuple[Job, ...], str]]:
-        """Asks for the next page."""
+        """Return the call for the next page."""
         states, kind = self._chosen
         request = list_request(
             states, kind, all_owners=self._all_owners, page_size=self._page_size, page_token=self._token
@@ -185,7 +185,7 @@ class JobPages:
         """The jobs of a page.
 
         Raises:
-            ServiceError: Pages do not get on.
+            ServiceError: The list does not end.
         """
         found, token = page
         self._empty = 0 if found else self._empty + 1
@@ -197,7 +197,7 @@ class JobPages:
 
 
 class JobWatch:
-    """One job's changes, over as many connections as it takes.
+    """Watch of one job, across lost connections.
 
     Attributes:
         is_over: True if the job has ended.
@@ -210,11 +210,11 @@ class JobWatch:
         self.is_over = False
 
     def attempts(self, policy: RetryPolicy, address: str) -> Attempts:
-        """Return the attempts: how often and when the changes are asked for."""
+        """Return the retry state of the watch."""
         return Attempts(policy, address, self._deadline_s, is_watch=True)
 
     def operation(self) -> Operation[Job]:
-        """Asks for what comes after all that was seen; every message is one for `take`."""
+        """Return the call for the changes after the last seen revision; its messages go to `take`."""
         request = jobs_pb2.WatchJobRequest(id=self._job_id, after_revision=self._revision)
         return Operation("WatchJob", request, lambda: UnaryReader(self.take), is_stream=True, is_about_jobs=True)
 
@@ -225,7 +225,7 @@ class JobWatch:
             ServiceError: It is another job, or nothing has changed.
         """
         job = job_reader(self._job_id)(message)
-        # A job that has ended is told of even if nothing has changed.
+        # The server sends a job that has ended even if nothing has changed.
         if job.revision < self._revision or (job.revision == self._revision and not job.state.has_ended):
             raise malformed("the changes of the job are not in order")
         self._revision = job.revision

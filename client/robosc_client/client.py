@@ -1,4 +1,4 @@
-"""The service as a typed Python object."""
+"""Client for synchronous programs."""
 
 import threading
 import time
@@ -20,7 +20,7 @@ from robosc_client.operations import client_method
 from robosc_client.retry import DEFAULT_RETRIES, RetryPolicy
 
 _CLOSE_S = 0.5
-"""Time that an interrupted program waits for the end of its connection, in seconds."""
+"""Time for an interrupted program to close its connection, in seconds."""
 
 
 def _unary_method[**P, Result](describe: Callable[P, Operation[Result]]) -> "Callable[Concatenate[Client, P], Result]":
@@ -54,10 +54,10 @@ def _list_method[**P](describe: Callable[P, JobPages]) -> "Callable[Concatenate[
 class Client:
     """A connection to one server; use it with `with`, or close it. Threads may share it.
 
-    Every method raises a kin of `ClientError` where there is no answer, and takes `deadline_s`, the seconds
-    that the caller is willing to wait in all; None leaves it to the server's own limit. Calls that found no server, or
-    one with too much to do, are made again as the retry policy says. `on_progress` is told where the work is; what it
-    raises ends the work.
+    Every method raises a subclass of `ClientError` if it fails, and takes `deadline_s`, the total time limit in
+    seconds; None leaves the time to the server's own limit. The retry policy defines when a call is repeated because no
+    server answered or the server was overloaded. `on_progress` receives the progress; an exception of it cancels the
+    work.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Client:
         Args:
             address: `HOST:PORT`.
             credentials: Certificates and token; None: neither.
-            retries: Policy of how often and when calls are made again.
+            retries: Policy for repeating calls.
             sleep: Function that waits for so many seconds.
             channel_options: More options of gRPC's channels, such as `grpc.use_local_subchannel_pool`.
 
@@ -101,14 +101,14 @@ class Client:
         if kind is None or issubclass(kind, Exception):
             self.close()
             return
-        # An interrupt may have come while gRPC was beginning a call, for whose end it would wait for ever; it cancels
-        # all calls before it waits.
+        # An interrupt during the start of a call would make gRPC wait for ever for its end. Closing cancels all calls
+        # before it waits.
         ending = threading.Thread(target=self._channel.close, daemon=True)
         ending.start()
         ending.join(_CLOSE_S)
 
     def close(self) -> None:
-        """End the connection; requests under way are cancelled."""
+        """Close the connection; open calls are cancelled."""
         self._channel.close()
 
     check = _unary_method(operations.check)
@@ -130,11 +130,11 @@ class Client:
     job_result = _unary_method(operations.job_result)
 
     def _answer[Result](self, operation: Operation[Result]) -> Result:
-        """Make a call, as often as it is worth it."""
+        """Make a call, with retries."""
         call = RetriedCall(operation, self._retries, self._address)
         while True:
             try:
-                # Closed at once whatever happens, so that a caller who gives up ends the work, too.
+                # Closed at once in any case, so that the work of an abandoned call is cancelled.
                 with closing(self._messages(operation, call.begin())) as messages:
                     for message in messages:
                         call.take(message)
@@ -144,7 +144,7 @@ class Client:
             self._sleep(delay_s)
 
     def _follow(self, job_watch: JobWatch) -> Iterator[Job]:
-        """A job until it has ended."""
+        """Yield a job after each change until it has ended."""
         attempts = job_watch.attempts(self._retries, self._address)
         while not job_watch.is_over:
             failure = WATCH_INTERRUPTED
@@ -160,12 +160,12 @@ class Client:
             self._sleep(attempts.delay_after(failure, has_answered=False))
 
     def _list(self, pages: JobPages) -> Iterator[Job]:
-        """Jobs, page by page."""
+        """Yield jobs, page by page."""
         while not pages.is_over:
             yield from pages.take(self._answer(pages.operation()))
 
     def _messages(self, operation: Operation[Any], timeout_s: float | None) -> Generator[Any]:
-        """The messages of one attempt; the call ends with their reader."""
+        """Yield the messages of one attempt; closing the generator cancels the call."""
         method = getattr(self._jobs if operation.is_about_jobs else self._tasks, operation.method)
         if not operation.is_stream:
             yield method(operation.request, timeout=timeout_s)

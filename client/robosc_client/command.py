@@ -1,4 +1,4 @@
-"""The installed command `robosc-client`: answers Ctrl-C at any moment, also while gRPC is being loaded or closed."""
+"""Entry point of the command `robosc-client`, which handles Ctrl-C even while gRPC is loaded or closed."""
 
 import os
 import sys
@@ -17,7 +17,7 @@ def entry() -> NoReturn:
             sys.exit(status)
     except KeyboardInterrupt:
         sys.stderr.write("robosc-client: interrupted\n")
-    # gRPC's own threads may wait for ever when they are interrupted twice; there is nothing left to finish.
+    # Threads of gRPC may wait for ever after a second interrupt; nothing else is left to do.
     sys.stderr.flush()
     os._exit(_INTERRUPTED)
 

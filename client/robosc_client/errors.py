@@ -1,13 +1,13 @@
-"""Errors between client and server; callers never see a raw gRPC error.
+"""Errors of the client; callers never see a raw gRPC error.
 
 ClientError
-|-- ServerUnavailableError   nobody answers at the address     (also a ConnectionError)
+|-- ServerUnavailableError   no server answers at the address  (also a ConnectionError)
 |-- CredentialsError         a certificate, key or token cannot be used
 |-- DeadlineError            no result in time                 (also a TimeoutError)
 |-- RequestRefusedError      the server refuses the request: malformed, too large, not allowed, beyond its limits
-|   `-- ServerBusyError      it may take it later
-|-- JobError                 a job is not there, has no result, or cannot be made
-`-- ServiceError             the server failed, or answered what no RoboSC server answers
+|   `-- ServerBusyError      the server may accept it later
+|-- JobError                 a job does not exist, has no result, or cannot be submitted
+`-- ServiceError             the server failed, or sent an invalid answer
 """
 
 
@@ -15,8 +15,7 @@ class ClientError(Exception):
     """Root of every error of the client; its text is one sentence for people.
 
     Attributes:
-        reason: Reason in the server's words: a word such as `SERVER_BUSY`, documented in the API; empty where the
-            server has given none.
+        reason: Reason of the server, such as `SERVER_BUSY`, as documented in the API; empty: not given.
     """
 
     def __init__(self, message: str, reason: str = "") -> None:
@@ -25,7 +24,7 @@ class ClientError(Exception):
 
 
 class ServerUnavailableError(ClientError, ConnectionError):
-    """Nobody answers at the address, the connection was lost, or the server is about to end."""
+    """No server answers at the address, the connection was lost, or the server is shutting down."""
 
 
 class CredentialsError(ClientError):
@@ -37,14 +36,14 @@ class DeadlineError(ClientError, TimeoutError):
 
 
 class RequestRefusedError(ClientError):
-    """The server refuses the request, or gave it up for what it takes."""
+    """The server refuses the request, or the task exceeded a limit."""
 
 
 class ServerBusyError(RequestRefusedError):
-    """The server has too much to do, or this caller asks for too much; later may be better.
+    """The server is overloaded, or the caller is over its quota; the call may succeed later.
 
     Attributes:
-        retry_after_s: Seconds after which the server would be asked again; None: it has not said.
+        retry_after_s: Seconds after which the call may be retried; None: not given.
     """
 
     def __init__(self, message: str, reason: str = "", retry_after_s: float | None = None) -> None:
@@ -53,13 +52,13 @@ class ServerBusyError(RequestRefusedError):
 
 
 class JobError(ClientError):
-    """A job is not there, has no result, or its idempotency key was used for another task; `reason` says which."""
+    """A job does not exist or has no result, or its idempotency key belongs to another task, see `reason`."""
 
 
 class ServiceError(ClientError):
-    """The server failed, or answered what no RoboSC server answers."""
+    """The server failed, or sent an invalid answer."""
 
 
 def malformed(what: str) -> ServiceError:
-    """The error for an answer that no RoboSC server gives."""
+    """Return the error for an invalid answer."""
     return ServiceError(f"the server's answer is malformed: {what}")

@@ -1,4 +1,4 @@
-"""Jobs, as values: tasks that go on without their caller."""
+"""Jobs as values: stored tasks that continue without their caller."""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -7,10 +7,10 @@ from robosc_api.jobs import JobState, TaskKind
 from robosc_client.results import Progress
 
 MAXIMUM_LABEL = 200
-"""Characters of what a job is called."""
+"""Maximum number of characters of a label."""
 
 MAXIMUM_IDEMPOTENCY_KEY = 128
-"""Characters of an idempotency key."""
+"""Maximum number of characters of an idempotency key."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +18,7 @@ class JobFailure:
     """Reason why a job has failed.
 
     Attributes:
-        reason: The word for it, such as `CPU_LIMIT`.
+        reason: Reason of the server, such as `CPU_LIMIT`.
         message: One sentence.
     """
 
@@ -41,7 +41,7 @@ class Job:
         created: Time of its acceptance.
         started: Time at which a worker began, or None.
         ended: Time of its end, or None.
-        expires: Time at which it and its result are forgotten, or None.
+        expires: Time at which the job and its result are deleted, or None.
         attempts: Number of times that a worker has begun.
         progress: Progress of the work, or None.
         failure: Reason why it has failed, or None.

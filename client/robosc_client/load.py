@@ -1,8 +1,8 @@
-"""Load on a server, as a table of times: for finding out what a server can do, like `ghz` for gRPC in general.
+"""Load test of a server, like `ghz` for gRPC in general.
 
-Calls are made from one event loop with messages that were serialized before, and answers are not looked into: what is
-measured is the server, and not the client. Each of the concurrent callers has one call under way at any time (a closed
-loop), so that no more is asked than is answered; its times say nothing about a server that is asked at a fixed rate.
+Calls are made from one event loop with serialized messages, and answers are not parsed, so that the server is measured
+and not the client. Each concurrent caller has one open call at any time (a closed loop), so that the request rate
+adapts to the server; the times say nothing about a server with a fixed request rate.
 """
 
 import asyncio
@@ -26,15 +26,15 @@ _CONNECT_S = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """Calls that make up a load.
+    """Definition of a load test.
 
     Attributes:
-        method: The method's whole name, such as `/robosc_api.v1.SynthesisService/Check`.
+        method: Full name of the method, such as `/robosc_api.v1.SynthesisService/Check`.
         is_stream: True if it answers with a stream.
         request: The serialized request of the call of a number.
         concurrency: Callers, each with one call at a time.
-        count: Calls in all; None: as many as there is time for.
-        duration_s: Seconds after which no call is begun any more; None: any number.
+        count: Total number of calls; None: limited only by the duration.
+        duration_s: Seconds after which no more calls start; None: unlimited.
         channels: Connections that the callers share.
         timeout_s: Seconds that one call may take.
     """
@@ -51,14 +51,14 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Result of a load.
+    """Result of a load test.
 
     Attributes:
         seconds: Time from the first call's beginning to the last one's end.
-        times_s: Time of each call that was answered well, sorted.
+        times_s: Duration of each successful call, sorted.
         answer_bytes: Bytes of all answers.
-        errors: Number of failed calls, by the reason in the server's words, or by gRPC's status.
-        is_interrupted: True if it was cancelled: calls under way then do not count.
+        errors: Number of failed calls, by the server's reason or the gRPC status.
+        is_interrupted: True if the test was cancelled; calls that were open then do not count.
     """
 
     seconds: float
@@ -69,7 +69,7 @@ class Measured:
 
     @property
     def calls_per_second(self) -> float:
-        """Calls that were answered well, by time."""
+        """Successful calls per second."""
         return len(self.times_s) / self.seconds if self.seconds else 0.0
 
     def percentile_s(self, percent: float) -> float | None:
@@ -98,7 +98,7 @@ class Measured:
 
 
 async def measure(address: str, credentials: Credentials, load: Load) -> Measured:
-    """Ask a server, and measure it; cancelled after its first answer, it gives what was measured until then.
+    """Run a load test; if it is cancelled after the first answer, return the measurements so far.
 
     Raises:
         SecurityError: A certificate, key or token cannot be used.
@@ -115,7 +115,7 @@ async def measure(address: str, credentials: Credentials, load: Load) -> Measure
 
 
 async def _connected(channels: list[grpc.aio.Channel]) -> None:
-    """Wait until there are connections; where there is no server, the calls tell so."""
+    """Wait for connections; without a server, the calls fail later."""
     ready = asyncio.gather(*(channel.channel_ready() for channel in channels))
     try:
         await asyncio.wait_for(ready, _CONNECT_S)
@@ -141,7 +141,7 @@ async def _measured(channels: list[grpc.aio.Channel], load: Load) -> Measured:
             except grpc.RpcError as error:
                 failure = failure_of(error)
                 errors[failure.reason or failure.code.name] += 1
-                # A server that refuses at once must not be asked in a tight loop.
+                # Avoid a tight loop against a server that refuses at once.
                 await asyncio.sleep(0.001)
             else:
                 times_s.append(time.perf_counter() - before_s)
@@ -159,7 +159,7 @@ async def _measured(channels: list[grpc.aio.Channel], load: Load) -> Measured:
 
 
 def _numbers(load: Load, begun_s: float) -> Iterator[int]:
-    """The calls that are to be begun, shared by all callers."""
+    """Yield the numbers of the calls, shared by all callers."""
     number = 0
     while load.count is None or number < load.count:
         if load.duration_s is not None and time.perf_counter() - begun_s >= load.duration_s:
@@ -169,7 +169,7 @@ def _numbers(load: Load, begun_s: float) -> Iterator[int]:
 
 
 def _call(channel: grpc.aio.Channel, load: Load) -> Callable[[bytes], Any]:
-    """Makes one call, and gives the bytes of its answer."""
+    """Return a function that makes one call and returns the size of its answer."""
     if not load.is_stream:
         unary: Any = channel.unary_unary(load.method)
 

@@ -1,11 +1,11 @@
-"""`robosc-client`: check, synthesize and generate on a server; prints and writes what `robosc` would."""
+"""The command `robosc-client`, which runs the commands of `robosc` on a server."""
 
 import argparse
 import os
 import sys
 from collections.abc import Sequence
 
-# gRPC's own log would tell once more, in its words, what we tell; it is read at its import.
+# gRPC would log the same errors again; it reads this variable at its import.
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 from robosc import __version__

@@ -1,7 +1,6 @@
-"""Methods of a client: their arguments, what they call, and how their answers are put together.
+"""Operations: one function for each method of the clients, which returns the description of its call.
 
-These functions are the one description of the methods of both clients, which take their names, arguments and
-documentation over: `robosc_client.client` has them done for threads, `robosc_client.aio` for asyncio.
+Both clients derive their methods, with names, arguments and documentation, from these functions.
 """
 
 import inspect
@@ -110,7 +109,7 @@ def explore(
     deadline_s: float | None = None,
     on_progress: OnProgress = ignore_progress,
 ) -> Operation[Exploration]:
-    """Everything that the robot may do under its supervisor; beyond so many states it is given up."""
+    """Explore the robot under its supervisor, up to a maximum number of states."""
     task = Explore(loaded(bundle), options, maximum_states)
     return _streaming_task("Explore", task, ExplorationReader, deadline_s, on_progress)
 
@@ -130,7 +129,7 @@ def verify(
     """Check a supervisor against its model, or verify properties of the robot under its supervisor.
 
     Args:
-        task: The model and its libraries, or the path of a model; or the whole task, which says the rest.
+        task: The model and its libraries, or the path of a model; or a task with all other arguments.
         properties: A property in the property language, or several.
         property_files: Files with a property on each line.
         supervisor: The supervisor to check: itself, the path of its file or its bytes; None: one is made of the model.
@@ -214,7 +213,7 @@ def submit(
     retention_s: float | None = None,
     deadline_s: float | None = None,
 ) -> Operation[Submission]:
-    """Have a task done without waiting for it; once this returns, the server keeps the job.
+    """Submit a task as a job; once this returns, the server has stored the job.
 
     Args:
         task: Task to be done.
@@ -223,7 +222,7 @@ def submit(
         retention_s: Time for which the job is kept after its end; None: as long as the server keeps jobs.
         deadline_s: See the class; it is about the submission, not about the task.
     """
-    # With a key, the call may be made again.
+    # A key makes the call repeatable.
     key = secrets.token_hex(16) if idempotency_key is None else idempotency_key
     request = submit_request(task, key, label, retention_s)
     return _job_call("SubmitJob", request, jobs.submission_of, deadline_s)
@@ -235,23 +234,23 @@ def get_job(job_id: str, *, deadline_s: float | None = None) -> Operation[Job]:
 
 
 def watch(job_id: str, *, after_revision: int = 0, deadline_s: float | None = None) -> JobWatch:
-    """A job as it is now, and whenever it has changed until it has ended; over lost connections, too.
+    """Watch a job: its current state, and each change until its end, across lost connections.
 
     Args:
         job_id: Its id.
-        after_revision: Nothing is given before there is a greater one, or the job has ended.
+        after_revision: Last seen revision; only later ones are returned.
         deadline_s: See the class.
     """
     return JobWatch(job_id, after_revision, deadline_s)
 
 
 def wait(job_id: str, *, deadline_s: float | None = None) -> JobWatch:
-    """A job, once it has ended."""
+    """Wait for the end of a job, and return it."""
     return JobWatch(job_id, deadline_s=deadline_s)
 
 
 def cancel_job(job_id: str, *, deadline_s: float | None = None) -> Operation[Job]:
-    """End a job; one that has ended stays as it is."""
+    """Cancel a job; one that has ended does not change."""
     return _job_call("CancelJob", jobs_pb2.CancelJobRequest(id=job_id), job_reader(job_id), deadline_s)
 
 
@@ -263,13 +262,13 @@ def list_jobs(
     page_size: int = 100,
     deadline_s: float | None = None,
 ) -> JobPages:
-    """List jobs, the youngest first, asked for page by page.
+    """List jobs page by page, newest first.
 
     Args:
         states: Only jobs in these; empty: in any.
         kind: Only jobs of this kind; None: of any.
         all_owners: True if those of other callers are wanted, too; for a token with the scope `admin`.
-        page_size: Jobs that are asked for at once.
+        page_size: Number of jobs per call.
         deadline_s: See the class; for each page.
     """
     return JobPages(states, kind, all_owners=all_owners, page_size=page_size, deadline_s=deadline_s)
@@ -307,11 +306,11 @@ def _job_call[Message, Result](
 def client_method[Method: Callable[..., Any]](
     method: Method, description: Callable[..., Any], of: str, returns: Any = None
 ) -> Method:
-    """Return a method that is called and documented as the function that describes it.
+    """Return a client method with the signature and documentation of its operation.
 
     Args:
         method: The method.
-        description: The function that describes it, but for `self`.
+        description: Function of the operation, without `self`.
         of: Name of the client's class.
         returns: Type that the method returns; None: the result type of the operation that the function returns.
     """

@@ -1,4 +1,4 @@
-"""Answers of a server, as the values that `robosc` itself would have made: so both print and write the same."""
+"""Conversion of responses to the values of the core, so that client and `robosc` print and write the same."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
@@ -60,7 +60,7 @@ def decoded(content: bytes) -> Supervisor:
 def require_made_for(supervisor: Supervisor, bundle: Bundle, deployment: Deployment) -> None:
     """Do nothing if a supervisor was made of these texts, for this deployment.
 
-    A signature tells who made a supervisor, and not for whom: an old one, or one of another robot, is signed as well.
+    A signature proves the origin of a supervisor, not its purpose: supervisors of other robots are signed as well.
 
     Raises:
         ServiceError: It was made of others, or for another.
@@ -124,7 +124,7 @@ class _Fault(msgspec.Struct):
 
     check: str
     message: str
-    # Absent without a run, and never null.
+    # Absent without a trace, and never null.
     trace: list[str] | UnsetType = UNSET
     shortest: bool | UnsetType = UNSET
     state: _State | UnsetType = UNSET
@@ -230,7 +230,7 @@ def _state(entry: Any, system: System, model: Model) -> tuple[Value, ...]:
         elif kind in ("service", "action"):
             found = entry["communications"][name]
         else:
-            # The plants of messages have one location only.
+            # The plants of messages have a single location.
             (found,) = subject_domain(system, subject)
         if not isinstance(found, bool | int | float | str):
             raise malformed("a value in a run is invalid")

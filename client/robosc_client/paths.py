@@ -1,7 +1,7 @@
-"""Names of files that a server sends: only those that are harmless in a folder, on any system, are taken.
+"""Validation of file names from a server: only names that are harmless on any system are accepted.
 
-On top of what `robosc.targets.GeneratedFiles` refuses (absolute paths, `..`, backslashes, drives, what Windows forbids,
-the manifest) these are about names that a system understands in its own way, and about names that meet each other.
+In addition to what `robosc.targets.GeneratedFiles` refuses (absolute paths, `..`, backslashes, drives, what Windows
+forbids, the manifest) these checks refuse names with a special meaning on some system, and names that collide.
 """
 
 import unicodedata
@@ -18,7 +18,7 @@ _DEVICES = frozenset(
     ["con", "prn", "aux", "nul", "conin$", "conout$"]
     + [f"{name}{number}" for name in ("com", "lpt") for number in "0123456789¹²³"]
 )
-"""Names that Windows takes for a device, whatever their extension."""
+"""Device names of Windows, with any extension."""
 
 
 def path_problem(path: str) -> str:
@@ -37,7 +37,7 @@ def path_problem(path: str) -> str:
         if part != part.strip() or part.endswith("."):
             return "a name in it begins or ends with a blank, or ends with a full stop"
         if part.startswith("."):
-            # What a shell, an editor or git obeys without being asked: no target makes such a file.
+            # Hidden files can configure shells, editors or git; no target generates one.
             return "a name in it begins with a full stop"
         if part.partition(".")[0].rstrip().casefold() in _DEVICES:
             return "a name in it is a device name on Windows"

@@ -1,7 +1,6 @@
-"""Servers that a user reaches often, by name: `client.toml` in the user's folder for settings.
+"""Profiles of servers in the file `client.toml` of the user's configuration folder.
 
-The file is the user's own: what else stands in it, comments too, stays. Tokens are in files of their own, which only
-their owner may read.
+The user may edit the file; comments are preserved. Tokens are stored in separate private files.
 
     default = "lab"
 
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from tomlkit import TOMLDocument
 
 MAXIMUM_BYTES = 64 * 1024
-"""Maximum size of the file, in bytes; nobody has more servers."""
+"""Maximum size of the file, in bytes."""
 
 MAXIMUM_TOKEN_BYTES = 4096
 
@@ -55,17 +54,17 @@ class Profile:
     token_file: Path | None = None
 
     def document(self) -> dict[str, Any]:
-        """As it stands in the file: without what is not set."""
+        """Return the values for the file, without unset ones."""
         paths = {name: str(getattr(self, name)) for name in _PATHS if getattr(self, name) is not None}
         return {"server": self.server, **({"tls": True} if self.tls else {}), **paths}
 
 
 @dataclass(frozen=True, slots=True)
 class Profiles:
-    """All of them.
+    """All profiles of a user.
 
     Attributes:
-        default: Name of the one that is used where none is named; None: there is none.
+        default: Name of the default profile; None: there is none.
         by_name: The profiles, in the order of the file.
     """
 
@@ -80,7 +79,7 @@ def is_address(text: str) -> bool:
 
 
 def settings_folder() -> Path:
-    """The user's folder for settings (XDG Base Directory Specification 0.8: a relative path does not count)."""
+    """Return the configuration folder (XDG Base Directory Specification 0.8: relative paths are ignored)."""
     chosen = Path(os.environ.get("XDG_CONFIG_HOME", ""))
     try:
         return (chosen if chosen.is_absolute() else Path.home() / ".config") / "robosc"
@@ -104,7 +103,7 @@ def read_profiles() -> Profiles:
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        # Also a number that is too long to be converted.
+        # ValueError also covers numbers that are too long.
         raise UsageError(f"{file}: {error}") from error
     found = document.pop("profiles", {})
     default = document.pop("default", None)
@@ -122,12 +121,12 @@ def add_profile(name: str, profile: Profile, *, token: str | None = None, is_def
     Args:
         name: Name of the profile.
         profile: Content of the profile.
-        token: A token that is kept in a file of its own, which the profile then names; None: there is none to keep.
-        is_default: True if it is the one that is used where none is named; the first one always is.
-        replaces: True if one of that name may be there.
+        token: Token to store in a separate file; None: none.
+        is_default: True to make it the default profile; the first one always is.
+        replaces: True to replace an existing profile of that name.
 
     Raises:
-        UsageError: The name is none, or taken; or a file cannot be written.
+        UsageError: The name is invalid or exists already; or a file cannot be written.
     """
     if not _NAME.match(name):
         raise UsageError(f"invalid profile name {name!r}: use at most 64 letters, digits, '.', '-' and '_'")
@@ -194,7 +193,7 @@ def _profile(file: Path, name: str, entry: Any) -> Profile:
             raise refused(f"unknown key {key!r}")
         if key in _PATHS and (not isinstance(value, str) or not value or "\0" in value):
             raise refused(f"{key!r} must be a file path")
-    # What is relative is so to the file, wherever the command is called.
+    # Paths are relative to the file, not to the working directory.
     try:
         paths = {key: file.parent / Path(entry[key]).expanduser() for key in _PATHS if key in entry}
     except RuntimeError as error:
@@ -238,7 +237,7 @@ def _text(file: Path) -> str:
 
 
 def _write(file: Path, text: str) -> None:
-    """Write a file for its owner alone, whole or not at all."""
+    """Write a private file atomically."""
     temporary = file.with_name(f".{file.name}.{os.getpid()}")
     try:
         file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)

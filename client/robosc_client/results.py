@@ -1,4 +1,4 @@
-"""Answers of the service, as values: those of the core where they mean the same."""
+"""Results of the service as values, shared with the core where they have the same meaning."""
 
 from dataclasses import dataclass
 

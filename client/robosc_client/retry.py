@@ -1,9 +1,8 @@
-"""Decisions on when a failed call is made again, taken here without making or waiting for anything.
+"""Retry decisions, without making calls or waiting.
 
-Only calls that cannot have any effect twice are tried again: every task gives the same result for the same request,
-and a job is submitted with a key by which the server knows it. The delays grow exponentially and are scattered at
-random, so that clients that lost one server together do not come back together (Marc Brooker, "Exponential Backoff
-And Jitter", AWS Architecture Blog, 2015).
+Only idempotent calls are retried: every task has the same result for the same request, and a job is submitted with an
+idempotency key. The delays grow exponentially with random jitter, so that clients that lost a server at the same time
+do not retry at the same time (Marc Brooker, "Exponential Backoff And Jitter", AWS Architecture Blog, 2015).
 """
 
 import random
@@ -42,15 +41,15 @@ _JOB_CODES = frozenset({grpc.StatusCode.NOT_FOUND, grpc.StatusCode.FAILED_PRECON
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RetryPolicy:
-    """Policy on how often and when calls are made again.
+    """Policy for repeating failed calls.
 
     Attributes:
-        attempts: Calls in all, the first included; 1: none is made again.
-        watch_attempts: The same for a watch, after each message anew.
+        attempts: Maximum number of calls, the first included; 1: no retries.
+        watch_attempts: The same for a watch, counted from its last message.
         first_s: The first delay, before it is scattered between a half and the whole of it.
         factor: Ratio of each delay to the one before: from 1 to 10.
         longest_s: The longest delay.
-        longest_asked_s: The longest delay that a server may ask for; if it asks for more, its error is raised.
+        longest_asked_s: Maximum delay that a server may request; a longer request raises its error.
         scatter: Random numbers from 0 to 1.
         clock: Seconds, as `time.monotonic`.
     """
@@ -73,20 +72,20 @@ class RetryPolicy:
 DEFAULT_RETRIES = RetryPolicy()
 
 NO_RETRIES = RetryPolicy(attempts=1, watch_attempts=1)
-"""Every failure is told at once."""
+"""Policy without retries."""
 
 
 class Attempts:
-    """One call, as often as it is made."""
+    """Attempts of one call."""
 
     def __init__(self, policy: RetryPolicy, address: str, deadline_s: float | None, *, is_watch: bool = False) -> None:
         """Begin.
 
         Args:
-            policy: Policy on how often and when.
+            policy: Policy for retries.
             address: Address that the call is made to, for messages.
             deadline_s: Seconds from now that all attempts and delays may take together; None: any number.
-            is_watch: True if what was received counts for the next attempt, too.
+            is_watch: True if the next attempt resumes after the received messages.
         """
         self._policy = policy
         self._address = address
@@ -97,10 +96,10 @@ class Attempts:
         self._failed = 0
 
     def timeout_s(self) -> float | None:
-        """Seconds that the next attempt may take; None: any number.
+        """Return the time limit of the next attempt in seconds; None: none.
 
         Raises:
-            DeadlineError: There are none left.
+            DeadlineError: The deadline has passed.
         """
         left_s = self._left_s()
         if left_s is not None and left_s <= 0:
@@ -108,7 +107,7 @@ class Attempts:
         return left_s
 
     def succeeded(self) -> None:
-        """Something was received: a watch has all its attempts again."""
+        """Reset the number of failures, since a message was received."""
         self._failed = 0
 
     def delay_after(self, failure: Failure, *, has_answered: bool) -> float:
@@ -119,7 +118,7 @@ class Attempts:
             has_answered: True if it had received anything.
 
         Raises:
-            ClientError: There is no next one.
+            ClientError: There is no next attempt.
         """
         self._failed += 1
         if not self._is_worth_it(failure, has_answered=has_answered) or self._failed >= self._most:
@@ -137,7 +136,7 @@ class Attempts:
         return is_busy and failure.retry_after_s is not None
 
     def _delay_s(self, asked_s: float | None) -> float | None:
-        """None: the server asks for more than is waited."""
+        """Return the delay in seconds; None: the server requests more than the policy allows."""
         policy = self._policy
         # No number of failures makes the power too large.
         grown_s = policy.first_s * policy.factor ** min(self._failed - 1, 64)
@@ -155,7 +154,7 @@ class Attempts:
         return DeadlineError(f"no result from {self._address} within {self._deadline_s:g} seconds")
 
     def _error(self, failure: Failure) -> ClientError:
-        """Our error for a failure."""
+        """Return the error for a failure."""
         code, reason, message = failure.code, failure.reason, failure.message
         if code is grpc.StatusCode.UNAVAILABLE:
             if reason:

@@ -1,4 +1,4 @@
-"""Tasks that a server can be asked to do, as values: done at once, or submitted as a job."""
+"""Tasks of a server as values, for direct calls and for jobs."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Failures over gRPC, besides the status code: details in the form of google.rpc (AIP-193)."""
+"""Details of failed gRPC calls in the form of google.rpc (AIP-193)."""
 
 from typing import Any
 
@@ -16,14 +16,14 @@ type Metadata = tuple[tuple[str, str | bytes], ...]
 def failure_metadata(
     code: grpc.StatusCode, message: str, reason: str, retry_after_s: float | None = None, context: Any = None
 ) -> Metadata:
-    """The trailing metadata of a call that ends without an answer.
+    """Return the trailing metadata of a failed call.
 
     Args:
         code: Its status code.
         message: One sentence for the caller.
-        reason: One word in capital letters, the same for the same cause.
-        retry_after_s: Seconds after which it may be worth another try; None: it is not, or nobody knows.
-        context: Of the call (of grpc.aio): what it was going to send stays; None: nothing.
+        reason: Identifier of the cause in capital letters.
+        retry_after_s: Seconds after which the call may be retried; None: no retry, or unknown.
+        context: Context of the call (of grpc.aio), whose trailing metadata is kept; None: none.
     """
     details = [_packed(error_details_pb2.ErrorInfo(reason=reason, domain=DOMAIN))]
     trailing: Metadata = () if context is None else tuple(context.trailing_metadata() or ())

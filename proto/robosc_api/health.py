@@ -15,7 +15,7 @@ from robosc_api.security.listening import read
 
 _ANYWHERE = {"0.0.0.0": "127.0.0.1", "": "127.0.0.1", "::": "::1"}  # noqa: S104  # Not listening: asked there.
 
-# What gRPC says by itself where a program has said nothing; whatever else it says came from the program.
+# Status codes of gRPC itself, without an answer of the program; all others come from the program.
 _UNANSWERED = (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED, grpc.StatusCode.CANCELLED)
 
 
@@ -81,7 +81,7 @@ def ask_health(
             certificate=client_certificate and client_certificate[0],
             key=client_certificate and client_certificate[1],
         )
-        # The certificate is for the name that others call the machine by.
+        # The certificate is for the external host name.
         options = (*options, ("grpc.ssl_target_name_override", _name_in(certificate)))
     return ask_service(address, service, credentials, timeout_s=timeout_s, options=options)
 
@@ -107,7 +107,7 @@ def ask_service(
         SecurityError: A file cannot be used.
     """
     with open_channel(address, credentials, options) as channel:
-        # A request has one text, and an answer one number: messages that everybody has, whose bytes are the same.
+        # Request and response have the same bytes as these standard messages: one text, and one number.
         ask = channel.unary_unary(
             _METHOD, request_serializer=StringValue.SerializeToString, response_deserializer=UInt32Value.FromString
         )
@@ -115,7 +115,7 @@ def ask_service(
             answer = ask(StringValue(value=service), timeout=timeout_s)
         except grpc.RpcError as error:
             is_alive = error.code() not in _UNANSWERED or (
-                # Nobody listens, or a handshake has failed.
+                # The port is closed, or a handshake has failed.
                 error.code() is grpc.StatusCode.UNAVAILABLE and _takes_connections(address, timeout_s)
             )
             return Condition(is_alive, False, f"{error.code().name}: {error.details()}")
@@ -144,7 +144,7 @@ def ask_alive(
 
 
 def _takes_connections(address: str, timeout_s: float) -> bool:
-    """Return True if somebody listens there."""
+    """Return True if the port accepts connections."""
     host, port = split(address)
     try:
         with socket.create_connection((host, port), timeout_s):
@@ -172,5 +172,5 @@ def _name_in(certificate: Path) -> str:
     ]
     if not found:
         raise SecurityError(f"{certificate}: the certificate names no host")
-    # A certificate for all machines of a domain is one for any of them.
+    # A wildcard certificate is valid for any host of the domain.
     return found[0].replace("*", "health", 1)

@@ -1,6 +1,6 @@
-"""Layers around the handlers of a server, one around the other, for the price of one interceptor.
+"""Layers around the handlers of a server, combined into one interceptor.
 
-An interceptor of grpc.aio costs every call a coroutine of its own, whatever it does.
+Each interceptor of grpc.aio adds a coroutine to every call; layers do not.
 """
 
 from abc import abstractmethod
@@ -13,18 +13,18 @@ import grpc.aio
 
 
 class Layer(grpc.aio.ServerInterceptor):
-    """One thing around handlers: an interceptor on its own, or one of `Layers`."""
+    """Wrapper around handlers, which is an interceptor itself or one of `Layers`."""
 
     def __init__(self) -> None:
-        # By method: the handler that was there, and the one with this around it, made once and not for each call.
+        # By method: the inner handler, and the wrapped one, which is made once and not for each call.
         self._made: dict[str, tuple[Any, Any]] = {}
 
     async def intercept_service(self, continuation: Callable[[Any], Awaitable[Any]], handler_call_details: Any) -> Any:
-        """The handler of a call, with this around it."""
+        """Return the wrapped handler of a call."""
         return self.handler(await continuation(handler_call_details), handler_call_details)
 
     def handler(self, inner: Any, details: Any) -> Any:
-        """The handler of a call, with this around it.
+        """Return the wrapped handler of a call.
 
         Args:
             inner: The handler inside; None: there is none.
@@ -40,7 +40,7 @@ class Layer(grpc.aio.ServerInterceptor):
 
     @abstractmethod
     def around(self, inner: Any, method: str) -> Any:
-        """A handler with this around it.
+        """Wrap a handler.
 
         Args:
             inner: The handler inside.
@@ -49,7 +49,7 @@ class Layer(grpc.aio.ServerInterceptor):
 
 
 class Layers(grpc.aio.ServerInterceptor):
-    """Layers around each other, as one interceptor.
+    """Nested layers as one interceptor.
 
     Args:
         *layers: The outermost first.
@@ -59,7 +59,7 @@ class Layers(grpc.aio.ServerInterceptor):
         self._inside_out = layers[::-1]
 
     async def intercept_service(self, continuation: Callable[[Any], Awaitable[Any]], handler_call_details: Any) -> Any:
-        """The handler of a call, with all of them around it."""
+        """Return the handler of a call, wrapped in all layers."""
         handler = await continuation(handler_call_details)
         for layer in self._inside_out:
             handler = layer.handler(handler, handler_call_details)
@@ -67,11 +67,10 @@ class Layers(grpc.aio.ServerInterceptor):
 
 
 async def write_responses(made: Awaitable[Any] | AsyncIterator[Any], context: Any) -> None:
-    """Send what a handler makes: handlers of streams are generators, or coroutines that write by themselves.
+    """Send the responses of a stream handler, which is a generator or a coroutine that writes by itself.
 
     Args:
-        made: Value that the handler gave when it was called. A generator is closed at once when the call ends before
-            it.
+        made: Return value of the handler. A generator is closed at once if the call ends before it.
         context: Context of the call.
     """
     if not hasattr(made, "__aiter__"):
@@ -83,7 +82,7 @@ async def write_responses(made: Awaitable[Any] | AsyncIterator[Any], context: An
 
 
 def writing(answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Awaitable[None]]:
-    """A handler of a stream, of either kind, as a coroutine that writes by itself."""
+    """Convert a stream handler of either kind to a coroutine that writes by itself."""
 
     async def write(request: Any, context: Any) -> None:
         await write_responses(answer(request, context), context)
@@ -100,7 +99,7 @@ def behaviour_of(handler: Any) -> Callable[[Any, Any], Any]:
 
 
 def with_behaviour(handler: Any, behaviour: Callable[[Any, Any], Any]) -> Any:
-    """A handler of the same kind, for the same messages, that does something else."""
+    """Return a handler of the same kind and messages with another behaviour."""
     make = _MAKERS[handler.request_streaming, handler.response_streaming]
     return make(behaviour, handler.request_deserializer, handler.response_serializer)
 

@@ -1,4 +1,4 @@
-"""Requests that are no protobuf message at all: INVALID_ARGUMENT, not a fault of ours with a traceback."""
+"""Refusal of requests that cannot be parsed with INVALID_ARGUMENT, instead of an internal error."""
 
 from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any
@@ -13,18 +13,18 @@ _MALFORMED = object()
 
 
 class MalformedError(Exception):
-    """Error that a stream of requests raises for one that is no message; whoever reads them lets it pass."""
+    """Error of a stream of requests for one that cannot be parsed; handlers let it pass."""
 
 
 _CODE, _MESSAGE = grpc.StatusCode.INVALID_ARGUMENT, "the request is not a valid message of this service"
 
 
 class MalformedRequests(Layer):
-    """Answers them for the methods of some services; methods that take bytes as they come look at them themselves.
+    """Layer that refuses malformed requests of some services; methods that take bytes check them themselves.
 
     Args:
-        services: Their full names.
-        limit: Bytes of a request; longer ones are not even parsed. None: any number.
+        services: Full names of the services.
+        limit: Maximum bytes of a request; longer ones are not parsed. None: no limit.
     """
 
     def __init__(self, *services: str, limit: int | None = None) -> None:
@@ -33,7 +33,7 @@ class MalformedRequests(Layer):
         self._prefixes = tuple(f"/{service}/" for service in services)
 
     def around(self, inner: Any, method: str) -> Any:
-        """A handler behind a check of its requests."""
+        """Wrap a handler in a check of its requests."""
         if inner.request_deserializer is None or not method.startswith(self._prefixes):
             return inner
         return self._behind(inner)
@@ -88,7 +88,7 @@ def _checked_each(answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Awa
         try:
             await write_responses(answer(requests(given), context), context)
         except MalformedError:
-            # Here and not where it is read: that may be another task, which cannot end the call.
+            # Not where it is read: that may be another asyncio task, which cannot abort the call.
             await _refuse(context)
 
     return checked

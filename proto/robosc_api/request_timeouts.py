@@ -83,7 +83,7 @@ class RequestTimeouts(Layer):
             try:
                 return await answer(timed(aiter(requests)), context)
             except _RequestTimeoutError:
-                # Here and not where it is read: that may be another task, which cannot end the call.
+                # Not where it is read: that may be another asyncio task, which cannot abort the call.
                 limits = f"{first.limit_s:g} seconds, and each further one within {following.limit_s:g}"
                 await _abort(context, f"the first request must arrive within {limits}")
 
@@ -101,7 +101,7 @@ class _Timeout:
 
     def __init__(self, limit_s: float) -> None:
         self.limit_s = limit_s
-        # Since when each task waits, the one that has waited longest first.
+        # Start of the wait of each task, the earliest first.
         self._since_s: dict[asyncio.Task[Any], float] = {}
         self._overdue: set[asyncio.Task[Any]] = set()
         self._is_scheduled = False
@@ -121,7 +121,7 @@ class _Timeout:
         try:
             return await answer
         except asyncio.CancelledError:
-            # Somebody else may have cancelled it as well.
+            # Another cancellation may have happened as well.
             if task in self._overdue and task.uncancel() == 0:
                 raise _RequestTimeoutError from None
             raise

@@ -1,4 +1,4 @@
-"""The parts of a server put together: what is kept, who works, who is served, and how it ends."""
+"""Assembly of a server from its parts: storage, workers, services, operations and graceful shutdown."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
@@ -50,40 +50,40 @@ from robosc_server.workers.factory import open_workers
 _RULE = Rule(frozenset({Scope.SYNTHESIZE}))
 
 _IDLE_METHODS = frozenset({f"/{JOB_SERVICE_NAME}/WatchJob", "/grpc.health.v1.Health/Watch"})
-"""Calls that a server which ends need not wait for."""
+"""Methods whose open calls do not delay a shutdown."""
 
 KEEPALIVE = (
     ("grpc.keepalive_time_ms", 30_000),
     ("grpc.keepalive_timeout_ms", 10_000),
-    # How long an answer to a ping is awaited goes by this one; a minute unless it is set.
+    # The timeout of a ping; a minute by default.
     ("grpc.http2.ping_timeout_ms", 10_000),
 )
-"""gRPC keepalive options: peers that have gone without a word are detected, so that nobody works for them."""
+"""gRPC keepalive options, which detect peers that have disappeared, so that their tasks end."""
 
 _RESERVED_TASKS = 1
-"""Tasks that may run beyond the workers' number, of callers of whom none runs."""
+"""Tasks that may run beyond the number of workers, for callers without a running task."""
 
 _UNREAD_RESULTS = 8
-"""Results of the greatest size that may be on their way to their readers."""
+"""Unread results of maximum size that the server holds in memory."""
 
 _REFUSED_CALLS = 1000
-"""Calls that are being refused at once, before gRPC itself refuses, which tells no reason and no log."""
+"""Calls that can be refused with a reason at the same time; beyond them gRPC refuses without a reason or log line."""
 
 _IDLE_S = 300.0
-"""A connection on which nothing is called for so long is ended; clients make a new one by themselves."""
+"""Time after which a connection without calls is closed; clients reconnect by themselves."""
 
 _REFLECTION_IDLE_S = 60.0
-"""Time between two requests of a stream about what is served here."""
+"""Maximum time between two requests of a reflection stream."""
 
 _HANDSHAKE_LIMIT_S = 10.0
-"""Time for TLS, and for the first words of HTTP/2."""
+"""Maximum time of the TLS and HTTP/2 handshakes."""
 
 _METADATA_BYTES = 8 * 1024
 """Maximum size of the metadata of a call, all names and values together, in bytes."""
 
 
 class StartError(Exception):
-    """The server cannot start as it is told to; one sentence for the operator."""
+    """The server cannot start with its settings; one sentence for the operator."""
 
 
 @asynccontextmanager
@@ -92,7 +92,7 @@ async def running_server(settings: Settings, workers: Workers | None = None) -> 
 
     Args:
         settings: Settings of the server.
-        workers: Workers that do the tasks, not started yet; None: as the settings say.
+        workers: Workers that run the tasks, not started yet; None: as configured.
 
     Raises:
         StartError: It cannot start as configured.
@@ -105,8 +105,8 @@ async def running_server(settings: Settings, workers: Workers | None = None) -> 
 
 
 async def _start(settings: Settings, given_workers: Workers | None, stack: AsyncExitStack) -> str:
-    """Put the parts together; the stack takes them apart, the last one first."""
-    # What is wrong with the settings is told before anything is started.
+    """Start the parts; the stack stops them in reverse order."""
+    # Wrong settings are reported before anything is started.
     if settings.metrics_address:
         check_metrics_address(settings.metrics_address, beyond_loopback=settings.metrics_beyond_loopback)
     finish = _finish(settings)
@@ -124,14 +124,14 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         tokens,
         has_client_certificates=settings.client_ca is not None,
     )
-    # Before the wait for the request: whoever sends none has a call open all the same.
+    # Outside of the request timeouts: a call without a request counts as open, too.
     open_calls = OpenCalls(
         CallLimits(settings.open_calls, settings.open_calls_per_caller),
-        # Reading certificates that nobody has shown takes longer than all the rest of it.
+        # Looking for a client certificate that cannot exist takes longer than the rest of the layer.
         caller_of if settings.client_ca is not None else token_or_host_of,
     )
     prompt = RequestTimeouts(settings.request_seconds, dict.fromkeys(REFLECTION_METHODS, _REFLECTION_IDLE_S))
-    # What takes more looks at it by itself.
+    # Services with larger requests check them themselves.
     malformed = MalformedRequests(
         JOB_SERVICE_NAME, health_names.SERVICE_NAME, reflection.SERVICE_NAME, limit=QUICK_BYTES
     )
@@ -199,7 +199,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         running=lambda: scheduler.running,
         jobs=lambda: {str(state): count for state, count in manager.counts.items()},
         conditions=health.conditions,
-        restarts=lambda: getattr(workers, "restarts", 0),  # Those of a cluster are its own.
+        restarts=lambda: getattr(workers, "restarts", 0),  # A cluster restarts its own workers.
     )
     await stack.enter_async_context(
         health.probing(
@@ -227,19 +227,19 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
 
 
 def _options(settings: Settings, request_bytes: int) -> list[tuple[str, int]]:
-    """Arguments of gRPC's core."""
+    """Channel arguments of the gRPC server."""
     return [
         *KEEPALIVE,
-        # Without this two servers could share a port and each get some of the requests.
+        # Otherwise two servers could share a port and each get a part of the requests.
         ("grpc.so_reuseport", 0),
         ("grpc.http2.min_ping_interval_without_data_ms", 10_000),
         ("grpc.server_handshake_timeout_ms", int(_HANDSHAKE_LIMIT_S * 1000)),
         ("grpc.max_connection_idle_ms", int(_IDLE_S * 1000)),
-        # Beyond it a client has calls wait without a word: those that are refused are to fit.
+        # Beyond this number a client queues calls silently; calls that are refused with a reason must fit.
         ("grpc.max_concurrent_streams", settings.open_calls_per_caller + _REFUSED_CALLS),
         ("grpc.max_metadata_size", _METADATA_BYTES),
         ("grpc.absolute_max_metadata_size", _METADATA_BYTES),
-        # What is too large is refused with a reason, by us; beyond this it is by gRPC, without one.
+        # The server refuses large messages with a reason; beyond this size gRPC refuses without one.
         ("grpc.max_receive_message_length", 2 * request_bytes),
     ]
 
@@ -261,7 +261,7 @@ def _finish(settings: Settings) -> Callable[[TaskKind, Result], Result]:
 
 
 def _descriptions(settings: Settings, request_limits: RequestLimits) -> tuple[bytes, bytes]:
-    """The answers of ListTargets and GetVersion; making them takes a while."""
+    """Return the serialized responses of ListTargets and GetVersion; this is slow."""
     limits = server_limits(
         request_limits,
         settings.task_limits,

@@ -1,7 +1,7 @@
-"""Time as the server sees it: the one place where it is read.
+"""Clock of the server: the only module that reads the time.
 
-What passes is measured by the clock of the event loop that runs, which asyncio's own waits go by, too (`sleep`,
-`timeout`, `wait`, `call_later`): a test has all of it pass as it likes with a loop of its own.
+Durations are measured with the clock of the running event loop, which asyncio's own waits use as well (`sleep`,
+`timeout`, `wait`, `call_later`): a test with its own loop controls all of them.
 """
 
 import sys
@@ -9,11 +9,11 @@ import time
 
 
 def monotonic() -> float:
-    """Seconds that never go back; where no event loop runs, those of the computer.
+    """Return monotonic seconds of the running event loop, or of the computer where no loop runs.
 
-    They are the same ones: asyncio's loops read that clock.
+    Both are the same clock, except in tests.
     """
-    # A worker's process has no loop, and need not load what has.
+    # A worker process has no event loop and need not import asyncio.
     asyncio = sys.modules.get("asyncio")
     try:
         return time.monotonic() if asyncio is None else asyncio.get_running_loop().time()
@@ -22,5 +22,5 @@ def monotonic() -> float:
 
 
 def wall() -> float:
-    """Seconds since 1970-01-01 UTC: what callers and operators read."""
+    """Return the seconds since 1970-01-01 UTC, for times that callers and operators read."""
     return time.time()

@@ -1,4 +1,4 @@
-"""The installed command `robosc-server`: what is asked again and again, beside a server, loads no server."""
+"""Entry point of the command `robosc-server`; the frequent `health` command does not import the server."""
 
 import sys
 from typing import NoReturn

@@ -54,14 +54,14 @@ class RefusedError(Exception):
 
 
 def code_of(reason: Reason) -> grpc.StatusCode:
-    """The status code that tells a reason."""
+    """Return the status code of a reason."""
     return _CODES[reason]
 
 
 async def abort(context: Any, error: RefusedError) -> NoReturn:
-    """End a call (of grpc.aio) with what is to be told."""
+    """Abort a call of grpc.aio with the status, message and details of an error."""
     code = code_of(error.reason)
-    # It goes twice into the metadata, which callers take 8 KiB of; what is too long loses the reason, too.
+    # The metadata has the message twice, and clients accept 8 KiB: longer metadata would lose the reason as well.
     message = error.message.encode("utf-8", "replace")[:MAXIMUM_MESSAGE_BYTES].decode("utf-8", "ignore")
     metadata = failure_metadata(code, message, error.reason, error.retry_after_s, context)
     await context.abort(code, message, metadata)
@@ -69,7 +69,7 @@ async def abort(context: Any, error: RefusedError) -> NoReturn:
 
 
 def public_failure(failure: Failure) -> Failure:
-    """A failure as it is told to callers; what only the log should know goes there, under an id that they are told."""
+    """Return a failure without its details; these are logged under an id that the caller gets."""
     if not failure.details:
         return failure
     fault = log_fault(failure.details, failure.reason)
@@ -77,5 +77,5 @@ def public_failure(failure: Failure) -> Failure:
 
 
 def fault_message(identity: str) -> str:
-    """Return the words for a caller about a fault that the log has under an id."""
+    """Return the message for a caller about an internal error that the log has under an id."""
     return f"internal error {identity}, please report it with the server's log"

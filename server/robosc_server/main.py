@@ -1,4 +1,4 @@
-"""`robosc-server`: start, tell where, stop gracefully; other commands beside."""
+"""The command `robosc-server`: serves until a signal, or runs another command."""
 
 import asyncio
 import logging
@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-# gRPC's own log would tell once more, in its words, what we tell; it is read at its import.
+# gRPC would log the same errors again; it reads this variable at its import.
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 from robosc_server.operations.commands import run_command
@@ -30,7 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _serve(settings: Settings) -> int:
     """Serve until a signal; returns the exit status."""
-    # Other commands, such as the health check of a container, need nothing of it, and it takes a while to import.
+    # Other commands do not need the application, which is slow to import.
     from robosc_server.application import StartError, running_server
 
     shutdown = ShutdownSignals(settings.drain_seconds)
@@ -52,7 +52,7 @@ def _serve(settings: Settings) -> int:
 
 
 def _announce(address: str) -> None:
-    """Print where the server listens; that nobody takes that is no reason to serve nobody."""
+    """Print the address; the server runs even if standard output cannot be written."""
     try:
         sys.stdout.write(f"robosc-server listening on {address}\n")
         sys.stdout.flush()
@@ -60,7 +60,7 @@ def _announce(address: str) -> None:
         logging.getLogger(__name__).warning(
             "listening on %s; the address cannot be written to standard output: %s", address, error
         )
-        # The interpreter would try once more at its end.
+        # Otherwise the interpreter would try again at its exit.
         sys.stdout = None
 
 

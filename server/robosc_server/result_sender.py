@@ -1,7 +1,7 @@
-"""Results on their way to those who asked: how much of them may wait to be read.
+"""Sender of results with a limit on unread bytes.
 
-A message that was given to gRPC stays in memory until its caller has read it, or its connection is gone. Who asks for
-large results and reads none of them would fill the server's memory without this.
+gRPC holds a message in memory until its caller has read it or the connection is lost. Without a limit, callers that do
+not read large results would fill the memory of the server.
 """
 
 from collections import Counter
@@ -13,13 +13,13 @@ from robosc_server.failures import RefusedError
 from robosc_server.tasks.task import Reason
 
 SMALL_BYTES = 64 * 1024
-"""Results up to this size are not counted: as many of them as calls can be under way."""
+"""Maximum size of results that are not counted, since the number of open calls bounds them."""
 
 _RETRY_S = 5.0
 
 
 class ResultSender:
-    """Sends results, and counts those that are not read yet.
+    """Sender of results, which counts unread bytes.
 
     Args:
         per_caller_bytes: Of one caller's results; one alone may be larger.
@@ -50,7 +50,7 @@ class ResultSender:
         async for message in messages:
             is_read = self.reserve(context, (message,))
             await context.write(message)
-            # gRPC takes one when there is room for it, which those before it have left.
+            # gRPC accepts a message once it has sent the one before.
             read()
             read = is_read
 

@@ -1,7 +1,7 @@
-"""The SynthesisService: bytes come in and go out; what is refused is raised, and told by what stands around every call.
+"""SynthesisService with serialized messages; its handlers raise RefusedError, which the call interceptor reports.
 
-Requests and responses stay serialized here: a request is looked at once (`tasks.requests`), workers make the responses,
-and one that is kept is sent as it is. What the generated bindings would do in between costs more than all of that.
+Requests and responses stay serialized: `tasks.requests` checks a request, workers make the responses, and a cached
+response is sent as it is. Parsing and serializing with the generated bindings would take longer than all of this.
 """
 
 import asyncio
@@ -24,7 +24,7 @@ SERVICE_NAME = _SERVICE.full_name
 METHODS = tuple(method.name for method in _SERVICE.methods)
 
 PROGRESS_PERIOD_S = 0.05
-"""Time that work may take before its caller is informed of it, and between two such messages, in seconds."""
+"""Time before the first progress message, and between two of them, in seconds."""
 
 type Context = grpc.aio.ServicerContext[Any, Any]
 type OnReport = Callable[[Report], Awaitable[None]]
@@ -39,7 +39,7 @@ _STREAMS = {
 
 
 class ResultProvider(Protocol):
-    """ResultProvider that gives an accepted task its result."""
+    """Provider of the results of accepted tasks."""
 
     def cached(self, key: str) -> Result | None:
         """The result of an equal task, if it is in memory."""
@@ -77,8 +77,8 @@ class SynthesisService:
         for name, kind in _UNARY.items():
             methods[name] = grpc.unary_unary_rpc_method_handler(self._unary(kind))
         for name, kind in _STREAMS.items():
-            # On the line a method that answers once is a stream of one message. gRPC sends the answer of such a
-            # handler together with the status, at once, and lets it write other messages before.
+            # On the wire, a unary response is a stream of one message. gRPC sends the response of such a handler
+            # together with the status, and lets the handler write other messages before.
             methods[name] = grpc.unary_unary_rpc_method_handler(self._stream(kind))
         for name, (message, answer) in self._fixed.items():
             methods[name] = grpc.unary_unary_rpc_method_handler(_fixed_answer(message, answer))
@@ -102,7 +102,7 @@ class SynthesisService:
             if result is None:
                 async with _ProgressWriter(context) as progress:
                     result = await self._provider.result(task, caller_of(context), progress.report)
-                    # Now: a caller that does not read its reports has the result wait.
+                    # Reserved now, since a caller that does not read its progress delays the result.
                     self._sender.reserve(context, result.messages)
             else:
                 self._sender.reserve(context, result.messages)
@@ -127,9 +127,9 @@ def _fixed_answer(request_type: Any, answer: bytes) -> Any:
 
 
 class _ProgressWriter:
-    """Tells a caller where the work is, if it takes a while: what is newest, and not too often.
+    """Writer of progress messages, which sends the newest report at a limited rate.
 
-    Each message costs server and client as much as a small call; who reads slowly misses some, and holds no worker up.
+    A message takes as long as a small call. A slow reader misses reports and does not delay its worker.
     """
 
     def __init__(self, context: Context) -> None:
@@ -148,15 +148,15 @@ class _ProgressWriter:
         if self._writer is None:
             return
         if kind is not None and issubclass(kind, asyncio.CancelledError):
-            self._writer.cancel()  # Nobody is there to read it.
+            self._writer.cancel()  # The caller has gone.
             await asyncio.gather(self._writer, return_exceptions=True)
             return
-        # A message that is on its way cannot be taken back: the next one has to wait for it.
+        # A message that is being written cannot be cancelled: the result has to wait for it.
         await self._writer
         self._pause.cancel()
 
     async def report(self, report: Report) -> None:
-        """Tell it soon, unless there is something newer by then."""
+        """Send a report soon, unless a newer one replaces it."""
         self._newest = report
         if self._may_write:
             self._begin()
@@ -178,9 +178,9 @@ class _ProgressWriter:
 
 
 def progress_message(report: Report) -> bytes:
-    """The message that tells where the work is: the same bytes in the response of each streaming method."""
+    """Return a serialized progress message, which is the same for each streaming method."""
     return pb.SynthesizeResponse(progress=pb.Progress(stage=report.stage, message=report.message)).SerializeToString()
 
 
 async def _drop(report: Report) -> None:
-    """Progress of a call whose response has no place for it."""
+    """Ignore the progress of a unary call."""

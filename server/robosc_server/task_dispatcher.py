@@ -1,4 +1,4 @@
-"""TaskDispatcher that gives an accepted task its result: one that is kept, or the one that a worker makes."""
+"""Dispatcher of accepted tasks: a task gets its result from the cache or from a worker."""
 
 from robosc_server.failures import RefusedError, public_failure
 from robosc_server.jobs import ResultCache, Scheduler
@@ -9,14 +9,14 @@ from robosc_server.workers import OnReport
 
 
 class TaskDispatcher:
-    """TaskDispatcher for the tasks of calls, which end with their call.
+    """Dispatcher of the tasks of calls; a task is cancelled when its call ends.
 
     Args:
-        results: Kept results.
-        scheduler: Scheduler that decides whose turn it is.
+        results: Cache of results.
+        scheduler: Queue in front of the workers.
         quotas: Quotas of what each caller may ask for.
         limits: Limits of one task.
-        metrics: Metrics that count the results that were kept and those that were not.
+        metrics: Metrics that count cache hits and misses.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class TaskDispatcher:
             self._metrics.cache_hit("store")
             return found
         self._metrics.cache_miss()
-        # What is refused since there is too much to do is not counted.
+        # A task that is refused because of a full queue does not count for the quota.
         self._scheduler.require_room(caller)
         self._quotas.admit(caller)
 

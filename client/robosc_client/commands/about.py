@@ -1,4 +1,4 @@
-"""`targets` and `version`: what a server has."""
+"""The commands `targets` and `version`."""
 
 import argparse
 import dataclasses

@@ -1,4 +1,4 @@
-"""`robosc-client bench`: how many calls a second a server answers, and how long they take."""
+"""The command `bench`, which measures the rate and duration of calls."""
 
 import argparse
 import asyncio
@@ -27,7 +27,7 @@ in the model makes every request different. An interrupt prints the measurements
 _EPILOG = exit_statuses("every call was answered", "the model file is not a text file", "a call was not answered")
 
 _RUN = secrets.token_hex(8)
-"""Identifier of this process: a request of another process is no request of this one."""
+"""Identifier of this process, so that the requests of two processes differ."""
 
 _METHODS = {
     "check": ("/robosc_api.v1.SynthesisService/Check", False),
@@ -111,7 +111,7 @@ def _requests(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[int], 
             task = Synthesize(chosen, synthesis_options(arguments))
         return request_of(task).SerializeToString()
 
-    # What cannot be sent is told before anything is measured; another comment changes nothing about that.
+    # Invalid requests are reported before the measurement; the comment has no influence on that.
     same = content(bundle)
     if not arguments.uncached:
         return lambda number: same
@@ -119,7 +119,7 @@ def _requests(arguments: argparse.Namespace, bundle: Bundle) -> Callable[[int], 
 
 
 def varied(bundle: Bundle, number: int) -> Bundle:
-    """The same model in another text; different at any other time, too."""
+    """Return the same model with a unique comment."""
     text = f"{bundle.main.text}\n// {_RUN} {number}\n"
     return Bundle(SourceFile(bundle.main.name, text), bundle.libraries, bundle.searched, bundle.interfaces)
 

@@ -1,4 +1,4 @@
-"""Server that a command asks, and the time that the command waits for it."""
+"""Arguments for the server and the deadline of a command."""
 
 import argparse
 import os
@@ -14,7 +14,7 @@ PROFILE_VARIABLE = "ROBOSC_PROFILE"
 
 SERVICE = "the server is unavailable, refused, failed or missed the deadline; or its answer was rejected"
 SIGNED_SERVICE = f"{SERVICE}, such\n     as a supervisor that no key of --signed-by has signed"
-"""Meaning of the exit status 3; this one where signatures are asked for, and `SERVICE` elsewhere."""
+"""Meaning of the exit status 3 of commands that check signatures; `SERVICE` for the others."""
 
 
 def exit_statuses(done: str, failed: str | None = None, service: str | None = SERVICE) -> str:
@@ -63,7 +63,7 @@ def add_connection_arguments(
         help=f"profile of the server, see 'profile --help' (default: ${PROFILE_VARIABLE}, or the default profile)",
     )
     add_client_arguments(parser)
-    # What the environment says is about a server that is named, not about a profile: no token goes to another server.
+    # Environment variables apply to --server, not to profiles, so that no token reaches another server.
     parser.set_defaults(from_environment={name: parser.get_default(name) for name in _FIELDS})
     parser.set_defaults(**dict.fromkeys(_FIELDS))
     parser.add_argument(

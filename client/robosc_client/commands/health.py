@@ -1,4 +1,4 @@
-"""`robosc-client health`: whether a server is well, by gRPC's health check."""
+"""The command `health`, which queries the gRPC health check of a server."""
 
 import argparse
 import sys
@@ -22,7 +22,7 @@ _EPILOG = exit_statuses(
 
 _DEADLINE_S = 5.0
 
-# gRPC's name for how a health check ends that is about a service nobody knows (gRPC Health Checking Protocol).
+# Status of a health check for an unknown service (gRPC Health Checking Protocol).
 _NO_SUCH_SERVICE = "NOT_FOUND:"
 
 

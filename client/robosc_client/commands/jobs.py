@@ -1,4 +1,4 @@
-"""`submit`, `watch`, `get`, `cancel` and `list`: jobs, which go on without their caller."""
+"""The commands `submit`, `watch`, `get`, `cancel` and `list` for jobs."""
 
 import argparse
 import sys
@@ -201,7 +201,7 @@ def _add_tasks(submit: argparse.ArgumentParser) -> None:
         else:
             add_model_arguments(parser)
         if name in ("synth", "generate", "explore"):
-            # A graph is of everything allowed, whatever goes on for ever.
+            # A graph contains all enabled events, livelocks included.
             add_synthesis_arguments(parser, has_choice=name != "explore")
         if name == "synth":
             add_verify_limit_argument(parser, "--verify-limit", SYNTHESIS_STATES)
@@ -253,7 +253,7 @@ def _add_verify_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--strict", action="store_true", help="fail if maximal permissiveness could not be checked")
     add_engine_options(parser)
-    # A server knows no keys that it could check a file by.
+    # A server has no keys to check a file with.
     parser.set_defaults(signed_by=[])
 
 
@@ -314,7 +314,7 @@ def _submit(arguments: argparse.Namespace, client: Client) -> int:
         deadline_s=arguments.deadline,
     )
     if arguments.watch:
-        # Whoever gives up waiting, or is cut off, knows how to ask for the job; the one JSON document comes at the end.
+        # Print the id first, so that the job can be found after an interrupt; the JSON document comes at the end.
         stream, told = (sys.stderr, f"submitted as {found.job.id}") if arguments.json else (sys.stdout, found.job.id)
         stream.write(f"{told}\n")
         stream.flush()
@@ -368,7 +368,7 @@ def _get(arguments: argparse.Namespace, client: Client) -> int:
 
 
 def _report_no_result(arguments: argparse.Namespace, job: Job) -> int:
-    """Tell why a job that has ended has no result."""
+    """Report why a job that has ended has no result."""
     why = "was cancelled" if job.failure is None else f"has failed: {job.failure.message} [{job.failure.reason}]"
     sys.stderr.write(f"robosc-client: job {job.id} {why}\n")
     if arguments.json:
@@ -377,7 +377,7 @@ def _report_no_result(arguments: argparse.Namespace, job: Job) -> int:
 
 
 def _report_nothing(job: Job, found: Synthesis | Generation | Exploration | Verification | Formatted) -> None:
-    """Tell why there is nothing to write, as the command would have told that does the same at once."""
+    """Report why there is nothing to write, like the corresponding command."""
     if isinstance(found, Verification | Formatted):
         print_diagnostics(found.diagnostics, None)
         if isinstance(found, Verification) and found.reason:
@@ -401,7 +401,7 @@ def _require_sound(arguments: argparse.Namespace, found: TaskResult, keys: "Coll
 
     supervisor = decoded(found.supervisor) if isinstance(found, Synthesis) and found.supervisor else None
     if supervisor is None or not isinstance(found, Synthesis):
-        # Whatever else the server sends, a graph or a report, nobody has signed.
+        # Other results, such as graphs and reports, have no signature.
         if keys or arguments.deployment:
             raise CommandError(
                 "the job has no supervisor, but --signed-by or --deployment requires one", ExitCode.SERVICE
@@ -505,7 +505,7 @@ def result_json(found: TaskResult) -> dict[str, Any]:
 
 def _print(found: TaskResult) -> None:
     if isinstance(found, Formatted) and found.text is not None:
-        # To a file or program byte for byte; on a terminal, no text of a server moves the cursor.
+        # Byte for byte to a file or program; without control characters to a terminal.
         sys.stdout.write(_harmless(found.text) if sys.stdout.isatty() else found.text)
         return
     if isinstance(found, tuple):
@@ -533,7 +533,7 @@ def _is_good(found: TaskResult) -> bool:
 
 
 def _write(arguments: argparse.Namespace, found: TaskResult) -> bool:
-    """Write what a job has found; whether there is anything to write.
+    """Write the result of a job; return False if there is nothing to write.
 
     Raises:
         UsageError: It cannot be written, or is never anything for a file.

@@ -1,4 +1,4 @@
-"""`robosc-client profile`: servers by name."""
+"""The command `profile`, which manages named servers."""
 
 import argparse
 import getpass
@@ -103,7 +103,7 @@ def _require_usable(profile: Profile, *, has_token: bool) -> None:
 
 
 def _token() -> str:
-    """A token that nobody sees on a terminal or in a list of processes."""
+    """Read a token without showing it on a terminal or in the list of processes."""
     if sys.stdin is None:
         raise UsageError("standard input is closed")
     try:

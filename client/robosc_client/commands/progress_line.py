@@ -29,7 +29,7 @@ class ProgressLine:
             from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
             from rich.progress import Progress as ProgressBar
 
-            # What a server says is text, and no markup.
+            # Texts of a server must not be interpreted as markup.
             words = TextColumn("{task.description}", markup=False)
             columns = (SpinnerColumn(), BarColumn(_BAR_WIDTH), words, TimeElapsedColumn())
             console = Console(stderr=True)
@@ -51,7 +51,7 @@ class ProgressLine:
 
         Args:
             text: Text of the line.
-            stage: Stage of the work, for the bar; a bar that moves to and fro means that it is not known.
+            stage: Stage of the work, for the bar; unknown stages show an indeterminate bar.
         """
         if self._bar is not None and self._line is not None:
             self._bar.update(self._line, description=text[:_MAXIMUM])
@@ -61,7 +61,7 @@ class ProgressLine:
                 self._bar.update(self._line, completed=len(_STAGES))
 
     def write(self, line: str) -> None:
-        """Write a line of the result to standard output, above the line that moves."""
+        """Write a line of the result to standard output, above the progress line."""
         if self._bar is not None:
             self._bar.stop()
         sys.stdout.write(f"{line}\n")
@@ -70,5 +70,5 @@ class ProgressLine:
             self._bar.start()
 
     def report(self, progress: Progress) -> None:
-        """Replace the line by where the work is."""
+        """Show the progress of the work."""
         self.show(f"{progress.stage}: {progress.message}", progress.stage)

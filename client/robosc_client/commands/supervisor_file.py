@@ -1,4 +1,4 @@
-"""A supervisor's file and the signature beside it, which must never say more than is so."""
+"""Writing of a supervisor file with its signature file, so that they never contradict each other."""
 
 from pathlib import Path
 

@@ -1,6 +1,6 @@
-"""`check`, `synth`, `generate`, `explore`, `verify` and `format`, done on a server.
+"""The commands `check`, `synth`, `generate`, `explore`, `verify` and `format` on a server.
 
-What they print and write is what those of `robosc` print and write.
+They print and write the same as the commands of `robosc`.
 """
 
 import argparse
@@ -90,11 +90,11 @@ def add_parsers(commands: Commands) -> None:
 
 
 def add_synthesis_arguments(parser: argparse.ArgumentParser, *, has_choice: bool = True) -> None:
-    """Add the arguments that say how a supervisor is made.
+    """Add the arguments for the synthesis of a supervisor.
 
     Args:
         parser: Parser of the command.
-        has_choice: True if silent steps that never end can be refused.
+        has_choice: True if livelocks can be refused.
     """
     add_deployment_argument(parser)
     add_engine_options(parser)
@@ -115,7 +115,7 @@ def add_signed_by_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def sendable(number: int | None, option: str) -> int | None:
-    """A number of an option, if a request can say it.
+    """Return a number of an option, if a request can contain it.
 
     Raises:
         UsageError: It cannot.
@@ -199,7 +199,7 @@ def _synth(arguments: argparse.Namespace, client: Client) -> int:
 
 
 def trusted_keys(arguments: argparse.Namespace) -> "tuple[PublicKey, ...]":
-    """The keys that `--signed-by` names; read before a server works for nothing.
+    """Read the keys of `--signed-by`, before the server is called.
 
     Raises:
         UsageError: A file cannot be read or holds no key, or the package for keys is not installed.
@@ -222,7 +222,7 @@ def trusted_keys(arguments: argparse.Namespace) -> "tuple[PublicKey, ...]":
 
 
 def require_signature(keys: "Collection[PublicKey]", supervisor: bytes, signature: bytes) -> None:
-    """Do nothing if one of these keys has signed a supervisor's file.
+    """Do nothing if one of the keys has signed a supervisor file.
 
     Raises:
         CommandError: None has.

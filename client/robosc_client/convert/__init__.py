@@ -1,4 +1,4 @@
-"""The core's values to protobuf messages and back: the one package of the client that touches generated names.
+"""Conversion between protobuf messages and values of the core; only this package uses generated names.
 
-What a server answers is not trusted: sizes, numbers, enums, digests and paths are checked here.
+Responses are not trusted: sizes, numbers, enums, digests and paths are checked here.
 """

@@ -1,4 +1,4 @@
-"""Failure of a call, as gRPC reports it and as google.rpc adds to it (AIP-193)."""
+"""Failure of a call: status and message of gRPC, and details of google.rpc (AIP-193)."""
 
 import math
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ class Failure:
 
     Attributes:
         code: gRPC's status code.
-        message: One sentence; harmless on a terminal.
-        reason: Server's word for the reason; empty: it has given none.
-        retry_after_s: Seconds after which the server wants to be asked again; None: it has not said.
+        message: One sentence without control characters.
+        reason: Reason of the server, such as `SERVER_BUSY`; empty: not given.
+        retry_after_s: Seconds after which the call may be retried; None: not given.
     """
 
     code: grpc.StatusCode
@@ -32,16 +32,13 @@ class Failure:
 
 
 def first_line(text: str) -> str:
-    """Return the words of gRPC or a server about a connection, as a sentence may end with them.
-
-    They are bounded, and harmless on a terminal.
-    """
+    """Return the first line of an error message of gRPC or a server, bounded and without control characters."""
     return visible(text[:_MAXIMUM_REASON].strip().partition("\n")[0].rstrip())
 
 
 def failure_of(error: grpc.RpcError) -> Failure:
     """Return the failure of a call; malformed details count as not given."""
-    # Every error of a call is also a grpc.Call; the stubs do not say so.
+    # Every error of a call is also a grpc.Call, which the type stubs omit.
     call: Any = error
     details = call.details() or ""
     message = visible(details[:_MAXIMUM_MESSAGE])
@@ -49,12 +46,12 @@ def failure_of(error: grpc.RpcError) -> Failure:
         if key == _DETAILS and isinstance(value, bytes):
             reason, retry_after_s = _details(value)
             return Failure(call.code(), message, reason, retry_after_s)
-    # Without a word of a server, this is gRPC's own.
+    # Without details of a server, the message is from gRPC itself.
     return Failure(call.code(), first_line(details) if call.code() is grpc.StatusCode.UNAVAILABLE else message)
 
 
 def _details(content: bytes) -> tuple[str, float | None]:
-    """Reason, and seconds to wait. What they are written in is imported when it is needed."""
+    """Return the reason and the delay of a retry; the modules for them are imported on use."""
     from google.protobuf.message import DecodeError
     from google.rpc import error_details_pb2, status_pb2
 

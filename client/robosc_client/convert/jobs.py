@@ -1,4 +1,4 @@
-"""Messages about jobs to values, each checked."""
+"""Conversion of messages about jobs to checked values."""
 
 import re
 from datetime import UTC, datetime

@@ -1,4 +1,4 @@
-"""Tasks to request messages."""
+"""Conversion of tasks to request messages."""
 
 from pathlib import PurePath
 
@@ -86,7 +86,7 @@ def _request(task: Task) -> Request:
 
 
 def submit_request(task: Task, key: str, label: str, retention_s: float | None) -> jobs_pb2.SubmitJobRequest:
-    """Asks for a job; raises as `request_of`."""
+    """Return the request for submitting a job; raises as `request_of`."""
     request = request_of(task)
     try:
         submitted = jobs_pb2.SubmitJobRequest(task=_task(request), idempotency_key=key, label=label)
@@ -100,7 +100,7 @@ def submit_request(task: Task, key: str, label: str, retention_s: float | None) 
 def list_request(
     states: tuple[JobState, ...], kind: TaskKind | None, *, all_owners: bool, page_size: int, page_token: str
 ) -> jobs_pb2.ListJobsRequest:
-    """Asks for one page of jobs."""
+    """Return the request for one page of jobs."""
     return jobs_pb2.ListJobsRequest(
         page_size=page_size,
         page_token=page_token,
@@ -156,10 +156,10 @@ def _options(options: SynthesisOptions) -> pb.SynthesisOptions:
 
 
 def _limit(most: int | None, name: str) -> int:
-    """A limit as a request has it, where 0 is the server's own.
+    """Return a limit for a request, in which 0 means the limit of the server.
 
     Raises:
-        ValueError: It is 0 or less, which no request can say.
+        ValueError: It is less than 1.
     """
     if most is not None and most < 1:
         raise ValueError(f"{name} is {most}, and must be at least 1")
@@ -196,7 +196,7 @@ def _bundle(bundle: Bundle) -> pb.Bundle:
 
 
 def _listing(file: SourceFile) -> pb.SourceFile:
-    """A file of properties: a place on this machine is nothing to a server, which takes relative names only."""
+    """Convert a file of properties; a server accepts only relative names."""
     path = PurePath(file.name)
     return pb.SourceFile(name=path.name if path.is_absolute() else file.name, text=file.text)
 

@@ -1,4 +1,4 @@
-"""Parts of response messages to values, each checked."""
+"""Conversion of parts of responses to checked values."""
 
 from collections.abc import Sequence
 
@@ -20,10 +20,10 @@ from robosc_client.results import (
 )
 
 MAXIMUM_SHOWN = 1000
-"""Characters of a line that is shown while work goes on."""
+"""Maximum number of characters of a progress line."""
 
 MAXIMUM_ITEMS = 100_000
-"""Findings, their places, and events of one answer: more than any model has, and few bytes can hold millions."""
+"""Maximum number of findings, their places, and events of one response; small messages could contain millions."""
 
 _MAXIMUM_TARGETS = 1000
 
@@ -51,7 +51,7 @@ _VERDICTS = {
 
 
 def require_at_most(most: int, count: int, what: str) -> None:
-    """Do nothing if there are not too many of something; looked at before any of them becomes a value.
+    """Do nothing if a number of items is within its limit; checked before the items are converted.
 
     Raises:
         ServiceError: There are.
@@ -84,7 +84,7 @@ def status_of(number: pb.SynthesisStatus) -> SynthesisStatus:
     """Return the status with which a synthesis ended.
 
     Raises:
-        ServiceError: The number says nothing.
+        ServiceError: The number is unknown.
     """
     if number not in _STATUSES:
         raise malformed(f"unknown status {number}")
@@ -99,7 +99,7 @@ def verification_status_of(number: pb.VerificationStatus) -> VerificationStatus:
 
 
 def explanation_of(text: str) -> EmptyExplanation | None:
-    """Return the explanation of what is to blame, or None where none is given.
+    """Return the explanation of a missing supervisor, or None if there is none.
 
     Raises:
         ServiceError: The text is no such document.

@@ -51,24 +51,24 @@ MAXIMUM_CHUNK_BYTES = 64 * 1024
 """Maximum size of a piece of a file or graph, in bytes."""
 
 MAXIMUM_PROGRESS = 1_000_000
-"""Messages that tell where the work is: many days of them, from a server that is one."""
+"""Maximum number of progress messages: a server sends fewer in many days."""
 
 
 class ResponseReader[Result](Protocol):
     """Reader that reassembles one result."""
 
     def take(self, message: Any) -> Progress | None:
-        """Take the next message; gives what it tells of the work.
+        """Take the next message; return its progress, if it has one.
 
         Raises:
-            ServiceError: No server of this version sends it, or not here.
+            ServiceError: The message is invalid at this point.
         """
 
     def result(self) -> Result:
         """The result, once the stream has ended.
 
         Raises:
-            ServiceError: It ended before there was a whole one.
+            ServiceError: The stream ended before the result was complete.
         """
 
 
@@ -205,7 +205,7 @@ class GenerationReader(_StreamReader):
         content, size = self._contents[chunk.file], files[chunk.file].size
         if chunk.file != self._place or chunk.offset != len(content):
             raise malformed("the chunks of files are not in order")
-        # A piece of nothing would be a way to go on for ever; an empty file may have one.
+        # Empty chunks could continue for ever; only an empty file may have one.
         is_empty = not chunk.data and size > 0
         if is_empty or len(chunk.data) > MAXIMUM_CHUNK_BYTES or len(content) + len(chunk.data) > size:
             raise malformed("a chunk of a file is empty or too long")
@@ -362,7 +362,7 @@ def _differ_in_layout_alone(before: str, after: str) -> bool:
     """Return True if two texts have the same tokens and the same comments, but for blanks."""
     if "".join(before.split()) != "".join(after.split()):
         return False
-    # A comment that ends a line later would swallow what was behind it.
+    # A comment that ends on a later line would hide the code after it.
     return tokenize(before).texts == tokenize(after).texts
 
 

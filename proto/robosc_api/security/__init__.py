@@ -1,9 +1,8 @@
-"""Access to a service of RoboSC, the same for each: TLS, client certificates, bearer tokens with scopes.
+"""Access control of RoboSC's services: TLS, client certificates, bearer tokens with scopes.
 
-A service listens beyond this machine with TLS only, unless it is told otherwise. Tokens are random texts of 256 bits;
-a
-file holds their SHA-256 digests, so that who reads it learns none. Without tokens and client certificates, whatever
-changes something is for callers on this machine alone.
+A service that other machines can reach needs TLS, unless insecure connections are allowed. Tokens have 256 random
+bits; a token file has their SHA-256 digests, so that it reveals no token. Without tokens and client certificates,
+methods that change something are only for callers on the same machine.
 """
 
 from robosc_api.security.addresses import is_loopback_host, is_loopback_peer, joined

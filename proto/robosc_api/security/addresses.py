@@ -1,4 +1,4 @@
-"""Addresses, and which of them are on this machine."""
+"""Parsing of addresses, and detection of loopback addresses."""
 
 import ipaddress
 import re
@@ -26,7 +26,7 @@ def joined(host: str, port: int) -> str:
 
 
 def is_loopback_host(host: str) -> bool:
-    """Return True if all that a host's name stands for is on this machine; one that stands for nothing is not."""
+    """Return True if all addresses of a host name are on this machine; unknown names are not."""
     try:
         found = socket.getaddrinfo(host.strip("[]"), None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError):

@@ -1,4 +1,4 @@
-"""The same options for the same thing in every command."""
+"""Security options that all commands share."""
 
 import argparse
 import os
@@ -134,17 +134,17 @@ def _amount(text: str) -> int:
 
 
 def issue_token(arguments: argparse.Namespace) -> tuple[str, str]:
-    """A new token for standard output, if it is not in a file, and for people the line that lets it in.
+    """Create a token; return the text for standard output and the line for the token file.
 
     Raises:
-        SecurityError: The name cannot stand in a file of tokens, or the file for the token is there or cannot be made.
+        SecurityError: The name is invalid, or the file for the token exists or cannot be created.
     """
     quota = Quota(arguments.waiting, arguments.per_minute, arguments.cpu_seconds_per_hour, arguments.calls)
     token, line = make_token(arguments.name, tuple(arguments.scope or arguments.default_scopes), quota)
     if arguments.output is None:
         return f"{token}\n", f"Keep the token secret; it is not shown again. The line for the token file:\n{line}\n"
     try:
-        # For its owner alone from the beginning: nobody can open it before its mode is set.
+        # Private from the start: no other user can open it before its mode is set.
         with os.fdopen(os.open(arguments.output, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as stream:
             stream.write(f"{token}\n")
     except OSError as error:

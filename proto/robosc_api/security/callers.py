@@ -1,4 +1,4 @@
-"""Caller behind the call under way."""
+"""Identity of the caller of the current call."""
 
 from contextvars import ContextVar
 from functools import lru_cache
@@ -11,10 +11,10 @@ from robosc_api.security.tokens import Entry, Scope
 _NETWORK_BITS = 64
 
 CALLER: ContextVar[str] = ContextVar("caller", default="")
-"""Name of the owner of the token that the call under way came with; empty: none was asked for."""
+"""Name of the token of the current call; empty: no token is required."""
 
 ENTRY: ContextVar[Entry | None] = ContextVar("entry", default=None)
-"""The token itself, as it stands in the file."""
+"""Entry of the token of the current call."""
 
 
 def caller_of(context: Any) -> str:
@@ -27,7 +27,7 @@ def caller_of(context: Any) -> str:
 
 
 def token_or_host_of(context: Any) -> str:
-    """The same, where callers are asked for no certificate."""
+    """Return the name of a caller, without client certificates."""
     return CALLER.get() or host_of(context.peer())
 
 
@@ -39,16 +39,16 @@ def is_admin() -> bool:
 
 @lru_cache(maxsize=4096)
 def host_of(peer: str) -> str:
-    """The host of a caller in gRPC's words (`ipv4:127.0.0.1:4711`, `ipv6:[::1]:4711`); `unix` for a socket's file."""
+    """Return the host of a gRPC peer (`ipv4:127.0.0.1:4711`, `ipv6:[::1]:4711`); `unix` for a Unix socket."""
     kind, _, rest = unquote(peer).partition(":")
     return kind if kind.startswith("unix") else rest.rpartition(":")[0].strip("[]") or peer
 
 
 @lru_cache(maxsize=4096)
 def network_of(caller: str) -> str:
-    """Return the name by which a caller is bounded: the network of one customer if only its address is known.
+    """Return the name to which limits of a caller apply; for an IPv6 address, its network.
 
-    A holder of an IPv6 address has 2^64 of them (RFC 6177); other names stay as they are.
+    A customer has 2^64 IPv6 addresses (RFC 6177); other names stay unchanged.
     """
     try:
         address = ip_address(caller.partition("%")[0])

@@ -1,4 +1,4 @@
-"""The caller's side: which services it believes, and what it shows to them."""
+"""Credentials of a client, and channels that use them."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,14 +15,14 @@ from robosc_api.security.tokens import MAXIMUM_TOKEN
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Credentials:
-    """Way to reach a service.
+    """Credentials for a service.
 
     Attributes:
-        is_secure: True to use TLS, believing the usual certificate authorities; a CA or certificate implies TLS.
-        ca: Certificates (PEM) that are believed instead; None: the usual ones.
-        certificate: The caller's own chain of certificates (PEM); None: none is shown.
+        is_secure: True to use TLS with the system's certificate authorities; a CA or certificate implies TLS.
+        ca: Certificate authorities (PEM) to trust instead; None: those of the system.
+        certificate: Client certificate chain (PEM); None: none.
         key: Its private key.
-        token_file: File that holds the caller's token, and nothing else; None: none is sent.
+        token_file: File that contains only the caller's token; None: no token is sent.
     """
 
     is_secure: bool = False
@@ -37,10 +37,10 @@ def open_channel(
     credentials: Credentials = Credentials(),
     options: tuple[tuple[str, Any], ...] = (),
 ) -> grpc.Channel:
-    """A channel to a service; the connection is made with the first call.
+    """Open a channel to a service; it connects with the first call.
 
     Raises:
-        SecurityError: A file cannot be used, or a token would be sent in the clear to another machine.
+        SecurityError: A file cannot be used, or a token would be sent without TLS to another machine.
     """
     token = _usable_token(address, credentials)
     if _is_secure(credentials):
@@ -55,7 +55,7 @@ def open_async_channel(
     credentials: Credentials = Credentials(),
     options: tuple[tuple[str, Any], ...] = (),
 ) -> grpc.aio.Channel:
-    """The same for asyncio; its calls are to be of one request each.
+    """Open a channel for asyncio, for calls with a single request.
 
     Raises:
         SecurityError: As `open_channel`.
@@ -73,7 +73,7 @@ def _is_secure(credentials: Credentials) -> bool:
 
 
 def _usable_token(address: str, credentials: Credentials) -> str | None:
-    """The token, where it may be sent to the address."""
+    """Return the token, if it may be sent to the address."""
     token = None if credentials.token_file is None else _token(credentials.token_file)
     if token is not None and not _is_secure(credentials) and not is_loopback_host(_host(address)):
         raise SecurityError(
@@ -121,21 +121,21 @@ def _token(path: Path) -> str:
 
 
 class _Bearer(grpc.UnaryUnaryClientInterceptor, grpc.UnaryStreamClientInterceptor, grpc.StreamStreamClientInterceptor):
-    """Shows a token with each call."""
+    """Interceptor that adds a token to each call."""
 
     def __init__(self, token: str) -> None:
         self._entry = ("authorization", f"Bearer {token}")
 
     def intercept_unary_unary(self, continuation: Any, client_call_details: Any, request: Any) -> Any:
-        """With the token."""
+        """Add the token."""
         return continuation(self._with_token(client_call_details), request)
 
     def intercept_unary_stream(self, continuation: Any, client_call_details: Any, request: Any) -> Any:
-        """With the token."""
+        """Add the token."""
         return continuation(self._with_token(client_call_details), request)
 
     def intercept_stream_stream(self, continuation: Any, client_call_details: Any, request_iterator: Any) -> Any:
-        """With the token."""
+        """Add the token."""
         return continuation(self._with_token(client_call_details), request_iterator)
 
     def _with_token(self, meant: Any) -> "_Details":
@@ -143,7 +143,7 @@ class _Bearer(grpc.UnaryUnaryClientInterceptor, grpc.UnaryStreamClientIntercepto
 
 
 class _Details(grpc.ClientCallDetails):
-    """A call as it was meant, with other metadata."""
+    """Details of a call with other metadata."""
 
     def __init__(self, meant: Any, metadata: Any) -> None:
         self.method = meant.method
@@ -155,24 +155,24 @@ class _Details(grpc.ClientCallDetails):
 
 
 class _AsyncBearer(grpc.aio.UnaryUnaryClientInterceptor):
-    """Shows a token with each call of asyncio that has one answer."""
+    """Interceptor that adds a token to each unary call of asyncio."""
 
     def __init__(self, token: str) -> None:
         self._entry = ("authorization", f"Bearer {token}")
 
     async def intercept_unary_unary(self, continuation: Any, client_call_details: Any, request: Any) -> Any:
-        """With the token."""
+        """Add the token."""
         return await continuation(_with_entry(client_call_details, self._entry), request)
 
 
 class _AsyncStreamBearer(grpc.aio.UnaryStreamClientInterceptor):
-    """Shows a token with each call of asyncio that has a stream of answers."""
+    """Interceptor that adds a token to each call of asyncio with a stream of responses."""
 
     def __init__(self, token: str) -> None:
         self._entry = ("authorization", f"Bearer {token}")
 
     async def intercept_unary_stream(self, continuation: Any, client_call_details: Any, request: Any) -> Any:
-        """With the token."""
+        """Add the token."""
         return await continuation(_with_entry(client_call_details, self._entry), request)
 
 

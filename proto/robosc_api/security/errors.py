@@ -1,5 +1,5 @@
-"""Error in certificates, keys, tokens or where a service is to listen."""
+"""Error of the security configuration."""
 
 
 class SecurityError(Exception):
-    """A service or client cannot be secured as it is told to; one sentence for a person, never with a secret in it."""
+    """A service or client cannot be secured as configured; one sentence without secrets."""

@@ -1,4 +1,4 @@
-"""Check of whether a caller may do what it asks for, before the service sees it."""
+"""Authorization of calls before the service handles them."""
 
 import logging
 from collections.abc import Awaitable, Callable, Mapping
@@ -26,8 +26,7 @@ class Rule:
 
     Attributes:
         scopes: Scopes of which a token needs one; empty: any token.
-        is_open: True if callers from other machines may, too, where neither tokens nor client certificates are asked
-            for.
+        is_open: True to admit callers from other machines if neither tokens nor client certificates are required.
     """
 
     scopes: frozenset[Scope] = frozenset()
@@ -35,13 +34,12 @@ class Rule:
 
 
 class Guard(Layer):
-    """Guard that looks at the token of each call, or at where it comes from. Health checks need none.
+    """Layer that authorizes each call by its token or its origin. Health checks need no token.
 
     Args:
-        rules: Rules by full name of a method (`/package.Service/Method`); what is not named may be called with any
-            token.
-        tokens: File of tokens; None: callers need none.
-        has_client_certificates: True if callers have shown certificates that were asked for.
+        rules: Rules by full name of a method (`/package.Service/Method`); other methods need any token.
+        tokens: Token file; None: no tokens are required.
+        has_client_certificates: True if the service requires client certificates.
     """
 
     def __init__(
@@ -53,27 +51,27 @@ class Guard(Layer):
         self._has_client_certificates = has_client_certificates
 
     def handler(self, inner: Any, details: Any) -> Any:
-        """The handler of a call, behind a look at the caller."""
+        """Return the handler of a call, after authorization."""
         method: str = details.method
         if inner is None or method.startswith(_HEALTH):
             return inner
         if self._tokens is not None and self._entry(self._tokens, details.invocation_metadata) is None:
-            # Whoever shows none is told so at once: a handler of single requests would wait for one that never comes,
-            # and hold one of the calls that a server can have.
+            # Refuse at once: a handler of unary requests would wait for a request that may never arrive, and count as
+            # an open call.
             return grpc.stream_stream_rpc_method_handler(self._refuse(method))
         return super().handler(inner, details)
 
     def _refuse(self, method: str) -> Any:
         async def refuse(requests: Any, context: Any) -> None:
             refusal = self._refusal(Rule(), method, context.invocation_metadata(), context.peer())
-            # One that has become valid in between is shown again.
+            # A token that has become valid meanwhile is refused once.
             code, message = refusal or _NO_TOKEN
             await context.abort(code, message, failure_metadata(code, message, code.name, context=context))
 
         return refuse
 
     def around(self, inner: Any, method: str) -> Any:
-        """A handler that does nothing before the caller is admitted."""
+        """Wrap a handler in the authorization of its caller."""
         rule = self._rules.get(method, Rule())
         if self._tokens is None and (rule.is_open or self._has_client_certificates):
             return inner
@@ -111,7 +109,7 @@ class Guard(Layer):
     @staticmethod
     def _entry(tokens: TokenFile, metadata: Any) -> Entry | None:
         given = [value for key, value in metadata or () if key.lower() == "authorization"]
-        # Two tokens are none: nobody can tell which one somebody between has added.
+        # Several tokens are refused: a proxy may have added one of them.
         if len(given) != 1 or not isinstance(given[0], str) or not given[0].lower().startswith(_SCHEME):
             return None
         return tokens.find(given[0][len(_SCHEME) :].strip())

@@ -1,4 +1,4 @@
-"""Address on which a service listens, and the certificate behind which it does."""
+"""Listening address and TLS configuration of a service."""
 
 import logging
 import os
@@ -26,9 +26,9 @@ class ServerSecurity:
     Attributes:
         certificate: Chain of certificates (PEM), the service's own first; None: no TLS.
         key: Its private key (PEM, not encrypted).
-        client_ca: Certificates (PEM) of those who sign callers' certificates; None: callers need none.
-        tokens: File of tokens; None: callers need none.
-        insecure_beyond_loopback: True to listen beyond this machine without TLS all the same.
+        client_ca: Authorities (PEM) of client certificates; None: no client certificates are required.
+        tokens: Token file; None: no tokens are required.
+        insecure_beyond_loopback: True to allow connections from other machines without TLS.
     """
 
     certificate: Path | None = None
@@ -41,7 +41,7 @@ class ServerSecurity:
 def add_port(server: Any, address: str, security: ServerSecurity) -> str:
     """Let a gRPC server listen; returns `HOST:PORT` with the port that it got.
 
-    A certificate that is replaced is taken for the next connections: the files are looked at for each.
+    A replaced certificate is used for the next connections: the files are checked for each of them.
 
     Args:
         server: A `grpc.Server` or `grpc.aio.Server`.
@@ -49,7 +49,7 @@ def add_port(server: Any, address: str, security: ServerSecurity) -> str:
         security: Security of the server.
 
     Raises:
-        SecurityError: It may not listen there like this, a file is wrong, or the address is in use or not ours.
+        SecurityError: The address needs TLS, a file is invalid, or the address is in use or belongs to another machine.
     """
     check_listening(address, security)
     host, port = split(address)
@@ -66,10 +66,10 @@ def add_port(server: Any, address: str, security: ServerSecurity) -> str:
 
 
 def check_listening(address: str, security: ServerSecurity) -> None:
-    """Check what can be known before it listens, without a look at the files.
+    """Check the configuration without reading the files.
 
     Raises:
-        SecurityError: It may not listen there like this.
+        SecurityError: The configuration is not allowed for this address.
         ValueError: The address is none.
     """
     host, _ = split(address)
@@ -86,7 +86,7 @@ def check_listening(address: str, security: ServerSecurity) -> None:
 
 
 def check_files(security: ServerSecurity) -> None:
-    """Read the files that a service would be secured with; a wrong one is found before it listens.
+    """Read the files of the configuration, to detect errors before the service listens.
 
     Raises:
         SecurityError: One of them cannot be used.
@@ -114,7 +114,7 @@ def _credentials(security: ServerSecurity) -> grpc.ServerCredentials:
         return grpc.ssl_server_certificate_configuration([(files.key, files.certificate)], files.client_ca)
 
     def changed() -> Any:
-        """Return the configuration for use from now on; None: the one in use stays. Called for each connection."""
+        """Return a changed configuration; None: unchanged. Called for each connection."""
         nonlocal latest, told
         found: object = None
         try:
@@ -124,7 +124,7 @@ def _credentials(security: ServerSecurity) -> grpc.ServerCredentials:
                 return None
             latest = _checked(security)
         except SecurityError as error:
-            # It may be half written: what is used now stays. Told once for each change, not for each connection.
+            # The file may be half written: keep the current one. Logged once for each change, not for each connection.
             if told != (found or str(error)):
                 _log.error("the changed certificate is not used: %s", error)
             told = found or str(error)
@@ -139,7 +139,7 @@ def _credentials(security: ServerSecurity) -> grpc.ServerCredentials:
 
 
 def _checked(security: ServerSecurity) -> _Files:
-    """The files, after OpenSSL found that they fit each other: gRPC would only fail in every handshake.
+    """Return the files, if OpenSSL accepts their combination: gRPC would fail only in each handshake.
 
     Raises:
         SecurityError: They do not.
@@ -184,14 +184,14 @@ def _read(security: ServerSecurity) -> _Files:
 
 
 def read_secret(path: Path) -> bytes:
-    """The bytes of a file with a key or a token, as `read`; the log warns if others than its owner may read it."""
+    """The bytes of a file with a key or a token, as `read`; logs a warning if other users can read it."""
     data = read(path)
     warn_if_readable_by_others(path)
     return data
 
 
 def warn_if_readable_by_others(path: Path) -> None:
-    """Tell the log if others than its owner may read a file that is to be secret."""
+    """Log a warning if other users can read a secret file."""
     try:
         mode = path.stat().st_mode
     except OSError:

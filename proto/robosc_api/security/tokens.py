@@ -23,10 +23,10 @@ from robosc_api.security.errors import SecurityError
 _log = logging.getLogger(__name__)
 
 MAXIMUM_BYTES = 64 * 1024
-"""Maximum size of a file of tokens, in bytes."""
+"""Maximum size of a token file, in bytes."""
 
 MAXIMUM_TOKEN = 512
-"""Characters of a token that is looked at."""
+"""Maximum number of characters of a token."""
 
 _CHECK_PERIOD_S = 1.0
 _PREFIX = "robosc_"
@@ -46,13 +46,13 @@ class Scope(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Quota:
-    """Quota of what the holder of a token may ask of a server; None: as much as anybody.
+    """Quotas of a token; None: only the general limits of the server apply.
 
     Attributes:
-        waiting: Tasks that may wait at once.
-        per_minute: Tasks that may be asked for in a minute.
-        cpu_seconds_per_hour: Seconds that the tasks of an hour may take of a processor.
-        calls: Calls that may be open at once.
+        waiting: Maximum number of waiting tasks.
+        per_minute: Maximum number of tasks per minute.
+        cpu_seconds_per_hour: Maximum CPU time of tasks per hour, in seconds.
+        calls: Maximum number of open calls.
     """
 
     waiting: int | None = None
@@ -61,7 +61,7 @@ class Quota:
     calls: int | None = None
 
     def __str__(self) -> str:
-        """As it stands in the file of tokens."""
+        """Return the quotas in the form of the token file."""
         pairs = ((field.name, getattr(self, field.name)) for field in fields(self))
         return " ".join(f"{name}={value}" for name, value in pairs if value is not None)
 
@@ -88,7 +88,7 @@ class Entry:
 
 
 def make_token(name: str, scopes: tuple[Scope, ...], quota: Quota = Quota()) -> tuple[str, str]:
-    """A new token, and the line for the file of tokens.
+    """Create a token; return it and the line for the token file.
 
     Raises:
         SecurityError: The name cannot stand in the file, or there is no scope.
@@ -119,7 +119,7 @@ def parse_tokens(text: str, place: str) -> tuple[Entry, ...]:
             continue
         match = _LINE.match(bare)
         if not match:
-            # Not the line itself: somebody may have written the token there.
+            # Not the line itself, which may contain the token by mistake.
             raise SecurityError(f"{place}:{number}: expected NAME SCOPE,SCOPE sha256:DIGEST")
         unknown = [word for word in match["scopes"].split(",") if word not in set(Scope)]
         if unknown:
@@ -155,17 +155,17 @@ def missing_scope(entries: Iterable[Entry], needed: Scope) -> str | None:
 
 
 class TokenFile:
-    """The tokens of a file; one that is changed is read again within a second, so that a token can be withdrawn.
+    """Tokens of a file, which is reloaded within a second after a change, so that tokens can be revoked.
 
-    A file that cannot be read any more, or has become wrong, changes nothing; the log says so.
+    If the changed file cannot be read or is invalid, the previous tokens stay valid, and the log says so.
 
     Args:
         path: Of the file.
         clock: Seconds of a monotonic clock.
-        needed: The scope without which nothing can be called; the log tells when no token has it. None: any will do.
+        needed: Scope that every call needs; a warning is logged if no token has it. None: no such scope.
 
     Raises:
-        SecurityError: The file cannot be read, is wrong, or others than its owner may write it.
+        SecurityError: The file cannot be read, is invalid, or other users can write it.
     """
 
     def __init__(self, path: Path, clock: Callable[[], float] = time.monotonic, *, needed: Scope | None = None) -> None:
@@ -179,7 +179,7 @@ class TokenFile:
         self._checked_s = clock()
 
     def find(self, token: str) -> Entry | None:
-        """Return the entry of a token; None: it is nobody's. Takes as long for any token."""
+        """Return the entry of a token in constant time; None: unknown token."""
         digest = _digest(token[:MAXIMUM_TOKEN])
         found = None
         for entry in self._current():
@@ -188,7 +188,7 @@ class TokenFile:
         return found if len(token) <= MAXIMUM_TOKEN else None
 
     def named(self, name: str) -> Entry | None:
-        """The token of somebody; None: there is none of that name."""
+        """Return the token of a name; None: there is none."""
         return next((entry for entry in self._current() if entry.name == name), None)
 
     @property
@@ -210,7 +210,7 @@ class TokenFile:
             return self._entries
 
     def _warn_if_scope_is_missing(self) -> None:
-        """Tell when it has become nobody."""
+        """Log a warning when no token has the needed scope any more."""
         words = None if self._needed is None else missing_scope(self._entries, self._needed)
         if words is not None and not self._is_scope_missing:
             _log.warning("%s: %s", self._path, words)

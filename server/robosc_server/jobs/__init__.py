@@ -1,4 +1,4 @@
-"""Jobs: tasks that go on without their caller."""
+"""Jobs: stored tasks that continue without their caller."""
 
 from robosc_server.jobs.convert import JOB_METHODS, JOB_SERVICE_NAME
 from robosc_server.jobs.manager import Caller, JobManager

@@ -1,4 +1,4 @@
-"""Between messages of the jobs' service and values."""
+"""Conversion between messages of the job service and values."""
 
 import hashlib
 import struct
@@ -33,7 +33,7 @@ _STATE_OF = {number: state for state, number in _STATES.items()}
 _KIND_OF = {number: kind for kind, number in _KINDS.items()}
 _FIELD_OF = {kind: pb.GetJobResultResponse.DESCRIPTOR.fields_by_name[kind.value].number for kind in TaskKind}
 
-# Time of creation, id, and what the page was asked for: eight bytes of a digest, against mistakes.
+# Time of creation, id, and eight bytes of a digest of the filter, which detect a token of another list.
 _TOKEN = struct.Struct(">Q16s8s")
 _TOKEN_CHARACTERS = 44
 _LENGTH_DELIMITED = 2
@@ -57,7 +57,7 @@ def submission(content: bytes, limits: RequestLimits) -> pb.SubmitJobRequest:
     try:
         return pb.SubmitJobRequest.FromString(content)
     except DecodeError:
-        # The parser's own words may quote the message.
+        # The parser's own message may quote the request.
         raise malformed(NOT_A_MESSAGE) from None
 
 
@@ -96,7 +96,7 @@ def checked_label(text: str) -> str:
 
 
 def retention_s_of(request: pb.SubmitJobRequest) -> float | None:
-    """For how long a job is to be kept; None: it is not said.
+    """Return the requested retention time of a job in seconds; None: not given.
 
     Raises:
         RefusedError: It is no time.
@@ -134,7 +134,7 @@ def page_token(last: JobRecord, chosen: JobFilter) -> str:
 
 
 def page_position(token: str, chosen: JobFilter) -> tuple[int, str] | None:
-    """Time of creation and id of the job that a page follows; None: it is the first.
+    """Return the creation time and id of the last job of the previous page; None: first page.
 
     Raises:
         RefusedError: The token is none, or one for other jobs.

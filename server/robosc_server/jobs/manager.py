@@ -38,7 +38,7 @@ class Caller:
 
     Attributes:
         name: Name that tells callers apart.
-        is_admin: True if the jobs of others count as this caller's, too.
+        is_admin: True if the caller may see and cancel the jobs of all callers.
     """
 
     name: str
@@ -179,7 +179,7 @@ class JobManager:
         """A job of the caller.
 
         Raises:
-            RefusedError: There is none, or the database is away.
+            RefusedError: There is no such job of the caller, or the database is unavailable.
         """
         return self._runner.current(await self._find(job_id, caller))
 
@@ -197,7 +197,7 @@ class JobManager:
             after_revision: Revision that was seen before; 0: none.
 
         Raises:
-            RefusedError: There is none, the database is away, or the server ends.
+            RefusedError: There is no such job, the database is unavailable, or the server is shutting down.
         """
         seen = after_revision
         with self._watchers.watch(job_id) as watch:
@@ -226,7 +226,7 @@ class JobManager:
         """End a job, wherever it is; one that has ended stays as it is.
 
         Raises:
-            RefusedError: There is none, or the database is away.
+            RefusedError: There is no such job of the caller, or the database is unavailable.
         """
         await self._find(job_id, caller)
         ended = await self._store.cancel(job_id)
@@ -239,7 +239,7 @@ class JobManager:
         """Jobs, the youngest first.
 
         Raises:
-            RefusedError: The database is away.
+            RefusedError: The database is unavailable.
         """
         return [self._runner.current(record) for record in await self._store.list_jobs(chosen, after, limit)]
 
@@ -247,7 +247,7 @@ class JobManager:
         """A job that has succeeded, and the messages of its result, read as they are taken.
 
         Raises:
-            RefusedError: It has none, there is no such job, or the database is away; also while they are read.
+            RefusedError: There is no such job or result, or the database is unavailable, also during the iteration.
         """
         record = await self._find(job_id, caller)
         if record.state is JobState.FAILED:

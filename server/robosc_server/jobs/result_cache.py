@@ -1,4 +1,4 @@
-"""Results by the content that they were made from: in memory, and in the database."""
+"""Cache of results by the key of their task, in memory and in the database."""
 
 import asyncio
 import contextlib
@@ -28,13 +28,13 @@ def _unchanged(kind: TaskKind, result: Result) -> Result:
 
 
 class ResultCache:
-    """Results that were worked out before; without the database, those in memory remain.
+    """Cache of results; while the database is unavailable, the results in memory remain.
 
-    Inside the context, kept results are written to the database in the background; outside, they stay in memory.
+    Inside the context, new results are written to the database in the background; outside, they stay in memory.
 
     Args:
         store: The database.
-        memory_bytes: Bytes of results that are kept in memory, those that were asked for last.
+        memory_bytes: Maximum bytes of results in memory, the most recently used ones.
         finish: Function that is applied to a result before it is sent; the database has the result as it was made.
     """
 
@@ -64,7 +64,7 @@ class ResultCache:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._tasks = []
-        # A last try: what was made shortly before the end is there after the next start.
+        # A last attempt to store results that were made shortly before the shutdown.
         with contextlib.suppress(StoreUnavailableError):
             while self._unwritten:
                 await self._write_some()
@@ -79,7 +79,7 @@ class ResultCache:
         return found
 
     async def find(self, key: str) -> Result | None:
-        """A result that is known; None also if the database cannot be asked."""
+        """Find a result in memory or in the database; None also while the database is unavailable."""
         found = self.in_memory(key)
         if found is not None:
             return found
@@ -88,7 +88,7 @@ class ResultCache:
             self.hits += 1
             return self.remember(key, *unwritten[:2])
         there = None
-        # While it is known to be away nobody waits for it: that may take longer than the work.
+        # An unavailable database is not queried: its timeout may take longer than the task.
         if self._store.is_readable:
             with contextlib.suppress(StoreUnavailableError):
                 there = await self._store.find_result(key)
@@ -148,7 +148,7 @@ class ResultCache:
             self._touched.add(key)
 
     async def _write(self) -> None:
-        """Write what is kept, in its order."""
+        """Write new results to the database in their order."""
         while True:
             await self._has_unwritten.wait()
             await asyncio.sleep(_GATHER_S)
@@ -166,7 +166,7 @@ class ResultCache:
         try:
             await self._store.keep_results([(key, *self._unwritten[key]) for key in some])
         except StoreUnavailableError:
-            # Others have their turn first: one of these may be what does not fit.
+            # Other results go first: one of these may be the cause of the error.
             self._writes_singly = True
             for key in some:
                 self._unwritten.move_to_end(key)
@@ -199,7 +199,7 @@ class ResultCache:
             self._has_unwritten.clear()
 
     async def _touch(self) -> None:
-        """Tell the database now and then what was asked for."""
+        """Note in the database periodically which results were used."""
         while True:
             await asyncio.sleep(_TOUCH_S)
             touched, self._touched = self._touched, set()

@@ -1,4 +1,4 @@
-"""Retention of jobs and results: how long they are kept, and how much of them."""
+"""Retention of jobs and results: limits on their number, size and age."""
 
 import asyncio
 import contextlib
@@ -13,7 +13,7 @@ from robosc_server.tasks.task import Reason, Result
 _log = logging.getLogger(__name__)
 
 _SHORTEST_PAUSE_S = 1.0
-"""Between two sweeps, also where the second is asked for."""
+"""Minimum time between two sweeps, even if one is requested, in seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +28,7 @@ class JobLimits:
         jobs_per_owner: Kept jobs of one caller; beyond it, those that ended first are forgotten.
         poll_s: Period, in seconds, at which a server that shares its database looks for what others have done there;
             one that has a database of its own needs it only after that was away.
-        lease_s: Time without a sign of life, in seconds, after which a server is taken for dead by those that share
-            its database.
+        lease_s: Duration of a lease, in seconds, after which the other servers take a server for dead.
         sweep_s: Period, in seconds, of the search for what need not be kept any more.
     """
 
@@ -42,7 +41,7 @@ class JobLimits:
 
 
 class Retention:
-    """Retention, which deletes what need not be kept any more, and knows how much there is.
+    """Retention policy, which deletes expired jobs and excess results.
 
     Args:
         store: The database.
@@ -62,41 +61,41 @@ class Retention:
         """Return the time that a job is kept after its end, in microseconds.
 
         Args:
-            asked_s: Seconds that were asked for; None, or too long: as long as jobs are kept.
+            asked_s: Requested time in seconds, bounded by the maximum; None: the maximum.
         """
         longest_s = self._limits.retention_s
         return round((longest_s if asked_s is None else min(asked_s, longest_s)) * 1e6)
 
     def admit(self) -> None:
-        """See whether there is room for the result of one more job.
+        """Do nothing if there is room for the result of one more job.
 
         Raises:
             RefusedError: There is none.
         """
         if self._needed_bytes >= self._limits.results_bytes:
-            # At once: whoever fills what was freed has others refused for a moment, not until the next round.
+            # Sweep at once, so that a caller who fills the storage blocks others only for a moment.
             self._is_wanted.set()
             message = "the storage for job results is full; try again after the server has deleted old results"
             raise RefusedError(Reason.SERVER_BUSY, message, retry_after_s=2 * _SHORTEST_PAUSE_S)
 
     def too_many(self) -> RefusedError:
-        """Return the error for a caller who has as many jobs as it may, none of which has ended."""
+        """Return the error for a caller whose jobs have reached the limit and have not ended."""
         count = self._limits.jobs_per_owner
         message = f"the caller has {count} unfinished jobs, which is the limit; try again after some have ended"
         return RefusedError(Reason.QUOTA_EXCEEDED, message, retry_after_s=self._limits.sweep_s)
 
     def note(self, result: Result) -> None:
-        """A job has a result more."""
+        """Count the result of another job."""
         self._needed_bytes += sum(map(len, result.messages))
 
     async def sweep_forever(self) -> None:
-        """Sweep now and then, and when there is no room, for ever."""
+        """Sweep periodically, and on request when there is no room."""
         while True:
             self._is_wanted.clear()
             try:
                 await self.sweep()
             except StoreUnavailableError:
-                pass  # It is tried again.
+                pass  # Retried at the next sweep.
             except Exception:
                 _log.exception("deleting expired jobs and results failed")
             await asyncio.sleep(min(_SHORTEST_PAUSE_S, self._limits.sweep_s))
@@ -104,7 +103,7 @@ class Retention:
                 await asyncio.wait_for(self._is_wanted.wait(), max(0.0, self._limits.sweep_s - _SHORTEST_PAUSE_S))
 
     async def sweep(self) -> None:
-        """Delete what need not be kept any more; called now and then."""
+        """Delete expired jobs and excess results once."""
         await self._store.sweep(self._limits.results_bytes)
         self._needed_bytes = await self._store.size_of_needed()
         self.counts = await self._store.counts_by_state()

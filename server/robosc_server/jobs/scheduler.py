@@ -1,7 +1,7 @@
 """Queue of tasks: bounded, and fair between callers.
 
-Callers take turns: whoever has had one goes to the end of the ring, so that a caller with a thousand tasks delays one
-with a single task by no more than one task (M. Shreedhar and G. Varghese, "Efficient Fair Queuing Using Deficit
+The queue serves callers round-robin, so that a caller with a thousand tasks delays a caller with a single task by at
+most one task (M. Shreedhar and G. Varghese, "Efficient Fair Queuing Using Deficit
 Round-Robin", IEEE/ACM Transactions on Networking 4(3), 1996, pages 375-385; here each task counts the same).
 """
 
@@ -20,7 +20,7 @@ from robosc_server.tasks.task import Failure, Outcome, Reason, Task, TaskLimits
 from robosc_server.workers import OnReport, WorkerLostError, Workers, WorkersError
 
 _POLL_S = 1.0
-"""While tasks wait: how often it is looked whether there are more workers."""
+"""Period at which the number of workers is checked while tasks wait, in seconds."""
 
 _FIRST_GUESS_S = 1.0
 _WEIGHT = 0.2
@@ -45,20 +45,20 @@ class QueueLimits:
 
 
 class Accounts(Protocol):
-    """Accounts of single callers: what each may take, and has taken."""
+    """Quotas and consumption of single callers."""
 
     def waiting(self, caller: str) -> int | None:
-        """Return the number of tasks of a caller that may wait; None: as many as anybody's."""
+        """Return the maximum number of waiting tasks of a caller; None: the general limit."""
 
     def check(self, caller: str) -> None:
-        """See whether a task of a caller may begin.
+        """Do nothing if a task of a caller may start.
 
         Raises:
             RefusedError: It may not yet.
         """
 
     def spent(self, caller: str, cpu_s: float) -> None:
-        """Note how many seconds of a processor's time a task of a caller has taken."""
+        """Count the CPU time of a task of a caller."""
 
 
 class Place:
@@ -68,7 +68,7 @@ class Place:
         caller: Caller whose place it is.
 
     Attributes:
-        line: Line of the queue in which it stands: all addresses of one network stand in one line.
+        line: Name of its line in the queue; all addresses of one network share a line.
     """
 
     __slots__ = ("_begun_s", "_turn", "caller", "line")
@@ -128,7 +128,7 @@ class Scheduler:
         return self._running
 
     def close(self) -> None:
-        """Refuse what comes from now on; what waits, waits on."""
+        """Refuse new tasks from now on; waiting tasks stay in the queue."""
         self._is_closed = True
 
     async def run(
@@ -163,7 +163,7 @@ class Scheduler:
             self.check(caller)
             return await self.work(place, task, limits, on_report)
         except WorkerLostError:
-            # Whoever asked would try the same again, if it were told that there are no workers.
+            # With WORKERS_UNAVAILABLE the caller would retry the task that crashes workers.
             return Failure(Reason.WORKER_DIED, "the worker process was lost more than once during this task")
         except WorkersError as error:
             raise _no_workers() from error
@@ -171,7 +171,7 @@ class Scheduler:
             self.leave(place)
 
     def check(self, caller: str) -> None:
-        """See whether a task of a caller may begin whose turn it is.
+        """Do nothing if a task of a caller whose turn it is may start.
 
         Raises:
             RefusedError: It may not yet.
@@ -238,7 +238,7 @@ class Scheduler:
         return self._limits.waiting_per_caller if own is None else own
 
     def enter_unbounded(self, caller: str) -> Place:
-        """A place for a task that was accepted before: no bound holds."""
+        """Enter the queue with a task that was accepted before, regardless of its limits."""
         place = Place(caller)
         self._ring.setdefault(place.line, deque()).append(place)
         self._waiting += 1
@@ -246,7 +246,7 @@ class Scheduler:
         return place
 
     def leave(self, place: Place) -> None:
-        """Give a place back, wherever it is; again does nothing."""
+        """Release a place in the queue or at a worker; releasing it again does nothing."""
         if place._begun_s is not None:
             took_s = self._clock() - place._begun_s
             self._mean_s = took_s if self._mean_s is None else self._mean_s + _WEIGHT * (took_s - self._mean_s)
@@ -266,7 +266,7 @@ class Scheduler:
 
     @contextmanager
     def waiting_outside(self, place: Place) -> Iterator[None]:
-        """Give a place back and wait beside the line for something else, which counts like waiting in it."""
+        """Release a place and wait outside the queue; the task still counts as waiting."""
         self.leave(place)
         self._waiting_outside[place.line] += 1
         try:
@@ -304,11 +304,11 @@ class Scheduler:
         while (name := next(filter(self._is_reserved_for, self._ring), None)) is not None:
             self._start(name)
         if self._waiting and self._poll_timer is None:
-            # Workers of a cluster come and go without telling.
+            # The number of workers of a cluster changes without notice.
             self._poll_timer = asyncio.get_running_loop().call_later(_POLL_S, self._poll_capacity)
 
     def _start(self, name: str) -> None:
-        """Give the next task of a line its turn; others in it wait for theirs at the end of the ring."""
+        """Start the next task of a caller, whose other tasks then wait at the end of the ring."""
         line = self._ring.pop(name)
         place = line.popleft()
         if line:
@@ -324,7 +324,7 @@ class Scheduler:
         self._start_waiting()
 
     def _retry_after_s(self, before: int) -> float:
-        """About when so many tasks have begun, by how long tasks took lately."""
+        """Estimate when so many tasks have started, from the mean duration of recent tasks."""
         mean_s = _FIRST_GUESS_S if self._mean_s is None else self._mean_s
         guess_s = mean_s * before / max(1, self._workers.capacity)
         return min(_LONGEST_RETRY_S, max(_SHORTEST_RETRY_S, guess_s))

@@ -1,4 +1,4 @@
-"""The RPCs of jobs: conversion at the border; what is refused is raised, and told by what stands around every call."""
+"""RPCs of the job service: they convert messages and raise RefusedError, which the call interceptor reports."""
 
 import asyncio
 from collections.abc import AsyncIterable, Awaitable, Callable
@@ -25,13 +25,13 @@ type Context = grpc.aio.ServicerContext[Any, Any]
 
 def caller_of(context: Any) -> Caller:
     """Return the caller of the call under way."""
-    # A certificate may name anybody, in any characters; a database takes no NUL.
+    # A certificate may contain any characters, but a database accepts no NUL.
     name = "".join(character if character.isprintable() else "?" for character in security.caller_of(context))
     return Caller(name, security.is_admin())
 
 
 def _unlimited(caller: str) -> None:
-    """Let each caller ask for as much as it likes."""
+    """Admit every caller, without a quota."""
 
 
 async def _write(context: Context, messages: AsyncIterable[bytes]) -> None:
@@ -44,9 +44,9 @@ class JobService(convert.JobServiceServicer):
 
     Args:
         manager: Manager that has the jobs.
-        accept: Function that looks at a request and makes a task of it, or raises RefusedError.
+        accept: Function that checks a request and returns its task, or raises RefusedError.
         identify: Function that returns the caller.
-        admit: Function that counts a job that somebody asks for, or raises RefusedError; is given the caller's name.
+        admit: Function that counts a requested job for a caller's name, or raises RefusedError.
         send: Function that sends the messages of a result, serialized.
         limits: Limits of a request.
     """
@@ -66,17 +66,17 @@ class JobService(convert.JobServiceServicer):
     async def SubmitJob(  # noqa: N802  # named by the .proto file
         self, content: bytes, context: Context
     ) -> pb.SubmitJobResponse:
-        """Accept a task; the request comes as bytes, to be looked at before it is parsed."""
+        """Accept a task; the request comes as bytes, which are checked before they are parsed."""
         request = convert.submission(content, self._limits)
         idempotency_key = convert.checked_idempotency_key(request.idempotency_key)
         label, retention_s = convert.checked_label(request.label), convert.retention_s_of(request)
         caller = self._identify(context)
         if not idempotency_key:
-            # First: it takes less time than a look at the request.
+            # First, since it takes less time than checking the request.
             self._count(caller)
         task = self._accept(*convert.kind_and_request(request.task))
         if idempotency_key:
-            # Whoever asks again because the answer was lost asks for nothing new, and is refused nothing.
+            # A repeated submission is nothing new, and does not count for the quota.
             if there := await self._manager.submitted(task, caller, idempotency_key):
                 return pb.SubmitJobResponse(job=self._job(there), existed=True)
             self._count(caller)
@@ -86,21 +86,21 @@ class JobService(convert.JobServiceServicer):
         return pb.SubmitJobResponse(job=self._job(record), existed=existed)
 
     def _count(self, caller: Caller) -> None:
-        """Count a job that somebody asks for, unless there is no room for it."""
+        """Count a requested job for the quota of its caller, unless the queue is full."""
         self._manager.require_room(caller)
         self._admit(caller.name)
 
     async def GetJob(  # noqa: N802
         self, request: pb.GetJobRequest, context: Context
     ) -> pb.GetJobResponse:
-        """Tell where a job is."""
+        """Return the state of a job."""
         record = await self._manager.get(_checked_id(request.id), self._identify(context))
         return pb.GetJobResponse(job=self._job(record))
 
     async def WatchJob(  # noqa: N802
         self, request: pb.WatchJobRequest, context: Context
     ) -> None:
-        """Tell where a job is, until it has ended."""
+        """Send the state of a job until it has ended."""
         caller = self._identify(context)
         async for record in self._manager.watch(_checked_id(request.id), caller, request.after_revision):
             await context.write(pb.WatchJobResponse(job=self._job(record)))
@@ -108,26 +108,26 @@ class JobService(convert.JobServiceServicer):
     async def CancelJob(  # noqa: N802
         self, request: pb.CancelJobRequest, context: Context
     ) -> pb.CancelJobResponse:
-        """End a job."""
+        """Cancel a job."""
         record = await self._manager.cancel(_checked_id(request.id), self._identify(context))
         return pb.CancelJobResponse(job=self._job(record))
 
     async def ListJobs(  # noqa: N802
         self, request: pb.ListJobsRequest, context: Context
     ) -> pb.ListJobsResponse:
-        """List jobs, the youngest first."""
+        """List jobs, newest first."""
         caller = self._identify(context)
         if request.all_owners and not caller.is_admin:
             raise RefusedError(Reason.PERMISSION_DENIED, "all_owners requires a token with the scope 'admin'")
         chosen = convert.filter_of(request, caller.name)
         size = convert.page_size_of(request)
-        # One more than asked for tells whether there are more.
+        # One more job than requested shows whether there is another page.
         found = await self._manager.list_jobs(chosen, convert.page_position(request.page_token, chosen), size + 1)
         token = convert.page_token(found[size - 1], chosen) if len(found) > size else ""
         answer = pb.ListJobsResponse(next_page_token=token)
         for place in range(0, min(size, len(found)), _JOBS_AT_ONCE):
             answer.jobs.extend(map(self._job, found[place : min(place + _JOBS_AT_ONCE, size)]))
-            # A long list takes a while: other calls have their turn in between.
+            # A long list takes a while: let other calls run in between.
             await asyncio.sleep(0)
         return answer
 
@@ -143,7 +143,7 @@ class JobService(convert.JobServiceServicer):
 
 
 def add_job_service(service: JobService, server: grpc.aio.Server) -> None:
-    """Have a server offer it; results go out as the bytes that they are kept as, and submissions come in as bytes."""
+    """Add the service to a server, with serialized results and serialized submissions."""
     convert.add_servicer(service, _SerializedAdapter(server))  # type: ignore[no-untyped-call]  # generated
 
 
@@ -158,7 +158,7 @@ class _SerializedAdapter:
         self._server = server
 
     def add_generic_rpc_handlers(self, handlers: Any) -> None:
-        """Not used: handlers that the server knows by name come first, and are the same."""
+        """Do nothing: the registered handlers of the same methods take precedence."""
 
     def add_registered_method_handlers(self, service: str, handlers: dict[str, Any]) -> None:
         """Register the handlers of a service."""
@@ -168,7 +168,7 @@ class _SerializedAdapter:
 
 
 def _checked_id(text: str) -> str:
-    # Any other text is no id either; the database need not look for it.
+    # No id has another form; this saves a database query.
     if not 0 < len(text) <= _ID_CHARACTERS or not text.isascii() or not text.isprintable():
         raise RefusedError(Reason.NO_SUCH_JOB, "there is no job with this id that the caller may see")
     return text

@@ -1,4 +1,4 @@
-"""Watchers of jobs: one that waits costs nothing until there is something to report."""
+"""Watchers of jobs; an idle watcher takes no time."""
 
 import asyncio
 from collections.abc import Iterator
@@ -8,11 +8,11 @@ from robosc_server.store import JobRecord
 
 
 class Watch:
-    """One watcher of one job: holds the newest record that it was given, and drops those between.
+    """One watcher of one job, which holds only the newest record.
 
     Attributes:
-        revision: Revision that it knows; set by whoever uses it.
-        is_gone: True if the job is there no more.
+        revision: Last seen revision, which the user of the watcher sets.
+        is_gone: True if the job was deleted.
     """
 
     __slots__ = ("_has_news", "_record", "is_gone", "revision")
@@ -24,13 +24,13 @@ class Watch:
         self._has_news = asyncio.Event()
 
     def notify(self, record: JobRecord) -> None:
-        """Give it a job as it is now."""
+        """Pass on the current record of the job."""
         if self._record is None or record.revision > self._record.revision:
             self._record = record
             self._has_news.set()
 
     def wake(self) -> None:
-        """Have it look up, though nothing has changed."""
+        """Wake the watcher without a new record."""
         self._has_news.set()
 
     async def next_record(self) -> JobRecord | None:
@@ -61,22 +61,22 @@ class Watchers:
                 del self._by_job[job_id]
 
     def notify(self, record: JobRecord) -> None:
-        """Tell all watchers of a job how it is now."""
+        """Pass the current record of a job to its watchers."""
         for watch in self._by_job.get(record.id, ()):
             watch.notify(record)
 
     def notify_gone(self, job_id: str) -> None:
-        """Tell all watchers of a job that it is there no more."""
+        """Tell the watchers of a job that it was deleted."""
         for watch in self._by_job.get(job_id, ()):
             watch.is_gone = True
             watch.wake()
 
     def wake(self) -> None:
-        """Have everybody look up."""
+        """Wake all watchers."""
         for watches in self._by_job.values():
             for watch in watches:
                 watch.wake()
 
     def revisions(self) -> dict[str, int]:
-        """The watched jobs, and what the one of their watchers knows that knows least."""
+        """Return the lowest revision that a watcher knows, for each watched job."""
         return {job_id: min(watch.revision for watch in watches) for job_id, watches in self._by_job.items() if watches}

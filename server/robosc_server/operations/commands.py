@@ -66,10 +66,10 @@ def new_token(argv: Sequence[str]) -> int:
         sys.stderr.write(f"robosc-server: {error}\n")
         return 2
     sys.stdout.write(token)
-    # The line is for a token that somebody has got.
+    # Print the line only after the token was written.
     sys.stdout.flush()
     if arguments.scope and Scope.SYNTHESIZE not in arguments.scope:
-        # A comment, for whoever appends what is written here to the file of tokens.
+        # A comment, since the output may be appended to the token file.
         sys.stderr.write(
             f"# warning: the token cannot be used with this server: it lacks the scope '{Scope.SYNTHESIZE}'\n"
         )

@@ -231,12 +231,12 @@ def _unwritable(folder: Path) -> str | None:
     """
     try:
         try:
-            # A file without a name, which nobody sees and which is gone when it is closed.
+            # An unnamed temporary file.
             os.close(os.open(folder, os.O_TMPFILE | os.O_RDWR | os.O_CLOEXEC, 0o600))
         except OSError as error:
             if error.errno not in (errno.EOPNOTSUPP, errno.EISDIR, errno.ENOENT):
                 raise
-            # Not every file system has them.
+            # Not every file system supports unnamed files.
             Path(tempfile.mkdtemp(prefix=".robosc-", dir=folder)).rmdir()
     except OSError as error:
         return error.strerror or str(error)
@@ -299,7 +299,7 @@ def _cluster(spec: str) -> tuple[Grade, str]:
 
 
 def _unreachable(address: str) -> str | None:
-    """Return the reason why nobody takes a connection at an address; None: somebody does."""
+    """Return the reason why an address cannot be connected to; None: it can."""
     try:
         socket.create_connection(split(address), timeout=_CONNECT_S).close()
     except (OSError, UnicodeError) as error:

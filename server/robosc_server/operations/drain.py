@@ -1,4 +1,4 @@
-"""Shutdown of the server that takes nothing from a caller that the server could still give."""
+"""Graceful shutdown: open calls finish before the server stops."""
 
 import asyncio
 from collections.abc import Callable
@@ -13,19 +13,19 @@ from robosc_server.operations.interceptor import CallInterceptor
 _POLL_S = 0.05
 
 _FLUSH_S = 0.2
-"""Time that small answers have to get on the wire after they were handed to gRPC, in seconds."""
+"""Time for gRPC to send small responses before the server stops, in seconds."""
 
 
 STOP_S = 5.0
-"""Time that gRPC may take to let go of its connections once all calls are cancelled, in seconds."""
+"""Time for gRPC to close its connections after all calls are cancelled, in seconds."""
 
 
 async def stop(server: Any, grace_s: float | None = None) -> None:
-    """End a server's calls and connections; those that gRPC does not let go of by then end with the process.
+    """End the calls and connections of a server; connections that gRPC does not close in time end with the process.
 
     Args:
         server: A `grpc.aio.Server`.
-        grace_s: Time that calls under way are given, in seconds; None: none at all.
+        grace_s: Time for open calls to finish, in seconds; None: cancel them at once.
     """
     stopping = asyncio.ensure_future(server.stop(grace_s))
     await asyncio.wait([stopping], timeout=(grace_s or 0.0) + STOP_S)
@@ -43,16 +43,16 @@ async def drain(
     idle_methods: frozenset[str] = frozenset(),
     unread_bytes: Callable[[], int] = lambda: 0,
 ) -> None:
-    """End a server: health says no, then calls are refused, those under way get time, and the rest is cancelled.
+    """Shut down a server: report NOT_SERVING, refuse new calls, wait for open calls, and cancel the rest.
 
-    Until then its port stays open, so that callers hear that it ends, and load balancers that it is not well.
+    The port stays open until then, so that callers and load balancers learn of the shutdown.
 
     Args:
         server: A `grpc.aio.Server`.
         health: Its health.
         calls: Interceptor in front of its services.
         seconds: Time that calls under way are given, in seconds.
-        idle_methods: Methods that are not waited for, since their callers can ask another server at any time.
+        idle_methods: Methods whose calls are not waited for, since their callers can use another server at any time.
         unread_bytes: Function that returns the bytes of large answers that were sent and are not read yet; they are
             waited for like calls.
     """

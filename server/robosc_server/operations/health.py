@@ -1,4 +1,4 @@
-"""Health of each service, as gRPC's health checks ask for it: it follows what the service needs."""
+"""gRPC health service: the health of a service follows from the conditions that it needs."""
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
@@ -65,17 +65,17 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
             self._notify()
 
     def drain(self) -> None:
-        """From now on nothing is well: whoever hands calls to servers chooses another one."""
+        """Report NOT_SERVING for all services from now on, so that load balancers choose another server."""
         self._is_draining = True
         self._notify()
 
     @asynccontextmanager
     async def probing(self, probes: Mapping[str, Probe], every_s: float = 2.0) -> AsyncIterator[None]:
-        """Ask again and again whether conditions hold; each was asked once before the context begins.
+        """Probe conditions periodically; each is probed once before the context begins.
 
         Args:
-            probes: By condition, who knows; one that raises or takes long says no.
-            every_s: Seconds between the end of a question and the next.
+            probes: Probe of each condition; an exception or a timeout counts as not met.
+            every_s: Seconds between the end of a probe and the next one.
         """
         await asyncio.gather(*(self._probe(name, probe) for name, probe in probes.items()))
         async with asyncio.TaskGroup() as group:

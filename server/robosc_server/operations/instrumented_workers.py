@@ -1,4 +1,4 @@
-"""Workers that are watched: their tasks are counted, and each run is a span."""
+"""Workers with metrics and traces of their tasks."""
 
 from types import TracebackType
 from typing import Any, Self
@@ -11,7 +11,7 @@ from robosc_server.workers import OnCpuTime, OnReport, Workers, ignore_cpu_time
 
 
 class InstrumentedWorkers:
-    """Some workers, watched.
+    """Workers whose tasks are counted and traced.
 
     Args:
         workers: Workers that do the work; entered and left with this.

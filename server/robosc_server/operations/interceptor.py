@@ -1,6 +1,6 @@
-"""Frame around every call: a request id, a line in the log, metrics, a span; and failures reported in one way.
+"""Interceptor of every call: request id, log line, metrics and span, and uniform reporting of failures.
 
-One interceptor for all of it, since each costs every call some microseconds.
+One interceptor does all of this, since each one takes some microseconds of every call.
 """
 
 import asyncio
@@ -31,9 +31,9 @@ _ROUNDED = 0.01
 
 
 class CallInterceptor(Layer):
-    """The outermost layer, so that it sees what others refuse.
+    """Outermost layer, which also sees the calls that other layers refuse.
 
-    Handlers may raise `RefusedError`, and need not care for other exceptions: the caller is given the id of a fault.
+    Handlers may raise `RefusedError`; for any other exception the caller gets the id of an internal error.
 
     Args:
         metrics: Metrics that count calls.
@@ -48,7 +48,7 @@ class CallInterceptor(Layer):
         self._log = structlog.get_logger().bind()
 
     def refuse_new(self) -> None:
-        """From now on calls are refused, health checks aside; those under way go on."""
+        """Refuse new calls from now on, except health checks."""
         self._is_refusing = True
 
     def under_way(self, idle_methods: frozenset[str] = frozenset()) -> int:
@@ -104,7 +104,7 @@ class CallInterceptor(Layer):
                 code = _DEADLINE_EXCEEDED if _is_at_its_deadline(context, given_s) else _CANCELLED
                 raise
             except grpc.aio.InternalError:
-                # gRPC's way to say that nobody is there to be written to.
+                # gRPC raises this when the caller has gone.
                 code = _CANCELLED
                 raise
             except Exception as error:
@@ -184,7 +184,7 @@ def _refuse(method: str) -> None:
 
 
 def internal_error(fault: BaseException | str) -> RefusedError:
-    """Return the error that a caller gets for a fault of ours, which the log has from now on.
+    """Log an internal error, and return the error for the caller.
 
     Args:
         fault: The fault, or a traceback of it from another process.

@@ -1,7 +1,7 @@
-"""The log: a line for each event, with the id of the request, as text or as JSON.
+"""Log: one line for each event, with the id of the request, as text or as JSON.
 
-Nothing of a model is written above the level debug. That is why exceptions are told by their kind and place there, and
-not by their message, which may quote what a caller sent.
+Only the level debug logs parts of models. At other levels, exceptions are logged with their type and place and
+without their message, which may quote a request.
 """
 
 import contextlib
@@ -29,7 +29,7 @@ _LEVELS = {
     LogLevel.WARNING: logging.WARNING,
     LogLevel.ERROR: logging.ERROR,
 }
-# They tell at the level info what helps their developers alone.
+# Their lines at the level info help only their developers.
 _VERBOSE_LIBRARIES = ("asyncio", "distributed", "opentelemetry", "sqlalchemy")
 _FRAMES = 12
 _PLAIN = re.compile(r"[A-Za-z0-9._:/+@,%'()\[\]-]+\Z")
@@ -38,7 +38,7 @@ type _Line = MutableMapping[str, Any]
 
 
 REQUEST_ID_HEADER = "x-request-id"
-"""Metadata that a caller may send, and that comes back behind the answer."""
+"""Metadata key of the request id, in requests and in trailing metadata."""
 
 REQUEST_ID: ContextVar[str] = ContextVar("request_id", default="")
 """Identifier of the call under way; empty: no call."""
@@ -47,7 +47,7 @@ _REQUEST_ID_FORM = re.compile(r"[A-Za-z0-9._:/+=@-]{1,128}\Z")
 
 
 def request_id_of(metadata: Any) -> str:
-    """The id in a call's metadata, or a new one: there is none, it is odd, or there are several."""
+    """Return the valid request id in the metadata of a call, or a random one."""
     found = None
     for key, value in metadata or ():
         if key == REQUEST_ID_HEADER:
@@ -58,7 +58,7 @@ def request_id_of(metadata: Any) -> str:
 
 
 def configure_logging(log_format: LogFormat, log_level: LogLevel, stream: TextIO | None = None) -> None:
-    """Send what is logged here, and through the standard library by others, to one place in one form.
+    """Write the log of this program and of libraries to one stream in one format.
 
     Args:
         log_format: Text or JSON.
@@ -82,7 +82,7 @@ def configure_logging(log_format: LogFormat, log_level: LogLevel, stream: TextIO
             foreign_pre_chain=[structlog.stdlib.add_log_level, structlog.stdlib.add_logger_name, *common],
             processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, renderer],
             keep_exc_info=False,
-            # What `exceptions` above has not taken is nobody's.
+            # Remaining exception information is dropped.
             use_get_message=True,
         )
     )
@@ -97,7 +97,7 @@ def configure_logging(log_format: LogFormat, log_level: LogLevel, stream: TextIO
 
 
 def log_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT") -> str:
-    """Log a fault of ours; returns its id, which is all that a caller is told of it.
+    """Log an internal error and return its id, which is all that the caller gets.
 
     Args:
         fault: It, or what another process tells of it, such as a traceback. Its words are logged at the level debug
@@ -134,7 +134,7 @@ _last_second = (0, "")
 
 
 def _second(second: int) -> str:
-    """It as ISO 8601 has it; the last one is kept, since many lines fall into one second."""
+    """Format a second as ISO 8601; the last one is cached, since many lines fall into one second."""
     global _last_second
     known, text = _last_second
     if known != second:
@@ -178,7 +178,7 @@ def _json(logger: Any, name: str, line: _Line) -> str:
         text = _encode(first | dict(line)).decode()
         if text.isprintable():
             return text
-    # Escaped as well: what JSON leaves as it is, but terminals and other readers obey, such as U+2028 or U+009B.
+    # Also escape characters that JSON permits but terminals interpret, such as U+2028 or U+009B.
     return json.dumps(first | dict(line), default=str, skipkeys=True)
 
 
@@ -188,7 +188,7 @@ def _text(logger: Any, name: str, line: _Line) -> str:
 
 
 def _shown(value: Any) -> str:
-    """In one line, whatever it is: nobody else's text can look like a line of ours."""
+    """Format a value on one line, so that no text can imitate another log line."""
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_shown, value))}]"
     text = str(value)

@@ -146,7 +146,7 @@ class Metrics:
 
         Args:
             kind: Kind of the task.
-            outcome: Outcome of the task; None: nobody waits for it any more.
+            outcome: Outcome of the task; None: it was cancelled.
             seconds: Wall-clock time during which a worker was busy with it, in seconds.
         """
         match outcome:
@@ -319,6 +319,6 @@ def check_metrics_address(address: str, *, beyond_loopback: bool) -> None:
 
 
 def metric_names() -> frozenset[str]:
-    """Every name that stands in the answer, for whoever draws or watches them."""
+    """Return the names of all metrics, for dashboards and alerts."""
     found: Any = Metrics("")._registry.collect()
     return frozenset(metric.name for metric in found)

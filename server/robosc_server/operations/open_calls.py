@@ -1,4 +1,4 @@
-"""Limit on the calls that a caller has open at once, those that only watch included, so that others find a place."""
+"""Limits on open calls, in total and for each caller, watches included."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ HEALTH_CALLS = 1000
 their own."""
 
 HEALTH_CALLS_PER_CALLER = 50
-"""More than probes, and channels that watch."""
+"""Enough for probes, and for channels that watch their server."""
 
 _HEALTH = "/grpc.health."
 _RETRY_S = 1.0
@@ -35,10 +35,9 @@ class CallLimits:
 
 
 class OpenCalls(Layer):
-    """Layer that counts open calls, and refuses those beyond the limits.
+    """Layer that counts open calls, and refuses calls beyond the limits.
 
-    It stands behind the guard, which knows whose calls they are, and before any wait. Never the outermost layer: what
-    it gives is for others to call.
+    It stands inside the guard, which identifies the caller, and outside of all waits. It is never the outermost layer.
 
     Args:
         limits: Limits, health checks aside.
@@ -55,7 +54,7 @@ class OpenCalls(Layer):
         super().__init__()
         self._identify = identify
         self._slots, self._health_slots = _CallSlots(limits), _CallSlots(health)
-        # Of whoever looks after this machine, whom nobody from elsewhere can crowd out.
+        # For monitoring on this machine, which other hosts cannot crowd out.
         self._own_health_slots = _CallSlots(health)
 
     @property
@@ -116,7 +115,7 @@ class _CallSlots:
             )
         self._by_caller[caller] = count + 1
         self.taken += 1
-        # When the call is over for gRPC, too: whoever reads no answer holds it when the handler has long ended.
+        # When the call has ended for gRPC as well: an unread response keeps it open after the handler has returned.
         context.add_done_callback(partial(self._give_back, caller))
 
     def _give_back(self, caller: str, context: Any) -> None:

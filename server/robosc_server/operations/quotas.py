@@ -1,4 +1,4 @@
-"""Quota of what each token may ask for: a bucket that fills steadily, from which each task takes.
+"""Quotas of tokens, as token buckets that refill steadily.
 
 Token buckets: J. Turner, New directions in communications, IEEE Communications Magazine 24(10), 1986, pp. 8-15. Each
 server counts by itself, in memory: after a restart the buckets are full.
@@ -67,7 +67,7 @@ class Quotas:
         self._accounts: dict[str, _Account] = {}
 
     def admit(self, caller: str) -> None:
-        """Count a task that somebody asks for.
+        """Count a requested task for the quota of a caller.
 
         Args:
             caller: Name of the token.
@@ -86,7 +86,7 @@ class Quotas:
             account.tasks.take(1.0, now_s)
 
     def check(self, caller: str) -> None:
-        """See whether a task that was admitted may begin, now that others of the token may have taken their time.
+        """Do nothing if an admitted task may start, since other tasks of the token may have used up its CPU time.
 
         Raises:
             RefusedError: Nothing of a processor's time is left.
@@ -96,18 +96,18 @@ class Quotas:
             _check_seconds(account, self._clock())
 
     def spent(self, caller: str, cpu_s: float) -> None:
-        """Count what a task has taken.
+        """Count the CPU time of a task.
 
         Args:
             caller: Name of the token that it was for.
-            cpu_s: Of a processor's time, in its process.
+            cpu_s: CPU time of its process, in seconds.
         """
         account = self._account(caller)
         if account is not None and account.seconds is not None:
             account.seconds.take(cpu_s, self._clock())
 
     def waiting(self, caller: str) -> int | None:
-        """Return the number of tasks of a token that may wait; None: as many as anybody's."""
+        """Return the maximum number of waiting tasks of a token; None: the general limit."""
         quota = self._quota(caller)
         return None if quota is None else quota.waiting
 
@@ -122,13 +122,13 @@ class Quotas:
             return None
         account = self._accounts.get(caller)
         if account is None or account.quota != quota:
-            # No more of them than lines of the file, but for tokens that were withdrawn and never come again.
+            # The number of accounts is bounded by the lines of the file, and by revoked tokens.
             account = self._accounts[caller] = _Account(quota, self._clock())
         return account
 
 
 def _check_seconds(account: _Account, now_s: float) -> None:
-    """A task's time is known when it has ended: one may begin as long as anything is left.
+    """Do nothing if CPU time is left; the time of a task is known only after its end.
 
     Raises:
         RefusedError: Nothing is.

@@ -1,6 +1,6 @@
-"""Settings for operators: one definition, from which the flags, the file, the environment and the manual follow.
+"""Settings: one definition, from which flags, environment variables, the settings file and the manual follow.
 
-A flag goes before the environment, the environment before the file, the file before the default.
+A flag overrides the environment, the environment overrides the file, and the file overrides the default.
 """
 
 import argparse
@@ -39,7 +39,7 @@ class LogFormat(StrEnum):
 
 
 class LogLevel(StrEnum):
-    """From which level on lines are written."""
+    """Lowest level of log lines that are written."""
 
     DEBUG = "debug"
     INFO = "info"
@@ -48,7 +48,7 @@ class LogLevel(StrEnum):
 
 
 class Confinement(StrEnum):
-    """Rule that says whether there are workers where a part of their confinement is not available."""
+    """Policy for machines that lack a part of the confinement of workers."""
 
     REQUIRED = "required"
     BEST_EFFORT = "best-effort"
@@ -65,7 +65,7 @@ def _bytes(value: object) -> object:
 
 
 def _whole(value: object) -> object:
-    """Not true and false, which Python takes for 1 and 0, nor 2.0."""
+    """Reject booleans, which Python takes for 1 and 0, and floats such as 2.0."""
     if isinstance(value, bool | float):
         raise PydanticCustomError("whole", "must be a whole number")
     return value
@@ -135,7 +135,7 @@ def _state_folder() -> Path:
 
 
 def _setting(default: Any, words: str, group: str, **more: Any) -> Any:
-    """A field: its default (or what makes it, with the words for that), what the manual says, its group there."""
+    """Return a field with its default or default factory, its description and its group in the manual."""
     extra = {"group": group, "default": more.pop("default_words", None), "metavar": more.pop("metavar", None)}
     if callable(default):
         return Field(default_factory=default, description=words, json_schema_extra=extra, **more)
@@ -149,7 +149,7 @@ _STORAGE, _WORKERS, _OPERATIONS = "jobs and results", "workers", "operations"
 class Settings(BaseModel):
     """Settings of one server; each field's description is what the manual says about it.
 
-    Made from its fields alone it looks at neither file nor environment: `load_settings` does.
+    Creating an instance reads neither the file nor the environment: `load_settings` does.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", hide_input_in_errors=True)
@@ -337,7 +337,7 @@ class SettingsError(Exception):
 
 
 class _SourcedSettings(BaseSettings, Settings):
-    """The same from all sources."""
+    """Settings read from flags, environment and file."""
 
     model_config = SettingsConfigDict(
         frozen=True,
@@ -390,11 +390,11 @@ def settings_from(flags: Mapping[str, Any], config: Path | None) -> Settings:
 
 
 def source_of(name: str, flags: Mapping[str, Any], config: Path | None) -> str:
-    """Return the source of the value that somebody has set for a setting, in words."""
+    """Return a description of the source of a setting's value."""
     if name in flags:
         return flag_of(name)
     variable = variable_of(name)
-    # Environment variables that are no settings are nobody's mistake: others may begin like ours.
+    # Unknown variables with our prefix are ignored: they may belong to other programs.
     if name in Settings.model_fields and os.environ.get(variable):
         return f"${variable}"
     return f"{config}: {name}"
@@ -451,7 +451,7 @@ def variable_of(name: str) -> str:
 
 
 def default_text(name: str) -> str:
-    """Return the value of a setting that nobody has set, in words."""
+    """Return the default of a setting as text."""
     field = Settings.model_fields[name]
     extra: Any = field.json_schema_extra
     if extra["default"] is not None:
@@ -462,7 +462,7 @@ def default_text(name: str) -> str:
 
 
 def format_value(name: str, value: Any) -> str:
-    """A value as the manual and a file have it: bytes with a unit, seconds without needless digits."""
+    """Format a value as in the manual and in files: bytes with a unit, seconds without needless digits."""
     if isinstance(value, bool):
         return str(value).lower()
     if name.endswith("_bytes"):
@@ -473,7 +473,7 @@ def format_value(name: str, value: Any) -> str:
 
 
 def group_of(name: str) -> str:
-    """Under which heading a setting stands."""
+    """Return the group of a setting."""
     extra: Any = Settings.model_fields[name].json_schema_extra
     return str(extra["group"])
 

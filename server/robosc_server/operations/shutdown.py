@@ -1,6 +1,6 @@
-"""Guaranteed end of a server that is told to end: at once if it is told once more, and in any case before long.
+"""Signal handling with a guaranteed exit: at once after a second interrupt, and in any case after a time limit.
 
-Nothing is lost by an end that is forced: what was accepted is on disk, and workers go with the server.
+A forced exit loses nothing: accepted jobs are on disk, and workers end with the server.
 """
 
 import asyncio
@@ -16,7 +16,7 @@ from typing import Any
 _log = logging.getLogger(__name__)
 
 END_S = 20.0
-"""Time for the end beyond that of calls under way, in seconds: mostly for a database that does not answer."""
+"""Time for the shutdown after open calls have ended, in seconds; mostly for a database that does not respond."""
 
 _LOGGED_BEFORE_S = 0.5
 _BY_SIGNAL = 128
@@ -34,21 +34,21 @@ class ShutdownSignals:
         self._limit_s = drain_s + end_s
         self._is_requested = asyncio.Event()
         self._interrupts = 0
-        # Without a standard error, nobody is told of what hangs; it ends all the same.
+        # Without standard error, the traceback is lost, but the process still exits.
         self._stderr = sys.__stderr__ or os.open(os.devnull, os.O_WRONLY)
 
     def listen(self) -> None:
-        """Heed signals from now on, on the event loop that runs."""
+        """Install the signal handlers on the running event loop."""
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self._on_signal, number)
 
     async def requested(self) -> None:
-        """Return when the server is to end: by itself from then on, but not for longer than its limit."""
+        """Wait for a signal; from then on, the process exits at its time limit at the latest."""
         await self._is_requested.wait()
 
     def finished(self) -> None:
-        """It has ended."""
+        """Cancel the forced exit, since the server has ended."""
         faulthandler.cancel_dump_traceback_later()
 
     def _on_signal(self, number: int) -> None:
@@ -56,17 +56,17 @@ class ShutdownSignals:
             self._is_requested.set()
             loop = asyncio.get_running_loop()
             loop.call_later(max(0.0, self._limit_s - _LOGGED_BEFORE_S), _log_pending_tasks)
-            # A thread of its own that needs nothing of the interpreter: whatever hangs, it ends the process.
+            # A watchdog thread that does not need the interpreter: it exits even if everything else hangs.
             faulthandler.dump_traceback_later(self._limit_s, exit=True, file=self._stderr)
         self._interrupts += number == signal.SIGINT
         if self._interrupts > 1:
-            # Somebody at a terminal who does not want to wait.
+            # A user at a terminal does not want to wait.
             _log.warning("exiting immediately after a second interrupt")
             os._exit(_BY_SIGNAL + number)
 
 
 def _log_pending_tasks() -> None:
-    """Log where everything waits that has not ended, by places in the code alone."""
+    """Log the places in the code at which unfinished asyncio tasks wait."""
     for task in asyncio.all_tasks():
         _log.error("the shutdown takes too long: %s waits at %s", task.get_name(), " < ".join(_places(task.get_coro())))
 

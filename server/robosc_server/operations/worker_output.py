@@ -1,8 +1,8 @@
-"""Filter for the words in which a worker reports its failure: only some of them may be logged.
+"""Filter of the output of workers: only some of it may be logged.
 
-A worker has handled a stranger's model, and may say anything: what looks like a traceback may quote the model, or be
-made up. Above the level debug, only words are logged that this server could have written itself: how a process ended,
-in a fixed form, names of exceptions that there are, and places in RoboSC's own code.
+A worker has processed an untrusted model, and its output is not trusted either: an apparent traceback may quote the
+model or be invented. Above the level debug, only the exit description in its fixed form, names of existing exceptions
+and places in RoboSC's own code are logged.
 """
 
 import builtins
@@ -45,7 +45,7 @@ def loggable_fields(words: str) -> dict[str, object]:
 
 
 def last_part(words: str) -> str:
-    """The end of a worker's words, where a traceback has the fault; for the level debug."""
+    """Return the end of a worker's output, where a traceback has the error; for the level debug."""
     return words if len(words) <= _WORDS else f"[...]{words[-_WORDS:]}"
 
 

@@ -1,4 +1,4 @@
-"""Storage of what is kept: jobs and results, in a database."""
+"""Database of jobs and results."""
 
 from robosc_server.store.errors import StoreError, StoreUnavailableError
 from robosc_server.store.factory import open_store

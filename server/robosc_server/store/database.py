@@ -1,8 +1,8 @@
-"""A database that is used from the event loop: transactions in a few threads, bounded in number and time.
+"""Asynchronous access to a database: transactions run in a few threads, bounded in number and time.
 
-A transaction that does not answer in time is given up: its connection is cut off from beside, so that its thread is
-free again, and whoever waits is told at once that the database is unavailable. Where connecting itself takes long (a
-host that is gone), calls are refused without another try for a moment.
+A transaction that exceeds its time is abandoned: its connection is closed, so that its thread is free again, and the
+caller gets StoreUnavailableError at once. After a failed connection, transactions are refused for a moment without
+another attempt, since connecting to a lost host takes long.
 """
 
 import asyncio
@@ -29,13 +29,13 @@ _PENDING = 2048
 """Transactions that may wait for a thread."""
 
 _TRIES = 3
-"""Number of tries of a change that meets another one of the same rows."""
+"""Attempts of a transaction that conflicts with another one."""
 
 _PROGRESS_STEPS = 100_000
-"""Steps of SQLite's machine, some milliseconds, after which a statement asks if its transaction was given up."""
+"""Steps of SQLite's virtual machine, some milliseconds, between checks whether a transaction was abandoned."""
 
 _PAUSE_S = 0.5
-"""After a connection has failed: for how long nothing is tried."""
+"""Time without further attempts after a failed connection, in seconds."""
 
 _PROGRAMMING_ERRORS = (IntegrityError, ProgrammingError, DataError)
 _CONFLICTS = frozenset({"40001", "40P01"})  # serialization_failure, deadlock_detected
@@ -72,7 +72,7 @@ class _Transaction[T]:
         raise AssertionError("unreachable: the last try returns or raises")
 
     def abandon(self) -> None:
-        """Cut it off, if it is under way; called in any thread."""
+        """Abandon the transaction, if it is running; may be called in any thread."""
         with self._lock:
             self._is_abandoned = True
             if self._driver_connection is not None:
@@ -86,7 +86,7 @@ class _Transaction[T]:
             driver_connection: Any = connection.connection.driver_connection
             is_sqlite = isinstance(driver_connection, sqlite3.Connection)
             if is_sqlite:
-                # An interrupt between two statements is lost: the next one is to end as well.
+                # An interrupt between two statements is lost: the next statement must end as well.
                 driver_connection.set_progress_handler(lambda: self._is_abandoned, _PROGRESS_STEPS)
             with self._lock:
                 self._driver_connection = driver_connection
@@ -104,7 +104,7 @@ def _abort_connection(driver_connection: Any) -> None:
     if isinstance(driver_connection, sqlite3.Connection):
         driver_connection.interrupt()
         return
-    with contextlib.suppress(Exception):  # It may be closing this moment.
+    with contextlib.suppress(Exception):  # The connection may be closing.
         duplicate = socket.socket(fileno=os.dup(driver_connection.fileno()))
         try:
             duplicate.shutdown(socket.SHUT_RDWR)
@@ -123,7 +123,7 @@ class Database:
         engine: Of the database; `close` disposes of it.
         readers: Threads for what only reads.
         writers: Threads for what changes something.
-        answer_s: Longest time that anybody waits for a transaction.
+        answer_s: Maximum duration of a transaction, in seconds.
         clock: Seconds of a monotonic clock.
     """
 
@@ -143,7 +143,7 @@ class Database:
         self._clock = clock
         self._pending = 0
         self._paused_until_s = 0.0
-        # What failed last, and nothing of its kind has succeeded since.
+        # True for reads and writes that failed last.
         self._is_failing = {False: False, True: False}
 
     @property
@@ -165,7 +165,7 @@ class Database:
         """Run some work in a transaction, and return what it finds.
 
         Raises:
-            StoreUnavailableError: The database is away or too slow.
+            StoreUnavailableError: The database is unavailable or too slow.
         """
         return await self._run(work, is_write=False)
 
@@ -173,7 +173,7 @@ class Database:
         """Return the result of some work whose changes are kept when this returns; it may be done twice.
 
         Raises:
-            StoreUnavailableError: The database is away, too slow or full.
+            StoreUnavailableError: The database is unavailable, too slow or full.
         """
         return await self._run(work, is_write=True)
 
@@ -192,7 +192,7 @@ class Database:
         future = asyncio.get_running_loop().run_in_executor(threads, transaction.run)
         future.add_done_callback(self._count_down)
         try:
-            # Who waits may be cancelled; the transaction goes on then.
+            # The caller may be cancelled; the transaction continues.
             result = await asyncio.wait_for(asyncio.shield(future), self._answer_s)
         except _PROGRAMMING_ERRORS:
             raise
@@ -214,7 +214,7 @@ class Database:
 
     def _note_failure(self, error: Exception, *, is_write: bool) -> None:
         if self.is_available:
-            # Without the statement's parameters: they are a caller's.
+            # Without the parameters of the statement, which come from a caller.
             reason = error.orig if isinstance(error, DBAPIError) else type(error).__name__
             _log.error("the database is unavailable: %s", reason)
         self._is_failing[is_write] = True
@@ -231,6 +231,6 @@ class Database:
 
 
 def _consume_outcome(future: asyncio.Future[Any]) -> None:
-    """Take notice of how something ended that nobody waits for."""
+    """Retrieve the exception of an abandoned transaction, so that asyncio does not log it."""
     if not future.cancelled():
         future.exception()

@@ -11,9 +11,9 @@ class StoreError(Exception):
 
 
 class StoreUnavailableError(RefusedError):
-    """The database is away, full or too slow now; what was asked for may be tried again.
+    """The database is unavailable, full or too slow; the operation may be retried.
 
-    Whether a change that was under way is kept is not known then.
+    It is unknown whether a change that was running has been stored.
     """
 
     def __init__(self) -> None:

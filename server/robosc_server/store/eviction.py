@@ -1,4 +1,4 @@
-"""Choice of who gives something back first: whoever holds most."""
+"""Fair choice of what to evict: the oldest items of the owner with the most data."""
 
 import heapq
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -7,20 +7,20 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 def choose_evicted(
     held: Mapping[str, int], oldest: Callable[[str], Iterable[tuple[str, int]]], excess: int, limit: int
 ) -> tuple[list[str], dict[str, int]]:
-    """Choose the things that go, one by one: each time the oldest of the owner who holds most at that moment.
+    """Choose items to evict one by one: each time the oldest item of the owner with the most data at that moment.
 
-    So nobody can push out what others have by holding much: all who hold more than the others come down to the same
-    level first (max-min fairness; D. Bertsekas and R. Gallager, Data Networks, 2nd edition, 1992, section 6.5.2).
+    So no owner can displace the data of others: owners with more data than others are reduced to the same level first
+    (max-min fairness; D. Bertsekas and R. Gallager, Data Networks, 2nd edition, 1992, section 6.5.2).
 
     Args:
         held: Amount that each owner holds.
-        oldest: Function that returns the things of an owner that may go, the oldest first, each with the amount that
-            its owner holds less then.
-        excess: Amount that is too much, of all together.
-        limit: Things that may go at once.
+        oldest: Function that returns the evictable items of an owner, the oldest first, each with the amount that its
+            eviction frees.
+        excess: Amount by which all owners together exceed their limit.
+        limit: Maximum number of evicted items.
 
     Returns:
-        The things that go, and the amount that each owner holds then.
+        The evicted items, and the remaining amount of each owner.
     """
     left = dict(held)
     heap = [(-amount, owner) for owner, amount in left.items()]

@@ -1,8 +1,8 @@
-"""Opens the database: SQLite in the server's own folder, or PostgreSQL by URL.
+"""Factory of the store: SQLite in the server's own folder, or PostgreSQL by URL.
 
-SQLite keeps a write-ahead log and waits for the disk at each commit, so that what was answered is there after the power
-has failed; the folder is locked, for one server alone. The log is cut back to 16 MiB at checkpoints, and pages that are
-free again go back to the disk a few at a time (sqlite.org: wal.html, pragma.html).
+SQLite uses a write-ahead log and waits for the disk at each commit, so that accepted jobs survive a power failure; a
+lock file excludes other servers. Checkpoints truncate the log to 16 MiB, and free pages are returned to the disk in
+small steps (sqlite.org: wal.html, pragma.html).
 """
 
 import fcntl
@@ -27,7 +27,7 @@ DATABASE_FILE = "jobs.sqlite"
 _LOG_BYTES = 16 * 2**20
 _BUSY_S = 5.0
 _INCREMENTAL = 2
-"""PRAGMA auto_vacuum: free pages go back to the disk when they are told to."""
+"""Value of PRAGMA auto_vacuum: free pages are released on request."""
 
 _FLOCK = "hhqqi"
 
@@ -102,7 +102,7 @@ def _open_sqlite(given: Path) -> tuple[Database, tuple[Path, int]]:
     except OSError as error:
         raise StoreError(f"the database {given} cannot be used: {error.strerror}") from error
     try:
-        # What is in it is the callers'.
+        # Private, since it holds data of callers.
         os.close(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600))
         engine = create_engine(
             URL.create("sqlite+pysqlite", database=str(path)),
@@ -121,7 +121,7 @@ def _open_sqlite(given: Path) -> tuple[Database, tuple[Path, int]]:
     except StoreError:
         _unlock(lock)
         raise
-    # One writer: SQLite takes one at a time, and here they wait in a fair line.
+    # One writer thread: SQLite permits one at a time, and here they wait in a fair queue.
     return Database(engine, readers=2, writers=1), lock
 
 
@@ -139,7 +139,7 @@ def _prepare(engine: Engine, what: str) -> None:
 
 
 def _set_up_sqlite(connection: sqlite3.Connection, _record: Any) -> None:
-    # Transactions begin where we say so, not where the driver thinks.
+    # Disable the implicit transactions of the driver.
     connection.isolation_level = None
     cursor = connection.cursor()
     cursor.execute(f"PRAGMA busy_timeout = {round(_BUSY_S * 1000)}")
@@ -159,16 +159,16 @@ def _set_up_sqlite(connection: sqlite3.Connection, _record: Any) -> None:
 
 
 def _begin_sqlite(connection: Connection) -> None:
-    # Who will write says so at once: a reader that becomes a writer may meet another one, and fails.
+    # A write transaction takes the lock at once: upgrading a read transaction may fail.
     is_write = connection.get_execution_options().get("robosc_write", False)
     connection.exec_driver_sql("BEGIN IMMEDIATE" if is_write else "BEGIN")
 
 
 def _locked(path: Path) -> tuple[Path, int]:
-    """A lock of this process beside a file, which no child inherits; within the process, `_held` tells.
+    """Lock a database file for this process, by a lock file that children do not inherit, and by `_held`.
 
     Raises:
-        StoreError: Somebody else has it.
+        StoreError: Another server has the lock.
         OSError: The file cannot be made.
     """
     taken = StoreError(f"the database {path} is in use by another robosc-server")

@@ -1,4 +1,4 @@
-"""Looks whether a server of this version could use a database, and makes or changes nothing there."""
+"""Inspection of a database without changing it: can a server of this version use it?"""
 
 from pathlib import Path
 
@@ -13,13 +13,13 @@ _BUSY_S = 1.0
 
 
 def inspect_sqlite(file: Path) -> None:
-    """Look at a file that is there; a server may have it open.
+    """Inspect an existing file; a server may have it open.
 
     Raises:
         StoreError: It is no database that a server of this version can use.
     """
-    # Whoever reads a database with a log of changes makes the files that readers and writers share, and cannot delete
-    # them again without the right to write. Where no log is, nobody is at it, and the file alone is all there is.
+    # Reading a database with a write-ahead log creates shared files, which a reader without write access cannot delete
+    # again. Without a log, no process uses the database, and the file alone is complete.
     has_log = _has_content(file.with_name(f"{file.name}-wal"))
     options = {"uri": "true", "mode": "ro"} | ({} if has_log else {"immutable": "1"})
     url = URL.create("sqlite+pysqlite", database=file.as_uri(), query=options)
@@ -27,7 +27,7 @@ def inspect_sqlite(file: Path) -> None:
 
 
 def inspect_postgresql(url: URL, connect_s: float) -> str:
-    """Look at a database by asking its server, and return its version.
+    """Inspect a PostgreSQL database and return the version of its server.
 
     Args:
         url: URL of the database.

@@ -1,7 +1,7 @@
-"""Rows of jobs: what one transaction does with them.
+"""Rows of jobs, and the operations on them within one transaction.
 
-Whoever changes a job says what it must be for that: in which state, and whose. Of two that want to change the same job
-one comes first, and the other finds that there is nothing left to do.
+Each change of a job checks its state and its server. Of two concurrent changes of one job, the first succeeds, and the
+second finds that there is nothing left to do.
 """
 
 from collections.abc import Collection, Iterator
@@ -20,9 +20,9 @@ _MESSAGE_CHARACTERS = 4096
 _SERVER_DIED = "the server crashed more than once while it ran this job"
 
 MAXIMUM_ATTEMPTS = 2
-"""Begun so often and interrupted each time, a job has failed."""
+"""Interrupted attempts after which a job has failed."""
 
-# Statements that are used often, made once: making one costs more than what the database does with it.
+# Frequent statements are built once: building one takes longer than executing it.
 _IS_KEPT = or_(JOBS.c.expires_us.is_(None), JOBS.c.expires_us > bindparam("now"))
 _IS_ACTIVE = or_(*(JOBS.c.state == state for state in sorted(ACTIVE)))
 _FIND = select(JOBS).where(JOBS.c.id == bindparam("job"), _IS_KEPT)
@@ -31,7 +31,7 @@ _FIND_BY_KEY = select(JOBS).where(_OF_KEY, _IS_KEPT)
 _FREE_KEY = delete(JOBS).where(_OF_KEY, JOBS.c.expires_us <= bindparam("now"))
 _SOME_OF_OWNER = select(JOBS.c.id).where(JOBS.c.owner == bindparam("by")).limit(bindparam("bound")).subquery()
 _COUNT = select(func.count()).select_from(_SOME_OF_OWNER)
-# One that another server is about to delete is left to it.
+# Skip a job that another server is about to delete.
 _ENDED_FIRST = (
     select(JOBS.c.id)
     .where(JOBS.c.owner == bindparam("by"), JOBS.c.ended_us.is_not(None))
@@ -222,7 +222,7 @@ def requeue(
         is_lost: True if they lost their workers, perhaps through their own fault; that is counted.
     """
     found = []
-    for job_id in sorted(ids):  # The same order in each server: none waits for one that waits for it.
+    for job_id in sorted(ids):  # The same order in each server prevents deadlocks.
         record = _locked(connection, job_id)
         if record is not None and record.replica == replica and record.state is JobState.RUNNING:
             values: dict[str, Any] = {"state": JobState.QUEUED, "attempts": record.attempts - 1}
@@ -232,7 +232,7 @@ def requeue(
 
 
 def release_queued(connection: Connection, replica: str) -> None:
-    """Leave the jobs of a server that wait to whoever finds them first."""
+    """Release the queued jobs of a server to the other servers."""
     connection.execute(
         update(JOBS).where(JOBS.c.replica == replica, JOBS.c.state == JobState.QUEUED).values(replica=None)
     )
@@ -256,7 +256,7 @@ def fail(connection: Connection, job_id: str, replica: str, failure: Failure, no
 
 
 def cancel(connection: Connection, job_id: str, now_us: int) -> JobRecord | None:
-    """End a job, whoever is at it; None: there is none. One that has ended stays as it is."""
+    """Cancel a job of any server; None: there is no such job. A job that has ended does not change."""
     record = _locked(connection, job_id)
     if record is None or record.state.has_ended:
         return record
@@ -264,7 +264,7 @@ def cancel(connection: Connection, job_id: str, now_us: int) -> JobRecord | None
 
 
 def write_progress(connection: Connection, replica: str, progress: dict[str, tuple[int, Report]]) -> None:
-    """Keep what workers have told, with the revisions that it has brought jobs to."""
+    """Store the progress of running jobs with their revisions."""
     for job_id, (revision, report) in progress.items():
         connection.execute(
             update(JOBS)
@@ -306,8 +306,8 @@ def take_orphans(connection: Connection, ours: str, now_us: int, limit: int) -> 
     Returns:
         The jobs that have changed.
     """
-    # Whoever else takes jobs at this moment takes others. Those that we have are not taken again, also where another
-    # server takes us for dead meanwhile.
+    # Concurrent servers take different jobs. Our own jobs are not taken again, even if another server takes us for
+    # dead meanwhile.
     query = select(JOBS).where(_is_orphan(), JOBS.c.replica.is_distinct_from(ours))
     query = query.order_by(JOBS.c.created_us, JOBS.c.id).limit(limit)
     found = [record_of(row) for row in connection.execute(query.with_for_update(skip_locked=True, of=JOBS))]
@@ -375,7 +375,7 @@ def _is_orphan() -> Any:
 
 
 def _locked(connection: Connection, job_id: str) -> JobRecord | None:
-    """A job that nobody else changes before the end of the transaction."""
+    """Lock a job against changes until the end of the transaction, and return it."""
     row = connection.execute(_LOCK, {"job": job_id}).one_or_none()
     return None if row is None else record_of(row)
 

@@ -8,10 +8,10 @@ from robosc_api.jobs import JobState
 from robosc_server.tasks.task import Failure, Report, TaskKind
 
 STEP = 2**20
-"""Amount that a change that is kept adds to a job's revision.
+"""Increment of a job's revision for each stored change.
 
-Between two of them, each report of a worker counts up by one in the memory of one server, so that no watcher sees a
-revision fall when that server dies.
+In between, progress reports increment the revision by one in the memory of one server, so that the revision never
+decreases for a watcher when that server dies.
 """
 
 _BLOCK_BYTES = 512 * 1024

@@ -1,8 +1,9 @@
 """Rows of servers that share a database.
 
-A server counts up its own beats. Another one that finds the same number for as long as a lease, by its own clock, takes
-it for dead; so no two clocks are compared (as in leases with a fencing number: C. Gray and D. Cheriton, "Leases", SOSP
-1989, pages 202-210). A server that was taken for dead finds no row of its own any more, and its jobs are another's.
+A server increments its own heartbeat. Another server that finds the same number for the length of a lease, by its own
+clock, takes it for dead; so clocks of different machines are never compared (as in leases with a fencing number: C.
+Gray and D. Cheriton, "Leases", SOSP 1989, pages 202-210). A server that was taken for dead finds that its row is gone;
+its jobs belong to another server then.
 """
 
 from collections.abc import Mapping
@@ -13,18 +14,18 @@ from robosc_server.store.schema import REPLICAS
 
 
 def enter(connection: Connection, replica: str) -> None:
-    """Tell that a server is there; it may have been told."""
+    """Add the row of a server, unless it exists."""
     if connection.scalar(select(REPLICAS.c.id).where(REPLICAS.c.id == replica)) is None:
         connection.execute(insert(REPLICAS).values(id=replica, beats=0))
 
 
 def leave(connection: Connection, replica: str) -> None:
-    """Tell that a server is gone, and has left its jobs to others."""
+    """Delete the row of a server; its jobs belong to no server then."""
     connection.execute(delete(REPLICAS).where(REPLICAS.c.id == replica))
 
 
 def beat(connection: Connection, replica: str) -> bool:
-    """Count up; False: the server was taken for dead."""
+    """Increment the heartbeat of a server; False: the server was taken for dead."""
     counted = connection.execute(update(REPLICAS).where(REPLICAS.c.id == replica).values(beats=REPLICAS.c.beats + 1))
     return bool(counted.rowcount)
 
@@ -36,11 +37,11 @@ def beats_of_others(connection: Connection, replica: str) -> dict[str, int]:
 
 
 def remove_dead(connection: Connection, dead: Mapping[str, int]) -> None:
-    """Tell that servers are gone that have not counted on from the numbers given; their jobs are nobody's then."""
+    """Delete the rows of servers whose heartbeats are still the given ones; their jobs belong to no server then."""
     for name, beats in dead.items():
         connection.execute(delete(REPLICAS).where(REPLICAS.c.id == name, REPLICAS.c.beats == beats))
 
 
 def remove_others(connection: Connection, ours: str) -> None:
-    """Tell that there is no other server; all jobs but ours are nobody's then."""
+    """Delete the rows of all other servers; their jobs belong to no server then."""
     connection.execute(delete(REPLICAS).where(REPLICAS.c.id != ours))

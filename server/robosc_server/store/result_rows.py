@@ -1,4 +1,4 @@
-"""Rows of results: what one transaction does with them."""
+"""Rows of results, and the operations on them within one transaction."""
 
 from collections.abc import Collection, Iterator
 from typing import Any
@@ -11,7 +11,7 @@ from robosc_server.store.records import blocks_of
 from robosc_server.store.schema import BLOCKS, JOBS, RESULTS
 from robosc_server.tasks.task import Result, TaskKind
 
-# Made once: making a statement costs more than what the database does with it.
+# Built once: building a statement takes longer than executing it.
 _INSERT = {
     "postgresql": postgresql.insert(RESULTS).on_conflict_do_nothing(),
     "sqlite": sqlite.insert(RESULTS).on_conflict_do_nothing(),
@@ -54,7 +54,7 @@ def read_blocks(connection: Connection, key: str) -> tuple[TaskKind, list[bytes]
 
 def touch(connection: Connection, keys: Collection[str], now_us: int) -> None:
     """Note that some results were asked for."""
-    names = sorted(keys)  # The same order in each server: none waits for one that waits for it.
+    names = sorted(keys)  # The same order in each server prevents deadlocks.
     for place in range(0, len(names), 500):
         part = names[place : place + 500]
         connection.execute(update(RESULTS).where(RESULTS.c.key.in_(part)).values(used_us=now_us))

@@ -1,7 +1,7 @@
-"""Tables, the same in SQLite and PostgreSQL, and their version.
+"""Tables of the database, the same in SQLite and PostgreSQL, and their schema version.
 
-Times are microseconds since 1970, in UTC. Texts and numbers of a job stand apart from its request, and the messages of
-a result from what is known about it, so that lists and sweeps touch no large values.
+Times are microseconds since 1970, in UTC. Requests and result messages have separate tables, so that lists and sweeps
+read no large values.
 """
 
 from sqlalchemy import (
@@ -27,16 +27,16 @@ from sqlalchemy import (
 from robosc_server.store.errors import StoreError
 
 VERSION = 2
-"""Version of the tables below. Earlier tables are brought up to it; a database of a later version is not touched."""
+"""Schema version of the tables below. Earlier versions are upgraded; a later version is refused."""
 
 _LOCK = 0x726F626F7363
-"""PostgreSQL's advisory lock while tables are made: replicas may start at the same time."""
+"""PostgreSQL advisory lock for creating tables: several servers may start at the same time."""
 
 METADATA = MetaData()
 
 SCHEMA = Table("robosc_schema", METADATA, Column("version", Integer, nullable=False))
 
-# Servers that share this database. A server counts up its beats; one that stops is taken for dead.
+# Servers that share this database, with their heartbeats.
 REPLICAS = Table(
     "replicas",
     METADATA,
@@ -51,7 +51,7 @@ RESULTS = Table(
     Column("kind", Text, nullable=False),
     Column("size", BigInteger, nullable=False),
     Column("used_us", BigInteger, nullable=False),
-    # For whom it was made first.
+    # The caller who requested it first.
     Column("owner", Text, nullable=False, server_default=""),
     Index("results_of_owners", "owner", "used_us"),
 )
@@ -88,11 +88,11 @@ JOBS = Table(
     Column("reason", Text),
     Column("message", Text),
     Column("is_from_store", Boolean, nullable=False),
-    # Whose it is to do; NULL: whoever finds it first, or it has ended.
+    # The server of the job; NULL: none yet, or the job has ended.
     Column("replica", Text),
-    # Set when it has succeeded. As long as it stands there, the result cannot be deleted.
+    # Set when the job has succeeded; it prevents the deletion of the result.
     Column("result_key", Text, ForeignKey("results.key")),
-    # How often its worker was lost under it in a way that may be its own fault.
+    # Number of lost workers for which the job may be the cause.
     Column("losses", Integer, nullable=False, server_default="0"),
     UniqueConstraint("owner", "idempotency_key", name="jobs_idempotency"),
     Index("jobs_listed", "owner", "created_us", "id"),
@@ -103,7 +103,7 @@ JOBS = Table(
     Index("jobs_results", "result_key"),
 )
 
-# What jobs that have not ended are asked to do.
+# Requests of unfinished jobs.
 REQUESTS = Table(
     "job_requests",
     METADATA,
@@ -112,7 +112,7 @@ REQUESTS = Table(
 )
 
 
-# What brings the tables of a version to the next one. Servers of the earlier version that are running go on meanwhile.
+# Upgrades from each version to the next. Running servers of the earlier version continue to work.
 _STEPS = {
     1: (
         "ALTER TABLE results ADD COLUMN owner TEXT NOT NULL DEFAULT ''",

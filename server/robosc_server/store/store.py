@@ -1,8 +1,8 @@
-"""Storage of what is kept: jobs, results, and the servers that there are.
+"""Store of jobs, results and servers.
 
-Each call is one transaction, or, where there may be many jobs, several, each of which leaves a sensible state.
+Each method runs one transaction, or several where there may be many jobs; each of them leaves a consistent state.
 
-Every call raises StoreUnavailableError where the database is away, full or too slow.
+Every method raises StoreUnavailableError if the database is unavailable, full or too slow.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -22,7 +22,7 @@ _TAKEN_AT_ONCE = 200
 _EVICTED_AT_ONCE = 50
 _FREE_PAGES = 2000
 _SWEEP_LOCK = 0x526F626F5343
-"""The advisory lock of PostgreSQL that one of several servers has while it makes room: any number that is ours."""
+"""PostgreSQL advisory lock for eviction, which one server at a time performs."""
 
 
 def _nothing() -> None:
@@ -123,7 +123,7 @@ class Store:
         return found
 
     async def release_queued(self, replica: str) -> None:
-        """Leave the jobs of a server that wait to whoever finds them first."""
+        """Release the queued jobs of a server to the other servers."""
         await self._database.write(lambda connection: job_rows.release_queued(connection, replica))
 
     async def end(self, job_id: str, replica: str, outcome: Result | Failure) -> JobRecord | None:
@@ -138,12 +138,12 @@ class Store:
         )
 
     async def cancel(self, job_id: str) -> JobRecord | None:
-        """End a job, whoever is at it; None: there is none."""
+        """Cancel a job of any server; None: there is no such job."""
         now_us = self.now_us()
         return await self._database.write(lambda connection: job_rows.cancel(connection, job_id, now_us))
 
     async def write_progress(self, replica: str, progress: Mapping[str, tuple[int, Report]]) -> None:
-        """Keep what workers have told; see `job_rows.write_progress`."""
+        """Store the progress of running jobs; see `job_rows.write_progress`."""
         told = {
             job_id: (revision, Report(job_rows.clean(report.stage), job_rows.clean(report.message)))
             for job_id, (revision, report) in progress.items()
@@ -159,7 +159,7 @@ class Store:
         return await self._database.read(lambda connection: job_rows.active_ids_of(connection, replica))
 
     async def enter(self, replica: str) -> None:
-        """Tell that a server is there; where no other can be, it takes over all jobs."""
+        """Register a server; if the database is not shared, it takes over all jobs."""
 
         def work(connection: Connection) -> None:
             replica_rows.enter(connection, replica)
@@ -171,7 +171,7 @@ class Store:
             await self._take_orphans(replica)
 
     async def leave(self, replica: str) -> None:
-        """Tell that a server is gone; its jobs that wait are left to others."""
+        """Unregister a server, and release its queued jobs to others."""
 
         def work(connection: Connection) -> None:
             job_rows.release_queued(connection, replica)
@@ -180,17 +180,17 @@ class Store:
         await self._database.write(work)
 
     async def beat(self, replica: str) -> bool:
-        """Tell that a server lives; False: it was taken for dead."""
+        """Renew the lease of a server; False: it was taken for dead."""
         return await self._database.write(partial(_beat, replica))
 
     async def others(self, replica: str) -> tuple[dict[str, int], bool]:
-        """Return the number of beats that each other server has counted, and whether there are jobs of nobody."""
+        """Return the heartbeats of the other servers, and whether there are jobs without a server."""
         return await self._database.read(
             lambda connection: (replica_rows.beats_of_others(connection, replica), job_rows.has_orphans(connection))
         )
 
     async def adopt(self, replica: str, dead: Mapping[str, int]) -> list[JobRecord]:
-        """Take over the jobs of servers that have not counted on from the numbers given, and those of nobody.
+        """Take over the jobs of servers whose heartbeats are still the given ones, and jobs without a server.
 
         Returns:
             The jobs that have changed.
@@ -202,7 +202,7 @@ class Store:
     async def keep_results(self, results: Sequence[tuple[str, TaskKind, Result, str]]) -> None:
         """Keep results by their keys, with their owners, but for those whose keys are there; all or none."""
         now_us = self.now_us()
-        # The same order in each server: none waits for one that waits for it.
+        # The same order in each server prevents deadlocks.
         ordered = sorted(results, key=lambda item: item[0])
 
         def insert(connection: Connection) -> None:
@@ -237,10 +237,10 @@ class Store:
         return sum((await self._database.read(job_rows.results_by_owner)).values())
 
     async def sweep(self, results_bytes: int) -> int:
-        """Delete jobs whose time has passed, and what is too much; in small transactions, others between.
+        """Delete expired jobs and excess results, in small transactions.
 
-        Where there is too much, whoever has most gives first, see `fairness`: results that no job refers to; and where
-        jobs refer to as much as may stay, those that ended first, so that a tenth of it is free again.
+        Excess data is evicted fairly, see `eviction`: results that no job refers to; and if results of jobs reach the
+        limit, the jobs that ended first, until a tenth of it is free again.
 
         Args:
             results_bytes: Bytes of results that may stay.
@@ -260,7 +260,7 @@ class Store:
         return total
 
     async def _take_orphans(self, replica: str) -> list[JobRecord]:
-        """Take over the jobs of nobody; in small transactions, since thousands would take longer than one may."""
+        """Take over the jobs without a server, in small transactions, since thousands would exceed the time limit."""
         now_us = self.now_us()
         taken: list[JobRecord] = []
         while some := await self._database.write(
@@ -275,7 +275,7 @@ class Store:
         give: Callable[[Connection, dict[str, int], int, int], tuple[int, dict[str, int]]],
         bound: int,
     ) -> int:
-        """Have owners give something back until all together hold no more than a bound; how many things that were."""
+        """Evict data of owners until all together are within a bound; return the number of evicted items."""
         held, total = await self._database.read(sizes), 0
         while sum(held.values()) > bound:
             number, held = await self._database.write(partial(_evict_some, sizes, give, held, bound))
@@ -292,7 +292,7 @@ def _evict_some(
     bound: int,
     connection: Connection,
 ) -> tuple[int, dict[str, int]]:
-    """Some of what is too much goes; where other servers do the same, one at a time, and by what is held by then."""
+    """Evict some excess data; servers that share a database do so one at a time, with current sizes."""
     if connection.dialect.name == "postgresql":
         if not connection.scalar(select(func.pg_try_advisory_xact_lock(_SWEEP_LOCK))):
             return 0, held

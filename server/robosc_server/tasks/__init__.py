@@ -1,1 +1,1 @@
-"""Work that the server is asked to do, whoever does it: tasks, their limits, and how they end."""
+"""Tasks of the server: requests, limits, execution and outcomes."""

@@ -1,6 +1,6 @@
-"""Description of this server and of what it can generate: answers that stay the same as long as it runs.
+"""Responses of ListTargets and GetVersion, which stay the same while the server runs.
 
-Making them imports targets and looks for engines, which takes a while: make them once, before serving.
+Making them is slow, since it imports targets and searches engines: make them once, before serving.
 """
 
 from robosc._version import __version__

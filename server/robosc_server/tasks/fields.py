@@ -80,7 +80,7 @@ def has_few_fields(content: bytes, nested: Nested, limit: int) -> bool:
             elif kind == _FIXED_32:
                 place += 4
             else:
-                # Groups are fields that nobody has any more; the parser refuses many in each other, or an end too many.
+                # Groups are deprecated; the parser refuses deep nesting and unbalanced ends.
                 groups += 1 if kind == _BEGIN_GROUP else -1
                 if not 0 <= groups <= _NESTING:
                     return True

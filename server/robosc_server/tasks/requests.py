@@ -1,8 +1,8 @@
-"""Requests as they come in: looked at, refused or accept_request, and given the key that says what they mean.
+"""Validation of requests: each is refused, or accepted as a task with a key of its meaning.
 
-This stands before everything else, in the server's own process, and looks at bytes of strangers: their number is
-limited before they are parsed, the parser refuses nesting (beyond 100 levels, unknown fields included) and texts that
-are no UTF-8, and no name is ever opened. Nothing of the core's stages is imported.
+This runs in the server's own process on untrusted bytes: their number is limited before they are parsed, the parser
+refuses nesting beyond 100 levels (unknown fields included) and texts that are not UTF-8, and no file is ever opened by
+name. No stage of the core is imported.
 """
 
 import hashlib
@@ -129,7 +129,7 @@ def accept_request(kind: TaskKind, request: bytes, limits: RequestLimits) -> Tas
     try:
         message = parse(request)
     except DecodeError:
-        # The parser's own words may quote the message.
+        # The parser's own message may quote the request.
         raise RefusedError(Reason.MALFORMED_REQUEST, NOT_A_MESSAGE) from None
     reader = _RequestReader(limits)
     # Python's notation of nested values is read back as those values only: other values have another notation.
@@ -139,7 +139,7 @@ def accept_request(kind: TaskKind, request: bytes, limits: RequestLimits) -> Tas
 
 
 class RequestCache:
-    """Acceptance of requests that knows earlier ones again, byte by byte: a client that asks twice is common.
+    """Cache of accepted requests by their bytes, since clients often repeat a request.
 
     Args:
         limits: Limits of a request.
@@ -184,7 +184,7 @@ def _producer_versions() -> tuple[str, ...]:
 
 
 class _RequestReader:
-    """Looks at the parts of one request, and counts their bytes.
+    """Reader of the parts of one request, which validates them and counts their bytes.
 
     Attributes:
         main_file: Name of the main file.

@@ -1,7 +1,7 @@
-"""The work itself, in a worker: from a request's message to the messages that answer it, with the core.
+"""Execution of a task in a worker, from the request message to the response messages.
 
-Each kind of task does what a command of `robosc` does: the same supervisor byte for byte, the same documents. What is
-wrong with a model is an answer. Everything else that can go wrong is a `Failure`.
+Each kind of task corresponds to a command of `robosc` and has the same result: the same supervisor byte for byte, the
+same documents. Errors of a model are results; everything else that can go wrong is a `Failure`.
 """
 
 import hashlib
@@ -82,7 +82,7 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
     Args:
         kind: Kind of the task.
         request: The message of an accepted request.
-        limits: Limits of the task; time and memory are the process's, and its keeper sees to them.
+        limits: Limits of the task; those of time and memory are enforced outside of this function.
         on_report: Callback that receives reports of the progress now and then.
     """
     try:
@@ -95,7 +95,7 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
         return Failure(Reason.RESULT_TOO_LARGE, f"the result has more than {limits.result_bytes} bytes")
     except (UnknownTargetError, UnknownEngineError, from_proto.OptionError, NoPropertyError) as error:
         return Failure(Reason.MALFORMED_REQUEST, str(error))
-    except Exception as error:  # The worker's border: whatever it was, the server logs it and lives on.
+    except Exception as error:  # The boundary of the worker: the server logs any error and continues.
         return Failure(Reason.INTERNAL_FAULT, "the server has an internal error", _places(error))
 
 
@@ -103,15 +103,15 @@ PRELOADED = ("robosc",)
 """Packages that are loaded, with all that is in them, before processes are forked that do tasks."""
 
 NOT_PRELOADED = ("robosc.cli", "robosc.event_logs", "robosc.pipeline", "robosc.starter")
-"""No task needs these, and what draws pictures starts threads."""
+"""Packages that no task needs; drawing libraries start threads."""
 
 
 def rehearse() -> None:
-    """Do a small task: what is loaded and made on first use is there for every process that is forked from this one."""
+    """Run a small task, so that every fork of this process has what is loaded or built on first use."""
     file = pb.SourceFile(name="rehearsal.rscd", text=_REHEARSAL)
     request = pb.SynthesizeRequest(bundle=pb.Bundle(main=file))
     run_task(TaskKind.SYNTHESIZE, request.SerializeToString(), TaskLimits(), lambda report: None)
-    # What reads the parts of generated programs comes with the first of them that is looked for.
+    # The first lookup loads the reader of package resources.
     resources.files("robosc.targets").joinpath("none").is_file()
     keep_ready(resolve_engine("auto"))
 
@@ -218,7 +218,7 @@ def _graph(supervisor: Supervisor, maximum_states: int) -> Graph:
 
 
 def _bounded_text(texts: Iterable[str], maximum_bytes: int) -> bytes:
-    """The bytes of a text that comes in pieces; nobody waits for the rest of one that is too long.
+    """Return the bytes of a text that comes in pieces; stop early if it is too long.
 
     Raises:
         _ResultTooLargeError: It has more than `maximum_bytes`.

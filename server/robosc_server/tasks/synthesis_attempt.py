@@ -1,4 +1,4 @@
-"""An attempt to make a supervisor, and what is told of it however it ends."""
+"""Attempt of a synthesis, and the fields of its result for every outcome."""
 
 from collections.abc import Callable
 from types import TracebackType
@@ -29,7 +29,7 @@ class Request(Protocol):
 
 
 class SynthesisAttempt:
-    """Context around all that may find out that a model cannot be handled: that error is kept, and ends the block.
+    """Context of a synthesis, which keeps the error of a model that is not supported.
 
     Attributes:
         made: Result of making the supervisor; None where the attempt did not come so far.

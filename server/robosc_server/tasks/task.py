@@ -1,4 +1,4 @@
-"""Tasks as values: they travel between the server, its database and its workers, and need neither network nor core."""
+"""Tasks, results and failures as values, which server, database and workers exchange."""
 
 from dataclasses import dataclass
 from enum import StrEnum

@@ -1,4 +1,4 @@
-"""Those who do tasks: processes of this machine, or of a cluster; each task in a process of its own, with limits."""
+"""Workers, on this machine or in a Dask cluster; each task runs in a separate process with limits."""
 
 from collections.abc import Awaitable, Callable
 from typing import Protocol
@@ -10,19 +10,19 @@ type OnCpuTime = Callable[[float], None]
 
 
 def ignore_cpu_time(cpu_s: float) -> None:
-    """Note for nobody what a process has taken."""
+    """Ignore the CPU time of a process."""
 
 
 class WorkersError(Exception):
-    """No worker can be had; one sentence for the operator."""
+    """No worker is available; one sentence for the operator."""
 
 
 class WorkerLostError(WorkersError):
-    """Those who start workers ended under a task, more than once: it may be what they end of."""
+    """The starters of workers ended more than once during a task, which may be the cause."""
 
 
 class Workers(Protocol):
-    """Some workers; an asynchronous context that starts and ends them."""
+    """Workers; an asynchronous context that starts and ends them."""
 
     @property
     def capacity(self) -> int:
@@ -31,16 +31,16 @@ class Workers(Protocol):
     async def run(
         self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime = ignore_cpu_time
     ) -> Outcome:
-        """The outcome of a task, begun at once: the caller sees to it that no more than `capacity` are under way.
+        """Run a task at once and return its outcome; the caller runs at most `capacity` tasks at a time.
 
-        However it ends, `on_cpu_time` is told how many seconds of a processor's time each process has taken that was at
-        it, as soon as that is known: about when the process is gone, which may be after this has returned. Of one that
-        was lost with those who knew, it is told the time by the clock.
+        However the task ends, `on_cpu_time` receives the CPU time of each process that ran it, as soon as it is known:
+        usually when the process has ended, which may be after this has returned. If the CPU time is lost, it receives
+        the wall-clock time.
 
-        Cancelling this kills the process that is at it, within 200 ms. A process that dies, or reaches a limit, is a
-        Failure, and harms no other task.
+        Cancelling this kills the process within 200 ms. A process that dies or reaches a limit is a Failure, and harms
+        no other task.
 
         Raises:
-            WorkersError: No worker can be had (the cluster is away); the task has not begun, or was lost on the way.
-            WorkerLostError: It was lost on the way, perhaps through its own fault.
+            WorkersError: No worker is available (the cluster is unavailable); the task has not started, or was lost.
+            WorkerLostError: The worker was lost, and the task may be the cause.
         """

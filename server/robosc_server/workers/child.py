@@ -1,4 +1,4 @@
-"""A worker: a fork of the fork server that waits for one task, does it, answers and ends."""
+"""Worker process: a fork that waits for one task, runs it, sends the outcome and exits."""
 
 import faulthandler
 import gc
@@ -24,7 +24,7 @@ from robosc_server.workers.sandbox import Sandbox, close_other_descriptors
 type TaskFunction = Callable[[TaskKind, bytes, TaskLimits, Callable[[Report], None]], Outcome]
 
 _COLLECT_EVERY = 20_000
-"""New objects of Python after which those that refer to each other in circles are looked for."""
+"""Number of new Python objects between two runs of the cyclic garbage collector."""
 
 OUT_OF_MEMORY = "the task exceeded its memory limit"
 
@@ -32,11 +32,11 @@ OUT_OF_MEMORY = "the task exceeded its memory limit"
 def run_worker(
     connection: socket.socket, crash_output: int, function: TaskFunction, sandbox: Sandbox, used_bytes: int
 ) -> None:
-    """Wait for a task, do it, send its outcome; confined before anything of a stranger's is read.
+    """Wait for a task, run it and send its outcome; the process is confined before it reads untrusted data.
 
     Args:
-        connection: Connection to the server; where it ends before a task came, nobody needs this process.
-        crash_output: Descriptor to which the interpreter writes where it was when it crashed.
+        connection: Connection to the server; if it ends before a task comes, the process exits.
+        crash_output: Descriptor to which the interpreter writes its traceback if it crashes.
         function: Function that does the task.
         sandbox: Sandbox that confines this process.
         used_bytes: Bytes of address space that this process has.
@@ -46,7 +46,7 @@ def run_worker(
     """
     faulthandler.enable(crash_output)
     confinement.prefer_oom_kill()
-    # What another process holds open tells nobody of its end, and gives who holds it something to reach.
+    # Inherited descriptors would hide the end of other processes, and would be accessible to this one.
     close_other_descriptors({connection.fileno(), crash_output} | sandbox.descriptors)
     sandbox.enter()
     try:
@@ -61,15 +61,15 @@ def _answer(
     connection: socket.socket, kind: TaskKind, request: bytes, limits: TaskLimits, function: TaskFunction
 ) -> None:
     gc.enable()
-    # A process that does one task and ends has little to collect, and its parts of the diagrams are not Python's.
+    # A process that runs one task has little garbage, and decision diagrams are not Python objects.
     gc.set_threshold(_COLLECT_EVERY)
     try:
         outcome = function(kind, request, limits, lambda report: connection.sendall(report_frame(report)))
     except ConnectionError:
-        raise  # Nobody waits any more.
+        raise  # The server has closed the connection.
     except MemoryError:
         outcome = Failure(Reason.MEMORY_LIMIT, OUT_OF_MEMORY)
-    except BaseException:  # The worker's border: whatever it was, the server logs it and lives on.
+    except BaseException:  # The boundary of the worker: the server logs any error and continues.
         confinement.raise_memory_limit()
         outcome = Failure(Reason.INTERNAL_FAULT, "the server has an internal error", traceback.format_exc())
     confinement.raise_memory_limit()
@@ -81,7 +81,7 @@ def _send(connection: socket.socket, outcome: Outcome, limits: TaskLimits) -> No
         messages = outcome.messages
         if sum(map(len, messages)) <= limits.result_bytes and len(messages) <= MESSAGES_LIMIT:
             for message in messages:
-                # In two, not put together: that would take the memory of a large message once more.
+                # Two writes, since joining them would copy a large message.
                 connection.sendall(HEADER.pack(Tag.MESSAGE.value, len(message)))
                 connection.sendall(message)
             connection.sendall(frame(Tag.RESULT, b""))
@@ -91,7 +91,7 @@ def _send(connection: socket.socket, outcome: Outcome, limits: TaskLimits) -> No
 
 
 def _receive(connection: socket.socket) -> bytes:
-    """The payload of the next frame of the server, which is believed."""
+    """Return the payload of the next frame of the server, which is trusted."""
     _, length = HEADER.unpack(_receive_exactly(connection, HEADER.size))
     return _receive_exactly(connection, length)
 
@@ -109,7 +109,7 @@ def _receive_exactly(connection: socket.socket, length: int) -> bytes:
 
 
 def redirect_to_devnull() -> None:
-    """Have standard input, output and error lead nowhere: libraries that print disturb nobody, and tell nothing."""
+    """Redirect standard input, output and error to the null device."""
     nowhere = os.open(os.devnull, os.O_RDWR)
     for descriptor in range(3):
         os.dup2(nowhere, descriptor)

@@ -1,4 +1,4 @@
-"""Limits of a worker's process, enforced by the kernel; the process does not outlive the one that started it."""
+"""Kernel-enforced limits of a worker process, which does not outlive its parent."""
 
 import math
 import os
@@ -17,7 +17,7 @@ _FAILURE_REPORT_S = 2
 
 
 def exit_with_parent(parent: int) -> None:
-    """Have the kernel kill this process when its parent dies; where that one is dead already, end at once."""
+    """Have the kernel kill this process when its parent dies; exit at once if it is dead already."""
     with suppress(OSError):
         kernel.prctl(kernel.SET_PARENT_DEATH_SIGNAL, int(signal.SIGKILL))
     if os.getppid() != parent:
@@ -25,9 +25,9 @@ def exit_with_parent(parent: int) -> None:
 
 
 def prefer_oom_kill() -> None:
-    """Be the first to go where the machine's memory ends."""
+    """Make this process the first one that the kernel kills when memory runs out."""
     with suppress(OSError):
-        # The file is the superuser's as long as nobody may look into this process.
+        # The file belongs to the superuser while the process is not dumpable.
         kernel.prctl(kernel.SET_DUMPABLE, 1)
         try:
             score = os.open("/proc/self/oom_score_adj", os.O_WRONLY | os.O_CLOEXEC)
@@ -46,9 +46,8 @@ def confine(limits: TaskLimits, used_bytes: int) -> None:
         limits: Limits of the task.
         used_bytes: Bytes of address space that the process has already.
 
-    The address space counts what the process has already; at least 64 MiB more are left to it, since less than that
-    is too little for any task. Processor time counts from here on, in whole seconds. No byte can be written to a
-    file.
+    The limit of the address space includes what the process has already, plus at least 64 MiB, the minimum for any
+    task. CPU time counts from here on, in whole seconds. Writing to files is impossible.
     """
     memory_bytes = max(limits.memory_bytes, used_bytes + _MINIMUM_FREE_BYTES)
     _set(resource.RLIMIT_AS, memory_bytes, memory_bytes + _FAILURE_REPORT_BYTES)
@@ -60,19 +59,19 @@ def confine(limits: TaskLimits, used_bytes: int) -> None:
 
 
 def raise_memory_limit() -> None:
-    """Let go of the memory limit by as much as it takes to say farewell."""
+    """Raise the memory limit, so that there is enough memory to report a failure."""
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
     with suppress(OSError, ValueError):
         resource.setrlimit(resource.RLIMIT_AS, (hard, hard))
 
 
 def disable_core_dumps() -> None:
-    """Leave no image of the memory, in which a model would stand, behind on a disk."""
+    """Disable core dumps, which would contain models."""
     _set(resource.RLIMIT_CORE, 0, 0)
 
 
 def _set(kind: int, soft: int, hard: int) -> None:
-    """Set a limit, within what the process may have already."""
+    """Set a limit, within the existing hard limit."""
     _, allowed = resource.getrlimit(kind)
     if allowed != resource.RLIM_INFINITY:
         soft, hard = min(soft, allowed), min(hard, allowed)

@@ -1,6 +1,6 @@
-"""Workers of a Dask cluster: tasks are sent to its scheduler, and done by processes beside its workers.
+"""Workers of a Dask cluster: its scheduler distributes tasks, and processes next to its workers run them.
 
-The package `distributed` is loaded only where somebody wants this.
+The package `distributed` is imported only if it is needed.
 """
 
 import asyncio
@@ -22,17 +22,17 @@ from robosc_server.workers.local import TASK_FUNCTION
 _LOG = logging.getLogger(__name__)
 
 CONNECT_S = 5.0
-"""Time that one attempt to reach the scheduler may take, in seconds."""
+"""Time limit of one attempt to connect to the scheduler, in seconds."""
 
 POLL_S = 0.5
 """Period at which the cluster is asked for its workers, in seconds."""
 
 _TLS = "tls://"
 _ATTEMPTS = 2
-"""Number of times that a task may begin."""
+"""Number of times that a task may start."""
 
 _STARTS = 3
-"""Number of times that it is handed to the cluster: its workers may be lost before they begin it."""
+"""Number of times that a task is submitted: workers may be lost before they start it."""
 
 _GRACE_S = 30.0
 _CANCEL_S = 1.0
@@ -45,7 +45,7 @@ _LOST = "two workers of the cluster were lost during this task"
 
 
 class _TaskEvents:
-    """Reports of a cluster on one task under way."""
+    """Events of one running task from the cluster."""
 
     def __init__(self) -> None:
         self.begun = 0
@@ -54,7 +54,7 @@ class _TaskEvents:
         self._news = asyncio.Event()
 
     def add(self, event: dict[str, Any]) -> None:
-        """Take an event of the cluster's."""
+        """Add an event of the cluster."""
         if event["is"] == "begun":
             self.begun += 1
             self.begun_at = monotonic()
@@ -63,7 +63,7 @@ class _TaskEvents:
         self._news.set()
 
     async def forward_reports(self, on_report: OnReport) -> Failure:
-        """Pass reports on, the last of them where the receiver is slow; returns once too many workers were lost."""
+        """Forward progress reports, only the newest ones to a slow receiver; return after too many lost workers."""
         while self.begun <= _ATTEMPTS:
             await self._news.wait()
             self._news.clear()
@@ -73,10 +73,10 @@ class _TaskEvents:
 
 
 class DaskWorkers:
-    """The workers of a cluster; an asynchronous context, which is there also while the cluster is away.
+    """The workers of a cluster; an asynchronous context, also while the cluster is unavailable.
 
     Attributes:
-        fault: Reason why no task can be done now, in one sentence; empty where tasks can be done.
+        fault: Reason why no task can run, in one sentence; empty if tasks can run.
     """
 
     def __init__(self, address: str, task_function: str = TASK_FUNCTION, *, must_be_confined: bool = False) -> None:
@@ -84,8 +84,8 @@ class DaskWorkers:
 
         Args:
             address: Address of the scheduler, such as `tcp://HOST:PORT` or `tls://HOST:PORT`.
-            task_function: Function that does tasks there, `package.module:name`.
-            must_be_confined: True if no task is to be done where a part of the confinement is not available.
+            task_function: Function that runs tasks there, `package.module:name`.
+            must_be_confined: True to run no task on a machine without complete confinement.
 
         Raises:
             WorkersError: The package `distributed` is missing, or cannot be loaded here; or there is to be TLS, and
@@ -97,7 +97,7 @@ class DaskWorkers:
             raise WorkersError(
                 "workers on a Dask cluster need the package distributed: pip install 'robosc[dask]'"
             ) from error
-        except OSError as error:  # It reads about the machine in /proc, which a sandbox may hide.
+        except OSError as error:  # It reads /proc, which a sandbox may hide.
             raise WorkersError(
                 f"workers on a Dask cluster need the package distributed, which cannot be loaded here: {error}"
             ) from error
@@ -131,7 +131,7 @@ class DaskWorkers:
             self._connection_task.cancel()
             await asyncio.gather(self._connection_task, return_exceptions=True)
         self.fault = "the workers are shut down"
-        # Whoever waits for a task is told, as long as there is a loop to tell it in.
+        # End the waits for tasks while the event loop is still running.
         self._is_closing.set()
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(_END_S):
@@ -142,7 +142,7 @@ class DaskWorkers:
 
     @property
     def capacity(self) -> int:
-        """Threads of all workers of the cluster that can be used; 0 while it is away."""
+        """Number of threads of all usable workers of the cluster; 0 while it is unavailable."""
         return sum(self._threads.values())
 
     async def run(
@@ -154,8 +154,8 @@ class DaskWorkers:
         second, and of many at once only the last.
 
         Raises:
-            WorkersError: The cluster is away, was lost on the way, has no worker, only such as cannot be used, or
-                loses them before they begin.
+            WorkersError: The cluster is unavailable or was lost, has no usable worker, or loses its workers before they
+                start the task.
             WorkerLostError: The starter of processes on a worker ended under it, more than once.
         """
         events = _TaskEvents()
@@ -165,7 +165,7 @@ class DaskWorkers:
                 return outcome
             if events.begun >= _ATTEMPTS:
                 return Failure(Reason.WORKER_DIED, _LOST)
-        # It has done nothing that workers could have been lost for.
+        # The task never started, so it cannot be the cause.
         raise WorkersError(f"the Dask cluster at {self._address} loses its workers before they start a task")
 
     async def _run_once(
@@ -202,12 +202,12 @@ class DaskWorkers:
         )
         try:
             done, _ = await asyncio.wait(works, return_when=asyncio.FIRST_COMPLETED)
-            # The answer first, if it is there.
+            # Prefer the answer, if there is one.
             return next(work for work in works if work in done).result()
         finally:
             del self._events[name]
             self._cpu_accounts[name].stop()
-            # What the last process took is told when it is gone, a moment after this.
+            # The CPU time of the last process is reported shortly after this, when it has ended.
             asyncio.get_running_loop().call_later(_CPU_REPORT_S, self._close_account, name)
             for work in works:
                 work.cancel()
@@ -215,7 +215,7 @@ class DaskWorkers:
                 async with asyncio.timeout(_CANCEL_S):
                     if future.done():
                         future.release()
-                    else:  # Its worker is told to stop by this.
+                    else:  # This tells the worker to stop.
                         await future.cancel()
                     await asyncio.gather(*works, return_exceptions=True)
 
@@ -229,7 +229,7 @@ class DaskWorkers:
             raise WorkersError(f"the Dask scheduler at {self._address} was lost") from error
         except self._distributed.KilledWorker:
             return None
-        except Exception as error:  # Whatever was raised there, or on the way from there.
+        except Exception as error:  # Any error of the worker, or of the transfer.
             told = f"{type(error).__name__}: {error}"
             raise WorkersError(f"the Dask cluster at {self._address} cannot run tasks: {told[:1000]}") from error
         if isinstance(content, bytes) and content[:1] == ANSWER:
@@ -245,7 +245,7 @@ class DaskWorkers:
     async def _watch_for_loss(
         self, client: Any, events: _TaskEvents, limits: TaskLimits, allowed: list[str] | None
     ) -> Failure | None:
-        """End a wait for something that will not come.
+        """End the wait for a task that cannot complete.
 
         Args:
             client: Client of the cluster that has the task.
@@ -254,8 +254,8 @@ class DaskWorkers:
             allowed: The workers that alone may do it; None: any.
 
         Returns:
-            Failure of the task; None: those workers are gone and others are there, but the scheduler would go on
-            waiting for them.
+            Failure of the task; None: all allowed workers are lost and others are available, but the scheduler would
+            still wait for the lost ones.
 
         Raises:
             WorkersError: The cluster is lost, or has had no worker for a while.
@@ -278,13 +278,13 @@ class DaskWorkers:
                 return Failure(Reason.TIME_LIMIT, "the task exceeded its time limit")
 
     async def _keep_connected(self) -> None:
-        """Have a client of the cluster, whenever that is there."""
+        """Keep a client connected to the cluster while the cluster is available."""
         while True:
             client = None
             try:
                 client = await self._connect()
                 await self._monitor(client)
-            except Exception as error:  # Of the network, of Dask, of another version of it: told, and tried again.
+            except Exception as error:  # Any error of the network or of Dask: reported, and retried.
                 why = await self._tls_fault() or _sentence(error)
                 self._note_fault(f"the Dask scheduler at {self._address} cannot be reached: {why}")
             finally:
@@ -297,13 +297,13 @@ class DaskWorkers:
             await asyncio.sleep(POLL_S)
 
     async def _connect(self) -> Any:
-        # Certificates for tls:// are Dask's own settings; the files are read anew.
+        # Dask's own settings name the certificates for tls://; the files are read again.
         return await self._distributed.Client(  # type: ignore[no-untyped-call]
             self._address, asynchronous=True, timeout=CONNECT_S, set_as_default=False, name="robosc-server"
         )
 
     async def _tls_fault(self) -> str | None:
-        """Return the fault of the certificates, theirs or ours, where Dask does not report it."""
+        """Return a problem with a certificate, which Dask itself does not report clearly."""
         if not self._address.startswith(_TLS):
             return None
         from robosc_server.workers.dask_tls import tls_fault
@@ -312,7 +312,7 @@ class DaskWorkers:
         return await tls_fault(host.strip("[]"), int(port), CONNECT_S)
 
     async def _monitor(self, client: Any) -> None:
-        """Know the cluster's workers, until it is lost."""
+        """Track the workers of the cluster until the connection is lost."""
         connection = client.scheduler_comm
         client.subscribe_topic(_topic(client), self._on_event)
         known: dict[str, str] = {}
@@ -349,14 +349,14 @@ class DaskWorkers:
                 )
         except (TimeoutError, OSError):
             return address, None
-        except Exception as error:  # Whatever was raised there: it has no RoboSC, or another Python.
+        except Exception as error:  # Any error of the worker, such as a missing RoboSC or another Python.
             return address, f"the Dask worker at {address} cannot load RoboSC: {_sentence(error)}"
         return address, "" if version.get(address) == __version__ else mismatch(
             address, str(version.get(address)), __version__
         )
 
     def _close_account(self, name: str) -> None:
-        """Account for what is known of a task that has ended, and wait for no more."""
+        """Close the CPU time account of a task that has ended."""
         account = self._cpu_accounts.pop(name, None)
         if account is not None:
             account.close()

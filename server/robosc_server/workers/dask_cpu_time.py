@@ -1,4 +1,4 @@
-"""Processor time that a task on a cluster has taken, put together from the reports of the cluster's workers."""
+"""CPU time of a task on a cluster, from the events of the cluster's workers."""
 
 import math
 from collections.abc import Callable
@@ -8,13 +8,13 @@ from robosc_server.workers import OnCpuTime
 
 
 class CpuTimeAccount:
-    """The processor's time of one task, whose workers may be lost.
+    """Account of the CPU time of one task, whose workers may be lost.
 
-    A worker tells when it begins, and what its process has taken when that is gone. One that is lost tells nothing any
-    more: then the time by the clock counts, until another one begins or nobody waits for the task.
+    A worker reports when it starts, and the CPU time of its process when that has ended. For a lost worker, the
+    wall-clock time counts, until another worker starts or the task has ended.
 
     Args:
-        on_cpu_time: Is told seconds.
+        on_cpu_time: Callback that receives seconds.
         clock: Seconds of a monotonic clock.
     """
 
@@ -26,7 +26,7 @@ class CpuTimeAccount:
         self._stopped_s: float | None = None
 
     def record_event(self, event: dict[str, Any]) -> None:
-        """Take an event of the cluster's: `begun` or `spent`; others are nothing."""
+        """Record an event of the cluster: `begun` or `spent`; other events are ignored."""
         match event["is"]:
             case "begun":
                 self.close()
@@ -38,11 +38,11 @@ class CpuTimeAccount:
                     self._on_spent(cpu_s)
 
     def stop(self) -> None:
-        """Nobody waits for the task any more, which has ended or is about to."""
+        """Stop the wall clock, since the task has ended."""
         self._stopped_s = self._clock()
 
     def close(self) -> None:
-        """Wait no more for what a worker that has begun may tell."""
+        """Count the wall-clock time of a worker that has not reported its CPU time."""
         if self._begun_s is not None:
             end_s = self._clock() if self._stopped_s is None else max(self._stopped_s, self._begun_s)
             self._on_spent(end_s - self._begun_s)

@@ -1,7 +1,7 @@
-"""Work of a Dask worker for the server: a task in a process of its own, reports on the way, an answer in bytes.
+"""Task on a Dask worker: it runs in a separate process, sends progress events, and answers in bytes.
 
-The answer is bytes with a mark before it, and never an object: the output of a process that has handled a hostile
-model is read by the server with the care of `frames`.
+The answer is bytes with a mark, never an object: the server reads the output of a process that has handled an untrusted
+model with the checks of `frames`.
 """
 
 import threading
@@ -31,7 +31,7 @@ _UNDER_WAY = ("executing", "long-running")
 
 
 def ready_version(task_function: str, must_be_confined: bool) -> str:
-    """This worker's version of RoboSC; has processes stand ready for what comes."""
+    """Start idle worker processes in the background; return the version of RoboSC on this worker."""
     threading.Thread(target=_prepare_quietly, args=(task_function, must_be_confined), daemon=True).start()
     return __version__
 
@@ -40,7 +40,7 @@ def _prepare_quietly(task_function: str, must_be_confined: bool) -> None:
     try:
         prepare(task_function, must_be_confined=must_be_confined)
     except WorkersError:
-        return  # The task that comes is told.
+        return  # The next task reports the error.
 
 
 def run_on_cluster(
@@ -53,7 +53,7 @@ def run_on_cluster(
     identity: tuple[str, str],
     limits: tuple[float, float, int, int, int],
 ) -> bytes:
-    """Do a task on this worker; stop when nobody on the cluster wants its result any more.
+    """Run a task on this worker; stop when the cluster has cancelled it.
 
     Args:
         version: Version of the server.
@@ -103,7 +103,7 @@ def run_on_cluster(
         return mark + f"the Dask worker at {worker.address}: {error}".encode()
     except StoppedError:
         return NO_WORKER + b"stopped"
-    except Exception:  # The task's border: whatever it was, the server logs it, and does not try the same for ever.
+    except Exception:  # The boundary of the task: the server logs any error, and does not retry the task.
         return ANSWER + answer(
             Failure(Reason.INTERNAL_FAULT, "the server has an internal error", traceback.format_exc())
         )
@@ -125,7 +125,7 @@ def answer(outcome: Outcome) -> bytes:
 
 
 def outcome_of(content: bytes, limits: TaskLimits) -> Outcome:
-    """The outcome that an answer tells.
+    """Return the outcome of a serialized answer.
 
     Raises:
         FrameError: It is no answer.

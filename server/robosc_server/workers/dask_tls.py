@@ -1,7 +1,7 @@
-"""TLS to a Dask scheduler: what Dask's own settings say of it, and in one sentence what is wrong with it.
+"""TLS to a Dask scheduler by Dask's own settings, with clear messages for its problems.
 
-Dask tells an expired certificate like a wrong one, and a certificate of ours that the scheduler refuses as a connection
-that took too long.
+Dask does not distinguish an expired certificate from a wrong one, and reports a rejected client certificate as a
+timeout.
 """
 
 import asyncio
@@ -35,7 +35,7 @@ def client_context() -> ssl.SSLContext:
 
 
 async def tls_fault(host: str, port: int, limit_s: float) -> str | None:
-    """Return the reason why there is no TLS with a scheduler; None: there is, or nobody is there at all.
+    """Return the reason why TLS with a scheduler fails; None: it works, or no scheduler is reachable.
 
     Args:
         host: Its host.
@@ -50,7 +50,7 @@ async def tls_fault(host: str, port: int, limit_s: float) -> str | None:
     try:
         async with asyncio.timeout(limit_s):
             reader, writer = await asyncio.open_connection(host, port, ssl=context)
-            # A scheduler speaks first. Whether it takes our certificate is known no sooner (RFC 8446, section 2).
+            # The scheduler sends first; only then it is known whether it accepts our certificate (RFC 8446, section 2).
             await reader.read(1)
     except ssl.SSLCertVerificationError as error:
         return f"its certificate is not accepted: {error.verify_message}"

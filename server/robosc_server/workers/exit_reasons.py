@@ -1,4 +1,4 @@
-"""Reasons why a worker's process ended without an answer, given honestly from the kernel's facts about it."""
+"""Failure reasons of worker processes that ended without an answer, from what the kernel reports."""
 
 import math
 import re
@@ -17,7 +17,7 @@ OUT_OF_TIME = "the task exceeded its time limit"
 
 _REMEMBERED_S = 1.0
 _NEAR_THE_LIMIT = 0.9
-_NEVER_RESIDENT_BYTES = 96 * 2**20  # Of the address space: mostly parts of libraries that nobody calls.
+_NEVER_RESIDENT_BYTES = 96 * 2**20  # Part of the address space: mostly unused parts of libraries.
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ EXIT_DESCRIPTION = re.compile(
     r"(ended with status \d{1,3} and no answer|was ended by (SIG[A-Z0-9]{2,8}|signal \d{1,3})) "
     r"after \d{1,9}\.\d\d s of CPU time, with at most \d{1,15} bytes resident"
 )
-"""Pattern of the text that `exit_description` returns: nobody can say anything of a model in this form."""
+"""Pattern of the text that `exit_description` returns: it cannot contain parts of a model."""
 
 
 def exit_description(end: ProcessExit) -> str:
@@ -66,7 +66,7 @@ def failure_of(end: ProcessExit, limits: TaskLimits, crash_output: str, was_memo
     if end.exit_code == -signal.SIGKILL and was_memory_short:
         return Failure(Reason.MEMORY_LIMIT, "the machine ran out of memory and killed the task", details)
     if end.exit_code and end.peak_bytes + _NEVER_RESIDENT_BYTES >= _NEAR_THE_LIMIT * limits.memory_bytes:
-        # Libraries in C end the process where memory is refused to them: CUDD by exit(1), others by abort().
+        # C libraries end the process if an allocation fails: CUDD by exit(1), others by abort().
         return Failure(Reason.MEMORY_LIMIT, OUT_OF_MEMORY, details)
     return Failure(Reason.WORKER_DIED, f"the worker process {_status_text(end.exit_code)}", details)
 
@@ -81,13 +81,13 @@ def oom_kills() -> int:
 
 
 class RecentOomKills:
-    """Number of processes killed for want of memory before now; asked of the kernel at most once a second.
+    """Number of processes killed for lack of memory so far, read from the kernel at most once a second.
 
-    Asking takes a tenth of a millisecond, and the answer is of use only where a worker is killed: one that was killed
-    within a second after another process ran out of memory is taken for one that did so itself.
+    Reading takes a tenth of a millisecond, and is useful only if a worker is killed. A worker that is killed within a
+    second after another process ran out of memory is assumed to have run out of memory as well.
 
     Args:
-        count: Function that asks the kernel.
+        count: Function that reads the number from the kernel.
         clock: Seconds that never go back.
     """
 

@@ -1,4 +1,4 @@
-"""Workers by what the operator writes: `local`, or the address of a cluster."""
+"""Factory of workers from the setting `workers`: `local`, or the address of a cluster."""
 
 import re
 
@@ -17,7 +17,7 @@ def open_workers(
         spec: `local`, `dask://HOST:PORT` or `dask+tls://HOST:PORT`.
         processes: Tasks that this machine does at once; a cluster has its own number.
         task_function: Function that does tasks, `package.module:name`.
-        must_be_confined: True if there are to be none where a part of their confinement is not available.
+        must_be_confined: True to start none on a machine without complete confinement.
 
     Raises:
         ValueError: The specification is none of these.

@@ -1,4 +1,4 @@
-"""Files that a worker may read: the programs it consists of; the kernel's Landlock enforces it, for any user."""
+"""Landlock rules of workers: they may read only program files."""
 
 import contextlib
 import os
@@ -24,7 +24,7 @@ _SCOPES_FROM, _SCOPES = 6, 0b11  # Sockets without a file, and signals, of proce
 
 
 class FileRules:
-    """Rules of what may be read, made once; forks of this process restrict themselves by them.
+    """Landlock rules, built once; forks of this process restrict themselves by them.
 
     Raises:
         OSError: The kernel has no Landlock, or it is turned off.
@@ -48,7 +48,7 @@ class FileRules:
     def _allow(self, place: Path) -> None:
         try:
             number = os.open(place, os.O_PATH | os.O_CLOEXEC)
-        except OSError:  # It is not there: then there is nothing to be read.
+        except OSError:  # A missing file cannot be read.
             return
         try:
             access = _READ_FILE | _READ_FOLDER if place.is_dir() else _READ_FILE
@@ -57,7 +57,7 @@ class FileRules:
             os.close(number)
 
     def restrict(self) -> None:
-        """From now on this process may read what the rules say, and nothing else; for good.
+        """Restrict this process permanently to the files of the rules.
 
         Raises:
             OSError: The kernel refuses it.
@@ -70,7 +70,7 @@ class FileRules:
 def program_places() -> set[Path]:
     """Return the places of the programs of this process: Python's library, what is installed, and loaded packages.
 
-    Not all of `sys.path`: the folder that a server was started in may be on it, and hold anything.
+    Not all of `sys.path`, which may include the working directory of the server.
     """
     paths = sysconfig.get_paths()
     names = {paths["stdlib"], paths["platstdlib"], paths["purelib"], paths["platlib"], *site.getsitepackages()}

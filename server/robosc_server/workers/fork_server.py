@@ -1,9 +1,9 @@
-"""The process that workers are forked from: it imports everything once, and holds no thread and no task.
+"""Fork server: a process that imports everything once and forks workers; it has one thread and runs no task.
 
-Started as a program with the descriptor of its line to the server, the name of the function that does tasks, the
-server's number, and whether workers must be confined whole. On the line (packets) it is told how many workers are
-wanted, and tells: what cannot be kept from workers here; a worker that stands ready, with its connection, its process
-descriptor and the pipe of its last words; a worker that has ended, and how; that no process can be had.
+Its arguments are the descriptor of its channel to the server, the name of the function that runs tasks, the process id
+of the server, and whether workers must be fully confined. On the channel it receives packets with the number of
+requested workers. It sends packets about the missing parts of the sandbox, about a new worker (with its connection, its
+process descriptor and the pipe of its crash output), about the exit of a worker, and about errors.
 """
 
 import contextlib
@@ -28,19 +28,19 @@ PACKET_BYTES = 4096
 """Maximum size of one packet on the line, in bytes."""
 
 MUST_BE_CONFINED = "required"
-"""Given to it where workers are not to be without a part of their confinement."""
+"""Argument that requires complete confinement."""
 
 _FORK_PAUSE_MS = 200
 
 
 class _ForkServer:
-    """Forks workers when it is told to, and reaps them."""
+    """Process that forks workers on request and reaps them."""
 
     def __init__(self, line: socket.socket, function: TaskFunction, sandbox: Sandbox) -> None:
         self._line = line
         self._function = function
         self._sandbox = sandbox
-        # A fork's is the same, and need not be read in each of them.
+        # Forks have the same size and need not read it.
         self._used_bytes = confinement.address_space_bytes()
         self._poll = select.poll()
         self._poll.register(line, select.POLLIN)
@@ -48,7 +48,7 @@ class _ForkServer:
         self._wanted = 0
 
     def run(self) -> None:
-        """Serve until the server is gone: then this process ends, and the kernel kills every worker with it."""
+        """Serve until the server has ended: then this process exits, and the kernel kills its workers."""
         while True:
             for descriptor, _ in self._poll.poll(_FORK_PAUSE_MS if self._wanted else None):
                 if descriptor in self._pids:
@@ -87,7 +87,7 @@ class _ForkServer:
             self._tell({"is": "worker", "pid": pid}, [ours.fileno(), descriptor, words])
 
     def _become_worker(self, fork_server: int, connection: socket.socket, crash_output: int) -> None:
-        """Do one task in the child, and end whatever happens."""
+        """Run one task in the child, and exit in any case."""
         try:
             confinement.exit_with_parent(fork_server)
             child.run_worker(connection, crash_output, self._function, self._sandbox, self._used_bytes)
@@ -118,10 +118,10 @@ class _ForkServer:
 
 
 def _load(name: str) -> TaskFunction:
-    """The function that does tasks, after everything that it may need was imported, and made on first use.
+    """Import the function that runs tasks, with everything that it needs, and return it.
 
-    What the former is the tuples `PRELOADED` and `NOT_PRELOADED` beside it tell, names of packages and beginnings of
-    names of modules; for the latter there is the function `rehearse`. Each may be missing.
+    The tuples `PRELOADED` and `NOT_PRELOADED` of its module name packages to import and prefixes of modules to skip;
+    the function `rehearse` builds what is built on first use. Each of them is optional.
     """
     module_name, _, attribute = name.partition(":")
     tasks = importlib.import_module(module_name)
@@ -130,7 +130,7 @@ def _load(name: str) -> TaskFunction:
         package = importlib.import_module(name)
         for module in pkgutil.walk_packages(package.__path__, f"{name}."):
             if not module.name.startswith(tasks.NOT_PRELOADED) and not module.name.endswith("__main__"):
-                # What is copied into generated packages needs the middleware that those run on.
+                # Modules for generated packages need their middleware.
                 with contextlib.suppress(ImportError):
                     importlib.import_module(module.name)
     if rehearse := getattr(tasks, "rehearse", None):
@@ -143,7 +143,7 @@ def main() -> None:
     line = socket.socket(fileno=int(sys.argv[1]))
     line.set_inheritable(False)
     confinement.exit_with_parent(int(sys.argv[3]))
-    # What it forks has these from it.
+    # Forks inherit these settings.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     confinement.disable_core_dumps()
     kernel.keep_memory_private()
@@ -153,7 +153,7 @@ def main() -> None:
         threads = len(list(Path("/proc/self/task").iterdir()))
         if threads > 1:
             raise RuntimeError(f"the fork server has {threads} threads and cannot fork safely")
-    except Exception as error:  # Whatever it was: the server tells it in one sentence.
+    except Exception as error:  # The server reports any error in one sentence.
         _give_up(line, f"cannot load {sys.argv[2]}: {type(error).__name__}: {error}")
     sandbox = Sandbox()
     if sandbox.missing and sys.argv[4] == MUST_BE_CONFINED:
@@ -161,7 +161,7 @@ def main() -> None:
             line, f"confinement is required, but this machine cannot confine workers: {'; '.join(sandbox.missing)}"
         )
     line.send(json.dumps({"is": "confined", "missing": sandbox.missing}).encode())
-    # Workers copy each page that they write to; a collection would write to all of them.
+    # Workers copy each page that they write, and a garbage collection would write to all pages.
     gc.collect()
     gc.freeze()
     gc.disable()
@@ -173,7 +173,7 @@ def main() -> None:
 
 
 def _give_up(line: socket.socket, message: str) -> NoReturn:
-    """Have the server tell why there are no workers."""
+    """Report to the server why there are no workers, and exit."""
     line.send(json.dumps({"is": "fault", "message": message[:1000]}).encode())
     sys.exit(1)
 

@@ -1,8 +1,7 @@
-"""Messages between a worker and the server: frames of a tag byte, a length of 8 bytes and a payload.
+"""Frames between a worker and the server: a tag byte, a length of 8 bytes and a payload.
 
-Nothing here builds objects other than bytes, numbers and text: a process that has handled a stranger's model could
-say anything, and must not run code in the server by it. A payload is read only after its length was found to be
-allowed.
+Decoding builds only bytes, numbers and texts: a process that has handled an untrusted model may send anything, and must
+not be able to run code in the server. A payload is read only if its length is allowed.
 
     server to worker   T  JSON: the kind and the limits        Q  the request's message
     worker to server   P  JSON: a report                       M  one message of the result
@@ -22,7 +21,7 @@ HEADER = struct.Struct(">cQ")
 """Tag and length of a payload."""
 
 MESSAGES_LIMIT = 100_000
-"""Messages of one result; many small ones would take far more memory than their bytes."""
+"""Maximum number of messages of one result; many small ones would take far more memory than their bytes."""
 
 REPORTS_BURST = 1000
 REPORTS_PER_SECOND = 50
@@ -63,7 +62,7 @@ class Tag(Enum):
 
 
 class FrameError(Exception):
-    """Received data that is no answer of a worker."""
+    """The received data is not a valid answer of a worker."""
 
 
 def frame(tag: Tag, payload: bytes) -> bytes:
@@ -116,7 +115,7 @@ def too_large(limits: TaskLimits) -> Failure:
 
 
 class AnswerReader:
-    """Puts the frames of one answer together, in two steps for each: may it be read, and what does it say.
+    """Reader of the frames of one answer, in two steps: it checks a header, then it decodes the payload.
 
     Args:
         limits: Of the task.
@@ -212,5 +211,5 @@ def _text(values: dict[str, Any], name: str, limit: int) -> str:
     value = values.get(name)
     if not isinstance(value, str):
         raise FrameError(f"a payload without the text {name}")
-    # Half a surrogate pair has no place in what is sent on.
+    # Lone surrogates cannot be sent in messages.
     return value[:limit].encode("utf-8", "replace").decode("utf-8")

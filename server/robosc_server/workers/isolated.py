@@ -1,4 +1,4 @@
-"""One task in a process of its own, for callers without an event loop, such as a thread of a Dask worker."""
+"""Execution of one task in a separate process, for callers without an event loop, such as threads of a Dask worker."""
 
 import asyncio
 import threading
@@ -15,15 +15,15 @@ _SPARE = 2
 
 
 class StoppedError(Exception):
-    """The task's process was killed, because the caller said so."""
+    """The process of the task was killed because the caller has cancelled it."""
 
 
 class _BackgroundWorkers:
-    """Workers in an event loop of their own, as long as this process lives."""
+    """Workers with their own event loop, for the lifetime of this process."""
 
     def __init__(self, task_function: str, *, must_be_confined: bool) -> None:
         self._loop = asyncio.new_event_loop()
-        # No thread is waited for at the end of the process; workers end with it.
+        # A daemon thread: workers end with this process.
         threading.Thread(target=self._loop.run_forever, name="robosc workers", daemon=True).start()
         self.workers = LocalWorkers(1, task_function, _SPARE, must_be_confined=must_be_confined)
         self._lock = threading.Lock()
@@ -34,7 +34,7 @@ class _BackgroundWorkers:
         return asyncio.run_coroutine_threadsafe(work, self._loop)
 
     def prepare(self) -> None:
-        """Return when workers stand ready; where that failed before, it is tried again."""
+        """Start the workers, unless they are running."""
         with self._lock:
             if not self._is_started:
                 self.start(self.workers.__aenter__()).result()
@@ -46,11 +46,11 @@ _BACKGROUNDS: dict[tuple[str, bool], _BackgroundWorkers] = {}
 
 
 def prepare(task_function: str = TASK_FUNCTION, *, must_be_confined: bool = False) -> None:
-    """Have processes stand ready for tasks; they stay as long as this process.
+    """Start idle processes for tasks; they live as long as this process.
 
     Args:
         task_function: Function that does tasks, `package.module:name`.
-        must_be_confined: True if there are to be none where a part of their confinement is not available.
+        must_be_confined: True to start none on a machine without complete confinement.
 
     Raises:
         WorkersError: None can be had.

@@ -1,4 +1,4 @@
-"""Calls of Linux that Python has no name for, with errors as Python's own calls raise them."""
+"""Linux system calls that Python does not offer, with Python's own errors."""
 
 import ctypes
 import os
@@ -14,7 +14,7 @@ SET_NO_NEW_PRIVILEGES = 38
 
 _CAPABILITIES_VERSION = 0x20080522  # Three: 64 bits for each set.
 
-# Made once, here: processes that are forked for one task each would pay for it again and again.
+# Built once here, not in each forked process.
 _CAPABILITIES_HEADER = struct.pack("=Ii", _CAPABILITIES_VERSION, 0)
 _NO_CAPABILITIES = bytes(24)
 _LIBRARY = ctypes.CDLL(None, use_errno=True) if sys.platform == "linux" else None
@@ -50,14 +50,14 @@ def system_call(number: int, *arguments: int | bytes | None) -> int:
 
 
 def drop_capabilities() -> None:
-    """Do without what the superuser may: a process of another user has none of it anyway.
+    """Drop all capabilities of the superuser.
 
     Raises:
         OSError: The kernel refuses it, or is not Linux.
     """
     library = _library()
     if not any(capabilities()):
-        return  # Who watches over the server may not even let it ask.
+        return  # A sandbox around the server may forbid the call.
     # The kernel writes to the header only where it does not know the version.
     if library.capset(_CAPABILITIES_HEADER, _NO_CAPABILITIES):
         raise _error()
@@ -74,7 +74,7 @@ def capabilities() -> list[int]:
 
 
 def keep_memory_private() -> None:
-    """Have the kernel let no process of the same user look into this one, or trace it; nor leave an image of it behind.
+    """Forbid other processes of the same user to inspect or trace this one, and disable its core dumps.
 
     Its memory, environment and descriptors in `/proc` are then the superuser's. Where the kernel is not Linux this does
     nothing.

@@ -1,4 +1,4 @@
-"""Workers of this machine: each task in a process of its own, forked ahead."""
+"""Workers of this machine: each task runs in a separate process that was forked in advance."""
 
 import asyncio
 import contextlib
@@ -19,7 +19,7 @@ _GONE_S = 5.0
 
 
 class LocalWorkers:
-    """At most so many processes at once; an asynchronous context that starts and ends them."""
+    """Bounded number of worker processes; an asynchronous context that starts and ends them."""
 
     def __init__(
         self,
@@ -34,8 +34,8 @@ class LocalWorkers:
         Args:
             size: Tasks under way at once.
             task_function: Function that does them, `package.module:name`; imported by the processes alone.
-            spare: Processes that stand ready beside those at work; None: as many as `size`.
-            must_be_confined: True if there are to be none where a part of their confinement is not available.
+            spare: Idle processes in addition to busy ones; None: `size`.
+            must_be_confined: True to start none on a machine without complete confinement.
         """
         self._size = size
         self._pool = WorkerPool(task_function, size if spare is None else spare, must_be_confined=must_be_confined)
@@ -54,7 +54,7 @@ class LocalWorkers:
 
     @property
     def pids(self) -> frozenset[int]:
-        """Numbers of all worker processes, ready and at work."""
+        """Process ids of all workers, idle and busy."""
         return self._pool.pids
 
     @property
@@ -103,12 +103,12 @@ class LocalWorkers:
         finally:
             termination = self._pool.terminate(worker)
             termination.add_done_callback(lambda _: on_cpu_time(_cpu_s(worker, monotonic() - begun_s)))
-            if not is_answered:  # Whoever gives a task up can count on its end.
+            if not is_answered:  # A cancelled task has ended when this returns.
                 await asyncio.wait([termination], timeout=_GONE_S)
 
 
 def _cpu_s(worker: WorkerProcess, clock_s: float) -> float:
-    """Seconds of a processor's time that a process took that is gone; by the clock, if the kernel's word was lost."""
+    """Return the CPU time of an ended process, or its wall-clock time if the CPU time is unknown."""
     known = worker.exit.done() and not worker.exit.cancelled()
     end = worker.exit.result() if known else None
     return clock_s if end is None else end.cpu_s

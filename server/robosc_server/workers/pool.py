@@ -21,7 +21,7 @@ from robosc_server.workers.process import WorkerProcess
 _LOG = logging.getLogger(__name__)
 
 START_S = 60.0
-"""Time that a fork server may take until its first worker stands ready, in seconds, also on an overloaded machine."""
+"""Time limit for the first idle worker after the start, in seconds; long enough for an overloaded machine."""
 
 _PAUSES_S = (0.0, 0.0, 0.2, 1.0, 5.0)
 _FAILING = 3
@@ -30,23 +30,23 @@ _REPLACEMENT_PAUSE_S = 0.2
 _KEY_DIGITS = 16
 _INHERITED = frozenset({"PATH", "HOME", "LANG", "LANGUAGE", "TZ", "TMPDIR", "LD_LIBRARY_PATH"})
 _INHERITED_PREFIXES = ("LC_", "PYTHON")
-"""Variables of the environment that workers have, too."""
+"""Environment variables that workers inherit."""
 
 
 class WorkerPool:
-    """WorkerPool of workers that stand ready; an asynchronous context.
+    """Pool of idle workers; an asynchronous context.
 
     Attributes:
-        restarts: Number of fork servers that ended without being told to.
-        fault: Reason why no process can be had now, in one sentence; empty where there are some.
+        restarts: Number of fork servers that ended unexpectedly.
+        fault: Reason why no worker process is available, in one sentence; empty if there is one.
         missing: Parts of the workers' confinement that this machine does not have, one sentence for each; None: that
             is not known yet.
     """
 
     def __init__(self, task_function: str, spare: int, *, must_be_confined: bool) -> None:
-        """Plan for workers that do tasks with a function (`package.module:name`), `spare` of them ready.
+        """Prepare a pool of `spare` idle workers that run tasks with a function (`package.module:name`).
 
-        Those that must be confined are not to be had where a part of the confinement is missing.
+        With `must_be_confined`, no worker starts on a machine that lacks a part of the confinement.
         """
         self.missing: tuple[str, ...] | None = None
         self._confinement = MUST_BE_CONFINED if must_be_confined else "best-effort"
@@ -90,13 +90,12 @@ class WorkerPool:
             await asyncio.gather(self._restarter, return_exceptions=True)
         self._changed.set()
         while self._terminations:
-            # Not `gather`: it returns at once where all of them are done, so that those that were done this moment
-            # never get to leave the set, and the loop to nothing else.
+            # Not `gather`: it returns at once if all tasks are done, before their callbacks remove them from the set.
             await asyncio.wait(self._terminations)
 
     @property
     def is_failing(self) -> bool:
-        """True if one fork server after the other ended without a worker; it is tried again now and then."""
+        """True if several fork servers in a row ended without a worker; restarts continue at intervals."""
         return self._failures >= _FAILING
 
     async def acquire(self) -> WorkerProcess:
@@ -120,7 +119,7 @@ class WorkerPool:
         return worker
 
     def _next_live_worker(self) -> WorkerProcess | None:
-        """The next worker that stands ready; one that has died is told of soon."""
+        """Return the next idle worker that is alive, if any."""
         while self._ready:
             worker = self._ready.popleft()
             if not worker.has_ended():
@@ -129,24 +128,24 @@ class WorkerPool:
         return None
 
     def _replace(self, worker: WorkerProcess) -> None:
-        """Bury a worker that died without a task, and have another one; if that goes on, a few times a second."""
+        """Replace an idle worker that has died, at a limited rate."""
         _LOG.warning("an idle worker process ended")
         self.terminate(worker)
         asyncio.get_running_loop().call_later(_REPLACEMENT_PAUSE_S, self._request_forks, 1)
 
     def terminate(self, worker: WorkerProcess) -> asyncio.Task[None]:
-        """End a worker now; what is returned ends when its process is gone."""
+        """Kill a worker; the returned task ends when its process has ended."""
         worker.kill()
         return self._begin(self._await_exit(worker))
 
     @property
     def pids(self) -> frozenset[int]:
-        """Numbers of all processes of workers, ready and at work."""
+        """Process ids of all workers, idle and busy."""
         return frozenset(self._known)
 
     async def _await_exit(self, worker: WorkerProcess) -> None:
         await worker.gone()
-        # The fork server tells how it ended; after that, its number may be another's.
+        # The fork server reports the exit; after that, the process id may be reused.
         await asyncio.shield(worker.exit)
         worker.close()
 
@@ -161,13 +160,13 @@ class WorkerPool:
         await self._changed.wait()
 
     def _request_forks(self, count: int) -> None:
-        """Tell the fork server to fork; where it is gone, the next one is told."""
+        """Request forks from the fork server; a missing one is replaced soon, and gets a new request."""
         if self._channel is not None:
             with contextlib.suppress(OSError):
                 self._channel.send(str(count).encode())
 
     async def _keep_fork_server(self) -> None:
-        """Have a fork server, always."""
+        """Keep a fork server running."""
         while True:
             status = await self._run_fork_server()
             self.restarts += 1
@@ -178,7 +177,7 @@ class WorkerPool:
             await asyncio.sleep(_PAUSES_S[min(self._failures, len(_PAUSES_S) - 1)])
 
     async def _run_fork_server(self) -> int | None:
-        """Start a fork server and take what it makes, until it ends; its status."""
+        """Run a fork server until it ends, and return its exit status."""
         loop = asyncio.get_running_loop()
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         ours.setblocking(False)
@@ -192,7 +191,7 @@ class WorkerPool:
                     stdout=asyncio.subprocess.DEVNULL,
                     pass_fds=[theirs.fileno()],
                     env=_environment(),
-                    # A terminal's signals reach the server alone.
+                    # Signals of a terminal must reach only the server.
                     start_new_session=True,
                 )
             self._channel = ours
@@ -209,7 +208,7 @@ class WorkerPool:
             self._receive_all(ours)
             loop.remove_reader(ours)
             ours.close()
-            # The kernel ends workers with their fork server; that they are gone is waited for.
+            # The kernel ends workers with their fork server; wait for their ends.
             for worker in self._ready:
                 self.terminate(worker)
             self._ready.clear()
@@ -222,13 +221,13 @@ class WorkerPool:
                 await process.wait()
 
     def _receive_all(self, channel: socket.socket) -> None:
-        """Take everything that a fork server reported before it ended."""
+        """Process all packets that a fork server sent before it ended."""
         with contextlib.suppress(OSError):
             while self._receive(channel):
                 pass
 
     def _receive(self, channel: socket.socket) -> bool:
-        """Take one packet of the fork server's; whether there was one."""
+        """Process one packet of the fork server; return False if there was none."""
         try:
             packet, descriptors, _, _ = socket.recv_fds(channel, PACKET_BYTES, _DESCRIPTORS, socket.MSG_CMSG_CLOEXEC)
         except BlockingIOError:
@@ -236,13 +235,15 @@ class WorkerPool:
         except OSError:
             packet, descriptors = b"", []
         if not packet:
-            asyncio.get_running_loop().remove_reader(channel)  # It ends: its status tells that.
+            asyncio.get_running_loop().remove_reader(
+                channel
+            )  # The fork server ends; its exit status is awaited elsewhere.
             return False
         packet_values = json.loads(packet)
         match packet_values["is"]:
             case "worker" if len(descriptors) < _DESCRIPTORS:
-                # The system had none to spare. A worker whose line nobody holds ends by itself; another one is asked
-                # for when there may be room.
+                # No descriptors were available. A worker without its connection exits by itself; request another one
+                # later.
                 for number in descriptors:
                     os.close(number)
                 self.fault = "this process has reached its limit of open files"
@@ -279,7 +280,7 @@ class WorkerPool:
 
     def _note_exit(self, pid: int, end: ProcessExit) -> None:
         worker = self._known.pop(pid, None)
-        if worker is None:  # It never got here: see `_receive`.
+        if worker is None:  # Its descriptors were lost: see `_receive`.
             return
         worker.exit.set_result(end)
         if worker in self._ready:
@@ -288,18 +289,18 @@ class WorkerPool:
 
 
 def _tasks_under_way(tasks: list[Task]) -> str:
-    """The tasks that may have to do with the end of a fork server: by their keys, since names are of the model."""
+    """Describe the tasks that may have ended a fork server, by their keys, since names are parts of models."""
     if not tasks:
         return ""
     return "; tasks under way: " + ", ".join(f"{task.kind} {task.key[:_KEY_DIGITS]}" for task in tasks)
 
 
 def _environment() -> dict[str, str]:
-    """Return what Python programs need of the server's environment; the same modules are found.
+    """Return the environment of workers: variables that Python programs need, and the same module search path.
 
-    Nothing else: a database's password, keys of a cloud or the server's own settings are no task's business.
+    Workers get nothing else, such as database passwords, cloud keys or settings of the server.
     """
-    # A copy: the environment itself may be changed by another thread in the middle of the start.
+    # A copy, since another thread may change the environment.
     environment = {
         name: value
         for name, value in os.environ.copy().items()

@@ -1,4 +1,4 @@
-"""One worker's process, as the server sees it: a connection, a descriptor to kill it by, and how it ended."""
+"""Handle of one worker process in the server: its connection, its process descriptor and its exit."""
 
 import asyncio
 import contextlib
@@ -20,11 +20,11 @@ _kills_before = RecentOomKills()
 
 
 class ForkServerLostError(Exception):
-    """The process that a worker was forked from has ended, and the worker with it."""
+    """The fork server of a worker has ended, and the worker with it."""
 
 
 class WorkerProcess:
-    """A worker that stands ready for one task.
+    """A worker process for one task.
 
     Attributes:
         pid: Its number.
@@ -48,22 +48,22 @@ class WorkerProcess:
         self._is_gone.set_result(None)
 
     def kill(self) -> None:
-        """Have the kernel end it, stopped or deep in a library as it may be."""
+        """Kill the process, even if it is stopped or busy in a C library."""
         with contextlib.suppress(ProcessLookupError):
             signal.pidfd_send_signal(self._descriptor, signal.SIGKILL)
 
     def has_ended(self) -> bool:
-        """Return True if the process is no more, asked of the kernel."""
+        """Return True if the process has ended."""
         poll = select.poll()
         poll.register(self._descriptor, select.POLLIN)
         return bool(poll.poll(0))
 
     async def gone(self) -> None:
-        """Return when the process is no more."""
+        """Wait until the process has ended."""
         await asyncio.shield(self._is_gone)
 
     def close(self) -> None:
-        """Let go of a process that is gone."""
+        """Close the descriptors of an ended process."""
         if not self._is_gone.done():
             asyncio.get_running_loop().remove_reader(self._descriptor)
         if self._writer is not None:
@@ -99,14 +99,14 @@ class WorkerProcess:
             tag, length = announced
             told = answer.read(tag, await reader.readexactly(length))
             if isinstance(told, Report):
-                # Nothing more is read meanwhile, so that a worker that reports too much has to wait.
+                # Reading pauses meanwhile, so that a worker with too many reports has to wait.
                 await on_report(told)
             elif told is not None:
                 return told
 
     async def _failure(self, limits: TaskLimits, kills: int) -> Failure:
         """Return the reason why the connection ended before an answer was whole."""
-        self.kill()  # It closed its end, but may live: then it was told nothing of a limit by the kernel.
+        self.kill()  # It has closed the connection, but may still be running.
         try:
             async with asyncio.timeout(_EXIT_S):
                 end = await asyncio.shield(self.exit)

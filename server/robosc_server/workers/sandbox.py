@@ -1,8 +1,8 @@
-"""Things that a worker is kept from, should a model ever make it run somebody else's program: nearly everything.
+"""Sandbox of workers, in case a model exploits a vulnerability to run its own program.
 
-The limits of `confinement` bound what a task takes; this bounds what its process can reach. Each part is held by the
-kernel, for any user, and cannot be given up again. A kernel may lack a part, or whoever runs the server's container
-may forbid it: the others hold all the same, and what is missing is reported.
+`confinement` limits the resources of a task; the sandbox limits what its process can access. The kernel enforces each
+part permanently, for any user. A kernel may lack a part, or a container may forbid it: the other parts still apply, and
+the missing ones are reported.
 """
 
 import contextlib
@@ -22,11 +22,11 @@ _KILLED = "the attempt was killed"
 
 
 class SandboxError(Exception):
-    """A part that could be had when it was tried cannot be had; one sentence."""
+    """A part of the sandbox that worked in the test cannot be entered; one sentence."""
 
 
 class Sandbox:
-    """To be made by a process with one thread, and entered by its forks."""
+    """Sandbox, which a process with one thread prepares and its forks enter."""
 
     def __init__(self) -> None:
         self._rules: FileRules | None = None
@@ -35,11 +35,11 @@ class Sandbox:
             self._rules = FileRules(program_places())
         except OSError as error:
             self._fault = error.strerror or str(error)
-        # What is made once here is there for every fork.
+        # Prepared here once for all forks.
         with contextlib.suppress(OSError):
             kernel.capabilities()
         prepare_filter()
-        # The last one keeps a process from entering the others.
+        # The last part forbids the calls that enter the others.
         self._parts: dict[str, Callable[[], None]] = {
             "capabilities cannot be dropped": kernel.drop_capabilities,
             "file access is not restricted (no Landlock)": self._restrict_files,
@@ -49,7 +49,7 @@ class Sandbox:
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Things that this machine cannot keep workers from and why, one sentence for each part."""
+        """Parts of the sandbox that this machine lacks, one sentence with the reason for each."""
         return tuple(f"{words}: {fault}" for words, fault in self._faults.items())
 
     @property
@@ -87,7 +87,7 @@ def _failure_of(restrict: Callable[[], None]) -> str:
         try:
             restrict()
             answer = "done"
-        except BaseException as error:  # A fork must not go on as if it were the process that it was forked from.
+        except BaseException as error:  # The fork must never continue with the code of its parent.
             answer = getattr(error, "strerror", None) or str(error)
         with contextlib.suppress(BaseException):
             os.write(write_end, answer.encode()[:_ANSWER_BYTES])
@@ -109,7 +109,7 @@ def close_other_descriptors(kept: Set[int]) -> None:
 
 
 def main() -> None:
-    """Print as a list in JSON what this machine cannot keep workers from."""
+    """Print the missing parts of the sandbox of this machine as a JSON list."""
     sys.stdout.write(json.dumps(Sandbox().missing))
 
 

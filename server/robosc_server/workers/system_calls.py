@@ -1,8 +1,8 @@
-"""Kernel requests that a worker may make: memory, time, its files' content, its connection; all else is refused.
+"""System calls that a worker may make: memory, time, reading files, its connection; all others are refused.
 
-A filter of seccomp in the kernel's language of filters (classic BPF), for 64-bit machines of two kinds. Anything that
-is not listed here, also what kernels to come will offer, fails with EPERM: new processes and programs, sockets,
-signals to others, looking into others, files that are made or written, more rights.
+A seccomp filter in classic BPF, for two 64-bit architectures. Every call that is not listed, including those of future
+kernels, fails with EPERM: new processes and programs, sockets, signals to and inspection of other processes, creating
+or writing files, and gaining rights.
 """
 
 import ctypes
@@ -31,17 +31,17 @@ _NUMBER, _ARCHITECTURE, _ARGUMENTS = 0, 4, 16
 _MAY_EXECUTE, _MAY_WRITE, _OF_NO_FILE = 0x4, 0x2, 0x20
 # Opened to write, made, emptied, or held without its content being read: O_ACCMODE, O_CREAT, O_TRUNC, O_PATH.
 _NOT_FOR_READING = 0o3 | 0o100 | 0o1000 | 0o10000000
-# F_DUPFD, F_GETFD, F_SETFD, F_GETFL and F_DUPFD_CLOEXEC; others make the kernel send signals, to whomever one likes.
+# F_DUPFD, F_GETFD, F_SETFD, F_GETFL and F_DUPFD_CLOEXEC; others can send signals to any process.
 _DESCRIPTOR_COMMANDS = (0, 1, 2, 3, 1030)
 
 
 _PLACEHOLDER_PID = 0x7FFFFFFE
-"""No process has this number: the kernel's are below 2^22. Nothing else in a filter is like it."""
+"""Placeholder of the process id: real ids are below 2^22, and no other constant of a filter has this value."""
 
 
 @dataclass(frozen=True, slots=True)
 class Architecture:
-    """A kind of machine.
+    """Architecture of a machine.
 
     Attributes:
         mark: Kernel's name for it (AUDIT_ARCH_...).
@@ -52,7 +52,7 @@ class Architecture:
     numbers: Mapping[str, int]
 
 
-# Numbers on x86_64 and on aarch64; 0: the call is not there. Read is 0 on x86_64, and stands apart.
+# Numbers on x86_64 and on aarch64; 0: no such call. `read` has the number 0 on x86_64, and is added below.
 _CALLS = {
     # Descriptors that are open already.
     "write": (1, 64),
@@ -157,7 +157,7 @@ def filter_program(architecture: Architecture, pid: int) -> bytes:
     conditions = _conditions(pid)
     program = [
         _Instruction(_LOAD, _ARCHITECTURE),
-        # A program for another kind of machine has other numbers for the same calls.
+        # Programs for another architecture have other numbers for the same calls.
         *_unless_equal(architecture.mark, _Instruction(_RETURN, KILL)),
         _Instruction(_LOAD, _NUMBER),
     ]
@@ -175,12 +175,12 @@ def _conditions(pid: int) -> dict[str, list[_Instruction]]:
     return {
         "kill": own_process,
         "tgkill": own_process,
-        # There is one thread, and it has the number of its process.
+        # The only thread has the id of its process.
         "tkill": own_process,
         "prlimit64": [_argument(0), *_unless_equal(0, refused)],
         "openat": [_argument(2), *_if_any_bit(_NOT_FOR_READING, [refused])],
         "fcntl": [_argument(1), *_unless_one_of(_DESCRIPTOR_COMMANDS, refused)],
-        # Libraries are mapped from files, which cannot be written; nothing that was written is executed.
+        # Libraries are mapped from read-only files; writable memory is never executable.
         "mmap": [
             _argument(2),
             *_if_any_bit(
@@ -218,12 +218,12 @@ def _if_any_bit(bits: int, then: list[_Instruction]) -> Iterator[_Instruction]:
 
 @cache
 def _placeholder_program(machine: str) -> bytes:
-    """The filter of a process with an impossible number: forks put in their own, and need not make it anew."""
+    """Return a filter with a placeholder id, which each fork replaces by its own."""
     return filter_program(ARCHITECTURES[machine], _PLACEHOLDER_PID)
 
 
 def prepare_filter() -> None:
-    """Make what `restrict_system_calls` takes, so that forks of this process need not."""
+    """Build the filter for `restrict_system_calls` once for all forks of this process."""
     machine = os.uname().machine
     if machine in ARCHITECTURES:
         _placeholder_program(machine)
@@ -244,7 +244,7 @@ class _Program(ctypes.Structure):
 
 
 def restrict_system_calls() -> None:
-    """From now on this process may make only the calls above; for good.
+    """Restrict this process permanently to the listed system calls.
 
     Raises:
         OSError: The kernel has no filters, or the machine is of another kind.

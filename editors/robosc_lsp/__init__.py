@@ -1,1 +1,1 @@
-"""The language server: RoboSC's answers to what editors ask, in the Language Server Protocol 3.17."""
+"""Language server of RoboSC, for the Language Server Protocol 3.17."""

@@ -1,4 +1,4 @@
-"""`robosc-lsp`: the language server as a program, on standard input and output."""
+"""The command `robosc-lsp`: the language server on standard input and output."""
 
 import argparse
 import logging
@@ -63,7 +63,7 @@ def _seconds(text: str) -> float:
 
 
 def entry() -> int:
-    """Serve one editor until it says goodbye; 0, or 1 where the server cannot run."""
+    """Serve one editor until it exits; return 0, or 1 if the server cannot run."""
     command_line = parser()
     arguments = command_line.parse_args()
     if arguments.log_file is not None:

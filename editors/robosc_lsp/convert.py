@@ -1,4 +1,4 @@
-"""Reports of RoboSC, in the words of the protocol."""
+"""Conversion of findings, symbols and tokens to values of the protocol."""
 
 from collections.abc import Iterable
 
@@ -87,7 +87,7 @@ _TOKENS = {
 
 
 def diagnostics(analysis: Analysis, project: Project, found: Iterable[Diagnostic]) -> list[lsp.Diagnostic]:
-    """The findings of a file, each with how to fix it; one of another file stands at the begin of this one."""
+    """Convert the findings of a file with their fixes; findings of other files are shown at its start."""
     return [_diagnostic(analysis, project, item) for item in found]
 
 
@@ -112,10 +112,10 @@ def _diagnostic(analysis: Analysis, project: Project, item: Diagnostic) -> lsp.D
 
 
 def symbol(part: Part, text: Text) -> lsp.DocumentSymbol:
-    """A part with what stands in it."""
+    """Convert a part with its nested parts."""
     definition = part.definition
     return lsp.DocumentSymbol(
-        # Editors refuse what has no name.
+        # Editors refuse empty names.
         definition.name or str(definition.kind),
         SYMBOLS[definition.kind],
         text.range(part.begin, part.end),
@@ -126,7 +126,7 @@ def symbol(part: Part, text: Text) -> lsp.DocumentSymbol:
 
 
 def semantic_tokens(analysis: Analysis) -> list[int]:
-    """Every name of a file with what it stands for, in the protocol's relative numbers."""
+    """Encode every name of a file with its kind, in the relative positions of the protocol."""
     data: list[int] = []
     line = column = 0
     for place, definition in analysis.names.occurrences(analysis.file):

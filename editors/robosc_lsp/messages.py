@@ -20,11 +20,11 @@ class SynthesisResponse(msgspec.Struct, frozen=True):
     """Result of synthesis for a robot.
 
     Attributes:
-        unknown: Reason why nothing is known; empty where something is.
-        states: States of the controlled robot; None where there is no supervisor.
-        reason: Reason why there is no supervisor; empty where there is one.
-        added: Additions of the supervisor to each controllable event, in words.
-        findings: Findings that only synthesis can make.
+        unknown: Reason why there is no result; empty if there is one.
+        states: States of the controlled robot; None if there is no supervisor.
+        reason: Reason why there is no supervisor; empty if there is one.
+        added: Conditions that the supervisor adds to each controllable event, as texts.
+        findings: Findings that need a synthesis.
     """
 
     unknown: str = ""
@@ -35,12 +35,12 @@ class SynthesisResponse(msgspec.Struct, frozen=True):
 
 
 class SynthesisRequest(msgspec.Struct, frozen=True):
-    """A robot on its way to the process.
+    """Request for the synthesis of a robot.
 
     Attributes:
         main: Name and text of its file.
         libraries: Those of each library.
-        known: Codes of findings that the checks have told already.
+        known: Codes of findings that the checks have already reported.
     """
 
     main: tuple[str, str]

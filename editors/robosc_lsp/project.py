@@ -1,4 +1,4 @@
-"""The files that an editor works on: what is open, what is saved, and what each robot consists of."""
+"""Files of an editor: open and saved texts, and the analysis of each robot."""
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
@@ -23,7 +23,7 @@ from robosc.source import Bundle, Location, SourceFile
 from robosc_lsp.texts import Text
 
 _MOST_FILES = 1_000
-"""Files of a folder that are looked through for who names something."""
+"""Maximum number of files that are searched for uses of a name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +33,10 @@ class Analysis:
     Attributes:
         uri: URI of its file.
         text: Text of its file.
-        bundle: All its texts; None where they cannot be read together.
+        bundle: All its texts; None if one of them cannot be read.
         inspected: Meaning of the texts.
         names: Meaning of their names.
-        whole: The parts of the file; None where nothing is sound.
+        whole: The parts of the file; None if no part is valid.
         uris: The URI of each file by its name in the bundle.
     """
 
@@ -60,11 +60,11 @@ class Analysis:
 
 
 class Project:
-    """Open texts over saved ones.
+    """Texts of a project, in which open texts replace saved ones.
 
     Args:
         encoding: Encoding in which the editor counts columns.
-        folders: The folders that it works on.
+        folders: Workspace folders.
     """
 
     def __init__(self, encoding: str, folders: Iterable[Path] = ()) -> None:
@@ -83,13 +83,13 @@ class Project:
         return tuple(self._open)
 
     def open(self, uri: str, text: str) -> None:
-        """A file has been opened, or its text given anew."""
+        """Open a file, or replace its text."""
         self._open[uri] = Text(text, self.encoding)
         self._find_paths()
         self.forget()
 
     def edit(self, uri: str, changes: Iterable[lsp.TextDocumentContentChangeEvent]) -> None:
-        """An open file has been edited: what depends on it is looked at again, or all if it is another library now."""
+        """Edit an open file; dependent analyses are dropped, or all of them if its library has changed."""
         before = self._open.get(uri, Text("", self.encoding))
         self._open[uri] = before.edited(changes)
         if declared_libraries(before.text) != declared_libraries(self._open[uri].text):
@@ -99,18 +99,18 @@ class Project:
                 del self._known[other]
 
     def close(self, uri: str) -> None:
-        """A file has been closed: what is saved counts."""
+        """Close a file; its saved text is used again."""
         self._open.pop(uri, None)
         self._find_paths()
         self.forget()
 
     def _find_paths(self) -> None:
-        # Two that are open may be one file; of the last one the text counts.
+        # Two URIs may name one file; the text that was opened last is used.
         paths = ((path, uri) for uri in self._open if (path := _path(uri)) is not None)
         self._by_path = {os.path.realpath(path): uri for path, uri in paths}
 
     def with_edits(self, changes: Mapping[str, Iterable[lsp.TextEdit]]) -> "Project":
-        """Return the project as it would be after some edits, of files that are there and that do not overlap."""
+        """Return the project after some edits of existing files, which must not overlap."""
         changed = Project(self.encoding, self.folders)
         changed.library_paths, changed.interface_paths = self.library_paths, self.interface_paths
         changed._open = dict(self._open)
@@ -118,7 +118,7 @@ class Project:
         for uri, edits in changes.items():
             text = self.text(uri)
             if text is not None:
-                # From the end on: what comes before stays where it is.
+                # From the end, so that earlier offsets stay valid.
                 last_first = sorted(edits, key=lambda edit: text.offset(edit.range.start), reverse=True)
                 changed.open(
                     uri,
@@ -130,22 +130,22 @@ class Project:
         return changed
 
     def forget(self) -> None:
-        """Something has changed: everything is looked at again when it is asked for."""
+        """Drop all analyses, which are made again on demand."""
         self._known.clear()
 
     def text(self, uri: str) -> Text | None:
-        """A text, open or saved; None where there is none."""
+        """Return an open or saved text; None if there is none."""
         if uri in self._open:
             return self._open[uri]
         path = _path(uri)
         try:
-            # What is no file, such as a pipe, might never be read to its end.
+            # Reading a special file, such as a pipe, might never end.
             return Text(read_source(path, path.name), self.encoding) if path is not None and path.is_file() else None
         except (OSError, LanguageError):
             return None
 
     def analysis(self, uri: str) -> Analysis | None:
-        """Return the analysis of a file; None where there is none."""
+        """Return the analysis of a file; None if there is no such file."""
         if uri not in self._known:
             text = self.text(uri)
             if text is None:
@@ -154,7 +154,7 @@ class Project:
         return self._known[uri]
 
     def analyses(self) -> Iterator[Analysis]:
-        """Yield the analysis of every file: the open ones, and those in the folders."""
+        """Yield the analyses of all open files and of all files in the folders."""
         seen = set[str]()
         for uri in (*self._open, *self._saved()):
             if uri not in seen:
@@ -176,7 +176,7 @@ class Project:
         return Surroundings(libraries, self._interfaces())
 
     def unreadable(self) -> Iterator[Path]:
-        """The files around that are no texts."""
+        """Yield the files of the folders that cannot be read as texts."""
         for uri in self._saved():
             path = _path(uri)
             if path is not None and uri not in self._open and path.is_file() and self.text(uri) is None:
@@ -191,7 +191,7 @@ class Project:
         return sorted(found)
 
     def _interfaces(self) -> Mapping[str, tuple[str, ...]]:
-        """The types of each ROS package that is installed; looked for once."""
+        """Return the types of each installed ROS package; searched once."""
         if self._packages is None:
             self._packages = {}
             for folder in self.interface_paths:
@@ -226,7 +226,7 @@ class Project:
         return bundle, {**uris, bundle.main.name: uri}, ()
 
     def _uri(self, path: Path) -> str:
-        """The URI of a file: that which the editor has for it, if it is open."""
+        """Return the URI of a file, as the editor spells it if the file is open."""
         real = os.path.realpath(path)
         return self._by_path.get(real) or from_fs_path(real) or ""
 
@@ -257,7 +257,7 @@ def _libraries(text: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
 
 
 def _path(uri: str) -> Path | None:
-    """The path of a URI; None for what is no file."""
+    """Return the path of a URI; None if it is no file."""
     if not uri.startswith("file:"):
         return None
     found = to_fs_path(uri)
@@ -265,7 +265,7 @@ def _path(uri: str) -> Path | None:
 
 
 def place_of(analysis: Analysis, project: Project, location: Location) -> lsp.Location | None:
-    """Return the place of a location for the editor; None where its file is not to be had."""
+    """Convert a location for the editor; None if its file is not available."""
     uri = analysis.uris.get(location.file)
     text = None if uri is None else project.text(uri)
     return None if uri is None or text is None else lsp.Location(uri, text.range_of(location))

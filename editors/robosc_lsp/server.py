@@ -1,8 +1,8 @@
 """The features of the language server.
 
-Everything is answered from what `Project` knows of the texts as they are this moment. Findings are told after each edit
-(after as long a pause as the last look took, so that typing is never behind); synthesis runs in a process beside, from
-half a second after the last edit until the next one.
+All features use the current texts of `Project`. Findings are published after each edit, after a pause as long as the
+last analysis, so that typing is never delayed. Synthesis runs in a separate process, from half a second after the last
+edit until the next one.
 """
 
 import asyncio
@@ -54,9 +54,9 @@ _FIX_TIME_S = 0.3
 
 
 class _Protocol(LanguageServerProtocol):
-    """Texts are kept by `Project` alone: lines end elsewhere for pygls' own.
+    """Protocol that leaves texts to `Project`, since pygls splits lines differently.
 
-    Handlers of notifications are plain functions: of others, which it would await, pygls keeps something for ever.
+    Handlers of notifications are plain functions: pygls never releases the futures of asynchronous ones.
     """
 
     @lsp_method(lsp.TEXT_DOCUMENT_DID_OPEN)
@@ -73,12 +73,12 @@ class _Protocol(LanguageServerProtocol):
 
 
 class Server(LanguageServer):
-    """A server for one editor.
+    """Language server for one editor.
 
     Args:
-        library_paths: Folders with libraries, beside those that the models' own places tell.
-        interface_paths: Folders with ROS packages, before those that the environment tells.
-        synthesis_s: Longest time of a synthesis beside; 0: there is none.
+        library_paths: Additional folders with libraries.
+        interface_paths: Folders with ROS packages, searched before those of the environment.
+        synthesis_s: Time limit of background synthesis in seconds; 0: no synthesis.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class Server(LanguageServer):
     # Texts
 
     def initialize(self, parameters: lsp.InitializeParams) -> None:
-        """The editor has told what it can and where it works."""
+        """Take over the capabilities and folders of the editor."""
         uris = [folder.uri for folder in parameters.workspace_folders or ()]
         if not uris and parameters.root_uri:
             uris = [parameters.root_uri]
@@ -118,12 +118,12 @@ class Server(LanguageServer):
         self.project.interface_paths = (*self._interface_paths, *self.project.interface_paths)
 
     def change_folders(self, added: Sequence[str], removed: Sequence[str]) -> None:
-        """The editor works in other folders now."""
+        """Change the workspace folders."""
         gone = _paths(removed)
         self.project.folders = [path for path in self.project.folders if path not in gone] + _paths(added)
 
     def opened(self, document: lsp.TextDocumentItem) -> None:
-        """A file is shown."""
+        """Open a file."""
         self._versions[document.uri] = document.version
         self._queue.prefer(document.uri)
         self.project.open(document.uri, document.text)
@@ -134,7 +134,7 @@ class Server(LanguageServer):
         document: lsp.VersionedTextDocumentIdentifier,
         changes: Sequence[lsp.TextDocumentContentChangeEvent],
     ) -> None:
-        """A file is edited: what is known of it is out of date."""
+        """Edit a file, and cancel its synthesis."""
         self._versions[document.uri] = document.version
         self._queue.prefer(document.uri)
         self._stop(document.uri)
@@ -142,7 +142,7 @@ class Server(LanguageServer):
         self.schedule_analysis()
 
     def closed(self, uri: str) -> None:
-        """A file is shown no more."""
+        """Close a file, and clear its findings."""
         self.project.close(uri)
         self._versions.pop(uri, None)
         self._outcomes.pop(uri, None)
@@ -152,12 +152,12 @@ class Server(LanguageServer):
         self.schedule_analysis()
 
     def schedule_analysis(self) -> None:
-        """Tell before long what is found in the open files."""
+        """Schedule the analysis of all open files."""
         if self._analysis_task is None or self._analysis_task.done():
             self._analysis_task = asyncio.get_running_loop().create_task(self._analyse_all())
 
     async def _analyse_all(self) -> None:
-        # As long as the last look took: edits that come meanwhile are looked at together.
+        # A pause as long as the last analysis, so that several edits are analysed together.
         await asyncio.sleep(min(self._last_analysis_s, _LONGEST_PAUSE_S))
         begun_s = time.monotonic()
         for uri in self.project.open_uris:
@@ -167,7 +167,7 @@ class Server(LanguageServer):
                     self._publish(uri, analysis)
                     self._begin_synthesis(uri, analysis)
             except Exception:
-                # A fault of ours: the other files are to be looked at for all that.
+                # An internal error must not prevent the analysis of other files.
                 _LOG.exception("analysis of %s failed", uri)
         self._last_analysis_s = time.monotonic() - begun_s
 
@@ -183,7 +183,7 @@ class Server(LanguageServer):
     # Synthesis
 
     def outcome(self, analysis: Analysis) -> SynthesisResponse | None:
-        """Return the result of synthesis for this very text; None: there is none yet."""
+        """Return the result of synthesis for the current text; None: not available yet."""
         known = self._outcomes.get(analysis.uri)
         if known is None or analysis.bundle is None or known[0] != analysis.bundle.digest:
             return None
@@ -239,11 +239,11 @@ class Server(LanguageServer):
         capabilities = self.client_capabilities.workspace
         lens = capabilities.code_lens if capabilities is not None else None
         if lens is not None and lens.refresh_support:
-            with contextlib.suppress(Exception):  # It is gone, or does not want to.
+            with contextlib.suppress(Exception):  # The editor may have exited, or refuse.
                 await self.workspace_code_lens_refresh_async(None)
 
     async def watch(self) -> None:
-        """Ask the editor to tell of files that change beside it."""
+        """Ask the editor to report file changes by other programs."""
         capabilities = self.client_capabilities.workspace
         watched = capabilities.did_change_watched_files if capabilities is not None else None
         if watched is not None and watched.dynamic_registration:
@@ -252,7 +252,7 @@ class Server(LanguageServer):
             await self.client_register_capability_async(lsp.RegistrationParams([registration]))
 
     async def finish(self) -> None:
-        """End what goes on beside; its processes are gone then."""
+        """Cancel analysis and synthesis, and wait for their processes to end."""
         if self._analysis_task is not None:
             self._analysis_task.cancel()
         for uri in tuple(self._syntheses):
@@ -263,7 +263,7 @@ class Server(LanguageServer):
     # Names
 
     def named(self, uri: str, position: lsp.Position) -> tuple[Analysis, Location, Definition] | None:
-        """The name at a position; None: there is none that means something."""
+        """Return the name at a position; None: there is no known name."""
         analysis = self.project.analysis(uri)
         if analysis is None:
             return None
@@ -272,7 +272,7 @@ class Server(LanguageServer):
         return None if found is None else (analysis, *found)
 
     def everywhere(self, analysis: Analysis, definition: Definition, *, declared: bool) -> list[lsp.Location]:
-        """Every place that names a definition, in whatever file."""
+        """Return all uses of a definition in all files."""
         home = place_of(analysis, self.project, definition.location)
         if home is None:
             return []
@@ -296,10 +296,10 @@ class Server(LanguageServer):
         return [home, *places] if declared else places
 
     def renamed(self, uri: str, position: lsp.Position, name: str) -> lsp.WorkspaceEdit | None:
-        """The edits that give a definition another name, in all files.
+        """Return the edits that rename a definition in all files.
 
         Raises:
-            JsonRpcInvalidParams: It is no name, or other names would mean something else afterwards.
+            JsonRpcInvalidParams: The name is invalid, or the rename would change the meaning of other names.
         """
         found = self.named(uri, position)
         if found is None:
@@ -325,16 +325,16 @@ class Server(LanguageServer):
         return lsp.WorkspaceEdit(changes=changes)
 
     def _require_visible_uses(self, analysis: Analysis, definition: Definition) -> None:
-        """See to it that no use of a definition stays unseen.
+        """Do nothing if all uses of a definition are known.
 
         Raises:
-            JsonRpcInvalidParams: Its name stands in what cannot be understood.
+            JsonRpcInvalidParams: Its name occurs in an invalid part of a text.
         """
         home = place_of(analysis, self.project, definition.location)
         is_shared = analysis.whole is not None and analysis.whole.definition.kind is DefinitionKind.LIBRARY
         for other in (analysis, *self.project.analyses()):
             is_here = home is not None and home.uri in other.uris.values()
-            # Errors may also hide that a file imports from the one with the definition.
+            # Errors may also hide an import from the file with the definition.
             if other.errors and (is_here or is_shared or definition.location.file != analysis.file):
                 for place in other.names.not_understood(SourceFile(other.file, other.text.text), definition.name):
                     line = other.text.range_of(place).start.line + 1
@@ -364,7 +364,7 @@ class Server(LanguageServer):
         return lsp.Hover(lsp.MarkupContent(lsp.MarkupKind.Markdown, text), analysis.text.range_of(place))
 
     def _declaration(self, analysis: Analysis, definition: Definition) -> str:
-        """The text of a definition; of one in another file, its line."""
+        """Return the text of a definition, or its line if it is in another file."""
         if definition.location.file == analysis.file and analysis.whole is not None:
             for part in parts(analysis.whole):
                 if part.definition.location == definition.location and part is not analysis.whole:
@@ -399,12 +399,12 @@ class Server(LanguageServer):
         return lsp.CompletionList(is_incomplete=False, items=items)
 
     def actions(self, uri: str, where: lsp.Range, kinds: Sequence[str] | None = None) -> list[lsp.CodeAction]:
-        """The fixes of the findings in a range, as many as can be tried in a moment.
+        """Return the fixes of the findings in a range, within a time limit.
 
         Args:
-            uri: Of the file.
+            uri: URI of the file.
             where: The range.
-            kinds: The kinds of actions that are wanted; None: all.
+            kinds: Requested kinds of actions; None: all.
         """
         analysis = self.project.analysis(uri)
         if analysis is None or (kinds is not None and not {"", lsp.CodeActionKind.QuickFix.value} & set(kinds)):
@@ -416,7 +416,7 @@ class Server(LanguageServer):
         for item, shown in zip(findings, diagnostics(analysis, self.project, findings), strict=True):
             if item.location is None or item.location.file != analysis.file or not _touch(shown.range, where):
                 continue
-            # One is always tried, however slow the machine is.
+            # Try at least one, even on a slow machine.
             if is_tried and time.monotonic() > until_s:
                 break
             is_tried = is_first = True
@@ -437,11 +437,11 @@ class Server(LanguageServer):
         return actions
 
     def _is_fixed(self, analysis: Analysis, found: Diagnostic, edit: lsp.TextEdit) -> bool:
-        """Return True if an edit removes a finding, and brings no more than one for it."""
+        """Return True if an edit removes a finding and does not increase the number of findings."""
         after = self.project.with_edits({analysis.uri: [edit]}).analysis(analysis.uri)
         if after is None:
             return False
-        # Behind errors of syntax others are not looked for: those that come into sight were there.
+        # Syntax errors hide other errors: compare only syntax errors, unless there are none.
         first, second = analysis.inspected.parsed.diagnostics, after.inspected.parsed.diagnostics
         if not first and not second:
             first, second = analysis.inspected.checked.diagnostics, after.inspected.checked.diagnostics
@@ -449,7 +449,7 @@ class Server(LanguageServer):
         return len(second) <= len(first) and (found.code, found.message, found.location) not in there
 
     def lenses(self, uri: str) -> list[lsp.CodeLens]:
-        """Over a robot: how many states it has under control, and to how many events the supervisor adds something."""
+        """Return the code lens of a robot: states of the controlled system, and events with added conditions."""
         analysis = self.project.analysis(uri)
         if analysis is None or analysis.whole is None:
             return []
@@ -491,7 +491,7 @@ def _completion(item: Candidate, number: int, where: lsp.Range) -> lsp.Completio
         kind=kind,
         detail=item.detail or None,
         preselect=item.is_wanted or None,
-        # In our order: what has the needed type comes first, words of the language last.
+        # Keep our order: candidates of the required type first, keywords last.
         sort_text=f"{number:05}",
         filter_text=item.text,
         text_edit=lsp.TextEdit(where, item.text),
@@ -624,7 +624,7 @@ def make_server(
         for begin, end, is_comment in folds(text.text):
             first, last = text.position(begin).line, text.position(end).line
             kind = lsp.FoldingRangeKind.Comment if is_comment else lsp.FoldingRangeKind.Region
-            # The line of the closing brace stays in sight.
+            # The line of the closing brace stays visible.
             last -= not is_comment
             if last > first:
                 found.append(lsp.FoldingRange(first, last, kind=kind))
@@ -638,7 +638,7 @@ def make_server(
         try:
             formatted = format_text(text.text)
         except LanguageError:
-            return []  # Its findings are shown.
+            return []  # The findings are shown instead.
         return [] if formatted == text.text else [lsp.TextEdit(text.whole, formatted)]
 
     @feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions(code_action_kinds=[lsp.CodeActionKind.QuickFix]))

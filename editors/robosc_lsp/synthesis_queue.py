@@ -1,7 +1,7 @@
 """Background synthesis for the editor: in a separate process, which is killed when its answer is no longer needed.
 
-That process runs `robosc_lsp.synthesizer`; nothing here imports it, so that the server starts without what only
-synthesis needs, and synthesis without what only the server needs.
+That process runs `robosc_lsp.synthesizer`, which nothing here imports, so that neither process loads what only the
+other needs.
 """
 
 import asyncio
@@ -26,11 +26,11 @@ class SynthesisQueue:
         self._is_busy = False
 
     def prefer(self, uri: str) -> None:
-        """A text has been edited."""
+        """Give priority to an edited text."""
         self._edited = [uri, *(other for other in self._edited if other != uri)]
 
     def forget(self, uri: str) -> None:
-        """A text is edited no more."""
+        """Remove the priority of a closed text."""
         self._edited = [other for other in self._edited if other != uri]
 
     @contextlib.asynccontextmanager
@@ -50,7 +50,7 @@ class SynthesisQueue:
             self._start_next()
 
     def _start_next(self) -> None:
-        # One that was cancelled has not left yet.
+        # A cancelled waiter may still be in the list.
         waiting = [each for each in self._waiting if not each[1].done()]
         if waiting and not self._is_busy:
             chosen = min(waiting, key=lambda each: self._priority_of(each[0]))
@@ -67,8 +67,8 @@ async def run_synthesis(bundle: Bundle, known: frozenset[str], limit_s: float) -
 
     Args:
         bundle: The robot.
-        known: Codes of findings that the checks have reported already.
-        limit_s: Longest time; after it, nothing is known.
+        known: Codes of findings that the checks have already reported.
+        limit_s: Time limit, in seconds.
     """
     request = SynthesisRequest(
         (bundle.main.name, bundle.main.text),
@@ -77,7 +77,7 @@ async def run_synthesis(bundle: Bundle, known: frozenset[str], limit_s: float) -
     )
     try:
         process = await asyncio.create_subprocess_exec(
-            # -P: the editor's folder may be a stranger's, and nothing in it is to be run.
+            # -P: never run code of the working directory, which may be untrusted.
             *(sys.executable, "-P", "-m", _PROGRAM),
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
@@ -101,7 +101,7 @@ async def run_synthesis(bundle: Bundle, known: frozenset[str], limit_s: float) -
 
 
 async def _answer(process: asyncio.subprocess.Process, request: bytes) -> bytes:
-    """Return the answer of a process, whose input stays open until it has answered."""
+    """Send a request and return the answer; the input of the process stays open until then."""
     if process.stdin is None or process.stdout is None:
         raise OSError("no pipes to the process of a synthesis")
     process.stdin.write(request)

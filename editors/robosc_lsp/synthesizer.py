@@ -1,7 +1,7 @@
-"""The program that synthesizes beside an editor: `python -m robosc_lsp.synthesizer`.
+"""Program for background synthesis: `python -m robosc_lsp.synthesizer`.
 
-It reads a bundle as a line of JSON and writes as JSON what synthesis tells of it. It ends when its input does: nothing
-goes on when the language server is gone.
+It reads a request as a line of JSON and writes the result of the synthesis as JSON. It exits when its input is closed,
+so that it never outlives the language server.
 """
 
 import os
@@ -21,7 +21,7 @@ from robosc.synthesis.engines import EngineOptions
 from robosc_lsp.messages import FindingMessage, SynthesisRequest, SynthesisResponse
 
 _MOST_NODES = 4_000_000
-"""Node limit of decision diagrams, for which CUDD takes a gigabyte at most: a user who types has other work to do."""
+"""Node limit of decision diagrams, with which CUDD takes a gigabyte at most."""
 
 
 def outcome(request: SynthesisRequest) -> SynthesisResponse:
@@ -68,7 +68,7 @@ def main() -> NoReturn:
     threading.Thread(target=_end_with, args=(sys.stdin.buffer,), daemon=True).start()
     sys.stdout.buffer.write(msgspec.json.encode(outcome(request)))
     sys.stdout.buffer.flush()
-    # Not by the interpreter's end: the thread holds a lock of the input.
+    # Not a normal exit, since the thread holds a lock of the input.
     os._exit(0)
 
 

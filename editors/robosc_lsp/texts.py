@@ -1,4 +1,4 @@
-"""Texts as an editor has them: lines and columns there and here, and edits."""
+"""Texts of an editor: conversion of positions, and edits."""
 
 import re
 from bisect import bisect_left, bisect_right
@@ -20,10 +20,10 @@ _MARK = "\ufeff"
 
 
 class Text:
-    """A text with its lines, as an editor counts them and as findings do.
+    """A text with the lines and columns of an editor and of findings.
 
-    An editor ends lines at a carriage return, too, and counts columns in the units of an encoding; findings count
-    characters, in lines that end at a line feed.
+    For an editor, a carriage return ends a line as well, and columns are code units of an encoding; findings count
+    characters in lines that end with a line feed.
 
     Args:
         text: All of it.
@@ -48,7 +48,7 @@ class Text:
         return self.range(0, len(self.text))
 
     def offset(self, position: lsp.Position) -> int:
-        """The offset of a position; one behind the end of its line means that end, one behind the last line its end."""
+        """Return the offset of a position, clipped to the end of its line and of the text."""
         if position.line >= len(self._starts):
             return len(self.text)
         begin = self._starts[position.line]
@@ -70,7 +70,7 @@ class Text:
         return lsp.Range(self.position(begin), self.position(end))
 
     def begin_of(self, location: Location) -> int:
-        """The offset at which a location begins; of one that is not in this text any more, the nearest."""
+        """Return the offset of a location, clipped to the text."""
         if location.line > len(self._own_starts):
             return len(self.text)
         return min(self._own_starts[location.line - 1] + location.column - 1, len(self.text))
@@ -121,9 +121,9 @@ class Text:
 
 
 def _sound(text: str) -> str:
-    """A text as texts are everywhere else, each character where it was.
+    """Return a valid text with the same offsets.
 
-    Halves of a character, as an editor may send them while one is split, become U+FFFD, and a byte order mark a blank.
+    Lone surrogates, which an editor may send, become U+FFFD, and a byte order mark becomes a blank.
     """
     if _SURROGATE.search(text):
         text = text.encode("utf-16-le", errors="surrogatepass").decode("utf-16-le", errors="replace")

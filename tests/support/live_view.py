@@ -9,10 +9,10 @@ from typing import Any
 
 from aiohttp import WSMsgType, web
 
-import robosc_bridge
+import robosc_view
 from support.waiting import wait_until
 
-PAGE = Path(robosc_bridge.__file__).parent / "view" / "page"
+PAGE = Path(robosc_view.__file__).parent / "page"
 TOKEN = "a-token-of-this-start"
 POLICY = "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 EMPTY_TOKEN = '<meta name="robosc-token" content="">'

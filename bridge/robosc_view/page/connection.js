@@ -76,7 +76,7 @@ export class Connection {
     if (message !== null && typeof message === "object") this.handlers.onMessage(message);
   }
 
-  look() {
+  poll() {
     const socket = this.socket;
     const since = performance.now() - Math.max(this.heardMs, this.openedMs);
     if (socket !== null && since > DEAD_MS) {

@@ -238,7 +238,7 @@ def node_check(manager: Manager, maximum_nodes: int | None) -> Callable[[], None
 
 def node_limit_error(maximum_nodes: int) -> NodeLimitError:
     """Return the error for diagrams that have become too large."""
-    return NodeLimitError(f"the limit of {maximum_nodes} nodes of the decision diagrams is exceeded")
+    return NodeLimitError(f"BDD node limit {maximum_nodes} exceeded; raise it with --max-nodes")
 
 
 def is_compiled(manager: Manager) -> bool:

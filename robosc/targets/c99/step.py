@@ -16,7 +16,7 @@ from robosc.expressions import (
 )
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
-from robosc.model.structure import Behaviour, Transition, Update, Variable, is_tau
+from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
 from robosc.targets.c99.expressions import ATOM, c_type, low_text
 from robosc.targets.c99.layout import event_data, width
 from robosc.targets.c99.naming import CNamer

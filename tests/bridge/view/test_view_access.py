@@ -330,7 +330,7 @@ def test_where_it_must_not_or_cannot_listen(robot: LiveRobot, tmp_path: Path) ->
         endpoint.stop()
         return str(error.value)
 
-    assert "can be reached from other machines" in why(ViewSettings("0.0.0.0:0"))
+    assert "is reachable from other machines" in why(ViewSettings("0.0.0.0:0"))
     assert "HOST:PORT" in why(ViewSettings("nonsense"))
     missing = ServerSecurity(certificate=tmp_path / "none.pem", key=tmp_path / "none.key")
     assert "none.pem" in why(ViewSettings("127.0.0.1:0", missing))

@@ -27,7 +27,7 @@ def test_reordering_and_enough_nodes_change_nothing(capsys: pytest.CaptureFixtur
 def test_too_few_nodes_end_it(capsys: pytest.CaptureFixture[str], command: list[str], engine: str) -> None:
     assert main([*command, NAVIGATION, "--max-nodes", "50", "--engine", engine]) == 1
     captured = capsys.readouterr()
-    assert captured.err == "robosc: the limit of 50 nodes of the decision diagrams is exceeded\n"
+    assert captured.err == "robosc: BDD node limit 50 exceeded; raise it with --max-nodes\n"
 
 
 @pytest.mark.parametrize("number", ["0", "-1", "many"])

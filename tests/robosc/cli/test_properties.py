@@ -90,7 +90,7 @@ def test_properties_of_a_supervisor_that_is_handed_over(tmp_path: Path, capsys: 
 def test_the_engine_may_be_told_more(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify", NAVIGATION, "--reorder", "--property", HOLDS]) == 0
     assert main(["verify", NAVIGATION, "--max-nodes", "60", "--property", HOLDS]) == 1
-    assert "more than the 60 nodes" in capsys.readouterr().err
+    assert "BDD node limit 60 exceeded" in capsys.readouterr().err
 
 
 def test_files_of_properties(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -13,7 +13,7 @@ import socket
 from collections.abc import Iterable
 
 from robosc_api.security import is_loopback_host, joined
-from robosc_api.security.addresses import split
+from robosc_api.security.addresses import split_address
 
 MAXIMUM_TOKEN = 200
 """Characters of a token that somebody shows."""
@@ -49,7 +49,9 @@ class Access:
     def is_ours(self, host: str | None) -> bool:
         """Return True if a header `Host` names this server; numbers need no name service, so nobody can bend them."""
         try:
-            name, port = split(host if host and ":" in host.rpartition("]")[2] else f"{host}:{self._default_port()}")
+            name, port = split_address(
+                host if host and ":" in host.rpartition("]")[2] else f"{host}:{self._default_port()}"
+            )
         except ValueError:
             return False
         if port != self._port:

@@ -16,7 +16,7 @@ from typing import Any
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from robosc_api.security import SecurityError, ServerSecurity, check_files, check_listening, joined
-from robosc_api.security.addresses import split
+from robosc_api.security.addresses import split_address
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.daemon.view_settings import ViewSettings
 from robosc_view.access import Access
@@ -127,7 +127,7 @@ class ViewServer:
         try:
             check_listening(settings.address, settings.security)
             check_files(settings.security)
-            host, port = split(settings.address)
+            host, port = split_address(settings.address)
         except (SecurityError, ValueError) as error:
             raise ViewError(f"the live view: {error}") from error
         context = tls_context(settings.security)

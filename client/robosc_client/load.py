@@ -179,10 +179,10 @@ def _call(channel: grpc.aio.Channel, load: Load) -> Callable[[bytes], Any]:
         return answer
     streamed: Any = channel.unary_stream(load.method)
 
-    async def answers(request: bytes) -> int:
+    async def answer_stream(request: bytes) -> int:
         size = 0
         async for message in streamed(request, timeout=load.timeout_s):
             size += len(message)
         return size
 
-    return answers
+    return answer_stream

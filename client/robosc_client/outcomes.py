@@ -90,9 +90,9 @@ def graph_of(found: StateGraph, bundle: Bundle, deployment: Deployment) -> Graph
     columns = graph_columns(to_automata(model, deployment), model)
     states = tuple(
         GraphState(
-            components=_shown(state.components),
-            variables={visible(name): _shown_value(value) for name, value in state.variables.items()},
-            communications=_shown(state.communications),
+            components=_printable(state.components),
+            variables={visible(name): _printable_value(value) for name, value in state.variables.items()},
+            communications=_printable(state.communications),
             enabled=tuple(map(visible, state.enabled)),
         )
         for state in found.states
@@ -103,11 +103,11 @@ def graph_of(found: StateGraph, bundle: Bundle, deployment: Deployment) -> Graph
     return Graph(model.name, found.initial, columns, states, transitions)
 
 
-def _shown(items: Mapping[str, str]) -> dict[str, str]:
+def _printable(items: Mapping[str, str]) -> dict[str, str]:
     return {visible(name): visible(text) for name, text in items.items()}
 
 
-def _shown_value(value: Value) -> Value:
+def _printable_value(value: Value) -> Value:
     return visible(value) if isinstance(value, str) else value
 
 

@@ -101,7 +101,7 @@ class Attempts:
         Raises:
             DeadlineError: The deadline has passed.
         """
-        left_s = self._left_s()
+        left_s = self._remaining_s()
         if left_s is not None and left_s <= 0:
             raise self._deadline_error()
         return left_s
@@ -121,15 +121,15 @@ class Attempts:
             ClientError: There is no next attempt.
         """
         self._failed += 1
-        if not self._is_worth_it(failure, has_answered=has_answered) or self._failed >= self._most:
+        if not self._is_retryable(failure, has_answered=has_answered) or self._failed >= self._most:
             raise self._error(failure)
         delay_s = self._delay_s(failure.retry_after_s)
-        left_s = self._left_s()
+        left_s = self._remaining_s()
         if delay_s is None or (left_s is not None and delay_s >= left_s):
             raise self._error(failure)
         return delay_s
 
-    def _is_worth_it(self, failure: Failure, *, has_answered: bool) -> bool:
+    def _is_retryable(self, failure: Failure, *, has_answered: bool) -> bool:
         if failure.code is grpc.StatusCode.UNAVAILABLE:
             return self._is_watch or not has_answered
         is_busy = failure.code is grpc.StatusCode.RESOURCE_EXHAUSTED and failure.reason in _BUSY
@@ -145,7 +145,7 @@ class Attempts:
             return delay_s
         return None if asked_s > policy.longest_asked_s else asked_s + delay_s / 2
 
-    def _left_s(self) -> float | None:
+    def _remaining_s(self) -> float | None:
         if self._deadline_s is None:
             return None
         return self._begun_s + self._deadline_s - self._policy.clock()
@@ -162,7 +162,7 @@ class Attempts:
             why = f": {message}" if message else ""
             return ServerUnavailableError(f"no server answers at {self._address}{why}")
         if code is grpc.StatusCode.DEADLINE_EXCEEDED:
-            left_s = self._left_s()
+            left_s = self._remaining_s()
             if left_s is not None and left_s <= _CLOCK_TOLERANCE_S:
                 return self._deadline_error()
             return DeadlineError(f"no result from {self._address}: {message}", reason)

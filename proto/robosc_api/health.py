@@ -8,7 +8,7 @@ from pathlib import Path
 import grpc
 from google.protobuf.wrappers_pb2 import StringValue, UInt32Value
 
-from robosc_api.security.addresses import joined, split
+from robosc_api.security.addresses import joined, split_address
 from robosc_api.security.client import Credentials, open_channel
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.listening import read
@@ -49,7 +49,7 @@ def local_address(address: str) -> str:
     Raises:
         ValueError: It is no address.
     """
-    host, port = split(address)
+    host, port = split_address(address)
     return joined(_ANYWHERE.get(host, host), port)
 
 
@@ -145,7 +145,7 @@ def ask_alive(
 
 def _takes_connections(address: str, timeout_s: float) -> bool:
     """Return True if the port accepts connections."""
-    host, port = split(address)
+    host, port = split_address(address)
     try:
         with socket.create_connection((host, port), timeout_s):
             return True

@@ -36,9 +36,9 @@ class MalformedRequests(Layer):
         """Wrap a handler in a check of its requests."""
         if inner.request_deserializer is None or not method.startswith(self._prefixes):
             return inner
-        return self._behind(inner)
+        return self._with_check(inner)
 
-    def _behind(self, handler: Any) -> Any:
+    def _with_check(self, handler: Any) -> Any:
         parse, serialize = _tolerant(handler.request_deserializer, self._limit), handler.response_serializer
         if handler.unary_unary:
             return grpc.unary_unary_rpc_method_handler(_checked(handler.unary_unary), parse, serialize)

@@ -42,18 +42,18 @@ class RequestTimeouts(Layer):
         """Wrap a handler in a wait for its request."""
         if inner.request_streaming and method not in self._next:
             return inner
-        return self._behind(inner, method)
+        return self._with_timeout(inner, method)
 
-    def _behind(self, handler: Any, method: str) -> Any:
+    def _with_timeout(self, handler: Any, method: str) -> Any:
         if handler.request_streaming:
-            answer = self._each(handler.stream_unary or writing(handler.stream_stream), method)
+            answer = self._streaming(handler.stream_unary or writing(handler.stream_stream), method)
         else:
-            answer = self._one(handler.unary_unary or writing(handler.unary_stream))
+            answer = self._unary(handler.unary_unary or writing(handler.unary_stream))
         is_stream = handler.response_streaming
         make = grpc.stream_stream_rpc_method_handler if is_stream else grpc.stream_unary_rpc_method_handler
         return make(answer, handler.request_deserializer, handler.response_serializer)
 
-    def _one(self, answer: Callable[[Any, Any], Awaitable[Any]]) -> Callable[[Any, Any], Awaitable[Any]]:
+    def _unary(self, answer: Callable[[Any, Any], Awaitable[Any]]) -> Callable[[Any, Any], Awaitable[Any]]:
         wait, end = self._first.wait, grpc.aio.EOF
 
         async def answered(requests: Any, context: Any) -> Any:
@@ -67,7 +67,9 @@ class RequestTimeouts(Layer):
 
         return answered
 
-    def _each(self, answer: Callable[[Any, Any], Awaitable[Any]], method: str) -> Callable[[Any, Any], Awaitable[Any]]:
+    def _streaming(
+        self, answer: Callable[[Any, Any], Awaitable[Any]], method: str
+    ) -> Callable[[Any, Any], Awaitable[Any]]:
         first, following = self._first, self._next[method]
 
         async def timed(requests: AsyncIterator[Any]) -> AsyncIterator[Any]:

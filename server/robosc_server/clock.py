@@ -21,6 +21,6 @@ def monotonic() -> float:
         return time.monotonic()
 
 
-def wall() -> float:
+def wall_clock_s() -> float:
     """Return the seconds since 1970-01-01 UTC, for times that callers and operators read."""
     return time.time()

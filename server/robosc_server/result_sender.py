@@ -46,7 +46,7 @@ class ResultSender:
         Raises:
             RefusedError: Too much that was sent before is not read yet.
         """
-        read: Callable[[], None] = _nothing
+        read: Callable[[], None] = _do_nothing
         async for message in messages:
             is_read = self.reserve(context, (message,))
             await context.write(message)
@@ -69,7 +69,7 @@ class ResultSender:
         """
         size = sum(map(len, messages))
         if size <= SMALL_BYTES:
-            return _nothing
+            return _do_nothing
         caller = caller_of(context)
         unread = self._unread[caller]
         if unread and unread + size > self._per_caller_bytes:
@@ -96,5 +96,5 @@ class ResultSender:
         return forget
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     """Nothing was counted."""

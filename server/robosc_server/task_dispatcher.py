@@ -50,12 +50,12 @@ class TaskDispatcher:
         self._scheduler.require_room(caller)
         self._quotas.admit(caller)
 
-        def made_meanwhile() -> Result | None:
+        def result_in_memory() -> Result | None:
             nonlocal found
             found = self._results.in_memory(task.key)
             return found
 
-        outcome = await self._scheduler.run(task, caller, self._limits, on_report, made_meanwhile)
+        outcome = await self._scheduler.run(task, caller, self._limits, on_report, result_in_memory)
         if found is not None:
             self._metrics.cache_hit("memory")
             return found

@@ -1,7 +1,7 @@
 import pytest
 
 from robosc_api.security import is_loopback_host, is_loopback_peer, joined
-from robosc_api.security.addresses import split
+from robosc_api.security.addresses import split_address
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.9.9.9", "localhost", "::1", "[::1]"])
@@ -30,10 +30,10 @@ def test_callers_elsewhere(peer: str) -> None:
 
 
 def test_addresses_are_taken_apart_and_put_together() -> None:
-    assert split("[::1]:50061") == ("::1", 50061)
-    assert split("robot:1") == ("robot", 1)
+    assert split_address("[::1]:50061") == ("::1", 50061)
+    assert split_address("robot:1") == ("robot", 1)
     assert joined("::1", 5) == joined("[::1]", 5) == "[::1]:5"
     assert joined("robot", 5) == "robot:5"
     for wrong in ("robot", ":1", "robot:70000", "::1:5", "a b:1", "robot:1\n"):
         with pytest.raises(ValueError, match="not HOST:PORT"):
-            split(wrong)
+            split_address(wrong)

@@ -44,9 +44,9 @@ from typing import Any
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, Task, TaskKind, TaskLimits
 from robosc_server.workers.frames import HEADER, Tag
-from support.hostile_code import rehearse, tried
+from support.hostile_code import tried, warm_up
 
-__all__ = ["TASK_FUNCTION", "fake_task", "rehearse", "run_task", "said"]
+__all__ = ["TASK_FUNCTION", "fake_task", "run_task", "said", "warm_up"]
 
 TASK_FUNCTION = "support.fake_tasks:run_task"
 

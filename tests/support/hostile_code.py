@@ -45,7 +45,7 @@ _SET_USER_NAMESPACE = 0x10000000
 _SEEN: list[int] = []
 
 
-def rehearse() -> None:
+def warm_up() -> None:
     """Look at the process that workers are forked from; called there."""
     _SEEN.append(_LIBRARY.prctl(_GET_DUMPABLE, 0, 0, 0, 0))
 

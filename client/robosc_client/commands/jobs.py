@@ -364,7 +364,7 @@ def _get(arguments: argparse.Namespace, client: Client) -> int:
         _print(found)
     elif has_nothing and not isinstance(found, tuple):
         _report_nothing(job, found)
-    return ExitCode.OK if _is_good(found) else ExitCode.FAILED
+    return ExitCode.OK if _is_success(found) else ExitCode.FAILED
 
 
 def _report_no_result(arguments: argparse.Namespace, job: Job) -> int:
@@ -506,22 +506,22 @@ def result_json(found: TaskResult) -> dict[str, Any]:
 def _print(found: TaskResult) -> None:
     if isinstance(found, Formatted) and found.text is not None:
         # Byte for byte to a file or program; without control characters to a terminal.
-        sys.stdout.write(_harmless(found.text) if sys.stdout.isatty() else found.text)
+        sys.stdout.write(_printable(found.text) if sys.stdout.isatty() else found.text)
         return
     if isinstance(found, tuple):
         print_diagnostics(found, None)
         return
-    if isinstance(found, Synthesis | Generation | Exploration) and not _is_good(found):
+    if isinstance(found, Synthesis | Generation | Exploration) and not _is_success(found):
         print_diagnostics(found.diagnostics, None)
     print_json(result_json(found))
 
 
-def _harmless(text: str) -> str:
+def _printable(text: str) -> str:
     """The lines of a text as a terminal may show them."""
     return "\n".join("\t".join(map(visible, line.split("\t"))) for line in text.split("\n"))
 
 
-def _is_good(found: TaskResult) -> bool:
+def _is_success(found: TaskResult) -> bool:
     match found:
         case tuple():
             return not any(item.severity == "error" for item in found)

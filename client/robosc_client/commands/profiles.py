@@ -7,7 +7,7 @@ import sys
 from robosc.cli.arguments import given_path
 from robosc.cli.output import ExitCode, UsageError, print_json
 from robosc_api.security import Credentials, SecurityError, check_credentials
-from robosc_api.security.addresses import is_loopback_host, split
+from robosc_api.security.addresses import is_loopback_host, split_address
 from robosc_client.commands.connection import address, exit_statuses
 from robosc_client.profiles import (
     MAXIMUM_TOKEN_BYTES,
@@ -96,7 +96,7 @@ def _require_usable(profile: Profile, *, has_token: bool) -> None:
     except SecurityError as error:
         raise UsageError(str(error)) from error
     is_secure = profile.tls or profile.ca is not None or profile.certificate is not None
-    if has_token and not is_secure and not is_loopback_host(split(profile.server)[0]):
+    if has_token and not is_secure and not is_loopback_host(split_address(profile.server)[0]):
         raise UsageError(
             f"a token may be sent to another machine only with TLS: add --tls or --ca for {profile.server}"
         )

@@ -21,7 +21,7 @@ def write_supervisor(output: Path, content: bytes, signature: bytes) -> None:
     Raises:
         UsageError: A file cannot be written or removed.
     """
-    is_same = _holds(output, content)
+    is_same = _has_content(output, content)
     write_bytes(output, content)
     if not output.is_file():
         return
@@ -35,7 +35,7 @@ def write_supervisor(output: Path, content: bytes, signature: bytes) -> None:
             raise UsageError(f"cannot remove {beside}: {error.strerror or error}") from error
 
 
-def _holds(file: Path, content: bytes) -> bool:
+def _has_content(file: Path, content: bytes) -> bool:
     """Return True if a plain file has just these bytes; one that cannot be read does not count."""
     try:
         return file.is_file() and file.stat().st_size == len(content) and file.read_bytes() == content

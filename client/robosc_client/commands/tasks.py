@@ -114,7 +114,7 @@ def add_signed_by_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def sendable(number: int | None, option: str) -> int | None:
+def checked_number(number: int | None, option: str) -> int | None:
     """Return a number of an option, if a request can contain it.
 
     Raises:
@@ -132,7 +132,7 @@ def synthesis_options(arguments: argparse.Namespace) -> SynthesisOptions:
         engine=arguments.engine or "auto",
         allow_livelock=getattr(arguments, "allow_livelock", True),
         allow_reordering=arguments.reorder,
-        maximum_nodes=sendable(arguments.max_nodes, "--max-nodes"),
+        maximum_nodes=checked_number(arguments.max_nodes, "--max-nodes"),
         verified_states=getattr(arguments, "verify_limit", None),
     )
 
@@ -159,7 +159,7 @@ def verify_task(arguments: argparse.Namespace, bundle: Bundle, supervisor: bytes
         property_files=tuple(listings),
         engine=arguments.engine,
         allow_reordering=arguments.reorder,
-        maximum_nodes=sendable(arguments.max_nodes, "--max-nodes"),
+        maximum_nodes=checked_number(arguments.max_nodes, "--max-nodes"),
         maximum_states=arguments.limit,
         is_strict=arguments.strict,
     )
@@ -259,7 +259,7 @@ def _explore(arguments: argparse.Namespace, client: Client) -> int:
     from robosc_client.outcomes import graph_of, outcome_from_response
 
     bundle = read_bundle(arguments)
-    options, limit = synthesis_options(arguments), sendable(arguments.limit, "--limit")
+    options, limit = synthesis_options(arguments), checked_number(arguments.limit, "--limit")
     with ProgressLine() as line:
         found = client.explore(
             bundle,

@@ -45,19 +45,19 @@ def job_of(message: pb.Job) -> Job:
         raise malformed("the state of a job contradicts its failure")
     return Job(
         id=message.id,
-        owner=_shown(message.owner),
+        owner=_printable(message.owner),
         kind=_KINDS[message.kind],
         state=state,
         revision=message.revision,
-        main_file=_shown(message.main_file),
-        label=_shown(message.label),
+        main_file=_printable(message.main_file),
+        label=_printable(message.label),
         created=_time(message.create_time),
         started=_time(message.start_time) if message.HasField("start_time") else None,
         ended=_time(message.end_time) if message.HasField("end_time") else None,
         expires=_time(message.expire_time) if message.HasField("expire_time") else None,
         attempts=message.attempts,
         progress=progress_of(message.progress) if message.HasField("progress") else None,
-        failure=JobFailure(_shown(message.failure.reason), _shown(message.failure.message))
+        failure=JobFailure(_printable(message.failure.reason), _printable(message.failure.message))
         if message.HasField("failure")
         else None,
         from_store=message.from_store,
@@ -81,7 +81,7 @@ def page_of(message: pb.ListJobsResponse, most: int) -> tuple[tuple[Job, ...], s
     return tuple(map(job_of, message.jobs)), message.next_page_token
 
 
-def _shown(text: str) -> str:
+def _printable(text: str) -> str:
     return visible(text[:MAXIMUM_SHOWN])
 
 

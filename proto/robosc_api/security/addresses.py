@@ -8,7 +8,7 @@ from urllib.parse import unquote
 _ADDRESS = re.compile(r"(?:\[([0-9A-Fa-f:.%]+)\]|([A-Za-z0-9._-]+)):([0-9]{1,5})\Z")
 
 
-def split(address: str) -> tuple[str, int]:
+def split_address(address: str) -> tuple[str, int]:
     """Host and port of `HOST:PORT`, an IPv6 address in brackets.
 
     Raises:

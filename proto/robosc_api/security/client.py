@@ -7,7 +7,7 @@ from typing import Any
 import grpc
 import grpc.aio
 
-from robosc_api.security.addresses import is_loopback_host, split
+from robosc_api.security.addresses import is_loopback_host, split_address
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.listening import check_certificates, read, read_secret
 from robosc_api.security.tokens import MAXIMUM_TOKEN
@@ -95,7 +95,7 @@ def check_credentials(credentials: Credentials) -> None:
 
 def _host(address: str) -> str:
     try:
-        return split(address)[0]
+        return split_address(address)[0]
     except ValueError:
         return ""
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import grpc
 
-from robosc_api.security.addresses import is_loopback_host, joined, split
+from robosc_api.security.addresses import is_loopback_host, joined, split_address
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.tokens import TokenFile
 
@@ -52,7 +52,7 @@ def add_port(server: Any, address: str, security: ServerSecurity) -> str:
         SecurityError: The address needs TLS, a file is invalid, or the address is in use or belongs to another machine.
     """
     check_listening(address, security)
-    host, port = split(address)
+    host, port = split_address(address)
     # gRPC's parser of addresses wants IPv6 in brackets, and takes a name that is a number for something else.
     name = joined(host, port)
     try:
@@ -72,7 +72,7 @@ def check_listening(address: str, security: ServerSecurity) -> None:
         SecurityError: The configuration is not allowed for this address.
         ValueError: The address is none.
     """
-    host, _ = split(address)
+    host, _ = split_address(address)
     is_secure = security.certificate is not None
     if is_secure != (security.key is not None):
         raise SecurityError("a certificate and its key must be given together: one of them is missing")

@@ -110,7 +110,7 @@ class LeaseMonitor:
     async def _adopt_jobs_of_dead(self) -> None:
         """Adopt the jobs of servers whose lease has expired."""
         now_s = self._clock()
-        beats, has_orphans = await self._store.others(self._runner.replica)
+        beats, has_orphans = await self._store.other_servers(self._runner.replica)
         self._seen = {
             name: self._seen[name] if name in self._seen and self._seen[name][0] == count else (count, now_s)
             for name, count in beats.items()

@@ -145,7 +145,7 @@ class JobManager:
             main_file=task.main_file,
             label=label,
             idempotency_key=idempotency_key or None,
-            retention_us=self._retention.kept_us(retention_s),
+            retention_us=self._retention.retention_us_of(retention_s),
             created_us=self._store.now_us(),
             replica=self._runner.replica,
         )
@@ -261,7 +261,7 @@ class JobManager:
             result = await self._results.find(record.result_key)
             if result is None:
                 raise StoreUnavailableError
-            return record, _each(result.messages)
+            return record, _stream_of(result.messages)
         number = await self._store.count_blocks(record.result_key)
         if number is None:
             raise _no_such_job()
@@ -318,7 +318,7 @@ class JobManager:
                 yield message
 
 
-async def _each(messages: Iterable[bytes]) -> AsyncIterator[bytes]:
+async def _stream_of(messages: Iterable[bytes]) -> AsyncIterator[bytes]:
     for message in messages:
         yield message
 

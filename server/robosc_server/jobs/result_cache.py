@@ -162,7 +162,7 @@ class ResultCache:
 
     async def _write_some(self) -> None:
         """Write what waits, many in one transaction; after one that failed, a single one."""
-        some = self._next_ones()
+        some = self._next_keys()
         try:
             await self._store.keep_results([(key, *self._unwritten[key]) for key in some])
         except StoreUnavailableError:
@@ -181,7 +181,7 @@ class ResultCache:
         for key in some:
             self._forget(key)
 
-    def _next_ones(self) -> list[str]:
+    def _next_keys(self) -> list[str]:
         """Keys of what is written next."""
         found: list[str] = []
         size = 0

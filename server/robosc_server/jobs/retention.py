@@ -57,7 +57,7 @@ class Retention:
         self._is_wanted = asyncio.Event()
         self.counts: Mapping[JobState, int] = dict.fromkeys(JobState, 0)
 
-    def kept_us(self, asked_s: float | None) -> int:
+    def retention_us_of(self, asked_s: float | None) -> int:
         """Return the time that a job is kept after its end, in microseconds.
 
         Args:

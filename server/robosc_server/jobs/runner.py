@@ -247,7 +247,7 @@ class JobRunner:
         pause_s = _RETRY_S
         while True:
             place = job.place = job.place or self._scheduler.enter_unbounded(job.record.owner)
-            await place.turn()
+            await place.wait_for_worker()
             if (wait_s := self._quota_wait_s(job)) > 0:
                 # It waits outside the queue, where it blocks no other task.
                 self._release_place(job)

@@ -57,7 +57,7 @@ class Accounts(Protocol):
             RefusedError: It may not yet.
         """
 
-    def spent(self, caller: str, cpu_s: float) -> None:
+    def charge(self, caller: str, cpu_s: float) -> None:
         """Count the CPU time of a task of a caller."""
 
 
@@ -71,22 +71,22 @@ class Place:
         line: Name of its line in the queue; all addresses of one network share a line.
     """
 
-    __slots__ = ("_begun_s", "_turn", "caller", "line")
+    __slots__ = ("_begun_s", "_worker_is_free", "caller", "line")
 
     def __init__(self, caller: str) -> None:
         self.caller = caller
         self.line = network_of(caller)
-        self._turn: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._worker_is_free: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._begun_s: float | None = None
 
     @property
-    def has_turn(self) -> bool:
+    def has_worker(self) -> bool:
         """True if a worker is free for it."""
         return self._begun_s is not None
 
-    async def turn(self) -> None:
+    async def wait_for_worker(self) -> None:
         """Wait until a worker is free for it."""
-        await asyncio.shield(self._turn)
+        await asyncio.shield(self._worker_is_free)
 
 
 class Scheduler:
@@ -157,7 +157,7 @@ class Scheduler:
             raise _no_workers()
         place = self.enter(caller)
         try:
-            await place.turn()
+            await place.wait_for_worker()
             if (outcome := known()) is not None:
                 return outcome
             self.check(caller)
@@ -189,7 +189,7 @@ class Scheduler:
 
     def _note_spent(self, caller: str, cpu_s: float) -> None:
         if self._accounts is not None:
-            self._accounts.spent(caller, cpu_s)
+            self._accounts.charge(caller, cpu_s)
 
     def enter(self, caller: str) -> Place:
         """A place in the line, or at once at a worker.
@@ -317,7 +317,7 @@ class Scheduler:
         self._running += 1
         self._running_of[name] += 1
         place._begun_s = self._clock()
-        place._turn.set_result(None)
+        place._worker_is_free.set_result(None)
 
     def _poll_capacity(self) -> None:
         self._poll_timer = None

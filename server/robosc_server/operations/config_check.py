@@ -32,7 +32,7 @@ from robosc_api.security import (
     is_loopback_host,
     missing_scope,
 )
-from robosc_api.security.addresses import split
+from robosc_api.security.addresses import split_address
 from robosc_api.security.listening import read
 from robosc_server.operations.metrics import check_metrics_address
 from robosc_server.operations.settings import Confinement, Settings, format_value
@@ -293,7 +293,7 @@ def _cluster(spec: str) -> tuple[Grade, str]:
     if error is None and protocol == "dask+tls":
         from robosc_server.workers.dask_tls import tls_fault
 
-        fault = asyncio.run(tls_fault(*split(address), _CONNECT_S))
+        fault = asyncio.run(tls_fault(*split_address(address), _CONNECT_S))
         error = None if fault is None else f"{address}: {fault}"
     return (Grade.OK, f"{address} answers") if error is None else (Grade.ERROR, error)
 
@@ -301,7 +301,7 @@ def _cluster(spec: str) -> tuple[Grade, str]:
 def _unreachable(address: str) -> str | None:
     """Return the reason why an address cannot be connected to; None: it can."""
     try:
-        socket.create_connection(split(address), timeout=_CONNECT_S).close()
+        socket.create_connection(split_address(address), timeout=_CONNECT_S).close()
     except (OSError, UnicodeError) as error:
         return f"{address}: {getattr(error, 'strerror', None) or error}"
     return None
@@ -316,7 +316,7 @@ def _metrics(settings: Settings) -> Iterator[tuple[Grade, str]]:
     except SecurityError as error:
         yield Grade.ERROR, str(error)
         return
-    yield _bindable(*split(settings.metrics_address))
+    yield _bindable(*split_address(settings.metrics_address))
 
 
 def _tracing(settings: Settings) -> Iterator[tuple[Grade, str]]:

@@ -76,13 +76,13 @@ class CallInterceptor(Layer):
         answer = behaviour_of(inner)
         if inner.response_streaming:
             answer = writing(answer)
-        return with_behaviour(inner, self._observed(answer, method, self._metrics.method(method)))
+        return with_behaviour(inner, self._measured(answer, method, self._metrics.method(method)))
 
-    def _observed(self, inner: Any, method: str, metrics: MethodMetrics) -> Any:
+    def _measured(self, inner: Any, method: str, metrics: MethodMetrics) -> Any:
         if self._tracing.is_on:
             inner = self._traced(inner, method)
 
-        async def observed(request: Any, context: Any) -> Any:
+        async def measured(request: Any, context: Any) -> Any:
             begun_s = monotonic()
             given_s = context.time_remaining()
             metrics.under_way += 1
@@ -114,7 +114,7 @@ class CallInterceptor(Layer):
                 metrics.under_way -= 1
                 self._ended(method, metrics, context, code, monotonic() - begun_s)
 
-        return observed
+        return measured
 
     def _traced(self, inner: Any, method: str) -> Any:
         async def traced(request: Any, context: Any) -> Any:

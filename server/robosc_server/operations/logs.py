@@ -109,14 +109,14 @@ def log_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT") -> str
     if isinstance(fault, str):
         known, words = loggable_fields(fault), last_part(fault)
     else:
-        known = {"error": type(fault).__qualname__, "places": _places(fault.__traceback__)}
+        known = {"error": type(fault).__qualname__, "places": _code_locations(fault.__traceback__)}
         words = "".join(traceback.format_exception(fault))
     log.error("fault", fault=identity, reason=str(reason), **known)
     log.debug("fault in words", fault=identity, traceback=words)
     return identity
 
 
-def _places(begin: TracebackType | None) -> list[str]:
+def _code_locations(begin: TracebackType | None) -> list[str]:
     frames = traceback.extract_tb(begin)[-_FRAMES:]
     return [f"{frame.filename}:{frame.lineno} {frame.name}" for frame in frames]
 
@@ -158,7 +158,7 @@ def _exception_without_message(logger: Any, name: str, line: _Line) -> _Line:
         line["error"] = type(error).__qualname__
         if isinstance(error, OSError) and error.strerror:
             line["cause"] = error.strerror
-        line["places"] = _places(error.__traceback__)
+        line["places"] = _code_locations(error.__traceback__)
     return line
 
 

@@ -23,7 +23,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from prometheus_client.exposition import CONTENT_TYPE_LATEST
 
 from robosc_api.security import SecurityError, is_loopback_host, joined
-from robosc_api.security.addresses import split
+from robosc_api.security.addresses import split_address
 from robosc_server.tasks.task import Failure, Outcome, TaskKind
 
 _CALL_SECONDS = (0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 300, 600)
@@ -252,7 +252,7 @@ class MetricsEndpoint:
             SecurityError: It may not listen there, or cannot.
         """
         check_metrics_address(self.address, beyond_loopback=self._beyond_loopback)
-        host, port = split(self.address)
+        host, port = split_address(self.address)
         try:
             self._server = await asyncio.start_server(self._answer, host, port, limit=_HEAD_BYTES)
         except OSError as error:
@@ -311,7 +311,7 @@ def check_metrics_address(address: str, *, beyond_loopback: bool) -> None:
     Raises:
         SecurityError: It may not listen there.
     """
-    if not beyond_loopback and not is_loopback_host(split(address)[0]):
+    if not beyond_loopback and not is_loopback_host(split_address(address)[0]):
         raise SecurityError(
             f"{address} is reachable from other machines, and metrics need no token: set metrics_beyond_loopback to "
             "allow this, or use a loopback address"

@@ -72,13 +72,13 @@ class OpenCalls(Layer):
             slots.take(network_of(identify(context)), context)
             return behaviour(request, context)
 
-        def counted_apart(request: Any, context: Any) -> Any:
+        def counted_health_check(request: Any, context: Any) -> Any:
             is_own = is_loopback_peer(context.peer())
             slots = self._own_health_slots if is_own else self._health_slots
             slots.take(network_of(identify(context)), context)
             return behaviour(request, context)
 
-        return with_behaviour(inner, counted_apart if method.startswith(_HEALTH) else counted)
+        return with_behaviour(inner, counted_health_check if method.startswith(_HEALTH) else counted)
 
 
 class _CallSlots:
@@ -116,9 +116,9 @@ class _CallSlots:
         self._by_caller[caller] = count + 1
         self.taken += 1
         # When the call has ended for gRPC as well: an unread response keeps it open after the handler has returned.
-        context.add_done_callback(partial(self._give_back, caller))
+        context.add_done_callback(partial(self._release, caller))
 
-    def _give_back(self, caller: str, context: Any) -> None:
+    def _release(self, caller: str, context: Any) -> None:
         self.taken -= 1
         left = self._by_caller[caller] - 1
         if left:

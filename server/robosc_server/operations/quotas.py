@@ -95,7 +95,7 @@ class Quotas:
         if account is not None:
             _check_seconds(account, self._clock())
 
-    def spent(self, caller: str, cpu_s: float) -> None:
+    def charge(self, caller: str, cpu_s: float) -> None:
         """Count the CPU time of a task.
 
         Args:

@@ -20,7 +20,7 @@ from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, Settings
 from robosc import __version__
 from robosc.cli.running import Parser
 from robosc_api.security import ServerSecurity, joined
-from robosc_api.security.addresses import split
+from robosc_api.security.addresses import split_address
 from robosc_server.tasks.task import TaskLimits
 
 ENVIRONMENT_PREFIX = "ROBOSC_SERVER_"
@@ -64,7 +64,7 @@ def _bytes(value: object) -> object:
     return value
 
 
-def _whole(value: object) -> object:
+def _require_integer(value: object) -> object:
     """Reject booleans, which Python takes for 1 and 0, and floats such as 2.0."""
     if isinstance(value, bool | float):
         raise PydanticCustomError("whole", "must be a whole number")
@@ -73,7 +73,7 @@ def _whole(value: object) -> object:
 
 def _host_and_port(text: str) -> str:
     try:
-        split(text)
+        split_address(text)
     except ValueError as error:
         raise PydanticCustomError("address", "must be HOST:PORT") from error
     return text
@@ -86,7 +86,7 @@ def _workers(text: str) -> str:
     if kind not in ("dask", "dask+tls"):
         raise PydanticCustomError("workers", "must be 'local', 'dask://HOST:PORT' or 'dask+tls://HOST:PORT'")
     try:
-        split(address)
+        split_address(address)
     except ValueError as error:
         raise PydanticCustomError("workers", "must have HOST:PORT after ://") from error
     return text
@@ -106,7 +106,7 @@ def _endpoint(text: str) -> str:
     try:
         if scheme not in ("http", "https"):
             raise ValueError
-        split(address.rstrip("/"))
+        split_address(address.rstrip("/"))
     except ValueError as error:
         raise PydanticCustomError("endpoint", "must be http://HOST:PORT or https://HOST:PORT") from error
     return text
@@ -118,8 +118,8 @@ def _host(text: str) -> str:
     return text
 
 
-type _Bytes = Annotated[int, BeforeValidator(_bytes), BeforeValidator(_whole), Field(ge=1, le=2**50)]
-type _Count = Annotated[int, BeforeValidator(_whole), Field(ge=1, le=1_000_000_000)]
+type _Bytes = Annotated[int, BeforeValidator(_bytes), BeforeValidator(_require_integer), Field(ge=1, le=2**50)]
+type _Count = Annotated[int, BeforeValidator(_require_integer), Field(ge=1, le=1_000_000_000)]
 type _Seconds = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
 
 
@@ -155,7 +155,7 @@ class Settings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", hide_input_in_errors=True)
 
     host: Annotated[str, AfterValidator(_host)] = _setting("127.0.0.1", "address to listen on", _LISTENING)
-    port: Annotated[int, BeforeValidator(_whole)] = _setting(
+    port: Annotated[int, BeforeValidator(_require_integer)] = _setting(
         50051, "TCP port to listen on; 0 selects a free port", _LISTENING, ge=0, le=65535
     )
     drain_seconds: Annotated[float, Field(ge=0, le=86400, allow_inf_nan=False)] = _setting(
@@ -268,9 +268,9 @@ class Settings(BaseModel):
         " most data are deleted first",
         _STORAGE,
     )
-    memory_cache_bytes: Annotated[int, BeforeValidator(_bytes), BeforeValidator(_whole), Field(ge=0, le=2**50)] = (
-        _setting(64 * 2**20, "maximum size of the results cached in memory; 0 disables the cache", _STORAGE)
-    )
+    memory_cache_bytes: Annotated[
+        int, BeforeValidator(_bytes), BeforeValidator(_require_integer), Field(ge=0, le=2**50)
+    ] = _setting(64 * 2**20, "maximum size of the results cached in memory; 0 disables the cache", _STORAGE)
 
     log_format: LogFormat = _setting(LogFormat.TEXT, "format of log lines: text or json", _OPERATIONS)
     log_level: LogLevel = _setting(

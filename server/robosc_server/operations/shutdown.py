@@ -68,10 +68,12 @@ class ShutdownSignals:
 def _log_pending_tasks() -> None:
     """Log the places in the code at which unfinished asyncio tasks wait."""
     for task in asyncio.all_tasks():
-        _log.error("the shutdown takes too long: %s waits at %s", task.get_name(), " < ".join(_places(task.get_coro())))
+        _log.error(
+            "the shutdown takes too long: %s waits at %s", task.get_name(), " < ".join(_code_locations(task.get_coro()))
+        )
 
 
-def _places(waiting: Any) -> Iterator[str]:
+def _code_locations(waiting: Any) -> Iterator[str]:
     """Yield the place in the code of a coroutine, and of each that it waits for, the outermost first."""
     while waiting is not None:
         frame = getattr(waiting, "cr_frame", None) or getattr(waiting, "gi_frame", None)

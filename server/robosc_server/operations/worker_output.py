@@ -38,7 +38,7 @@ def loggable_fields(words: str) -> dict[str, object]:
     if kinds:
         fields["error"] = kinds[-1]
     found = [match for line in lines if (match := _PLACE.match(line))][-_PLACES:]
-    places = [f"{match[1]}:{match[2]}" for match in found if _is_ours(match[1])]
+    places = [f"{match[1]}:{match[2]}" for match in found if _is_module_file(match[1])]
     if places:
         fields["places"] = places
     return fields
@@ -63,6 +63,6 @@ def _folder(package: str) -> Path:
     return Path(str(sys.modules[package].__file__)).parent
 
 
-def _is_ours(file: str) -> bool:
+def _is_module_file(file: str) -> bool:
     package, _, rest = file.partition("/")
     return package in sys.modules and (_folder(package) / rest).is_file()

@@ -17,7 +17,7 @@ from typing import Any
 from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 
-from robosc_server.clock import wall
+from robosc_server.clock import wall_clock_s
 from robosc_server.store.database import Database
 from robosc_server.store.errors import StoreError
 from robosc_server.store.schema import prepare
@@ -46,7 +46,9 @@ _held: set[Path] = set()
 _held_lock = threading.Lock()
 
 
-def open_store(state_dir: Path, database_url: str | None = None, wall_clock: Callable[[], float] = wall) -> Store:
+def open_store(
+    state_dir: Path, database_url: str | None = None, wall_clock: Callable[[], float] = wall_clock_s
+) -> Store:
     """The server's database, with its tables; blocks until it has answered.
 
     Args:

@@ -23,7 +23,7 @@ def inspect_sqlite(file: Path) -> None:
     has_log = _has_content(file.with_name(f"{file.name}-wal"))
     options = {"uri": "true", "mode": "ro"} | ({} if has_log else {"immutable": "1"})
     url = URL.create("sqlite+pysqlite", database=file.as_uri(), query=options)
-    _look(create_engine(url, poolclass=NullPool, connect_args={"timeout": _BUSY_S}))
+    _query(create_engine(url, poolclass=NullPool, connect_args={"timeout": _BUSY_S}))
 
 
 def inspect_postgresql(url: URL, connect_s: float) -> str:
@@ -44,14 +44,14 @@ def inspect_postgresql(url: URL, connect_s: float) -> str:
         connect_args={"connect_timeout": round(connect_s)},
         hide_parameters=True,
     )
-    return _look(engine, "SHOW server_version")
+    return _query(engine, "SHOW server_version")
 
 
-def _look(engine: Engine, question: str = "SELECT sqlite_version()") -> str:
-    """Return a database's answer to a question, if its tables are missing or ours."""
+def _query(engine: Engine, statement: str = "SELECT sqlite_version()") -> str:
+    """Return a database's answer to a statement, if its tables are missing or ours."""
     try:
         with engine.connect() as connection:
-            answer = str(connection.scalar(text(question)))
+            answer = str(connection.scalar(text(statement)))
             version_of(connection)
     except DBAPIError as error:
         raise StoreError(" ".join(str(error.orig).split())) from error

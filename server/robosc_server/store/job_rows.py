@@ -205,7 +205,9 @@ def begin(connection: Connection, job_id: str, replica: str, now_us: int) -> tup
     if ended is not None:
         return ended, b""
     attempts = record.attempts + 1
-    begun = _changed(connection, job_id, **_NO_PROGRESS, state=JobState.RUNNING, attempts=attempts, started_us=now_us)
+    begun = _update_row(
+        connection, job_id, **_NO_PROGRESS, state=JobState.RUNNING, attempts=attempts, started_us=now_us
+    )
     return begun, bytes(connection.scalar(_REQUEST, {"of": job_id}) or b"")
 
 
@@ -227,7 +229,7 @@ def requeue(
         if record is not None and record.replica == replica and record.state is JobState.RUNNING:
             values: dict[str, Any] = {"state": JobState.QUEUED, "attempts": record.attempts - 1}
             values["losses"] = record.losses + is_lost
-            found.append(_changed(connection, job_id, **_NO_PROGRESS, **values, replica=next_replica))
+            found.append(_update_row(connection, job_id, **_NO_PROGRESS, **values, replica=next_replica))
     return found
 
 
@@ -316,7 +318,7 @@ def take_orphans(connection: Connection, ours: str, now_us: int, limit: int) -> 
         if record.state is JobState.RUNNING and record.attempts >= MAXIMUM_ATTEMPTS:
             taken.append(_fail(connection, record, Failure(Reason.SERVER_DIED, _SERVER_DIED), now_us))
             continue
-        taken.append(_changed(connection, record.id, **_NO_PROGRESS, state=JobState.QUEUED, replica=ours))
+        taken.append(_update_row(connection, record.id, **_NO_PROGRESS, state=JobState.QUEUED, replica=ours))
     return taken
 
 
@@ -380,8 +382,8 @@ def _locked(connection: Connection, job_id: str) -> JobRecord | None:
     return None if row is None else record_of(row)
 
 
-def _changed(connection: Connection, job_id: str, **values: Any) -> JobRecord:
-    """Change a job that is locked, and how it is then."""
+def _update_row(connection: Connection, job_id: str, **values: Any) -> JobRecord:
+    """Change a locked job and return its new record."""
     new = {f"new_{name}": value for name, value in values.items()}
     return record_of(connection.execute(_change_of(tuple(values)), {"job": job_id, **new}).one())
 
@@ -403,7 +405,7 @@ def _fail(connection: Connection, record: JobRecord, failure: Failure, now_us: i
 def _end(connection: Connection, record: JobRecord, state: JobState, now_us: int, **values: Any) -> JobRecord:
     connection.execute(_DROP_REQUEST, {"of": record.id})
     times: dict[str, Any] = {"ended_us": now_us, "expires_us": now_us + record.retention_us}
-    return _changed(connection, record.id, **values, **times, state=state, replica=None)
+    return _update_row(connection, record.id, **values, **times, state=state, replica=None)
 
 
 def clean(text: str) -> str:

@@ -11,7 +11,7 @@ from itertools import batched
 
 from sqlalchemy import Connection, func, select
 
-from robosc_server.clock import wall
+from robosc_server.clock import wall_clock_s
 from robosc_server.store import job_rows, replica_rows, result_rows
 from robosc_server.store.database import Database
 from robosc_server.store.records import JobFilter, JobRecord, JobState, messages_of
@@ -25,7 +25,7 @@ _SWEEP_LOCK = 0x526F626F5343
 """PostgreSQL advisory lock for eviction, which one server at a time performs."""
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     """Nothing was locked."""
 
 
@@ -41,8 +41,8 @@ class Store:
     def __init__(
         self,
         database: Database,
-        on_close: Callable[[], None] = _nothing,
-        wall_clock: Callable[[], float] = wall,
+        on_close: Callable[[], None] = _do_nothing,
+        wall_clock: Callable[[], float] = wall_clock_s,
     ) -> None:
         self._database = database
         self._on_close = on_close
@@ -183,7 +183,7 @@ class Store:
         """Renew the lease of a server; False: it was taken for dead."""
         return await self._database.write(partial(_beat, replica))
 
-    async def others(self, replica: str) -> tuple[dict[str, int], bool]:
+    async def other_servers(self, replica: str) -> tuple[dict[str, int], bool]:
         """Return the heartbeats of the other servers, and whether there are jobs without a server."""
         return await self._database.read(
             lambda connection: (replica_rows.beats_of_others(connection, replica), job_rows.has_orphans(connection))

@@ -28,7 +28,7 @@ from robosc_server.tasks.synthesis_attempt import OnReport, SynthesisAttempt
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
 from robosc_server.tasks.verify import NoPropertyError, verification
 
-_REHEARSAL = """
+_WARM_UP_MODEL = """
 robot Rehearsal {
     component Button {
         outgoing message pressed with identifier: "/pressed", type: boolean
@@ -96,7 +96,7 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
     except (UnknownTargetError, UnknownEngineError, from_proto.OptionError, NoPropertyError) as error:
         return Failure(Reason.MALFORMED_REQUEST, str(error))
     except Exception as error:  # The boundary of the worker: the server logs any error and continues.
-        return Failure(Reason.INTERNAL_FAULT, "the server has an internal error", _places(error))
+        return Failure(Reason.INTERNAL_FAULT, "the server has an internal error", _code_locations(error))
 
 
 PRELOADED = ("robosc",)
@@ -106,9 +106,9 @@ NOT_PRELOADED = ("robosc.cli", "robosc.event_logs", "robosc.pipeline", "robosc.s
 """Packages that no task needs; drawing libraries start threads."""
 
 
-def rehearse() -> None:
+def warm_up() -> None:
     """Run a small task, so that every fork of this process has what is loaded or built on first use."""
-    file = pb.SourceFile(name="rehearsal.rscd", text=_REHEARSAL)
+    file = pb.SourceFile(name="warm_up.rscd", text=_WARM_UP_MODEL)
     request = pb.SynthesizeRequest(bundle=pb.Bundle(main=file))
     run_task(TaskKind.SYNTHESIZE, request.SerializeToString(), TaskLimits(), lambda report: None)
     # The first lookup loads the reader of package resources.
@@ -116,10 +116,10 @@ def rehearse() -> None:
     keep_ready(resolve_engine("auto"))
 
 
-def _places(error: BaseException) -> str:
+def _code_locations(error: BaseException) -> str:
     """Return the places of a fault, for a log: without its message, which may hold names of the model."""
     cause = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
-    before = f"{_places(cause)}\n" if cause is not None else ""
+    before = f"{_code_locations(cause)}\n" if cause is not None else ""
     return f"{before}{''.join(traceback.format_tb(error.__traceback__))}{type(error).__qualname__}"
 
 

@@ -49,13 +49,13 @@ def verification(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnRep
     """
     try:
         if request.supervisor:
-            return _given(request, maximum_nodes, on_report)
-        return _made(request, maximum_nodes, on_report)
+            return _verify_given(request, maximum_nodes, on_report)
+        return _verify_synthesized(request, maximum_nodes, on_report)
     except UnsupportedModelError as error:
         return pb.VerificationResult(status=pb.VERIFICATION_STATUS_UNSUPPORTED_MODEL, reason=str(error))
 
 
-def _given(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) -> pb.VerificationResult:
+def _verify_given(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) -> pb.VerificationResult:
     """Verify the given supervisor; if it is right, and only if asked for, verify its robot's properties."""
     engine = resolve_engine(from_proto.engine_name(request.options))
     try:
@@ -84,8 +84,8 @@ def _no_robot(found: FileVerification) -> str:
     return "a library has no robot that a supervisor could be for"
 
 
-def _made(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) -> pb.VerificationResult:
-    """Properties of the robot under the supervisor that is made for it."""
+def _verify_synthesized(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) -> pb.VerificationResult:
+    """Synthesize a supervisor and verify properties of the robot under it."""
     # Errors of properties are reported before the synthesis, which may take long.
     model = check(from_proto.bundle(request.bundle)).model
     errors = None if model is None else _property_errors(request, model)

@@ -72,7 +72,7 @@ def run_on_cluster(
     kept: deque[Report] = deque(maxlen=_KEPT_REPORTS)
     asks = 0
 
-    def is_unwanted() -> bool:
+    def is_abandoned() -> bool:
         nonlocal asks
         asks += 1
         if asks % _TELL_EVERY_ASKS == 0 and kept:
@@ -92,7 +92,7 @@ def run_on_cluster(
             task,
             TaskLimits(*limits),
             kept.append,
-            is_unwanted,
+            is_abandoned,
             task_function,
             report_cpu_time,
             must_be_confined=must_be_confined,

@@ -55,7 +55,7 @@ async def tls_fault(host: str, port: int, limit_s: float) -> str | None:
     except ssl.SSLCertVerificationError as error:
         return f"its certificate is not accepted: {error.verify_message}"
     except ssl.SSLError as error:
-        return f"TLS fails: {_words(error)}"
+        return f"TLS fails: {_openssl_message(error)}"
     except OSError:  # A TimeoutError is one.
         return None
     finally:
@@ -66,6 +66,6 @@ async def tls_fault(host: str, port: int, limit_s: float) -> str | None:
     return None
 
 
-def _words(error: ssl.SSLError) -> str:
+def _openssl_message(error: ssl.SSLError) -> str:
     """Return the words of OpenSSL, such as `tlsv1 alert unknown ca`."""
     return (error.reason or str(error)).replace("_", " ").lower()

@@ -62,7 +62,7 @@ class _ForkServer:
                     self._fork()
                     self._wanted -= 1
             except OSError as error:
-                self._tell({"is": "fault", "message": f"cannot start a worker process: {error.strerror}"})
+                self._send({"is": "fault", "message": f"cannot start a worker process: {error.strerror}"})
 
     def _fork(self) -> None:
         with contextlib.ExitStack() as stack:
@@ -84,7 +84,7 @@ class _ForkServer:
                 raise
             self._pids[descriptor] = pid
             self._poll.register(descriptor, select.POLLIN)
-            self._tell({"is": "worker", "pid": pid}, [ours.fileno(), descriptor, words])
+            self._send({"is": "worker", "pid": pid}, [ours.fileno(), descriptor, words])
 
     def _become_worker(self, fork_server: int, connection: socket.socket, crash_output: int) -> None:
         """Run one task in the child, and exit in any case."""
@@ -103,7 +103,7 @@ class _ForkServer:
         self._poll.unregister(descriptor)
         os.close(descriptor)
         _, status, usage = os.wait4(pid, 0)
-        self._tell(
+        self._send(
             {
                 "is": "ended",
                 "pid": pid,
@@ -113,7 +113,7 @@ class _ForkServer:
             }
         )
 
-    def _tell(self, values: dict[str, object], descriptors: list[int] | None = None) -> None:
+    def _send(self, values: dict[str, object], descriptors: list[int] | None = None) -> None:
         socket.send_fds(self._line, [json.dumps(values).encode()], descriptors or [])
 
 
@@ -121,7 +121,7 @@ def _load(name: str) -> TaskFunction:
     """Import the function that runs tasks, with everything that it needs, and return it.
 
     The tuples `PRELOADED` and `NOT_PRELOADED` of its module name packages to import and prefixes of modules to skip;
-    the function `rehearse` builds what is built on first use. Each of them is optional.
+    the function `warm_up` builds what is built on first use. Each of them is optional.
     """
     module_name, _, attribute = name.partition(":")
     tasks = importlib.import_module(module_name)
@@ -133,8 +133,8 @@ def _load(name: str) -> TaskFunction:
                 # Modules for generated packages need their middleware.
                 with contextlib.suppress(ImportError):
                     importlib.import_module(module.name)
-    if rehearse := getattr(tasks, "rehearse", None):
-        rehearse()
+    if warm_up := getattr(tasks, "warm_up", None):
+        warm_up()
     return function
 
 

@@ -144,7 +144,7 @@ class WorkerPool:
         return frozenset(self._known)
 
     async def _await_exit(self, worker: WorkerProcess) -> None:
-        await worker.gone()
+        await worker.wait_for_exit()
         # The fork server reports the exit; after that, the process id may be reused.
         await asyncio.shield(worker.exit)
         worker.close()

@@ -41,9 +41,9 @@ class WorkerProcess:
         self._crash_output = crash_output
         self._is_gone = asyncio.get_running_loop().create_future()
         self._writer: asyncio.StreamWriter | None = None
-        asyncio.get_running_loop().add_reader(descriptor, self._note_gone)
+        asyncio.get_running_loop().add_reader(descriptor, self._note_exit)
 
-    def _note_gone(self) -> None:
+    def _note_exit(self) -> None:
         asyncio.get_running_loop().remove_reader(self._descriptor)
         self._is_gone.set_result(None)
 
@@ -58,7 +58,7 @@ class WorkerProcess:
         poll.register(self._descriptor, select.POLLIN)
         return bool(poll.poll(0))
 
-    async def gone(self) -> None:
+    async def wait_for_exit(self) -> None:
         """Wait until the process has ended."""
         await asyncio.shield(self._is_gone)
 

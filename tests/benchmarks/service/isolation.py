@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from figures import text_table
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.requests import RequestLimits, accept_request
-from robosc_server.tasks.run import rehearse, run_task
+from robosc_server.tasks.run import run_task, warm_up
 from robosc_server.tasks.task import Report, Result, Task, TaskKind, TaskLimits
 from robosc_server.workers.local import LocalWorkers
 from support.fake_tasks import TASK_FUNCTION, fake_task
@@ -93,7 +93,7 @@ async def _rows() -> list[list[str]]:
         TaskKind.SYNTHESIZE: pb.SynthesizeRequest(bundle=bundle),
         TaskKind.GENERATE: pb.GenerateRequest(bundle=bundle, target="ros2"),
     }
-    rehearse()
+    warm_up()
     rows = [await _row("nothing", fake_task("echo"), TASK_FUNCTION)]
     for kind, request in requests.items():
         task = accept_request(kind, request.SerializeToString(), RequestLimits())

@@ -387,7 +387,7 @@ class Allowance:
         if self.spent_s.get(caller, 0.0) > self.may_spend_s.get(caller, math.inf):
             raise RefusedError(Reason.QUOTA_EXCEEDED, "nothing is left", retry_after_s=3600.0)
 
-    def spent(self, caller: str, cpu_s: float) -> None:
+    def charge(self, caller: str, cpu_s: float) -> None:
         self.spent_s[caller] = self.spent_s.get(caller, 0.0) + cpu_s
 
 

@@ -61,20 +61,20 @@ def test_who_has_no_task_running_need_not_wait_for_who_has_all_workers() -> None
     async def test() -> None:
         scheduler = Scheduler(ScriptedWorkers(2), QueueLimits(waiting=3, reserved=1))
         greedy = [scheduler.enter("greedy") for _ in range(5)]
-        assert [place.has_turn for place in greedy] == [True, True, False, False, False]
+        assert [place.has_worker for place in greedy] == [True, True, False, False, False]
         # The line is full, too.
         first, second = scheduler.enter("modest"), None
-        assert first.has_turn
+        assert first.has_worker
         with pytest.raises(RefusedError):
             second = scheduler.enter("modest")
         assert (scheduler.running, second) == (3, None)
         # One of three has ended: as many go on as there are workers.
         scheduler.leave(greedy[0])
-        assert not greedy[2].has_turn
+        assert not greedy[2].has_worker
         scheduler.leave(greedy[1])
-        assert greedy[2].has_turn
+        assert greedy[2].has_worker
         scheduler.leave(first)
-        assert (greedy[3].has_turn, greedy[4].has_turn) == (True, False)
+        assert (greedy[3].has_worker, greedy[4].has_worker) == (True, False)
 
     run(test)
 
@@ -160,11 +160,11 @@ def test_more_workers_are_noticed_while_tasks_wait(monkeypatch: pytest.MonkeyPat
             await scheduler.run(task_of("a"), "me", TaskLimits(), drop)
         assert refused.value.reason is Reason.WORKERS_UNAVAILABLE
         place = scheduler.enter("me")
-        assert not place.has_turn
+        assert not place.has_worker
         workers.capacity = 1
         async with asyncio.timeout(30):
-            await place.turn()
-        assert place.has_turn
+            await place.wait_for_worker()
+        assert place.has_worker
 
     run(test)
 
@@ -308,7 +308,7 @@ def test_whatever_happens_it_does_as_the_twin(
                 twin.serve()
             assert scheduler.waiting == len(twin.waiting)
             assert scheduler.running == len(twin.running)
-            assert {number for number, place in enumerate(places) if place and place.has_turn} == twin.running.keys()
+            assert {number for number, place in enumerate(places) if place and place.has_worker} == twin.running.keys()
             order = twin.before()
             for number, place in enumerate(places):
                 if place is not None:

@@ -177,7 +177,7 @@ def test_a_server_that_has_counted_on_is_not_taken_for_dead(tmp_path: Path) -> N
         assert (await found(store, "d")).state is JobState.RUNNING
         assert await store.beat("living")
         assert not await store.beat("dead")
-        assert await store.others("ours") == ({"living": 2}, False)
+        assert await store.other_servers("ours") == ({"living": 2}, False)
         # Nothing is left for a second one that found the same.
         assert await store.adopt("living", {"dead": 0}) == []
 

@@ -94,9 +94,9 @@ def test_who_comes_when_it_is_told_is_let_in(tmp_path: Path) -> None:
 def test_time_of_a_processor_is_counted_afterwards(tmp_path: Path) -> None:
     clock = Clock()
     quotas = quotas_for(tmp_path, clock, a=Quota(cpu_seconds_per_hour=100))
-    quotas.spent("a", 90.0)
+    quotas.charge("a", 90.0)
     quotas.admit("a")
-    quotas.spent("a", 40.0)
+    quotas.charge("a", 40.0)
     error = refused(quotas, "a")
     assert error.message == "the token has used up its quota of 100 CPU seconds per hour"
     assert error.retry_after_s == pytest.approx(30 * 36)
@@ -124,7 +124,7 @@ def test_a_quota_that_is_changed_in_the_file_holds_from_then_on(tmp_path: Path) 
 def test_without_tokens_there_are_no_quotas() -> None:
     quotas = Quotas(None)
     quotas.admit("127.0.0.1")
-    quotas.spent("127.0.0.1", 1e9)
+    quotas.charge("127.0.0.1", 1e9)
     assert quotas.waiting("127.0.0.1") is None
 
 

@@ -1,4 +1,4 @@
-"""The installed command `robosc-bridge`: what only talks to a bridge loads nothing that runs one: a stop is quick."""
+"""The installed command `robosc-bridge`; remote commands such as `stop` start without loading the daemon."""
 
 import sys
 from typing import NoReturn

@@ -1,4 +1,4 @@
-"""`robosc-bridge`: run a supervisor on a robot's devices, and what is needed before that."""
+"""`robosc-bridge`: run a supervisor on a robot's devices, and check and prepare its configuration."""
 
 import argparse
 import dataclasses

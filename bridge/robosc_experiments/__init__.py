@@ -1,1 +1,1 @@
-"""The paper's experiments, run whole: scenarios with a supervisor, a robot, and a judgement of what happened."""
+"""The paper's experiments, run whole: scenarios with a supervisor and a robot, and checks of their outcome."""

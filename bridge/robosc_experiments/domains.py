@@ -1,4 +1,4 @@
-"""Domains of ROS 2 that nobody else on this machine takes: what is tried must not reach a robot."""
+"""ROS domain ids that are free on this machine: an experiment must not reach a robot."""
 
 import itertools
 import os

@@ -1,4 +1,4 @@
-"""Becomes a program that is told to end as soon as who started it is gone, even by SIGKILL; run as a file.
+"""Runs a program that receives a signal when its parent dies, even by SIGKILL; run as a file.
 
     python -I -S end_with_parent.py PARENT PROGRAM [ARGUMENTS ...]
 

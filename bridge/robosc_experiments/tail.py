@@ -1,4 +1,4 @@
-"""Files that grow while a scenario runs: what stands in their last line, and how many lines they have."""
+"""Files that grow while a scenario runs: their last line, and their number of lines."""
 
 import contextlib
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Causes of differences between a robot's way on the floor, how far its wheels rotate, and what its encoders count."""
+"""Drift: differences between a robot's motion, the rotation of its wheels and the counts of its encoders."""
 
 import random
 

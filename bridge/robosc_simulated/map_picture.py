@@ -1,4 +1,4 @@
-"""A picture of a scene from above, with the way that a robot has gone in it. Needs matplotlib."""
+"""A picture of a scene from above, with the path of a robot in it. Needs matplotlib."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The record of a robot's motion: where it was, how fast, and what happened to it, as JSON Lines.
+"""The record of a robot's motion: poses, velocities and events, as JSON Lines.
 
 A sample every 50 ms of the world, what happens when it happens, and the end, with a sample before it where the robot
 was elsewhere since; each line is written at once:

@@ -1,4 +1,4 @@
-"""A simulated ArduPilot Rover: modes, arming, velocity targets that expire, and what it tells of itself.
+"""A simulated ArduPilot Rover: modes, arming, velocity targets that expire, and telemetry.
 
 It steers like a tank, with two wheels in the world. Its north is the world's x. What it owes its host (heartbeats,
 time-outs) goes by the clock, as with all simulated devices. Sources: ArduPilot Rover (`GCS_MAVLink_Rover.cpp`,

@@ -1,4 +1,4 @@
-"""A bus of servos behind one adapter: which packet is for whom, and what comes back (ROBOTIS e-Manual, Protocol 2.0).
+"""A bus of servos behind one adapter: addressing of packets, and answers (ROBOTIS e-Manual, Protocol 2.0).
 
 A servo that a SYNC READ or BULK READ lists and that is silent leaves a gap; those behind it answer all the same.
 FAST SYNC READ and FAST BULK READ are not there, as in the firmware before them.

@@ -1,4 +1,4 @@
-"""Rules on who may use the page: by which names of this server, from which pages, and with which token.
+"""Access rules of the page: names of this server, origins, and the token.
 
 A page of another site that a browser shows on this machine can send requests here. It is kept out in three ways: the
 header `Host` must be a name of this server, so that a name of somebody else that is made to lead here is of no use

@@ -1,4 +1,4 @@
-"""From one source to all who look: the latest state, and every entry once, however slowly somebody reads.
+"""Broadcast from one source to all viewers: the latest state, and every event once, for slow readers too.
 
 All of it lives in the event loop of the server. A source runs as long as somebody looks; one that is lost is told, and
 tried again after a while that grows.

@@ -1,4 +1,4 @@
-"""The robot as a source defines it: components, automata, communications; what came from elsewhere is checked.
+"""The definition of a robot by its source: components, automata, communications; foreign ones are checked.
 
 The topic `/state` of generated nodes and the bridge's service tell it in the same words (semantics 3.10).
 """

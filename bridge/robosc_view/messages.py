@@ -1,4 +1,4 @@
-"""Messages of the page from what a source reports: updates, and entries with the transitions that they lit."""
+"""Messages to the page from a source's reports: updates, and events with the transitions that they took."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""The files of the page, read once: what is not among them is not served, whatever a path says."""
+"""The files of the page, read once: no other file is served, whatever a path says."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Facts that any source reports: the robot, what it is doing, what happens. Plain values, ready for the page."""
+"""Reports of any source: the robot, its status, its events. Plain values, ready for the page."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Sources of what is shown, behind one narrow protocol: a source reports to a sink, and may be steered."""
+"""Sources of the page behind one narrow protocol: a source reports to a sink, and a replay may be controlled."""
 
 import importlib.util
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""The configuration of a bridge: which devices it has, and what the communications of a model are mapped to."""
+"""The configuration of a bridge: its devices, and the mapping of a model's communications to channels."""
 
 from robosc_bridge.configuration.channel_mapping import ChannelMapping, map_channels, unsuitable_because
 from robosc_bridge.configuration.channels import CHANNELS, Channel, channel_name

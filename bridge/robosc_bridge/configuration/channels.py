@@ -1,4 +1,4 @@
-"""The channels of the bridge: what a communication of a model can be mapped to, with the shape of its data.
+"""The channels of the bridge, to which communications of a model are mapped, with the shapes of their data.
 
 One table, `CHANNELS`, from which the check of a configuration, its template and its documentation are made. Shapes
 follow the ROS messages that models link to (geometry_msgs/Twist, sensor_msgs/LaserScan, Imu and BatteryState,

@@ -1,4 +1,4 @@
-"""A first configuration for a robot and a model: what is plain is mapped, the rest is left to be filled in."""
+"""A first configuration for a robot and a model: obvious mappings are made, the others are left to be filled in."""
 
 import json
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""The programs that are connected, and how each is told something."""
+"""The connected programs, and delivery of items to them."""
 
 import logging
 

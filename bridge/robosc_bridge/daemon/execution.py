@@ -1,4 +1,4 @@
-"""The supervisor at work, run by run: when it decides, and what it shows."""
+"""Execution of the supervisor, run by run, and its state for snapshots."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Files that a configuration names for who reaches the bridge, or is reached by it: looked at before anything starts.
+"""Check of the files that a configuration names for remote access, before anything starts.
 
 They are read as they are when they are used, so that what is wrong with one is not found by a robot that is started
 and cannot be reached.

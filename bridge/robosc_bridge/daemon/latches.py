@@ -1,4 +1,4 @@
-"""Conditions that hold in the safety layer until somebody says otherwise, as the loop knows them."""
+"""Latched reasons of the safety layer, as the loop knows them: they hold until a reset or a resume."""
 
 from robosc_bridge.daemon.orders import Orders
 from robosc_bridge.daemon.reports import SafetyNotice

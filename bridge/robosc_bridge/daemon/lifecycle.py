@@ -1,4 +1,4 @@
-"""State of the bridge, and what changes it: operators' commands, devices, the safety layer, the supervisor.
+"""State of the bridge, and its transitions: operators' commands, devices, the safety layer, the supervisor.
 
 The effect of each command in each state is described in docs/bridge-daemon.md.
 """

@@ -1,4 +1,4 @@
-"""The loop: executes the supervisor at its period, between what devices tell and what the safety layer lets through.
+"""The loop: executes the supervisor at its period, between the devices' reports and the safety layer.
 
 One thread runs it and calls the executor; the devices' threads, remote endpoints and signal handlers only put something
 into its inbox.

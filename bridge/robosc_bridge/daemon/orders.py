@@ -1,4 +1,4 @@
-"""Orders of operators that wait for their answer, and stops that are on their way to the loop."""
+"""Pending orders of operators, and stops that are on their way to the loop."""
 
 import logging
 from collections import deque

@@ -1,4 +1,4 @@
-"""Plain data that programs send: whether it is plain at all, and whether it is what a model and a channel expect."""
+"""Checks of the plain data that programs send: its kind, and its fit to the model and the channel."""
 
 import sys
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Dispatch of what programs send: to the model's other side, or to the caller's side of a layer."""
+"""Dispatch of items from programs: to the program channel, or to the requesters of a layer."""
 
 from typing import assert_never
 

@@ -1,4 +1,4 @@
-"""Items of programs on their way to the loop: bounded for each program, so that none can hold up the others.
+"""Queue of items from programs to the loop, bounded for each program, so that none can hold up the others.
 
 The loop takes some in each of its cycles, from each program in turn. A program that sends faster than they are taken
 loses what is beyond the limits, and all that follows until it is told so, in its place in the order. Whatever it

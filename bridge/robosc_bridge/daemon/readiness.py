@@ -1,4 +1,4 @@
-"""Knowledge of the loop about the devices: whether each is there, and what it reported last."""
+"""Presence of the devices and their last readings, as the loop knows them."""
 
 from robosc_bridge.daemon.reports import Device
 from robosc_bridge.devices.interface import DriveReading, Scan

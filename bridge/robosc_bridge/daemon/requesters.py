@@ -1,4 +1,4 @@
-"""The caller's side of a supervision layer: programs that may ask for what the layer lets through or holds back.
+"""The caller's side of a supervision layer: programs whose requests the layer passes on or blocks.
 
 Ids of calls and goals are each program's own. What a program asked for ends with its connection: goals are cancelled,
 and what its messages and calls keep moving stands still at once, without waiting for `command_timeout_s`. The layer

@@ -1,4 +1,4 @@
-"""The robot as the executor sees it: requests go to channels, and what the devices tell comes from them.
+"""The executor's interface to the robot: requests go to channels, readings of devices come from them.
 
 What follows from a request at once, such as that a rotation has failed, is told to the executor later, in
 `deliver_pending`: it must not be called while it is at work.

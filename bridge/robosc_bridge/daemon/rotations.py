@@ -1,4 +1,4 @@
-"""Rotations by an angle that the model asked for, one at a time: who wants to know of their end, and is told so."""
+"""Rotations by an angle that the model asked for, one at a time, and the report of their end."""
 
 import logging
 import math

@@ -1,4 +1,4 @@
-"""Input of an executor from the robot and programs, and the identifiers on which it hears what."""
+"""Input of an executor from the robot and programs, and the identifiers on which it receives each channel."""
 
 from typing import Any, Protocol
 

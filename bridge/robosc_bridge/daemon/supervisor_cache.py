@@ -1,4 +1,4 @@
-"""Storage of what a synthesis server made last, so that the robot starts without a network, too."""
+"""Cache of the last supervisors from a synthesis server, so that the robot also starts without a network."""
 
 import contextlib
 import logging

@@ -1,4 +1,4 @@
-"""A device kept open and at work, step by step: what a thread of its own does, without the thread.
+"""Workers that keep a device open and at work, step by step; they know no thread.
 
 A step does what is due and says when the next one is. A device that fails is closed and tried again later, each time
 with a longer pause; it is opened by the same steps as at the start, and never moves by itself afterwards: what passes

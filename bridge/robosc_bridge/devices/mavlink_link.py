@@ -1,4 +1,4 @@
-"""One line to a vehicle, and everyone in this process who uses it.
+"""One line to a vehicle, shared by all its users in this process.
 
 A drive base and a scanner may be configured on one line, and have a thread each. A thread of the line itself reads, and
 sorts what comes; it never sends. What is sent comes from its users' threads, so that a user who no longer lives keeps

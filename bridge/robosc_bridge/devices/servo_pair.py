@@ -1,4 +1,4 @@
-"""The two wheel servos on their bus: what is asked of both, and seen to be done."""
+"""The two wheel servos on their bus, as one unit whose commands are confirmed."""
 
 from collections.abc import Mapping
 from dataclasses import replace

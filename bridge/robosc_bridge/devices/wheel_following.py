@@ -1,4 +1,4 @@
-"""Watch over the wheels: whether they rotate as they are told."""
+"""Monitor of whether the wheels follow their commands."""
 
 from collections.abc import Sequence
 

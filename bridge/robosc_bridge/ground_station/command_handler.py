@@ -1,4 +1,4 @@
-"""Commands of ground stations: each is answered once, whatever becomes of it, and none makes anybody wait.
+"""Handling of ground stations' commands: each is answered once, and none blocks the session.
 
 A command that is repeated because its answer was lost changes nothing a second time, and nothing at all once a stop has
 come in between. Stopping takes effect before it is answered. What the daemon answers later is waited for without

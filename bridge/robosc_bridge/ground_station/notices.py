@@ -1,4 +1,4 @@
-"""Notices for a person at the ground station, in words: what has happened, and what stands in the way."""
+"""Notices for a person at the ground station: events, and reasons why the robot does not move."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Messages that a ground station, or anybody, has sent, and the commands that some of them are."""
+"""Messages received by a ground link, and the commands among them."""
 
 from dataclasses import dataclass
 from typing import Any

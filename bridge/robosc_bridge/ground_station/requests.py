@@ -1,4 +1,4 @@
-"""Answers to what stations ask when they connect, so that they need not ask again and again.
+"""Answers to what ground stations request when they connect, so that they do not repeat it.
 
 Sources: mavlink.io (parameter, mission, FTP, PING and TIMESYNC microservices). There are two parameters, which can be
 read and not changed; no missions; no files.

@@ -1,4 +1,4 @@
-"""A conversation with a ground station, driven by time and bytes alone: what came in, what goes out.
+"""A session with a ground station, driven by time and bytes alone.
 
 It needs no socket, thread or clock. Whatever comes is untrusted: garbage is counted, a message that makes no sense is
 answered or dropped, and nothing raises.

@@ -1,4 +1,4 @@
-"""Telemetry: what goes out by itself, or when somebody asks for it once."""
+"""Telemetry, periodic and on request."""
 
 import itertools
 import math

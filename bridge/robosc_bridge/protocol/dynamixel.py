@@ -1,4 +1,4 @@
-"""Packets of Dynamixel protocol 2.0: dynamixel-sdk's packet handler with what it gets wrong put right.
+"""Packets of Dynamixel protocol 2.0: dynamixel-sdk's packet handler with its errors corrected.
 
 The SDK knows the packets, their checksum and how to find one among other bytes. Three of its functions cannot be used
 as they are (dynamixel-sdk 4.1.0, `protocol2_packet_handler.py`):

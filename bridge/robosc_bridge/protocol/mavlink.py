@@ -1,4 +1,4 @@
-"""MAVLink packets: what goes to a vehicle as bytes, what comes from it as values.
+"""MAVLink packets: encoded to bytes for a vehicle, decoded from it to values.
 
 pymavlink's generated codec packs, unpacks, checks and signs; it is made for that, and knows every message. Its search
 for packets is not used: behind a header in noise it takes whole packets along, and without `MAVLINK20=1` in the

@@ -1,4 +1,4 @@
-"""The control table of an OpenCR board with TurtleBot3's ROS 2 firmware: what its bytes mean.
+"""The control table of an OpenCR board with TurtleBot3's ROS 2 firmware: addresses and encoding.
 
 Source: ROBOTIS-GIT/OpenCR 1.5.3, `turtlebot3_ros2`. Where turtlebot3_node 2.3.6 takes another type for a register, the
 firmware's counts: illumination is two bytes (not a float), infrared four bytes (not a float), battery unsigned.

@@ -1,4 +1,4 @@
-"""The control table of Dynamixel X servos: where things are and what their bytes mean.
+"""The control table of Dynamixel X servos: addresses and encoding.
 
 Source: ROBOTIS e-Manual, pages XL430-W250 and XM430-W210.
 """

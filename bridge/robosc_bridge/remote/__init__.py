@@ -1,4 +1,4 @@
-"""The remote endpoint: the bridge as a gRPC service, for whoever watches, commands or is a program of the model.
+"""The remote endpoint: the bridge as a gRPC service for watchers, operators and programs of the model.
 
 It runs in a thread of its own and sees the daemon only through its `Operations`; the control loop never waits for it.
 """

@@ -1,4 +1,4 @@
-"""Slots for connections: if all are taken, gRPC refuses callers and tells nobody."""
+"""Warning when all connections are taken: gRPC refuses callers and reports it to nobody."""
 
 import logging
 from pathlib import Path

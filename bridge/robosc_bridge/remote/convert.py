@@ -1,4 +1,4 @@
-"""Protobuf messages for what the daemon shows and tells, and back.
+"""Conversion between the daemon's values and protobuf messages.
 
 This is the one module of the endpoint with generated names.
 """

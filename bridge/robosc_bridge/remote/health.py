@@ -1,4 +1,4 @@
-"""The standard health check of gRPC: whether the bridge is well, asked at any time by anybody.
+"""The standard health check of gRPC: true while the loop runs without a fault.
 
 Not `grpc_health`'s own servicer: that one tells what it was told last, and keeps a stream and a name for whoever asks
 to be told of changes, without a token and without a limit.

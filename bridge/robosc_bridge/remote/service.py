@@ -1,4 +1,4 @@
-"""The calls of the bridge service: limits and statuses; what they do is the daemon's."""
+"""The calls of the bridge service, with their limits and status codes; the daemon does their work."""
 
 import asyncio
 import contextlib

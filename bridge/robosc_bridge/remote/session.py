@@ -1,4 +1,4 @@
-"""One program's stream: what it tells the loop, at a pace that the loop can follow, and what the loop tells it."""
+"""A program's stream in both directions, at a rate that the loop can follow."""
 
 import asyncio
 import contextlib

@@ -1,4 +1,4 @@
-"""The end of calls when the bridge ends: those that wait for their caller are told so, and nobody waits for them.
+"""The end of calls when the bridge ends: those that wait for their caller are ended with a status.
 
 gRPC itself would cancel them and write a traceback for each.
 """

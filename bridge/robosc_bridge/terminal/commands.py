@@ -1,4 +1,4 @@
-"""`robosc-bridge status|start|standby|stop|resume|reset|watch|teleop|token`: what a person types."""
+"""`robosc-bridge status|start|standby|stop|resume|reset|watch|teleop|token`: commands for a terminal."""
 
 import argparse
 import json

@@ -1,1 +1,1 @@
-"""Bytes on a line: what opens, waits for, reads, writes and closes one, and says in one way what went wrong."""
+"""Transport of bytes on a line: opening, waiting, reading, writing and closing, with one kind of errors."""

@@ -1,4 +1,4 @@
-"""Cycles of a generated controller that drives: what it publishes goes through real middleware to another process."""
+"""Cycles of a generated controller that drives, with real middleware to another process."""
 
 import json
 import shutil

@@ -1,4 +1,4 @@
-"""Times of cycles: what they are, what the paper says, and what comes to a controller while they are measured."""
+"""Times of cycles, those of the paper, and the sensor input of a controller while they are measured."""
 
 import statistics
 from collections.abc import Mapping, Sequence

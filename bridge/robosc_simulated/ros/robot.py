@@ -1,4 +1,4 @@
-"""The robot as the drivers of a TurtleBot3 show it to ROS: what is due when, and how velocities move the wheels.
+"""The robot as the drivers of a TurtleBot3 show it to ROS: periodic readings, and wheels that follow velocities.
 
 The drivers: ROBOTIS-GIT/turtlebot3 (`turtlebot3_node`) and ROBOTIS-GIT/hls_lfcd_lds_driver. The firmware for ROS 1
 stops the wheels when no velocity has come for half a second (`CONTROL_MOTOR_TIMEOUT` in ROBOTIS-GIT/OpenCR).

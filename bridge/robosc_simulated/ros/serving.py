@@ -1,4 +1,4 @@
-"""The twin behind ROS, served until a signal: what both ROS have in common.
+"""The twin behind ROS, served until a signal: the part common to both versions of ROS.
 
 Generated nodes live by the computer's clock, also where they take stamps from `/clock`. So the world follows that
 clock, `--speed` times as fast; but where this process was late, the world waits: what nobody could see is not made up

@@ -1,4 +1,4 @@
-"""`/usr/bin/python3 -m rospy_side`: a rospy node that shows what the twin tells it and passes velocities on.
+"""`/usr/bin/python3 -m rospy_side`: a rospy node that publishes the twin's readings and forwards velocities.
 
 Frames come on standard input and go out on what was standard output; the node ends when standard input does.
 """

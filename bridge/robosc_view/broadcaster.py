@@ -125,7 +125,7 @@ class Viewer:
 
 
 class RobotCache:
-    """Makes portraits, and keeps the last one: pages that are opened again need not wait for it.
+    """Prepares robots, and keeps the last one: pages that are opened again need not wait for it.
 
     Args:
         robot: One that is known already; None: none is.
@@ -136,7 +136,7 @@ class RobotCache:
         self._lock = asyncio.Lock()
 
     async def prepared(self, robot: Robot) -> PreparedRobot:
-        """The portrait of a robot."""
+        """The prepared robot."""
         async with self._lock:
             if self._kept is None or self._kept.robot != robot:
                 # In another thread, since the graphs of a large robot take their time.
@@ -149,7 +149,7 @@ class Broadcaster:
 
     Args:
         source: Source that reports.
-        robot_cache: Studio where portraits are made, and kept.
+        robot_cache: Cache in which robots are prepared, and kept.
     """
 
     def __init__(self, source: Source, robot_cache: "RobotCache") -> None:

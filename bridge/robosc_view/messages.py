@@ -48,7 +48,7 @@ class MessageBuilder:
     """Reporter of what one robot does.
 
     Args:
-        prepared: Portrait that was made of it.
+        prepared: Robot, prepared for it.
     """
 
     def __init__(self, prepared: PreparedRobot) -> None:

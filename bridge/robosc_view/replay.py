@@ -232,7 +232,7 @@ class Replay:
         self._recording = recording
         self._player = Player(recording)
         self._is_steered = asyncio.Event()
-        self._wishes: list[ReplayCommand] = []
+        self._commands: list[ReplayCommand] = []
 
     async def run(self, sink: Sink) -> None:
         """Tell where the log is, until cancelled."""
@@ -250,12 +250,12 @@ class Replay:
             now_s = loop.time()
             player.advance(now_s - last_s)
             last_s = now_s
-            wishes, self._wishes = self._wishes, []
+            commands, self._commands = self._commands, []
             self._is_steered.clear()
             before_s = player.time_s
-            for command in wishes:
+            for command in commands:
                 player.control_replay(command)
-            if player.time_s != before_s or any(isinstance(command, Seek) for command in wishes):
+            if player.time_s != before_s or any(isinstance(command, Seek) for command in commands):
                 told = self._go_to(sink)
             else:
                 told = self._go_on(sink, told)
@@ -270,9 +270,9 @@ class Replay:
 
     def control_replay(self, command: ReplayCommand) -> None:
         """Move in the log; done with the next step."""
-        if len(self._wishes) >= MOST_AT_ONCE:
-            del self._wishes[0]
-        self._wishes.append(command)
+        if len(self._commands) >= MOST_AT_ONCE:
+            del self._commands[0]
+        self._commands.append(command)
         self._is_steered.set()
 
     def _go_to(self, sink: Sink) -> int:

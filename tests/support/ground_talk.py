@@ -11,7 +11,7 @@ from support.ground import PlayedDaemon, Station, of_type
 
 BEGIN_S = 100.0
 FASTEST = Velocity(0.2, 2.0)
-OPEN = GroundSettings("udpin:127.0.0.1:0", FASTEST, obeys_unsigned=True)
+OPEN = GroundSettings("udpin:127.0.0.1:0", FASTEST, accepts_unsigned=True)
 
 
 @dataclass

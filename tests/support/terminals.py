@@ -79,7 +79,7 @@ def driving(daemon: FakeDaemon) -> Iterator[Terminal]:
             terminal.close()
 
 
-def wishes(daemon: FakeDaemon) -> list[tuple[str, float, float]]:
+def requested_velocities(daemon: FakeDaemon) -> list[tuple[str, float, float]]:
     """The velocities that the operator has asked for: on which topic, ahead, to the left."""
     found = daemon.of(programs.MessageRequested)
     return [(item.identifier, item.data["linear"]["x"], item.data["angular"]["z"]) for item in found]

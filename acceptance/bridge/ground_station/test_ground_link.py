@@ -26,7 +26,7 @@ def test_a_station_is_called_arms_the_robot_and_the_link_is_soon_stopped() -> No
         there.bind(("127.0.0.1", 0))
         there.settimeout(5.0)
         address = f"udpout:127.0.0.1:{there.getsockname()[1]}"
-        link = GroundLink(daemon.operations, GroundSettings(address, FASTEST, obeys_unsigned=True))
+        link = GroundLink(daemon.operations, GroundSettings(address, FASTEST, accepts_unsigned=True))
         link.start()
         data, robot = there.recvfrom(65535)
         assert of_type("HEARTBEAT", station.hear(data))

@@ -8,7 +8,7 @@ import pytest
 from robosc_bridge.daemon import programs
 from robosc_bridge.terminal.teleop import LAPSE_S
 from support.remote import FakeDaemon
-from support.terminals import driving, wishes
+from support.terminals import driving, requested_velocities
 from support.waiting import wait_until
 
 
@@ -22,12 +22,12 @@ def daemon() -> Iterator[FakeDaemon]:
 def test_without_a_key_it_halts_by_itself(daemon: FakeDaemon) -> None:
     with driving(daemon) as terminal:
         terminal.type("www")
-        wait_until(lambda: ("/cmd_vel", 0.06, 0) in wishes(daemon))
+        wait_until(lambda: ("/cmd_vel", 0.06, 0) in requested_velocities(daemon))
         begin_s = time.monotonic()
-        wait_until(lambda: wishes(daemon)[-1] == ("/cmd_vel", 0, 0))
+        wait_until(lambda: requested_velocities(daemon)[-1] == ("/cmd_vel", 0, 0))
         assert time.monotonic() - begin_s < 5 * LAPSE_S
-        # The operator is there, and wishes nothing.
-        seen, count = daemon.seen, len(wishes(daemon))
+        # The operator is there, and requests nothing.
+        seen, count = daemon.seen, len(requested_velocities(daemon))
         wait_until(lambda: daemon.seen >= seen + 5)
-        assert len(wishes(daemon)) <= count + 3
+        assert len(requested_velocities(daemon)) <= count + 3
         assert not daemon.of(programs.Detached)

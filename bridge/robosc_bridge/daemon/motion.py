@@ -12,7 +12,7 @@ from robosc_bridge.skills import Rotate, RotateState
 
 
 class MotionTarget:
-    """One wish at a time; the last one counts.
+    """One target at a time; the last one counts.
 
     Args:
         rotate: The skill that rotates.

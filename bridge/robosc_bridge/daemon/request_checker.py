@@ -107,13 +107,13 @@ class RequestChecker:
             InvalidRequestError: It is not.
         """
         channel = self._channels[communication.name]
-        heeded = CHANNELS[type(channel)].used_parts
+        used_parts = CHANNELS[type(channel)].used_parts
         why = why_not_shaped(self._shapes[communication.name], data)
         why = why or why_not_typed(self._model, communication.request, data)
         if why:
             raise InvalidRequestError(f"'{communication.name}': {why}")
-        for path, value in _leaves(data, "") if heeded else ():
-            if path not in heeded and value:
+        for path, value in _leaves(data, "") if used_parts else ():
+            if path not in used_parts and value:
                 raise InvalidRequestError(
                     f"'{communication.name}': '{path}' must be 0: '{channel_name(channel)}' does not use it"
                 )

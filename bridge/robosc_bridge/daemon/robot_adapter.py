@@ -186,7 +186,7 @@ class RobotAdapter:
         self.deliver_pending(executor)
 
     def watch_buttons(self, buttons: Mapping[str, bool]) -> None:
-        """Heed the operator's buttons while no supervisor is executed."""
+        """Handle the operator's buttons while no supervisor is executed."""
         self._switch.on_buttons([name for name, is_held in buttons.items() if is_held], None)
         # What was pressed meanwhile is no event for the next run, but bumpers are told at its start.
         self._buttons = {}

@@ -11,7 +11,7 @@ STOP_HELD = "a button that stops the robot is pressed"
 
 
 class StopSwitch:
-    """Stop switch of the operator, wherever the operator's wish comes from.
+    """Stop switch of the operator, wherever the operator's command comes from.
 
     Args:
         skill: Skill that interprets buttons, keys and calls.

@@ -26,16 +26,16 @@ class Stop(StrEnum):
 
     @property
     def command(self) -> OperatorCommand:
-        """Wish for the daemon."""
+        """Command for the daemon."""
         return OperatorCommand.STANDBY if self is Stop.STANDBY else OperatorCommand.STOP
 
 
 @dataclass(frozen=True)
 class Change:
-    """Wish that something is to change.
+    """Request that something is to change.
 
     Attributes:
-        command: Wish for the daemon.
+        command: Command for the daemon.
         mode: The mode that was asked for by its number; None: no mode was.
     """
 

@@ -55,7 +55,7 @@ def from_position_target(told: Any) -> Velocity:
 def from_manual_control(told: Any, fastest: Velocity) -> Velocity:
     """Return the velocity of a stick: x ahead, r to the right, as ground stations send it.
 
-    The axes y and z and the buttons are not heeded.
+    The axes y and z and the buttons are ignored.
 
     Args:
         told: MANUAL_CONTROL.

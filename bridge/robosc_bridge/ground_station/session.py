@@ -49,7 +49,7 @@ IDLE_S = 0.05
 """After so long without a byte, what has come of a packet does not hide whole ones behind it any more."""
 
 MESSAGES_PER_S, MOST_MESSAGES = 100.0, 200.0
-"""Messages that are heeded; beyond that, only those that stop."""
+"""Messages that are handled; beyond that, only those that stop."""
 
 _OLD = "This station speaks MAVLink 1: set it to MAVLink 2."
 _NOT_SIGNED = "Only stopping is obeyed here without a valid signature."
@@ -250,7 +250,7 @@ class StationSession:
         return received.is_signed or self._signing is None
 
     def _may_change(self, received: ReceivedMessage) -> bool:
-        return received.is_signed or (self._signing is None and self._settings.obeys_unsigned)
+        return received.is_signed or (self._signing is None and self._settings.accepts_unsigned)
 
     def _take(self, received: ReceivedMessage) -> list[Make]:
         if self._is_own(received):
@@ -308,9 +308,9 @@ class StationSession:
         elif self._driving is None:
             why = "Set-points are for a supervision layer whose drive is mapped; this supervisor drives by itself."
         elif snapshot is None or not self._stream.is_running or self._stream.is_stale(self._now_s):
-            why = "The robot is not armed: set-points are not heeded."
+            why = "The robot is not armed: set-points are ignored."
         elif is_held(snapshot):
-            why = "An operator has stopped the robot: set-points are not heeded."
+            why = "An operator has stopped the robot: set-points are ignored."
         try:
             velocity = read()
         except Unusable as error:

@@ -39,7 +39,7 @@ class GroundSettings:
         system: Number of the vehicle.
         component: Number of the bridge in it.
         signing: The key; None: nothing is signed.
-        obeys_unsigned: True if, without a key, more than stopping and asking is allowed.
+        accepts_unsigned: True if, without a key, more than stopping and asking is allowed.
         interval_s: Time between two messages of pose, and of obstacles, in seconds.
         range_m: Shortest and longest that the LiDAR measures.
     """
@@ -50,7 +50,7 @@ class GroundSettings:
     system: int = 1
     component: int = AUTOPILOT
     signing: Signing | None = None
-    obeys_unsigned: bool = False
+    accepts_unsigned: bool = False
     interval_s: float = 0.1
     range_m: tuple[float, float] = _ANY_RANGE_M
 
@@ -85,7 +85,7 @@ def ground_settings(configuration: Configuration, fastest: Velocity) -> GroundSe
         baud,
         remote.mavlink_system,
         signing=None if remote.mavlink_key is None else Signing(Path(remote.mavlink_key), remote.mavlink_link_id),
-        obeys_unsigned=remote.mavlink_unsigned_commands or is_loopback(address),
+        accepts_unsigned=remote.mavlink_unsigned_commands or is_loopback(address),
         interval_s=remote.mavlink_interval_s,
         range_m=_ANY_RANGE_M if scanner is None else _RANGES_M.get(scanner.driver, _ANY_RANGE_M),
     )

@@ -49,7 +49,7 @@ class Stream:
 
     Attributes:
         snapshot: The latest; None: there was none yet.
-        bad_packets: Packets that have come and were not heeded.
+        bad_packets: Packets that have come and were ignored.
         held_back: Requests that a supervision layer has held back.
         schedule: Schedule of each message.
     """

@@ -53,7 +53,7 @@ def sys_status(snapshot: Snapshot, bad_packets: int) -> Make:
 
     Args:
         snapshot: The latest.
-        bad_packets: Packets that have come and were not heeded.
+        bad_packets: Packets that have come and were ignored.
     """
     devices, reading = snapshot.devices, snapshot.reading
     present = _MOTORS | (_PROXIMITY if Device.SCANNER in devices else 0)

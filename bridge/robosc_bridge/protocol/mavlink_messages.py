@@ -62,7 +62,7 @@ class MavCommand(IntEnum):
 
 
 class Incoming(IntEnum):
-    """Messages that a vehicle heeds, with their numbers."""
+    """Messages that a vehicle handles, with their numbers."""
 
     HEARTBEAT = 0
     PING = 4

@@ -1,6 +1,6 @@
 """Skills: what the bridge can do by itself, as state machines that readings and time are passed to.
 
-No threads, no clock, no lines: whoever runs them brings both. The velocities that they ask for are wishes, which pass
+No threads, no clock, no lines: whoever runs them brings both. The velocities that they ask for are requests, which pass
 the safety layer like every other.
 """
 

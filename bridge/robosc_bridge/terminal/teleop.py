@@ -1,8 +1,8 @@
 """Driving by keys through a supervision layer.
 
-Nobody at the keys, no motion: a wish lapses soon after the last key, as a held key is repeated by its terminal. Signs
-of life are sent while keys come or the terminal answers (ECMA-48, 8.3.35: DSR 5 is answered by CSI 0 n): a program
-whose terminal was cut off would else go on for its operator.
+Nobody at the keys, no motion: a requested velocity expires soon after the last key, as a held key is repeated by its
+terminal. Signs of life are sent while keys come or the terminal answers (ECMA-48, 8.3.35: DSR 5 is answered by CSI 0
+n): a program whose terminal was cut off would else go on for its operator.
 """
 
 import os
@@ -34,13 +34,13 @@ KEEP_ALIVE_S = 0.5
 """Time between signs of life while it is not."""
 
 LAPSE_S = 0.6
-"""A wish holds for so long after a key: longer than terminals wait before they repeat a held key, commonly 0.5 s."""
+"""A request holds for so long after a key: longer than terminals wait before they repeat a held key, commonly 0.5 s."""
 
 PRESENT_S = 1.5
 """After so long without a byte of the terminal nobody is there."""
 
 LINEAR_M_S, ANGULAR_RAD_S = 0.22, 2.0
-"""Fastest wish; what the robot may do is for the bridge's own limits."""
+"""Fastest request; what the robot may do is for the bridge's own limits."""
 
 STEP_M_S, STEP_RAD_S = 0.02, 0.2
 
@@ -104,12 +104,12 @@ class RequestedVelocity:
         return bool(self.linear_m_s or self.angular_rad_s)
 
     def expire(self, now_s: float) -> None:
-        """Without a key for too long nothing is wished."""
+        """Without a key for too long no velocity is requested."""
         if now_s >= self._expiry_s:
             self.linear_m_s = self.angular_rad_s = 0.0
 
     def press(self, key: str, now_s: float) -> None:
-        """Heed a key; any but those of the help changes nothing."""
+        """Handle a key; any but those of the help changes nothing."""
         self.expire(now_s)
         if key in _DRIVING:
             self._expiry_s = now_s + LAPSE_S
@@ -162,7 +162,7 @@ def drive(terminal: Terminal, client: BridgeClient, topic: DriveTopic) -> None:
         terminal.write(f"{HELP}\r\n")
         _drive(terminal, client, operator, topic, status_line)
     finally:
-        # However it ends, also by a signal: nothing is wished any more.
+        # However it ends, also by a signal: no velocity is requested any more.
         with suppress(RefusedError, UnreachableError):
             operator.drive(topic, 0.0, 0.0)
         operator.close()
@@ -189,7 +189,7 @@ def _drive(
             if key == PRESENT:
                 continue
             requested.press(key, now_s)
-            # What is wished goes out with the key, not with the next period.
+            # What is requested goes out with the key, not with the next period.
             next_s, zeros_left = now_s, _ZEROS
             _obey(client, key, status_line, resuming)
         resuming.poll()

@@ -155,7 +155,7 @@ function inWords() {
     const degrees = ((pose[2] * 180) / Math.PI) % 360;
     parts.push(`Robot at x ${figure(pose[0], 2)} m, y ${figure(pose[1], 2)} m, heading ${figure(degrees, 0)}°.`);
   }
-  if (drive) parts.push(`Moves at ${figure(drive.linear_m_s, 2)} m/s, turns at ${figure(drive.angular_rad_s, 2)} rad/s.`);
+  if (drive) parts.push(`Moves at ${figure(drive.linear_m_s, 2)} m/s, rotates at ${figure(drive.angular_rad_s, 2)} rad/s.`);
   if (Number.isFinite(drive?.battery_v)) parts.push(`Battery ${figure(drive.battery_v, 1)} V.`);
   if (drive) parts.push(drive.is_torque_on ? "Motors hold." : "Motors do not hold.");
   const nearest = nearestOf(told.scan?.ranges_m ?? []);

@@ -28,7 +28,7 @@ def test_nothing_moves_before_all_devices_are_there(scene: Scene) -> None:
     assert states == [(State.STARTING, False)] * 3
     scene.live(1.0, 2.0)
     assert (scene.daemon.state, scene.out) == (State.RUNNING, Velocity(0.1, 0.0))
-    # The scan from before the start was heeded: nothing was decided on what is not known.
+    # The scan from before the start was used: nothing was decided on what is not known.
     assert "turn.request" not in scene.events()
 
 

@@ -70,7 +70,7 @@ def linked(
     host: VirtualHost, address: str = LISTENING, daemon: PlayedDaemon | None = None, **values: Any
 ) -> Iterator[tuple[PlayedDaemon, GroundLink]]:
     daemon = daemon or PlayedDaemon()
-    link = GroundLink(daemon.operations, GroundSettings(address, FASTEST, **{"obeys_unsigned": True, **values}), host)
+    link = GroundLink(daemon.operations, GroundSettings(address, FASTEST, **{"accepts_unsigned": True, **values}), host)
     is_over = False
 
     def turn() -> None:
@@ -192,7 +192,7 @@ def test_a_flood_of_datagrams_leaves_two_thirds_of_the_time(host: VirtualHost, m
 def test_signed(host: VirtualHost, tmp_path: Path) -> None:
     (tmp_path / "key").write_bytes(KEY)
     signing = Signing(tmp_path / "key")
-    with linked(host, signing=signing, obeys_unsigned=False) as (daemon, _):
+    with linked(host, signing=signing, accepts_unsigned=False) as (daemon, _):
         stranger, station = Peer(host), Peer(host, key=KEY)
         stranger.send(stranger.station.heartbeat())
         station.station.codec.signing.timestamp = signing.begin().timestamp()
@@ -207,7 +207,7 @@ def test_signed(host: VirtualHost, tmp_path: Path) -> None:
 def test_who_sends_our_own_packets_back_takes_nobodys_place(host: VirtualHost, tmp_path: Path) -> None:
     (tmp_path / "key").write_bytes(KEY)
     signing = Signing(tmp_path / "key")
-    with linked(host, signing=signing, obeys_unsigned=False) as (daemon, _):
+    with linked(host, signing=signing, accepts_unsigned=False) as (daemon, _):
         thief, station = Peer(host), Peer(host, key=KEY)
         station.station.codec.signing.timestamp = signing.begin().timestamp()
         station.send(station.station.heartbeat())

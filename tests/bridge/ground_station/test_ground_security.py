@@ -82,7 +82,7 @@ def test_a_station_that_speaks_mavlink_1_stops_the_robot_and_is_told(
 
 
 def test_without_a_key_mavlink_1_is_heard_like_mavlink_2() -> None:
-    daemon, session = _session(GroundSettings("udpin:127.0.0.1:0", FASTEST, obeys_unsigned=True))
+    daemon, session = _session(GroundSettings("udpin:127.0.0.1:0", FASTEST, accepts_unsigned=True))
     station = Station()
     beat = station.old(station.codec.heartbeat_encode(6, 8, 0, 0, 4))
     session.step(BEGIN_S, beat + station.old_command(400, 1.0), is_datagram=True)
@@ -215,7 +215,7 @@ def test_another_computer_without_a_key_may_look_and_stop(number: int, parameter
 
 
 def test_another_station_may_stop_and_nothing_more() -> None:
-    daemon, session = _session(GroundSettings("udpin:127.0.0.1:0", FASTEST, obeys_unsigned=True))
+    daemon, session = _session(GroundSettings("udpin:127.0.0.1:0", FASTEST, accepts_unsigned=True))
     other = Station(system=254)
     found = other.hear(session.receive_from_other(BEGIN_S, other.command(400, 1.0) + other.command(512, 148)))
     assert found == []
@@ -300,7 +300,7 @@ def _settings(remote: str, scanner: str = "") -> GroundSettings | None:
 
 
 @pytest.mark.parametrize(
-    ("url", "address", "baud", "obeys"),
+    ("url", "address", "baud", "accepts_unsigned"),
     [
         ("udpout:192.168.1.2:14550", "udpout:192.168.1.2:14550", 57600, False),
         ("udpout:127.0.0.1:14550", "udpout:127.0.0.1:14550", 57600, True),
@@ -312,14 +312,14 @@ def _settings(remote: str, scanner: str = "") -> GroundSettings | None:
         ("/dev/ttyUSB0,115200", "/dev/ttyUSB0", 115200, False),
     ],
 )
-def test_addresses(url: str, address: str, baud: int, obeys: bool) -> None:
+def test_addresses(url: str, address: str, baud: int, accepts_unsigned: bool) -> None:
     found = _settings(f"mavlink_url: '{url}'")
     assert found is not None
-    assert (found.address, found.baud, found.obeys_unsigned) == (address, baud, obeys)
-    assert is_loopback(address) == obeys
+    assert (found.address, found.baud, found.accepts_unsigned) == (address, baud, accepts_unsigned)
+    assert is_loopback(address) == accepts_unsigned
     found = _settings(f"mavlink_url: '{url}', mavlink_unsigned_commands: true")
     assert found is not None
-    assert found.obeys_unsigned
+    assert found.accepts_unsigned
 
 
 @pytest.mark.parametrize(

@@ -180,9 +180,9 @@ def test_a_safe_stop_is_told_and_its_end_and_no_ordinary_end(talk: Talk) -> None
     assert joined_texts(talk.live(0.2)) == ["Fault: division by zero"]
 
 
-@pytest.mark.parametrize("obeys", [True, False])
-def test_a_fault_is_told_while_somebody_sends_nonsense(obeys: bool) -> None:
-    talk = Talk(settings=GroundSettings("udpin:0.0.0.0:0", FASTEST, obeys_unsigned=obeys))
+@pytest.mark.parametrize("accepts_unsigned", [True, False])
+def test_a_fault_is_told_while_somebody_sends_nonsense(accepts_unsigned: bool) -> None:
+    talk = Talk(settings=GroundSettings("udpin:0.0.0.0:0", FASTEST, accepts_unsigned=accepts_unsigned))
     for tick in range(100):
         talk.daemon.show()
         if tick == 50:
@@ -265,7 +265,7 @@ def test_only_ground_stations_are_operators(talk: Talk) -> None:
 
 
 def test_the_worked_arming_is_answered_byte_for_byte() -> None:
-    talk = Talk(settings=GroundSettings("udpin:127.0.0.1:0", FASTEST, component=191, obeys_unsigned=True))
+    talk = Talk(settings=GroundSettings("udpin:127.0.0.1:0", FASTEST, component=191, accepts_unsigned=True))
     talk.daemon.answers[OperatorCommand.START] = ""
     for _ in range(7):
         talk.session._codec.encode(lambda library: library.heartbeat_encode(10, 0, 0, 0, 0))

@@ -100,9 +100,9 @@ class Bridge:
     """A bridge with an operator's stream, as the client of it has them.
 
     Attributes:
-        wishes: Time and velocities of each request: forward, and counter-clockwise, in m/s and rad/s.
-        signs_s: Times at which the operator was reported present without a wish, in seconds.
-        heard: Stops, and wishes of other kinds.
+        requests: Time and velocities of each request: forward, and counter-clockwise, in m/s and rad/s.
+        signs_s: Times at which the operator was reported present without a request, in seconds.
+        heard: Stops, and commands of other kinds.
         told: Callback that reports something to the operator; set when the stream is begun.
         refusal: Refusal of a resume; None: it is never answered.
         failure: Failure of whatever is sent next.
@@ -110,7 +110,7 @@ class Bridge:
     """
 
     def __init__(self, time: VirtualHost) -> None:
-        self.wishes: list[tuple[float, float, float]] = []
+        self.requests: list[tuple[float, float, float]] = []
         self.signs_s: list[float] = []
         self.heard: list[RequestedCommand | str] = []
         self.told: Callable[[str, str], None] = lambda what, text: None
@@ -127,7 +127,7 @@ class Bridge:
         assert topic == TOPIC
         if self.failure is not None:
             raise self.failure
-        self.wishes.append((self._time.monotonic(), linear_m_s, angular_rad_s))
+        self.requests.append((self._time.monotonic(), linear_m_s, angular_rad_s))
 
     def keep_alive(self) -> None:
         if self.failure is not None:
@@ -140,8 +140,8 @@ class Bridge:
     def stop(self) -> None:
         self.heard.append("stop")
 
-    def request(self, wish: RequestedCommand) -> None:
-        self.heard.append(wish)
+    def request(self, command: RequestedCommand) -> None:
+        self.heard.append(command)
         if self.refusal is None:
             self._time.sleep(math.inf)
         if self.refusal:
@@ -211,13 +211,13 @@ def typed() -> Iterator[Typed]:
 class TestDriving:
     def test_a_key_drives_at_once_and_it_is_said_again_while_wished(self, typed: Typed) -> None:
         typed.time.sleep(10.2)
-        assert typed.bridge.wishes == []
+        assert typed.bridge.requests == []
         typed.type("w\x1b[D")
         for _ in range(20):
             typed.time.sleep(0.5)
             typed.type("k")
-        times_s = [time_s for time_s, *_ in typed.bridge.wishes]
-        assert {wish[1:] for wish in typed.bridge.wishes} == {(0.02, 0.2)}
+        times_s = [time_s for time_s, *_ in typed.bridge.requests]
+        assert {command[1:] for command in typed.bridge.requests} == {(0.02, 0.2)}
         assert times_s[0] == pytest.approx(10.2)
         # Every tenth of a second, and with each key.
         assert max(after_s - before_s for before_s, after_s in itertools.pairwise(times_s)) <= PERIOD_S + 1e-9
@@ -227,11 +227,11 @@ class TestDriving:
         typed.type("www")
         begin_s = typed.time.monotonic()
         typed.time.sleep(60.0)
-        driven = [time_s for time_s, *wish in typed.bridge.wishes if wish == [0.06, 0.0]]
-        halted = [time_s for time_s, *wish in typed.bridge.wishes if wish == [0.0, 0.0]]
+        driven = [time_s for time_s, *command in typed.bridge.requests if command == [0.06, 0.0]]
+        halted = [time_s for time_s, *command in typed.bridge.requests if command == [0.0, 0.0]]
         assert driven[-1] - begin_s == pytest.approx(LAPSE_S - PERIOD_S)
         assert [time_s - begin_s for time_s in halted] == pytest.approx([LAPSE_S + k * PERIOD_S for k in range(3)])
-        # The operator is there, and wishes nothing.
+        # The operator is there, and requests nothing.
         assert len(typed.bridge.signs_s) == pytest.approx(60.0 / KEEP_ALIVE_S, abs=2)
         assert not typed.bridge.is_closed
 
@@ -242,31 +242,31 @@ class TestDriving:
         typed.time.sleep(60.0)
         assert typed.asked - asked == pytest.approx(60.0 / KEEP_ALIVE_S, abs=1)
         assert begin_s + PRESENT_S - 2 * KEEP_ALIVE_S <= typed.bridge.signs_s[-1] < begin_s + PRESENT_S
-        # A key is one: nothing is wished with it.
-        assert typed.bridge.wishes == []
+        # A key is one: nothing is requested with it.
+        assert typed.bridge.requests == []
         typed.type("?")
-        assert typed.bridge.wishes == [(typed.time.monotonic(), 0.0, 0.0)]
+        assert typed.bridge.requests == [(typed.time.monotonic(), 0.0, 0.0)]
         typed.time.sleep(1.0)
         assert typed.bridge.signs_s[-1] > 70.0
 
     def test_what_was_wished_ends_with_zeros_and_the_link_stays(self, typed: Typed) -> None:
         typed.type("wx")
         typed.time.sleep(10.0)
-        assert [wish[1:] for wish in typed.bridge.wishes] == [(0.0, 0.0)] * 3
+        assert [command[1:] for command in typed.bridge.requests] == [(0.0, 0.0)] * 3
         assert not typed.bridge.is_closed
 
     def test_q_ends_with_a_stop_of_the_motion(self, typed: Typed) -> None:
         typed.type("www")
         typed.type("q")
         typed.program.join()
-        assert [wish[1:] for wish in typed.bridge.wishes] == [(0.06, 0.0), (0.0, 0.0)]
+        assert [command[1:] for command in typed.bridge.requests] == [(0.06, 0.0), (0.0, 0.0)]
         assert typed.bridge.is_closed
         assert typed.error is None
 
     def test_the_space_bar_stops_the_robot_and_r_lets_it_go_on(self, typed: Typed) -> None:
         typed.type("w ")
         assert typed.bridge.heard == ["stop"]
-        assert typed.bridge.wishes[-1][1:] == (0.0, 0.0)
+        assert typed.bridge.requests[-1][1:] == (0.0, 0.0)
         assert "stopped: r lets it go on" in typed.seen
         typed.bridge.refusal = "a button that stops is pressed"
         typed.type("r")

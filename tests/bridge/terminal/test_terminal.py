@@ -9,7 +9,7 @@ import pytest
 
 from robosc_bridge.daemon import programs
 from support.remote import FakeDaemon, served
-from support.terminals import Terminal, driving, wishes
+from support.terminals import Terminal, driving, requested_velocities
 from support.waiting import PATIENCE_S, wait_until
 
 
@@ -24,12 +24,12 @@ def test_a_signal_ends_it_in_order(number: int, daemon: FakeDaemon) -> None:
     with driving(daemon) as terminal:
         assert terminal.is_raw
         terminal.type("w")
-        wait_until(lambda: ("/cmd_vel", 0.02, 0) in wishes(daemon))
+        wait_until(lambda: ("/cmd_vel", 0.02, 0) in requested_velocities(daemon))
         terminal.process.send_signal(number)
         assert terminal.process.wait(PATIENCE_S) == 128 + number
         assert not terminal.is_raw
         wait_until(lambda: daemon.of(programs.Detached))
-        assert wishes(daemon)[-1] == ("/cmd_vel", 0, 0)
+        assert requested_velocities(daemon)[-1] == ("/cmd_vel", 0, 0)
 
 
 def test_the_end_of_the_bridge_is_told(daemon: FakeDaemon) -> None:

@@ -169,22 +169,22 @@ def _stands_at(time_s: float) -> Any:
     )
 )
 @settings(max_examples=examples(100))
-def test_a_player_stays_within_the_log(wishes: list[Any]) -> None:
+def test_a_player_stays_within_the_log(commands: list[Any]) -> None:
     player = Player(RECORDING)
     expected_s = BEGIN_S
-    for wish in wishes:
+    for command in commands:
         before_s, was_playing = player.time_s, player.is_playing
-        if isinstance(wish, float):
-            player.advance(wish)
-            expected_s = min(before_s + wish * player.speed, RECORDING.end_s) if was_playing else before_s
+        if isinstance(command, float):
+            player.advance(command)
+            expected_s = min(before_s + command * player.speed, RECORDING.end_s) if was_playing else before_s
         else:
-            player.control_replay(wish)
-            if isinstance(wish, Seek):
-                expected_s = min(max(wish.time_s, RECORDING.begin_s), RECORDING.end_s)
-            elif isinstance(wish, Play) and before_s >= RECORDING.end_s:
+            player.control_replay(command)
+            if isinstance(command, Seek):
+                expected_s = min(max(command.time_s, RECORDING.begin_s), RECORDING.end_s)
+            elif isinstance(command, Play) and before_s >= RECORDING.end_s:
                 expected_s = BEGIN_S
         assert player.time_s == expected_s
-        assert not (player.is_playing and isinstance(wish, Pause))
+        assert not (player.is_playing and isinstance(command, Pause))
         count = RECORDING.count(player.time_s)
         assert RECORDING.times_s[count - 1] <= player.time_s
         assert count == len(RECORDING.times_s) or RECORDING.times_s[count] > player.time_s

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 
 from robosc_bridge.daemon import programs
-from robosc_bridge.terminal.teleop import LAPSE_S
+from robosc_bridge.terminal.teleop import EXPIRY_S
 from support.remote import FakeDaemon
 from support.terminals import driving, requested_velocities
 from support.waiting import wait_until
@@ -25,7 +25,7 @@ def test_without_a_key_it_halts_by_itself(daemon: FakeDaemon) -> None:
         wait_until(lambda: ("/cmd_vel", 0.06, 0) in requested_velocities(daemon))
         begin_s = time.monotonic()
         wait_until(lambda: requested_velocities(daemon)[-1] == ("/cmd_vel", 0, 0))
-        assert time.monotonic() - begin_s < 5 * LAPSE_S
+        assert time.monotonic() - begin_s < 5 * EXPIRY_S
         # The operator is there, and requests nothing.
         seen, count = daemon.seen, len(requested_velocities(daemon))
         wait_until(lambda: daemon.seen >= seen + 5)

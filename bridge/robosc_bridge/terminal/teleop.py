@@ -33,7 +33,7 @@ PERIOD_S = 0.1
 KEEP_ALIVE_S = 0.5
 """Time between signs of life while it is not."""
 
-LAPSE_S = 0.6
+EXPIRY_S = 0.6
 """A request holds for so long after a key: longer than terminals wait before they repeat a held key, commonly 0.5 s."""
 
 PRESENT_S = 1.5
@@ -112,7 +112,7 @@ class RequestedVelocity:
         """Handle a key; any but those of the help changes nothing."""
         self.expire(now_s)
         if key in _DRIVING:
-            self._expiry_s = now_s + LAPSE_S
+            self._expiry_s = now_s + EXPIRY_S
         match key:
             case "w" | "s":
                 step = STEP_M_S if key == "w" else -STEP_M_S

@@ -44,7 +44,7 @@ def test_the_commands() -> None:
     words = " ".join(PAGE.split())
     assert f"{teleop.STEP_M_S:g} m/s" in words
     assert f"{teleop.STEP_RAD_S:g} rad/s" in words
-    assert f"lapses {teleop.LAPSE_S:g} s after" in words
+    assert f"expires {teleop.EXPIRY_S:g} s after" in words
 
 
 def test_the_page_is_listed() -> None:

@@ -10,8 +10,8 @@ from robosc_bridge.host import Thread
 from robosc_bridge.terminal.client import DriveTopic, RefusedError, RequestedCommand, UnreachableError
 from robosc_bridge.terminal.teleop import (
     ANGULAR_RAD_S,
+    EXPIRY_S,
     KEEP_ALIVE_S,
-    LAPSE_S,
     LINEAR_M_S,
     PERIOD_S,
     PRESENT,
@@ -72,9 +72,9 @@ class TestKeys:
         requested.press("w", 10.0)
         requested.press("k", 10.5)
         requested.press("?", 11.0)
-        requested.expire(10.5 + LAPSE_S - 0.01)
+        requested.expire(10.5 + EXPIRY_S - 0.01)
         assert requested.linear_m_s == 0.02
-        requested.expire(10.5 + LAPSE_S)
+        requested.expire(10.5 + EXPIRY_S)
         assert not requested.is_motion
 
     def test_a_key_after_that_begins_anew(self) -> None:
@@ -229,8 +229,8 @@ class TestDriving:
         typed.time.sleep(60.0)
         driven = [time_s for time_s, *command in typed.bridge.requests if command == [0.06, 0.0]]
         halted = [time_s for time_s, *command in typed.bridge.requests if command == [0.0, 0.0]]
-        assert driven[-1] - begin_s == pytest.approx(LAPSE_S - PERIOD_S)
-        assert [time_s - begin_s for time_s in halted] == pytest.approx([LAPSE_S + k * PERIOD_S for k in range(3)])
+        assert driven[-1] - begin_s == pytest.approx(EXPIRY_S - PERIOD_S)
+        assert [time_s - begin_s for time_s in halted] == pytest.approx([EXPIRY_S + k * PERIOD_S for k in range(3)])
         # The operator is there, and requests nothing.
         assert len(typed.bridge.signs_s) == pytest.approx(60.0 / KEEP_ALIVE_S, abs=2)
         assert not typed.bridge.is_closed

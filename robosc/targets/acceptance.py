@@ -5,13 +5,12 @@ The conditions that the supervisor adds come on top; each generator writes decis
 
 from typing import NamedTuple
 
-from robosc.automata.plants import communication_plant_name
 from robosc.expressions import FALSE, TRUE, Expression, IntegerType, StateTest, Unary, conjunction
 from robosc.expressions.text import expression_text
 from robosc.model.structure import Behaviour, Deployment, EventKind, Model, Transition, is_tau
 from robosc.supervisor import Supervisor
-from robosc.targets.events import has_plant_location, plant_step, split, taken_transition
-from robosc.targets.model_text import requirement_text
+from robosc.targets.events import plant_step, split, taken_transition
+from robosc.targets.words import requirement_text
 
 
 class InOneOf(NamedTuple):
@@ -48,12 +47,9 @@ def enabling_conditions(supervisor: Supervisor, event: str) -> list[tuple[str, C
     result: list[tuple[str, Condition]] = []
     if is_tau(event):
         result.append(_changes_something(model, event))
-    else:
-        communication = model.communication(name)
-        if has_plant_location(communication):
-            sources, _ = plant_step(communication, EventKind(kind))
-            plant = communication_plant_name(communication)
-            result.append((f"{plant} is {' or '.join(sources)}", InOneOf(plant, sources)))
+    if (step := plant_step(model, event)) is not None:
+        plant, sources, _ = step
+        result.append((f"{plant} is {' or '.join(sources)}", InOneOf(plant, sources)))
     result += accepting_conditions(model, event)
     if kind == EventKind.REQUEST:
         result += [(requirement_text(item), item.condition) for item in model.requirements_on(name)]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+from robosc.automata.plants import communication_plant_name
 from robosc.model.structure import (
     ISSUED_KINDS,
     Behaviour,
@@ -35,17 +36,27 @@ def has_plant_location(communication: Communication) -> bool:
     return communication.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 
 
-def plant_step(communication: Communication, kind: EventKind) -> tuple[tuple[str, ...], str | None]:
-    """Locations from which an event is possible, and the one it leads to (None: it stays); semantics part 1."""
+def plant_step(model: Model, event: str) -> tuple[str, tuple[str, ...], str | None] | None:
+    """The plant of an event's service or action, and the event there; None for an event of no such plant.
+
+    Returns:
+        Name of the plant, the locations from which the event is possible, and the one that it leads to (None: it
+        stays); semantics part 1.
+    """
+    name, kind = split(event)
+    if is_tau(event) or not has_plant_location(model.communication(name)):
+        return None
+    communication = model.communication(name)
     busy = "waiting" if communication.kind is CommunicationKind.SERVICE else "executing"
-    return {
+    sources, target = {
         EventKind.REQUEST: (("idle",), busy),
         EventKind.RESPONSE: ((busy,), "ready"),
         EventKind.ERROR: ((busy,), "failed"),
         EventKind.FEEDBACK: ((busy,), None),
         EventKind.CANCEL: ((busy,), "idle"),
         EventKind.RESET: (("ready", "failed"), "idle"),
-    }[kind]
+    }[EventKind(kind)]
+    return communication_plant_name(communication), sources, target
 
 
 def taken_transition(behaviour: Behaviour, event: str, state: str) -> Transition | None:

@@ -3,7 +3,6 @@
 All updates of a step read the state before it: a copy, of which a compiler keeps what is needed.
 """
 
-from robosc.automata.plants import communication_plant_name
 from robosc.expressions import (
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
@@ -16,8 +15,8 @@ from robosc.expressions import (
 )
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
-from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
-from robosc.targets.c99.expressions import ATOM, c_type, low_text
+from robosc.model.structure import Behaviour, Transition, Update, Variable, is_tau
+from robosc.targets.c99.expressions import c_type, low_text
 from robosc.targets.c99.layout import event_data, width
 from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.received import Reader
@@ -26,7 +25,7 @@ from robosc.targets.c99.unit import Lvalue, Reading, Unit, declared
 from robosc.targets.code.conditions import accepted
 from robosc.targets.code.expressions import Code, Sort
 from robosc.targets.code.text import indent
-from robosc.targets.events import Branch, branches_of, has_plant_location, is_controllable, plant_step, split
+from robosc.targets.events import Branch, branches_of, is_controllable, plant_step
 from robosc.targets.paths import path_type
 
 
@@ -46,6 +45,7 @@ class Stepper:
         self._namer = CNamer(frozenset({"data", "notes", "s", "old", "skipped", "r"}))
         self._received: dict[Path, Code] = {}
         self._may_skip = False
+        self._plant_step = plant_step(unit.layout.model, event)
         self._reading = Reading(unit, "old.", self._read, self._type_at)
 
     @property
@@ -137,24 +137,17 @@ class Stepper:
     def _refusals(self) -> list[str]:
         """Refuse where the event is not accepted, before anything changes."""
         lines = []
-        name, kind = split(self.event)
-        if not is_tau(self.event) and has_plant_location(self.unit.layout.model.communication(name)):
-            communication = self.unit.layout.model.communication(name)
-            sources, _ = plant_step(communication, EventKind(kind))
-            code = self._reading.in_one_of(communication_plant_name(communication), sources)
-            lines += self._reading.unless(code, "return REFUSED;")
+        if self._plant_step is not None:
+            plant, sources, _ = self._plant_step
+            lines += self._reading.unless(self._reading.in_one_of(plant, sources), "return REFUSED;")
         if is_controllable(self.event):
             for words, code in accepted(self.unit.layout.model, self.event, self._reading):
                 lines += [*comment(words), *self._reading.unless(code, "return REFUSED;")]
         return lines
 
     def _plant(self) -> list[str]:
-        name, kind = split(self.event)
-        if is_tau(self.event) or not has_plant_location(self.unit.layout.model.communication(name)):
-            return []
-        communication = self.unit.layout.model.communication(name)
-        _, target = plant_step(communication, EventKind(kind))
-        return [] if target is None else [self._move(communication_plant_name(communication), target)]
+        plant, _, target = self._plant_step or ("", (), None)
+        return [] if target is None else [self._move(plant, target)]
 
     def _move(self, automaton: str, target: str) -> str:
         layout = self.unit.layout

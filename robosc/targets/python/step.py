@@ -6,7 +6,6 @@ other, so whatever is read after it may have been written is first copied to a l
 
 from collections.abc import Iterator
 
-from robosc.automata.plants import communication_plant_name
 from robosc.expressions import (
     ArrayType,
     DoubleType,
@@ -20,7 +19,7 @@ from robosc.expressions import (
 )
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
-from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable, is_tau
+from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable
 from robosc.targets.code.conditions import accepted
 from robosc.targets.code.expressions import (
     FALSE_CODE,
@@ -36,7 +35,7 @@ from robosc.targets.code.expressions import (
     place,
 )
 from robosc.targets.code.text import indent
-from robosc.targets.events import Branch, branches_of, has_plant_location, is_controllable, plant_step, split
+from robosc.targets.events import Branch, branches_of, is_controllable, plant_step, split
 from robosc.targets.paths import path_text, path_type
 from robosc.targets.python.changes import noted_change, noted_write
 from robosc.targets.python.expressions import Scope, code_text
@@ -137,7 +136,7 @@ class _StepWriter:
         self.scope = Scope(
             writer.used.add, self._variable, self._location, self._received, self._received_type, self._type_below
         )
-        self._protocol = _protocol(writer, event)
+        self._plant_step = plant_step(writer.model, event)
 
     def method(self) -> list[str]:
         """The whole method."""
@@ -167,10 +166,10 @@ class _StepWriter:
     def _refusals(self) -> list[str]:
         """Return None where the event is not accepted, before anything changes."""
         lines = []
-        if self._protocol is not None:
-            location, sources, _ = self._protocol
+        if self._plant_step is not None:
+            plant, sources, _ = self._plant_step
             test = f"!= {sources[0]!r}" if len(sources) == 1 else f"not in {sources!r}"
-            lines += [f"if {location} {test}:", "    return None"]
+            lines += [f"if {self.writer.scope.location(plant)} {test}:", "    return None"]
         if is_controllable(self.event):
             for words, code in accepted(self.writer.model, self.event, self.writer.scope):
                 refused = code_text(self.scope.negated(code))
@@ -179,9 +178,10 @@ class _StepWriter:
 
     def _plant(self) -> list[str]:
         """Move the plant of a service or action."""
-        if self._protocol is None or self._protocol[2] is None:
+        plant, sources, target = self._plant_step or ("", (), None)
+        if target is None:
             return []
-        location, sources, target = self._protocol
+        location = self.writer.scope.location(plant)
         if target in sources:
             return noted_write(location, literal(repr(target), Sort.ENUM), self.writer.stale)
         return [f"{location} = {target!r}", *noted_change(location, self.writer.stale)]
@@ -304,15 +304,3 @@ class _StepWriter:
     def _checked(self, function: str, *arguments: Code) -> Code:
         self.writer.used.add(function)
         return call(function, *arguments, unknown=Unknown.VALUE)
-
-
-def _protocol(writer: Writer, event: str) -> tuple[str, tuple[str, ...], str | None] | None:
-    """Attribute of the event's service or action, the locations that it is possible in, and where it leads."""
-    name, kind = split(event)
-    if is_tau(event):
-        return None
-    communication = writer.model.communication(name)
-    if not has_plant_location(communication):
-        return None
-    sources, target = plant_step(communication, EventKind(kind))
-    return writer.scope.location(communication_plant_name(communication)), sources, target

@@ -10,7 +10,7 @@ from robosc.expressions.text import expression_text
 from robosc.model.structure import Behaviour, Deployment, EventKind, Model, Transition, is_tau
 from robosc.supervisor import Supervisor
 from robosc.targets.events import plant_step, split, taken_transition
-from robosc.targets.words import requirement_text
+from robosc.targets.model_text import requirement_text
 
 
 class InOneOf(NamedTuple):

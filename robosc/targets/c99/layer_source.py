@@ -64,7 +64,7 @@ def _match_function(unit: Unit, item: Communication) -> list[str]:
             lines.append("(void)data;")
         lines += reader.take_lines()
         lines += [f"(void){name};" for name in reader.names]
-        reading = Reading(unit, None, reader.read, reader.type_at)
+        reading = Reading(unit, None, reader.read, data)
     return [
         f"static int {layout.function('matches', item.name)}({', '.join(parameters)})",
         "{",

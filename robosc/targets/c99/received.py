@@ -129,7 +129,7 @@ def converter(unit: Unit, enum: EnumDefinition) -> list[str]:
 def _conversion(unit: Unit, enum: EnumDefinition) -> list[str]:
     lvalue = Lvalue("data", unit.layout.is_by_pointer(enum.source))
     reader = Reader(unit, enum.source, lvalue, "notes")
-    reading = Reading(unit, None, reader.read, reader.type_at)
+    reading = Reading(unit, None, reader.read, enum.source)
     values = unit.layout.values
     body = ["(void)data;", "(void)notes;"]
     all_false = TRUE_CODE

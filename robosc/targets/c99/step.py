@@ -16,7 +16,7 @@ from robosc.expressions import (
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
 from robosc.model.structure import Behaviour, Transition, Update, Variable, is_tau
-from robosc.targets.c99.expressions import c_type, low_text
+from robosc.targets.c99.expressions import ATOM, c_type, low_text
 from robosc.targets.c99.layout import event_data, width
 from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.received import Reader
@@ -26,7 +26,6 @@ from robosc.targets.code.conditions import accepted
 from robosc.targets.code.expressions import Code, Sort
 from robosc.targets.code.text import indent
 from robosc.targets.events import Branch, branches_of, is_controllable, plant_step
-from robosc.targets.paths import path_type
 
 
 class Stepper:
@@ -46,15 +45,15 @@ class Stepper:
         self._received: dict[Path, Code] = {}
         self._may_skip = False
         self._plant_step = plant_step(unit.layout.model, event)
-        self._reading = Reading(unit, "old.", self._read, self._type_at)
+        self._reading = Reading(unit, "old.", self._read, self.data)
 
     @property
     def parameters(self) -> list[str]:
         """Parameters of the step function after the state: one value for each path."""
         self._name_received()
         return [
-            f"const {self.unit.layout.raw(self._type_at(path))} *{code.word}"
-            if isinstance(self._type_at(path), ArrayType)
+            f"const {self.unit.layout.raw(self._reading.received_type(path))} *{code.word}"
+            if isinstance(self._reading.received_type(path), ArrayType)
             else declared(c_type(code.sort), code.word)
             for path, code in self._received.items()
         ]
@@ -130,9 +129,6 @@ class Stepper:
 
     def _read(self, path: Path) -> Code:
         return self._received[path]
-
-    def _type_at(self, path: Path) -> Type:
-        return path_type(self.unit.layout.model, self._root, path)
 
     def _refusals(self) -> list[str]:
         """Refuse where the event is not accepted, before anything changes."""

@@ -11,7 +11,6 @@ from robosc.expressions import (
     ArrayType,
     BooleanType,
     DoubleType,
-    Element,
     EnumType,
     IntegerType,
     ObjectType,
@@ -25,8 +24,9 @@ from robosc.expressions import (
     leaves,
 )
 from robosc.model.received import Path
+from robosc.model.structure import Model
 from robosc.supervisor import Supervisor
-from robosc.targets.c99.expressions import C, CWriter, c_type, code_text, number_code, unknown_as, unknown_text
+from robosc.targets.c99.expressions import C, CWriter, c_type, number_code, unknown_as, unknown_text
 from robosc.targets.c99.layout import Layout, make_layout
 from robosc.targets.code.expression_writer import read_nothing
 from robosc.targets.code.expressions import (
@@ -178,15 +178,20 @@ class Reading(CWriter):
         unit: The file.
         base: Text before a member of the state, or None where there is no state.
         received: Code of received data by path; of an array, its address.
-        received_type: Type of received data by path.
+        root: Type of the received data, or None where there is none.
         elements: Place and type of what the quantifiers around look at, the innermost first.
     """
 
     unit: Unit
     base: str | None = "s->"
     received: Callable[[Path], Code] = read_nothing
-    received_type: Callable[[Path], Type] = read_nothing
+    root: Type | None = None
     elements: tuple[tuple[Lvalue, Type], ...] = ()
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+        return self.unit.layout.model
 
     def variable(self, component: str, name: str) -> tuple[str, Type]:
         """Text and type of a variable."""
@@ -207,9 +212,6 @@ class Reading(CWriter):
         """A statement that is executed where a known condition does not hold."""
         return [f"if ({self.unit.text(self.negated(code))}) {{", f"    {statement}", "}"]
 
-    def _received_code(self, path: tuple[PathStep, ...]) -> Code:
-        return self.received(path)
-
     def location(self, automaton: str) -> str:
         """Text of an automaton's location."""
         return f"{self.base}{self.unit.layout.locations[automaton]}"
@@ -217,18 +219,6 @@ class Reading(CWriter):
     def _element_code(self, level: int, path: tuple[PathStep, ...]) -> Code:
         lvalue, type_ = self.elements[level]
         return self.unit.part(lvalue, type_, path, "NULL")
-
-    def _array(self, part: ArrayPart) -> tuple[Code, ArrayType]:
-        """Address and type of an array; the address is NULL where it is absent."""
-        match part.array:
-            case Received(path=path):
-                code, type_ = self.received(path), self.received_type(path)
-            case Element(level=level, path=path):
-                code = self._element_code(level, path)
-                type_ = path_type(self.unit.layout.model, self.elements[level][1], path)
-        if not isinstance(type_, ArrayType):
-            raise InternalError(f"{code_text(code)} is no array")
-        return code, type_
 
     def _loop(self, part: ArrayPart) -> tuple[str, str, set[str]]:
         """The number of elements that are looked at, the place of the one with number `k`, and what these call."""
@@ -305,7 +295,7 @@ class Reading(CWriter):
             parameters.append(pointer_to(raw(outer_type), f"outer_{number + 1}"))
             arguments.append(Code(Kind.PLACE, lvalue.address))
             elements.append((Lvalue(f"outer_{number + 1}", True), outer_type))
-        inner = Reading(self.unit, "s->", codes.__getitem__, self.received_type, tuple(elements))
+        inner = Reading(self.unit, "s->", codes.__getitem__, self.root, tuple(elements))
         with self.unit.uses_apart() as used:
             condition = self.unit.text(inner.value(expression.condition))
         ends = int(expression.word == "any")

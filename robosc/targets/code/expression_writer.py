@@ -9,14 +9,16 @@ A number that is unknown as NaN is compared natively: the comparisons of IEEE 75
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from robosc.errors import InternalError
 from robosc.expressions import (
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
+    ArrayPart,
+    ArrayType,
     Binary,
     Call,
     Conditional,
@@ -24,18 +26,21 @@ from robosc.expressions import (
     Element,
     EnumValue,
     Expression,
-    PathStep,
     Quantifier,
     Received,
     Reduction,
     StateTest,
+    Type,
     Unary,
     VariableRead,
     children,
 )
 from robosc.expressions.bounds import call_bounds
+from robosc.model.received import Path
+from robosc.model.structure import Model
 from robosc.targets.acceptance import Condition, InOneOf, StaysInRange
 from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, Kind, Sort, Unknown, bounds_of, operation
+from robosc.targets.paths import path_type
 
 _ARITHMETIC = frozenset({"+", "-", "*", "/"})
 COMPARISONS = ("=", "!=", "<", "<=", ">", ">=")
@@ -66,9 +71,24 @@ def may_compute(conditions: Iterable[Expression]) -> bool:
 
 
 class ExpressionWriter(ABC):
-    """Writes expressions in one language, at one place of the generated code."""
+    """Writes expressions in one language, at one place of the generated code.
+
+    Attributes:
+        received: The code that reads received data of a path.
+        root: Type of the received data, or None where there is none.
+        elements: Place and type of what the quantifiers around look at, the innermost first.
+    """
+
+    received: Callable[[Path], Code]
+    root: Type | None
+    elements: tuple[tuple[Any, Type], ...]
 
     # What the expressions read
+
+    @property
+    @abstractmethod
+    def model(self) -> Model:
+        """The model, for the types of parts."""
 
     @abstractmethod
     def _constant_code(self, constant: bool | int | float | str) -> Code:
@@ -87,11 +107,7 @@ class ExpressionWriter(ABC):
         """Return the code that tests whether an automaton is in a location, or is not."""
 
     @abstractmethod
-    def _received_code(self, path: tuple[PathStep, ...]) -> Code:
-        """The code that reads received data."""
-
-    @abstractmethod
-    def _element_code(self, level: int, path: tuple[PathStep, ...]) -> Code:
+    def _element_code(self, level: int, path: Path) -> Code:
         """The code of a part of a quantifier's element."""
 
     @abstractmethod
@@ -152,6 +168,22 @@ class ExpressionWriter(ABC):
         """An implication between conditions that may be unknown."""
         return self._kleene_call("implies", left, right)
 
+    def received_type(self, path: Path) -> Type:
+        """The type of received data of a path."""
+        assert self.root is not None  # noqa: S101  # There are paths only where data comes.
+        return path_type(self.model, self.root, path)
+
+    def _array(self, part: ArrayPart) -> tuple[Code, ArrayType]:
+        """The array that is looked at a part of, and its type."""
+        match part.array:
+            case Received(path=path):
+                code, type_ = self.received(path), self.received_type(path)
+            case Element(level=level, path=path):
+                code, type_ = self._element_code(level, path), path_type(self.model, self.elements[level][1], path)
+        if not isinstance(type_, ArrayType):
+            raise InternalError(f"{code.word} is no array")
+        return code, type_
+
     # The three readings
 
     def value(self, expression: Expression) -> Code:
@@ -166,7 +198,7 @@ class ExpressionWriter(ABC):
             case StateTest(component=component, state=state):
                 return self.state_code(component, state)
             case Received(path=path):
-                return self._received_code(path)
+                return self.received(path)
             case Unary(operator="holds", operand=operand):
                 return self.truth(operand)
             case Unary(operator="not", operand=operand):

@@ -8,8 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
-from robosc.errors import InternalError
-from robosc.expressions import ArrayPart, ArrayType, Element, PathStep, Quantifier, Received, Reduction, Type
+from robosc.expressions import ArrayPart, Quantifier, Reduction, Type
+from robosc.model.received import Path
+from robosc.model.structure import Model
 from robosc.targets.code.expression_writer import ExpressionWriter, read_nothing
 from robosc.targets.code.expressions import (
     FALSE_CODE,
@@ -26,6 +27,7 @@ from robosc.targets.code.expressions import (
     operation,
     place,
 )
+from robosc.targets.paths import path_type
 
 
 class Precedence(IntEnum):
@@ -111,20 +113,20 @@ class Scope(ExpressionWriter):
 
     Attributes:
         used: Function called with the name of each function of `values` that the code needs.
+        model: The model, for the types of parts.
         variable: Text and type of a variable, given component and variable.
         location: Text of an automaton's current location.
         received: The code that reads received data of a path.
-        received_type: The type of received data of a path.
-        type_below: The type of a part of a type.
+        root: Type of the received data, or None where there is none.
         elements: Local name and type of what the quantifiers around look at, the innermost first.
     """
 
     used: Callable[[str], None]
+    model: Model
     variable: Callable[[str, str], tuple[str, Type]] = read_nothing
     location: Callable[[str], str] = read_nothing
-    received: Callable[[tuple[PathStep, ...]], Code] = read_nothing
-    received_type: Callable[[tuple[PathStep, ...]], Type] = read_nothing
-    type_below: Callable[[Type, tuple[PathStep, ...]], Type] = read_nothing
+    received: Callable[[Path], Code] = read_nothing
+    root: Type | None = None
     elements: tuple[tuple[str, Type], ...] = ()
 
     def _constant_code(self, constant: bool | int | float | str) -> Code:
@@ -164,39 +166,30 @@ class Scope(ExpressionWriter):
             return operation("between", integer(low), code, integer(high))
         return self._helper("stays_in_range", code, integer(low), integer(high))
 
-    def _received_code(self, path: tuple[PathStep, ...]) -> Code:
-        return self.received(path)
-
-    def _element_code(self, level: int, path: tuple[PathStep, ...]) -> Code:
+    def _element_code(self, level: int, path: Path) -> Code:
         name, type_ = self.elements[level]
         code = place(name, type_, Unknown.VALUE)
         for step in path:
             function = "read_element" if isinstance(step, int) else "read_property"
             code = self._helper(function, code, literal(repr(step), Sort.TEXT))
-        return code.typed(self.type_below(type_, path), Unknown.VALUE)
+        return code.typed(path_type(self.model, type_, path), Unknown.VALUE)
 
-    def _array(self, part: ArrayPart) -> tuple[Code, Type]:
+    def _elements(self, part: ArrayPart) -> tuple[Code, Type]:
         """The elements that are looked at, and their type."""
-        match part.array:
-            case Received(path=path):
-                code, type_ = self.received(path), self.received_type(path)
-            case Element(level=level, path=path):
-                code, type_ = self._element_code(level, path), self.type_below(self.elements[level][1], path)
-        if not isinstance(type_, ArrayType):
-            raise InternalError(f"{code_text(code)} is no array")
+        code, type_ = self._array(part)
         if part.low is not None and part.high is not None:
             code = self._helper("array_part", code, integer(part.low), integer(part.high))
         return code, type_.element
 
     def _reduction_code(self, expression: Reduction) -> Code:
-        array, element = self._array(expression.part)
+        array, element = self._elements(expression.part)
         code = self._helper(_REDUCTIONS[expression.function], array)
         if expression.function == "length":
             return replace(code, sort=Sort.INTEGER, unknown=Unknown.VALUE, low=0)
         return code.typed(element, Unknown.VALUE)
 
     def _quantifier_code(self, expression: Quantifier) -> Code:
-        array, element = self._array(expression.part)
+        array, element = self._elements(expression.part)
         name = f"x{len(self.elements) + 1}"
         inner = replace(self, elements=((name, element), *self.elements))
         condition = operation("lambda", place(name, element), inner.value(expression.condition))

@@ -82,15 +82,11 @@ class Reader:
     @property
     def scope(self) -> Scope:
         """The scope of conditions on the datum."""
-        return Scope(self.used.add, received=self.read, received_type=self.type_at, type_below=self.type_below)
+        return Scope(self.used.add, self.layout.model, received=self.read, root=self.root_type)
 
     def type_at(self, path: Path) -> Type:
         """The type of a path."""
         return path_type(self.layout.model, self.root_type, path)
-
-    def type_below(self, type_: Type, path: Path) -> Type:
-        """The type of a part of a type."""
-        return path_type(self.layout.model, type_, path)
 
     def seen(self, path: Path) -> str:
         """Text of a path's value as the event log shows it: as it came, None where nothing fitting came."""

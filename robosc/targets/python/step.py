@@ -133,9 +133,8 @@ class _StepWriter:
         self.received: dict[Path, Code] = {}
         self.copies: dict[str, str] = {}
         self.may_skip = False
-        self.scope = Scope(
-            writer.used.add, self._variable, self._location, self._received, self._received_type, self._type_below
-        )
+        root = _event_type(writer, event) if self.paths else None
+        self.scope = Scope(writer.used.add, writer.model, self._variable, self._location, self._received, root)
         self._plant_step = plant_step(writer.model, event)
 
     def method(self) -> list[str]:
@@ -226,12 +225,6 @@ class _StepWriter:
 
     def _received(self, path: tuple[PathStep, ...]) -> Code:
         return self.received[path]
-
-    def _received_type(self, path: Path) -> Type:
-        return path_type(self.writer.model, _event_type(self.writer, self.event), path)
-
-    def _type_below(self, type_: Type, path: Path) -> Type:
-        return path_type(self.writer.model, type_, path)
 
     def _block(self, component: str, behaviour: Behaviour, branches: list[Branch]) -> list[str]:
         """Return the statements of what one component does."""

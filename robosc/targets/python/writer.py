@@ -34,7 +34,7 @@ class Writer:
     skipping: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        self.scope = Scope(self.used.add, self._variable, self._location)
+        self.scope = Scope(self.used.add, self.model, self._variable, self._location)
         self.conditions = PythonConditions(self.layout, self.system, self.scope)
 
     @property

@@ -51,6 +51,34 @@ def require_names_of_a_layer(found: tuple[Topic, ...], asked: tuple[Communicatio
         _require_one_each(f"{kind}s", ((item.identifier, item.name) for item in asked if item.kind is kind))
 
 
+def require_own_topics(
+    found: tuple[Topic, ...], asked: tuple[Communication, ...], action_topics: tuple[str, ...]
+) -> None:
+    """Do nothing if no topic is one of those that an action is made of: a layer has a server of its own there.
+
+    Args:
+        found: The topics.
+        asked: The services and actions.
+        action_topics: Topics that an action is made of, below its name; none where an action has a name of its own.
+
+    Raises:
+        UnsupportedModelError: One is; says which.
+    """
+    parts = {
+        robots_name("", f"{item.identifier}/{part}"): item.name
+        for item in asked
+        if item.kind is CommunicationKind.ACTION
+        for part in action_topics
+    }
+    for topic in found:
+        action = parts.get(robots_name("", topic.identifier))
+        if action is not None:
+            raise UnsupportedModelError(
+                f"the topic {topic.identifier} is a part of the action '{action}', which a supervision layer offers "
+                "by itself"
+            )
+
+
 def _require_own_sides(identifier: str) -> None:
     if identifier.startswith("~"):
         raise UnsupportedModelError(

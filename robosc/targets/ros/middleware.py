@@ -16,8 +16,8 @@ from robosc.targets.files import GeneratedFiles
 from robosc.targets.python.generate import header
 from robosc.targets.python.package import beside_supervisor, python_text
 from robosc.targets.registry import GenerateOptions
-from robosc.targets.ros.layer import Renamed, remapped_names, require_names_of_a_layer
-from robosc.targets.ros.package import chosen, context, error_context, packages, release_identifiers, require_own_names
+from robosc.targets.ros.layer import Renamed, remapped_names, require_names_of_a_layer, require_own_topics
+from robosc.targets.ros.package import chosen, context, packages, release_identifiers, require_own_names
 from robosc.targets.ros.runtime.parameters import Parameter, declarations
 from robosc.targets.ros.runtime.supervised import callers_name, robots_name
 from robosc.targets.ros.topics import Topic, servers, topics
@@ -54,7 +54,7 @@ _FILES_OF = {
 _TEMPLATES_OF_A_LAYER = {"README.md": "README_layer.md", "node.py": "layer_node.py", "start.py": "start_layer.py"}
 
 
-def _nothing_more(found: tuple[Topic, ...], asked: tuple[Communication, ...], deployment: Deployment) -> None:
+def _nothing_more(found: tuple[Topic, ...], asked: tuple[Communication, ...]) -> None:
     """Every name that ROS 2 takes is one."""
 
 
@@ -72,6 +72,7 @@ class Middleware:
         remapped: Names everything that an existing controller has to call otherwise, given messages and services, and
             actions.
         require_names: Raises UnsupportedModelError for what is no name in this middleware.
+        parts_of_actions: Topics that an action is made of, below its name; none where an action has a name of its own.
         parameters: Its own parameters.
         without: Parameters that its nodes have in another way, or not at all.
         script: Template of the programs, or nothing where something else makes them.
@@ -85,7 +86,8 @@ class Middleware:
     files: tuple[str, ...]
     launch: str
     remapped: Callable[[Iterable[str], Iterable[str]], Renamed]
-    require_names: Callable[[tuple[Topic, ...], tuple[Communication, ...], Deployment], None] = _nothing_more
+    require_names: Callable[[tuple[Topic, ...], tuple[Communication, ...]], None] = _nothing_more
+    parts_of_actions: tuple[str, ...] = ()
     parameters: tuple[Parameter, ...] = ()
     without: frozenset[str] = frozenset()
     script: str = ""
@@ -103,9 +105,10 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
     with error_context(middleware.target):
         found, asked = topics(supervisor.model), servers(supervisor.model)
         require_own_names(name, found, asked)
-        middleware.require_names(found, asked, deployment)
+        middleware.require_names(found, asked)
         if deployment is Deployment.LAYER:
             require_names_of_a_layer(found, asked)
+            require_own_topics(found, asked, middleware.parts_of_actions)
         values = context(supervisor, name, found, asked)
     declared = (*declarations(release_identifiers(found), str(deployment)), *middleware.parameters)
     values["dependencies"] = sorted({*middleware.dependencies, *packages(found, asked)})

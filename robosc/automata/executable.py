@@ -47,6 +47,17 @@ class Moves:
     plant: str
     targets: Mapping[str, str]
 
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """The locations from which the event is possible."""
+        return tuple(self.targets)
+
+    @property
+    def target(self) -> str | None:
+        """The location that the event leads to; None where it stays."""
+        found = {target for source, target in self.targets.items() if target != source}
+        return found.pop() if found else None
+
 
 @dataclass(frozen=True, slots=True)
 class Participant:

@@ -5,11 +5,10 @@ The conditions that the supervisor adds come on top; each generator writes decis
 
 from typing import NamedTuple
 
+from robosc.automata.executable import ExecutableEvent, Participant
 from robosc.expressions import FALSE, TRUE, Expression, IntegerType, StateTest, Unary, conjunction
 from robosc.expressions.text import expression_text
-from robosc.model.structure import Behaviour, Deployment, EventKind, Model, Transition, is_tau
-from robosc.supervisor import Supervisor
-from robosc.targets.events import plant_step, split, taken_transition
+from robosc.model.structure import EventKind, Requirement, Transition
 from robosc.targets.model_text import requirement_text
 
 
@@ -40,55 +39,45 @@ Condition = Expression | InOneOf | StaysInRange
 """An expression holds only when it is true."""
 
 
-def enabling_conditions(supervisor: Supervisor, event: str) -> list[tuple[str, Condition]]:
-    """Return the conditions that a controllable event needs, each with words: plants, ranges, requirements."""
-    model = supervisor.model
-    name, kind = split(event)
+def enabling_conditions(event: ExecutableEvent) -> list[tuple[str, Condition]]:
+    """Return the conditions that an issued event needs, each with words: plants, ranges, requirements."""
     result: list[tuple[str, Condition]] = []
-    if is_tau(event):
-        result.append(_changes_something(model, event))
-    if (step := plant_step(model, event)) is not None:
-        plant, sources, _ = step
+    if event.communication is None:
+        result.append(_changes_something(event))
+    if event.moves is not None:
+        plant, sources = event.moves.plant, event.moves.sources
         result.append((f"{plant} is {' or '.join(sources)}", InOneOf(plant, sources)))
-    result += accepting_conditions(model, event)
-    if kind == EventKind.REQUEST:
-        result += [(requirement_text(item), item.condition) for item in model.requirements_on(name)]
-    elif kind == EventKind.CANCEL:
-        result += _cancel_condition(supervisor, name)
+    result += accepting_conditions(event)
+    if event.kind is EventKind.CANCEL:
+        result += _cancel_condition(event.requirements)
+    else:
+        result += [(requirement_text(item), item.condition) for item in event.requirements]
     return result
 
 
-def accepting_conditions(model: Model, event: str) -> list[tuple[str, Condition]]:
-    """Return the conditions for behaviours to accept a controllable event and keep synthesis variables in range."""
-    if is_tau(event):
-        return [_tau_condition(model, event)]
-    return [
-        condition
-        for component in model.components
-        if component.behaviour
-        for condition in _component_conditions(component.name, component.behaviour, event)
-    ]
+def accepting_conditions(event: ExecutableEvent) -> list[tuple[str, Condition]]:
+    """Return the conditions for behaviours to accept an issued event and keep synthesis variables in range."""
+    if event.communication is None:
+        return [_tau_condition(event)]
+    return [condition for participant in event.participants for condition in _component_conditions(participant)]
 
 
-def _cancel_condition(supervisor: Supervisor, action: str) -> list[tuple[str, Condition]]:
-    """Cancel only where at least one requirement does not hold; without requirements, and as a layer, anywhere."""
-    requirements = supervisor.model.requirements_on(action)
-    if not requirements or supervisor.deployment is Deployment.LAYER:
+def _cancel_condition(requirements: tuple[Requirement, ...]) -> list[tuple[str, Condition]]:
+    """Cancel only where at least one requirement does not hold; where there is none, anywhere."""
+    if not requirements:
         return []
     all_hold = conjunction(*(requirement.condition for requirement in requirements))
     return [("at least one of the action's requirements does not hold", Unary("not", Unary("holds", all_hold)))]
 
 
-def _tau(model: Model, event: str) -> tuple[str, Transition]:
+def _tau(event: ExecutableEvent) -> tuple[str, Transition]:
     """The component and the transition of a tau."""
-    component, _ = split(event)
-    behaviour = model.component(component).behaviour
-    assert behaviour is not None  # noqa: S101  # It has the tau.
-    return component, next(item for item in behaviour.transitions if item.event == event)
+    (participant,) = event.participants
+    return participant.component, next(iter(participant.taken.values()))
 
 
-def _tau_condition(model: Model, event: str) -> tuple[str, Condition]:
-    component, transition = _tau(model, event)
+def _tau_condition(event: ExecutableEvent) -> tuple[str, Condition]:
+    component, transition = _tau(event)
     guard = transition.guard if transition.guard is not None else TRUE
     source = f"in {transition.source}: " if transition.source else ""
     condition = f" if {expression_text(guard)}" if transition.guard is not None else ""
@@ -97,9 +86,9 @@ def _tau_condition(model: Model, event: str) -> tuple[str, Condition]:
     return f"{component}: {source}transition{condition}{target}", conjunction(place, guard)
 
 
-def _changes_something(model: Model, event: str) -> tuple[str, Condition]:
+def _changes_something(event: ExecutableEvent) -> tuple[str, Condition]:
     """A tau that would change nothing is not taken."""
-    component, transition = _tau(model, event)
+    component, transition = _tau(event)
     if transition.target is None or transition.target == transition.source:
         return "it would change nothing", FALSE
     if transition.source is not None:
@@ -107,18 +96,15 @@ def _changes_something(model: Model, event: str) -> tuple[str, Condition]:
     return f"{component} is elsewhere", Unary("not", StateTest(component, transition.target))
 
 
-def _component_conditions(component: str, behaviour: Behaviour, event: str) -> list[tuple[str, Condition]]:
-    """Return the conditions for a component to accept a request and keep every synthesis variable in its range."""
-    if not any(item.event == event for item in behaviour.transitions):
-        return []
-    taken = {state.name: taken_transition(behaviour, event, state.name) for state in behaviour.states}
-    accepting = tuple(state for state, transition in taken.items() if transition is not None)
+def _component_conditions(participant: Participant) -> list[tuple[str, Condition]]:
+    """Return the conditions for a component to accept an event and keep every synthesis variable in its range."""
+    component, behaviour, taken = participant.component, participant.behaviour, participant.taken
     result: list[tuple[str, Condition]] = []
-    if len(accepting) < len(taken) and split(event)[1] == EventKind.REQUEST:
-        result.append((f"{component} accepts it in {', '.join(accepting)}", InOneOf(component, accepting)))
+    if participant.may_block and len(taken) < len(behaviour.states):
+        result.append((f"{component} accepts it in {', '.join(taken)}", InOneOf(component, tuple(taken))))
     variables = {variable.name: variable for variable in behaviour.variables}
     for state, transition in taken.items():
-        for update in transition.updates if transition is not None else ():
+        for update in transition.updates:
             variable = variables[update.variable]
             if variable.is_synthesis and isinstance(variable.type, IntegerType):
                 words = f"{component}.{update.variable} := {expression_text(update.expression)} stays in its range"

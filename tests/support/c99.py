@@ -8,6 +8,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import communication_plant_name
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.clock import ManualClock
@@ -30,7 +31,6 @@ from robosc.model.structure import CommunicationKind, ObjectValue
 from robosc.supervisor import Supervisor
 from robosc.targets import generate
 from robosc.targets.c99.layout import PLANT_LOCATIONS, Layout, event_data, make_layout
-from robosc.targets.events import has_plant_location
 from support.c99_main import batch_types, events_back, test_program
 
 GCC = shutil.which("gcc")
@@ -247,10 +247,10 @@ class Reference:
             for variable in behaviour.variables:
                 words.append(self._value(variable.type, state[component]["variables"][variable.name]))
         for item in self.model.communications:
-            if has_plant_location(item):
+            if item.kind in CALLED_KINDS:
                 place = self.system._state[communication_plant_name(item), None]
                 words.append(str(PLANT_LOCATIONS[item.kind].index(str(place))))
-        enabled = "".join(str(int(self.system.enabled(event))) for event in self.layout.controllable)
+        enabled = "".join(str(int(self.system.enabled(event))) for event in self.layout.issued)
         counters, executor = self.executor.counters, self.executor
         before = self.clock.now_s
         if now_s is not None:

@@ -2,6 +2,7 @@
 
 import re
 
+from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import communication_plant_name
 from robosc.expressions import (
     ArrayType,
@@ -21,7 +22,6 @@ from robosc.targets.c99.layout import Layout, event_data
 from robosc.targets.c99.provide import Field, request_field
 from robosc.targets.c99.source import source_file
 from robosc.targets.c99.unit import make_unit
-from robosc.targets.events import has_plant_location
 
 _TOP = """
 #include "@p@.h"
@@ -337,10 +337,10 @@ class _Program:
                 name, type_ = layout.variables[component, variable.name]
                 lines.append("    " + _print_value(type_, f"r.state.{name}"))
         for item in layout.model.communications:
-            if has_plant_location(item):
+            if item.kind in CALLED_KINDS:
                 lines.append(f'    printf(" %d", (int)r.state.{layout.locations[communication_plant_name(item)]});')
         lines.append('    printf(" enabled ");')
-        lines += [f'    printf("%d", (int)@p@_enabled(&r, {layout.events[event]}));' for event in layout.controllable]
+        lines += [f'    printf("%d", (int)@p@_enabled(&r, {layout.events[event]}));' for event in layout.issued]
         lines.append(
             '    printf(" status %d fault %d counters %u %u %u\\n", (int)@p@_status(&r, now_us), @p@_fault(&r) != 0,'
             " (unsigned)r.counters.unknown, (unsigned)r.counters.unexpected, (unsigned)r.counters.faults);"

@@ -4,6 +4,7 @@ import re
 from importlib import resources
 
 from robosc._version import __version__
+from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import communication_plant_name
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import (
@@ -27,7 +28,6 @@ from robosc.targets.c99.step import unknown_name
 from robosc.targets.c99.text import comment, safe
 from robosc.targets.c99.unit import Unit, declared
 from robosc.targets.code.text import indent
-from robosc.targets.events import has_plant_location, is_controllable, split
 from robosc.targets.model_text import requirement_text
 
 
@@ -161,7 +161,7 @@ def _unknowns(layout: Layout) -> list[str]:
 def counts(layout: Layout) -> dict[str, int]:
     """The numbers that the engine is made for."""
     model, infos = layout.model, layout.description.communications
-    uncontrollable = [event for event in layout.events if not is_controllable(event)]
+    uncontrollable = [event.name for event in layout.executable.events.values() if not event.is_issued]
     return {
         "EVENT": len(layout.events),
         "COMMUNICATION": len(model.communications),
@@ -214,7 +214,7 @@ def _numbers(layout: Layout) -> list[str]:
             "",
         ]
     for item in layout.model.communications:
-        if has_plant_location(item):
+        if item.kind in CALLED_KINDS:
             plant = communication_plant_name(item)
             names = [layout.location_names[plant, location] for location in PLANT_LOCATIONS[item.kind]]
             lines += [
@@ -332,7 +332,7 @@ def _state(layout: Layout) -> list[str]:
             name, type_ = layout.variables[component, variable.name]
             body.append(f"{declared(stored_type(type_), name)}; /* {component}.{variable.name} */")
     for item in layout.model.communications:
-        if has_plant_location(item):
+        if item.kind in CALLED_KINDS:
             body.append(f"uint8_t {layout.locations[communication_plant_name(item)]}; /* {item.kind} {item.name} */")
     return [
         "/* The state: where everything is. */",
@@ -426,7 +426,7 @@ def receive_head(layout: Layout, identifier: str) -> str:
 
 def reply_head(layout: Layout, event: str) -> str:
     """The head of the function that takes what comes back to a request."""
-    name, kind = split(event)
+    name, kind = event.rpartition(".")[::2]
     purpose = {"feedback": "feedback"}.get(
         kind, "reply" if layout.model.communication(name).kind is CommunicationKind.SERVICE else "succeeded"
     )

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from robosc.automata.executable import CALLED_KINDS, ExecutableSystem
 from robosc.automata.plants import communication_plant_name
 from robosc.errors import InternalError
 from robosc.execution.interpreter import describe
@@ -21,7 +22,6 @@ from robosc.expressions import (
 from robosc.model.structure import Behaviour, Communication, CommunicationKind, Deployment, EventKind, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.c99.naming import CNamer, prefix_for
-from robosc.targets.events import events, has_plant_location, is_controllable
 
 PLANT_LOCATIONS = {
     CommunicationKind.SERVICE: ("idle", "waiting", "ready", "failed"),
@@ -99,14 +99,19 @@ class Layout:
         return self.prefix.upper()
 
     @property
+    def executable(self) -> ExecutableSystem:
+        """Everything that the model does."""
+        return self.supervisor.executable
+
+    @property
     def behaviours(self) -> tuple[tuple[str, Behaviour], ...]:
         """Components that have a behaviour, in source order."""
         return tuple((item.name, item.behaviour) for item in self.model.components if item.behaviour)
 
     @property
-    def controllable(self) -> tuple[str, ...]:
+    def issued(self) -> tuple[str, ...]:
         """Events the executor may cause: requests, cancels, resets in source order, then taus."""
-        return tuple(event for event in events(self.model) if is_controllable(event))
+        return tuple(event.name for event in self.executable.events.values() if event.is_issued)
 
     @property
     def requests(self) -> tuple[Communication, ...]:
@@ -199,7 +204,7 @@ def make_layout(supervisor: Supervisor, prefix: str | None = None) -> Layout:
     engine = {f"{start}_{name}" for start in (layout.prefix, layout.upper) for name in _ENGINE_NAMES}
     layout._namer = CNamer(frozenset(engine))
     name, upper = layout._namer.name, layout.upper
-    for event in events(model):
+    for event in supervisor.executable.events:
         layout.events[event] = name(f"{upper}_EVENT_{event.replace('.', '_')}")
     for item in model.communications:
         layout.communications[item.name] = name(f"{upper}_COMMUNICATION_{item.name}")
@@ -236,7 +241,7 @@ def _name_state(layout: Layout) -> None:
             member = members.name(f"v_{component}_{variable.name}")
             layout.variables[component, variable.name] = (member, variable.type)
     for item in layout.model.communications:
-        if has_plant_location(item):
+        if item.kind in CALLED_KINDS:
             plant = communication_plant_name(item)
             layout.locations[plant] = members.name(f"at_{item.name}")
             for location in PLANT_LOCATIONS[item.kind]:
@@ -270,7 +275,7 @@ def request_data(item: Communication) -> Type | None:
 def data_that_comes(layout: Layout) -> tuple[Type, ...]:
     """The types of all data that is handed over, in the order of the events."""
     model = layout.model
-    found = [event_data(model, event) for event in layout.events if not is_controllable(event)]
+    found = [event.received for event in layout.executable.events.values() if not event.is_issued]
     if layout.is_layer:
         found += [request_data(item) for topic in layout.topics for item in told_apart(model, topic)]
     return tuple(type_ for type_ in found if type_ is not None)

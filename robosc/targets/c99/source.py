@@ -1,5 +1,6 @@
 """The generated C file: tables, the functions of the model, the engine, and the functions through which data comes."""
 
+from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import communication_plant_name
 from robosc.expressions import ArrayType, BooleanType, DoubleType, EnumType, IntegerType, NoneType, ObjectType, Type
 from robosc.model.received import converted_paths
@@ -16,7 +17,6 @@ from robosc.targets.c99.step import Stepper, unknown_name
 from robosc.targets.c99.text import string_literal
 from robosc.targets.c99.unit import Unit
 from robosc.targets.code.text import indent
-from robosc.targets.events import has_plant_location, is_controllable, split
 
 _ENGINE = tuple(f"{part}.c" for part in "log releases goals steps policies decisions rest time replies life".split())
 _LAYER_ENGINE = tuple(f"{part}.c" for part in "log releases goals steps rest callers time replies layer life".split())
@@ -27,7 +27,7 @@ def source_file(unit: Unit) -> str:
     """The text of `<robot>.c`."""
     layout = unit.layout
     conditions = CConditions(unit)
-    allows = [conditions.allow_function(event) for event in layout.controllable]
+    allows = [conditions.allow_function(event) for event in layout.issued]
     steppers = [Stepper(unit, event) for event in layout.events if not _never_taken(layout, event)]
     steps = [item.step_function() for item in steppers]
     happens = [item.happen_function() for item in steppers if _happens(layout, item.event)]
@@ -72,7 +72,8 @@ def _never_taken(layout: Layout, event: str) -> bool:
 
 def _happens(layout: Layout, event: str) -> bool:
     """Return True if the environment causes an event otherwise than by an error."""
-    return not is_controllable(event) and split(event)[1] != EventKind.ERROR
+    found = layout.executable.events[event]
+    return not found.is_issued and found.kind is not EventKind.ERROR
 
 
 def _prologue(layout: Layout) -> str:
@@ -223,7 +224,7 @@ def _dispatchers(layout: Layout) -> list[list[str]]:
     """Return the functions through which the engine asks the model."""
     prefix, function, events = layout.prefix, layout.function, layout.events
     result = [_initial(layout), _same(layout), _model_settings(layout)]
-    allowed = [(events[event], f"return {function('allows', event)}(s);") for event in layout.controllable]
+    allowed = [(events[event], f"return {function('allows', event)}(s);") for event in layout.issued]
     result.append(
         _switch(
             f"static bool is_allowed(const state_t *s, {prefix}_event_t event)",
@@ -235,9 +236,9 @@ def _dispatchers(layout: Layout) -> list[list[str]]:
     )
     if layout.requests or layout.description.taus:
         taken = [
-            (name, f"return {function('takes', event)}(s);")
-            for event, name in events.items()
-            if (is_controllable(event) and not _never_taken(layout, event)) or split(event)[1] == EventKind.ERROR
+            (events[event.name], f"return {function('takes', event.name)}(s);")
+            for event in layout.executable.events.values()
+            if (event.is_issued and not _never_taken(layout, event.name)) or event.kind is EventKind.ERROR
         ]
         result.append(
             _switch(
@@ -315,7 +316,7 @@ def _initial(layout: Layout) -> list[str]:
             name, type_ = layout.variables[component, variable.name]
             lines.append(f"    s->{name} = {_literal(layout, type_, variable.initial)};")
     for item in layout.model.communications:
-        if has_plant_location(item):
+        if item.kind in CALLED_KINDS:
             plant = communication_plant_name(item)
             lines.append(f"    s->{layout.locations[plant]} = {layout.location_names[plant, 'idle']};")
     return [*lines, "}"]
@@ -344,7 +345,7 @@ def _same(layout: Layout) -> list[str]:
             is_plain = isinstance(type_, BooleanType | IntegerType | DoubleType | EnumType)
             tests.append(f"a->{name} == b->{name}" if is_plain else f"strcmp(a->{name}, b->{name}) == 0")
     for item in layout.model.communications:
-        if has_plant_location(item):
+        if item.kind in CALLED_KINDS:
             name = layout.locations[communication_plant_name(item)]
             tests.append(f"a->{name} == b->{name}")
     lines = ["static bool is_same_state(const state_t *a, const state_t *b)", "{", "    (void)a;", "    (void)b;"]

@@ -3,6 +3,7 @@
 All updates of a step read the state before it: a copy, of which a compiler keeps what is needed.
 """
 
+from robosc.automata.executable import Participant
 from robosc.expressions import (
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
@@ -25,7 +26,6 @@ from robosc.targets.c99.unit import Lvalue, Reading, Unit, declared
 from robosc.targets.code.conditions import accepted
 from robosc.targets.code.expressions import Code, Sort
 from robosc.targets.code.text import indent
-from robosc.targets.events import Branch, branches_of, is_controllable, plant_step
 
 
 class Stepper:
@@ -44,7 +44,7 @@ class Stepper:
         self._namer = CNamer(frozenset({"data", "notes", "s", "old", "skipped", "r"}))
         self._received: dict[Path, Code] = {}
         self._may_skip = False
-        self._plant_step = plant_step(unit.layout.model, event)
+        self._executable = unit.layout.executable.events[event]
         self._reading = Reading(unit, "old.", self._read, self.data)
 
     @property
@@ -63,8 +63,8 @@ class Stepper:
         parameters = self.parameters
         with self.unit.uses_apart() as used:
             body = [*self._refusals(), *self._plant()]
-            for component, behaviour, branches in branches_of(self.unit.layout.behaviours, self.event):
-                body += self._block(component, behaviour, branches)
+            for participant in self._executable.participants:
+                body += self._block(participant)
         self.unit.used |= used
         reads_old = any(word == "&old" or word.startswith("old.") for word in used)
         head = ", ".join(["state_t *s", *parameters])
@@ -133,26 +133,26 @@ class Stepper:
     def _refusals(self) -> list[str]:
         """Refuse where the event is not accepted, before anything changes."""
         lines = []
-        if self._plant_step is not None:
-            plant, sources, _ = self._plant_step
-            lines += self._reading.unless(self._reading.in_one_of(plant, sources), "return REFUSED;")
-        if is_controllable(self.event):
-            for words, code in accepted(self.unit.layout.model, self.event, self._reading):
+        if (moves := self._executable.moves) is not None:
+            lines += self._reading.unless(self._reading.in_one_of(moves.plant, moves.sources), "return REFUSED;")
+        if self._executable.is_issued:
+            for words, code in accepted(self._executable, self._reading):
                 lines += [*comment(words), *self._reading.unless(code, "return REFUSED;")]
         return lines
 
     def _plant(self) -> list[str]:
-        plant, _, target = self._plant_step or ("", (), None)
-        return [] if target is None else [self._move(plant, target)]
+        moves = self._executable.moves
+        return [] if moves is None or moves.target is None else [self._move(moves.plant, moves.target)]
 
     def _move(self, automaton: str, target: str) -> str:
         layout = self.unit.layout
         return f"s->{layout.locations[automaton]} = {layout.location_names[automaton, target]};"
 
-    def _block(self, component: str, behaviour: Behaviour, branches: list[Branch]) -> list[str]:
+    def _block(self, participant: Participant) -> list[str]:
         """Return the statements of what one component does."""
+        component, behaviour = participant.component, participant.behaviour
         lines: list[str] = []
-        for states, transition in branches:
+        for states, transition in participant.branches:
             body = self._transition(component, behaviour, states, transition)
             if body and len(states) == len(behaviour.states):
                 lines += body

@@ -3,8 +3,8 @@
 from abc import ABC, abstractmethod
 
 from robosc.automata import System
+from robosc.automata.executable import ExecutableEvent
 from robosc.conditions.rendering import Formulas, in_words, size_in_words
-from robosc.model.structure import Model
 from robosc.supervisor import DecisionDiagram, DecisionNode, Supervisor
 from robosc.supervisor.diagram import diagram_domains
 from robosc.targets.acceptance import accepting_conditions, enabling_conditions
@@ -15,9 +15,9 @@ Condition = tuple[str, Code]
 """Words that explain a condition, and its code."""
 
 
-def accepted(model: Model, event: str, scope: ExpressionWriter) -> list[Condition]:
+def accepted(event: ExecutableEvent, scope: ExpressionWriter) -> list[Condition]:
     """Return the conditions for behaviours to accept a controllable event and keep synthesis variables in range."""
-    found = ((words, scope.condition(item)) for words, item in accepting_conditions(model, event))
+    found = ((words, scope.condition(item)) for words, item in accepting_conditions(event))
     return [item for item in found if item[1] != TRUE_CODE]
 
 
@@ -50,7 +50,8 @@ class Conditions(ABC):
 
     def enabling(self, event: str) -> list[Condition]:
         """Return the conditions for an event to be allowed: plants, ranges, requirements, then the supervisor's."""
-        found = [(words, self._scope.condition(item)) for words, item in enabling_conditions(self._supervisor, event)]
+        needed = enabling_conditions(self._supervisor.executable.events[event])
+        found = [(words, self._scope.condition(item)) for words, item in needed]
         diagram = self._supervisor.added_condition(event)
         if diagram is not None:
             words, code = self._diagram(diagram)

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
+from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import communication_plant_name
 from robosc.expressions import (
     ArrayType,
@@ -24,7 +25,6 @@ from robosc.targets.c99.text import comment, string_literal
 from robosc.targets.c99.unit import Unit
 from robosc.targets.code.text import indent
 from robosc.targets.cpp.naming import require_field_name
-from robosc.targets.events import has_plant_location, is_controllable
 from robosc.targets.ros.state_topic import state_topic
 
 _LITERAL = 100
@@ -79,7 +79,10 @@ class Writer:
             f"inline constexpr const char* ROBOT = {string_literal(model.name)};",
             "",
             *_array("const char* const IDENTIFIERS", (string_literal(i.identifier) for i in model.communications)),
-            *_array("const bool IS_CONTROLLABLE", ("true" if is_controllable(e) else "false" for e in layout.events)),
+            *_array(
+                "const bool IS_CONTROLLABLE",
+                ("true" if event.is_issued else "false" for event in layout.executable.events.values()),
+            ),
             *comment("The event of each communication's request."),
             *_array("const int REQUEST_EVENTS", (self._request_event(item) for item in model.communications)),
             *comment("Of each outgoing message the number of its topic among those that are received."),
@@ -156,7 +159,7 @@ class Writer:
 
     def _put_communications(self) -> list[str]:
         layout = self.layout
-        called = [item for item in layout.model.communications if has_plant_location(item)]
+        called = [item for item in layout.model.communications if item.kind in CALLED_KINDS]
         lines = ["out += '{';"]
         for place, item in enumerate(called):
             names = ", ".join(string_literal(location) for location in PLANT_LOCATIONS[item.kind])

@@ -1,6 +1,7 @@
 """The generated `supervisor.py`: a class that implements `robosc.execution.runtime.protocol.ControlledSystem`."""
 
 from robosc._version import __version__
+from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import communication_plant_name
 from robosc.errors import InternalError, UnsupportedModelError
 from robosc.execution.interpreter import describe
@@ -9,7 +10,6 @@ from robosc.expressions import DoubleType
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets.code.text import indent, printable
-from robosc.targets.events import has_plant_location
 from robosc.targets.model_text import requirement_text
 from robosc.targets.python.bundle import bundle, section_title
 from robosc.targets.python.changes import (
@@ -132,7 +132,7 @@ def _supervisor_title(writer: Writer) -> list[str]:
 def _class(writer: Writer) -> list[str]:
     model, conditions = writer.model, writer.conditions
     requested = [item.name for item in model.communications if ("provide", item.name) in writer.layout.methods]
-    allows = [conditions.allow_method(event) for event in writer.layout.controllable]
+    allows = [conditions.allow_method(event) for event in writer.layout.issued]
     description = describe(writer.layout.supervisor)
     requests, silent = _allow_names(writer, description)
     writer.stale = stale_bits([*requests, *silent], conditions.reads)
@@ -147,8 +147,8 @@ def _class(writer: Writer) -> list[str]:
         _signature(writer),
     ]
     methods += allows
-    methods += [read_method(writer, event) for event in writer.layout.uncontrollable]
-    methods += [step_method(writer, event) for event in (*writer.layout.controllable, *writer.layout.uncontrollable)]
+    methods += [read_method(writer, event) for event in writer.layout.received]
+    methods += [step_method(writer, event) for event in (*writer.layout.issued, *writer.layout.received)]
     for identifier, batch in batches(description.communications).items():
         methods.append(receive_method(writer, identifier, tuple(event for _, event in batch)))
     methods += [provide_method(writer, name) for name in requested]
@@ -243,7 +243,7 @@ def _signature(writer: Writer) -> list[str]:
 
 
 def _location(writer: Writer) -> list[str]:
-    plants = [item for item in writer.model.communications if has_plant_location(item)]
+    plants = [item for item in writer.model.communications if item.kind in CALLED_KINDS]
     lines = ["def location(self, communication):", '    """Location of a service\'s or action\'s plant."""']
     for item in plants:
         place = writer.scope.location(communication_plant_name(item))

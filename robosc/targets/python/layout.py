@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from robosc.automata.executable import CALLED_KINDS, ExecutableSystem
 from robosc.automata.plants import communication_plant_name
 from robosc.expressions import Type
 from robosc.model.structure import (
@@ -12,7 +13,6 @@ from robosc.model.structure import (
     Model,
 )
 from robosc.supervisor import Supervisor
-from robosc.targets.events import events, has_plant_location, is_controllable
 from robosc.targets.python.naming import PythonNamer
 
 PROTOCOL_NAMES = (
@@ -61,19 +61,24 @@ class Layout:
         return self.supervisor.model
 
     @property
+    def executable(self) -> ExecutableSystem:
+        """Everything that the model does."""
+        return self.supervisor.executable
+
+    @property
     def behaviours(self) -> tuple[tuple[str, Behaviour], ...]:
         """Components that have a behaviour, in source order."""
         return tuple((item.name, item.behaviour) for item in self.model.components if item.behaviour)
 
     @property
-    def controllable(self) -> tuple[str, ...]:
+    def issued(self) -> tuple[str, ...]:
         """Events the executor may cause: requests, cancels, resets in source order, then taus."""
-        return tuple(event for event in events(self.model) if is_controllable(event))
+        return tuple(event.name for event in self.executable.events.values() if event.is_issued)
 
     @property
-    def uncontrollable(self) -> tuple[str, ...]:
+    def received(self) -> tuple[str, ...]:
         """Events of the environment, in source order."""
-        return tuple(event for event in events(self.model) if not is_controllable(event))
+        return tuple(event.name for event in self.executable.events.values() if not event.is_issued)
 
 
 def make_layout(supervisor: Supervisor) -> Layout:
@@ -89,17 +94,17 @@ def make_layout(supervisor: Supervisor) -> Layout:
             attribute = members.name(f"{component.name}__{variable.name}")
             variables[component.name, variable.name] = (attribute, variable.type)
     for item in model.communications:
-        if has_plant_location(item):
+        if item.kind in CALLED_KINDS:
             locations[communication_plant_name(item)] = members.name(f"{item.name}__location")
-    return Layout(supervisor, locations, variables, _method_names(model, members), _converter_names(model))
+    return Layout(supervisor, locations, variables, _method_names(supervisor, members), _converter_names(model))
 
 
-def _method_names(model: Model, members: PythonNamer) -> dict[tuple[str, str], str]:
+def _method_names(supervisor: Supervisor, members: PythonNamer) -> dict[tuple[str, str], str]:
+    model = supervisor.model
     methods = {}
-    for event in events(model):
-        purposes = ("allow", "step") if is_controllable(event) else ("read", "step")
-        for purpose in purposes:
-            methods[purpose, event] = members.name(f"{purpose}_{event.replace('.', '_')}")
+    for event in supervisor.executable.events.values():
+        for purpose in ("allow" if event.is_issued else "read", "step"):
+            methods[purpose, event.name] = members.name(f"{purpose}_{event.name.replace('.', '_')}")
     for item in model.communications:
         if EventKind.REQUEST in EVENT_KINDS[item.kind]:
             for purpose in ("provide", "requirements", "conjuncts"):

@@ -6,6 +6,7 @@ other, so whatever is read after it may have been written is first copied to a l
 
 from collections.abc import Iterator
 
+from robosc.automata.executable import Participant
 from robosc.expressions import (
     ArrayType,
     DoubleType,
@@ -19,7 +20,7 @@ from robosc.expressions import (
 )
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
-from robosc.model.structure import Behaviour, EventKind, Transition, Update, Variable
+from robosc.model.structure import Behaviour, Transition, Update, Variable
 from robosc.targets.code.conditions import accepted
 from robosc.targets.code.expressions import (
     FALSE_CODE,
@@ -35,7 +36,6 @@ from robosc.targets.code.expressions import (
     place,
 )
 from robosc.targets.code.text import indent
-from robosc.targets.events import Branch, branches_of, is_controllable, plant_step, split
 from robosc.targets.paths import path_text, path_type
 from robosc.targets.python.changes import noted_change, noted_write
 from robosc.targets.python.expressions import Scope, code_text
@@ -107,8 +107,7 @@ def _is_array(reader: Reader, path: Path) -> bool:
 
 
 def _event_type(writer: Writer, event: str) -> Type:
-    name, kind = split(event)
-    type_ = writer.model.communication(name).received_type(EventKind(kind))
+    type_ = writer.layout.executable.events[event].received
     assert type_ is not None  # noqa: S101  # There are paths only where data comes.
     return type_
 
@@ -135,16 +134,13 @@ class _StepWriter:
         self.may_skip = False
         root = _event_type(writer, event) if self.paths else None
         self.scope = Scope(writer.used.add, writer.model, self._variable, self._location, self._received, root)
-        self._plant_step = plant_step(writer.model, event)
+        self._executable = writer.layout.executable.events[event]
 
     def method(self) -> list[str]:
         """The whole method."""
         self._name_received()
-        blocks = branches_of(self.writer.layout.behaviours, self.event)
-        self._copy_what_is_overwritten(blocks)
-        body = [
-            line for component, behaviour, branches in blocks for line in self._block(component, behaviour, branches)
-        ]
+        self._copy_what_is_overwritten()
+        body = [line for participant in self._executable.participants for line in self._block(participant)]
         parameters = "".join(f", {code.word}" for code in self.received.values())
         lines = [f"def {self.writer.layout.methods['step', self.event]}(self{parameters}):"]
         lines.append(f"    {docstring(f'Take {self.event}.')}")
@@ -165,34 +161,35 @@ class _StepWriter:
     def _refusals(self) -> list[str]:
         """Return None where the event is not accepted, before anything changes."""
         lines = []
-        if self._plant_step is not None:
-            plant, sources, _ = self._plant_step
+        if (moves := self._executable.moves) is not None:
+            sources = moves.sources
             test = f"!= {sources[0]!r}" if len(sources) == 1 else f"not in {sources!r}"
-            lines += [f"if {self.writer.scope.location(plant)} {test}:", "    return None"]
-        if is_controllable(self.event):
-            for words, code in accepted(self.writer.model, self.event, self.writer.scope):
+            lines += [f"if {self.writer.scope.location(moves.plant)} {test}:", "    return None"]
+        if self._executable.is_issued:
+            for words, code in accepted(self._executable, self.writer.scope):
                 refused = code_text(self.scope.negated(code))
                 lines += [*comment(words), f"if {refused}:", "    return None"]
         return lines
 
     def _plant(self) -> list[str]:
         """Move the plant of a service or action."""
-        plant, sources, target = self._plant_step or ("", (), None)
-        if target is None:
+        moves = self._executable.moves
+        if moves is None or (target := moves.target) is None:
             return []
-        location = self.writer.scope.location(plant)
-        if target in sources:
+        location = self.writer.scope.location(moves.plant)
+        if target in moves.sources:
             return noted_write(location, literal(repr(target), Sort.ENUM), self.writer.stale)
         return [f"{location} = {target!r}", *noted_change(location, self.writer.stale)]
 
-    def _copy_what_is_overwritten(self, blocks: list[tuple[str, Behaviour, list[Branch]]]) -> None:
+    def _copy_what_is_overwritten(self) -> None:
         """Find attributes that are read after a place that may write them; a superset is fine."""
         written: set[str] = set()
         overwritten: dict[str, None] = {}
-        for component, _, branches in blocks:
+        for participant in self._executable.participants:
+            component = participant.component
             location = self.writer.scope.location(component)
             in_block: set[str] = set()
-            for _, transition in branches:
+            for _, transition in participant.branches:
                 for update in transition.updates:
                     for text in self._reads(update.expression):
                         if text in written or text in in_block:
@@ -226,12 +223,13 @@ class _StepWriter:
     def _received(self, path: tuple[PathStep, ...]) -> Code:
         return self.received[path]
 
-    def _block(self, component: str, behaviour: Behaviour, branches: list[Branch]) -> list[str]:
+    def _block(self, participant: Participant) -> list[str]:
         """Return the statements of what one component does."""
+        component, behaviour = participant.component, participant.behaviour
         lines: list[str] = []
         location = self.writer.scope.location(component)
         tested: set[str] = set()
-        for states, transition in branches:
+        for states, transition in participant.branches:
             body = self._transition(component, behaviour, states, transition)
             if not body:
                 continue

@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from robosc.automata.executable import CALLED_KINDS
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind, Deployment, Interface, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.code.naming import snake_case
 from robosc.targets.code.templates import shared_values
-from robosc.targets.events import has_plant_location
 from robosc.targets.python.generate import header
 from robosc.targets.python.layout import make_layout
 from robosc.targets.registry import GenerateOptions
@@ -91,11 +91,11 @@ def context(
         "sent": {item.name: sent_paths(model, item) for item in requested},
         "starter": f"start_{snake_case(model.name)[:MAXIMUM_STARTER]}",
         "requests": tuple(f"{item.name}.request" for item in requested),
-        "controllable": layout.controllable,
-        "uncontrollable": layout.uncontrollable,
+        "controllable": layout.issued,
+        "uncontrollable": layout.received,
         "definition": tables.definition,
         "transitions": tables.transitions,
-        "called": tuple(item.name for item in model.communications if has_plant_location(item)),
+        "called": tuple(item.name for item in model.communications if item.kind in CALLED_KINDS),
     }
 
 

@@ -36,7 +36,6 @@ from robosc.model.structure import (
 )
 from robosc.supervisor import Supervisor, decode, encode
 from robosc.targets import GenerateOptions, generate, write_files
-from robosc.targets.events import events, is_controllable
 from robosc.targets.python import changes
 from support.effort import examples
 from support.generated import example_supervisor, imported, load_system, python_text, same
@@ -54,6 +53,7 @@ class Twins:
 
     def __init__(self, supervisor: Supervisor) -> None:
         self.model = supervisor.model
+        self.events = supervisor.executable.events
         self.generated = load_system(supervisor)
         self.interpreted = InterpretedSystem(supervisor)
         self.seen: Counter[str] = Counter()
@@ -62,7 +62,7 @@ class Twins:
     def compare(self) -> None:
         """Everything that can be asked without changing anything."""
         assert same(self.generated.state(), self.interpreted.state())
-        for event in filter(is_controllable, events(self.model)):
+        for event in (name for name, item in self.events.items() if item.is_issued):
             allowed = self.interpreted.enabled(event)
             assert self.generated.enabled(event) is allowed, event
             self.seen["enabled" if allowed else "disabled"] += 1
@@ -89,7 +89,7 @@ class Twins:
     def step(self, event: str, data: Any = None) -> tuple[str, ...] | None:
         """Take an event, with data if it is one of the environment."""
         readings: list[Any] = [None, None]
-        if not is_controllable(event):
+        if not self.events[event].is_issued:
             readings = [system.read(event, data) for system in (self.generated, self.interpreted)]
             left, right = readings
             assert same(left.data, right.data), (event, data)
@@ -133,13 +133,13 @@ class Twins:
     def run(self, dice: Random, steps: int) -> None:
         """A random walk that takes what is enabled more often than not."""
         identifiers = list(batches(self.generated.description.communications))
-        names = events(self.model)
+        names = tuple(self.events)
         telling = [item.events[0] for item in self.model.communications if item.request is None] * 3
         for _ in range(steps if names else 0):
             self.compare()
             event = dice.choice([*names, *telling])
-            if is_controllable(event) and dice.random() < 0.8:
-                enabled = [name for name in names if is_controllable(name) and self.interpreted.enabled(name)]
+            if self.events[event].is_issued and dice.random() < 0.8:
+                enabled = [name for name in names if self.events[name].is_issued and self.interpreted.enabled(name)]
                 event = dice.choice(enabled) if enabled else event
             self.step(event, random_data(dice))
             self.match(random_data(dice))
@@ -202,7 +202,7 @@ def test_an_example_behaves_as_interpreted(name: str, deployment: Deployment) ->
     twins.run(Random(1), 200)
     samples: tuple[Any, ...] = (FULL_SCAN, {"ranges": [0.1] * 360}, {"ranges": []}, None, {"success": True}, 0.7, 2.0)
     for data in samples:
-        for event in events(twins.model):
+        for event in twins.events:
             twins.step(event, data)
             twins.compare()
 

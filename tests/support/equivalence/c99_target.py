@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
+from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import communication_plant_name
 from robosc.execution.interpreter import describe
 from robosc.execution.runtime.middleware_messages import is_finite
@@ -16,7 +17,6 @@ from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets.c99.layer import request_parameters
 from robosc.targets.c99.layout import PLANT_LOCATIONS, event_data, make_layout
-from robosc.targets.events import has_plant_location
 from support.c99 import SANITIZERS, compiled, data_words, microseconds, settings_words
 from support.c99_layer import REFUSALS, caller_place, compiled_layer, layer_settings_words
 from support.c99_layer_main import TOKENS
@@ -155,23 +155,21 @@ class C99Target:
         plants = {
             communication_plant_name(item): PLANT_LOCATIONS[item.kind][int(next(left))]
             for item in self._layout.model.communications
-            if has_plant_location(item)
+            if item.kind in CALLED_KINDS
         }
         locations = {
             item.name: plants[communication_plant_name(item)]
             for item in self._layout.model.communications
-            if has_plant_location(item)
+            if item.kind in CALLED_KINDS
         }
         assert next(left) == "enabled"
-        flags = next(left) if self._layout.controllable else ""
+        flags = next(left) if self._layout.issued else ""
         named = dict(zip(left, left, strict=False))
         return Observation(
             issued=tuple(issued),
             log=tuple(log),
             state=state,
-            enabled=frozenset(
-                event for event, flag in zip(self._layout.controllable, flags, strict=True) if flag == "1"
-            ),
+            enabled=frozenset(event for event, flag in zip(self._layout.issued, flags, strict=True) if flag == "1"),
             locations=locations,
             status=(_STATUSES[int(named["status"])].value, named["fault"] == "1"),
         )

@@ -3,11 +3,11 @@
 from types import SimpleNamespace
 from typing import Any
 
+from robosc.automata.executable import ExecutableSystem
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime import clock, event_log, executor, layer, settings
 from robosc.model.structure import Communication, CommunicationKind, Deployment, Model
 from robosc.supervisor import Supervisor
-from robosc.targets.events import events, is_controllable
 from support.equivalence.observation import FULL, NO_LOG, Entry, Issued, Observation, entry, flat
 from support.equivalence.scenario import PERIOD_S, Action, Scenario
 
@@ -107,7 +107,9 @@ class PythonTarget:
         self._model = model
         self._system = system
         self._runtime = runtime
-        self._events = tuple(event for event in events(model) if is_controllable(event))
+        self._events = tuple(
+            event.name for event in ExecutableSystem(model, Deployment.CONTROLLER).events.values() if event.is_issued
+        )
         self._servers = [item.name for item in model.communications if _is_server(item)]
         self._clock = runtime.ManualClock()
         self._log = runtime.MemoryLog() if has_log else runtime.NullLog()

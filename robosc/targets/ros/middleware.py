@@ -17,7 +17,7 @@ from robosc.targets.python.generate import header
 from robosc.targets.python.package import beside_supervisor, python_text
 from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros.layer import Renamed, remapped_names, require_names_of_a_layer, require_own_topics
-from robosc.targets.ros.package import chosen, context, packages, release_identifiers, require_own_names
+from robosc.targets.ros.package import chosen, context, error_context, packages, release_identifiers, require_own_names
 from robosc.targets.ros.runtime.parameters import Parameter, declarations
 from robosc.targets.ros.runtime.supervised import callers_name, robots_name
 from robosc.targets.ros.topics import Topic, servers, topics

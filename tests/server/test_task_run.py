@@ -417,9 +417,11 @@ class TestFailures:
         request = small_request(kind, NAVIGATION.read_text())
         if is_asked_for:
             request.options.maximum_nodes = 20
-        found = failure(kind, request, LIMITS if is_asked_for else replace(LIMITS, nodes=20))
+        limits = LIMITS if is_asked_for else replace(LIMITS, nodes=20)
+        found = failure(kind, request, limits)
         assert found.reason is Reason.NODE_LIMIT
-        assert "20 nodes" in found.message
+        advice = f"raise it with --max-nodes, up to {limits.nodes} on this server"
+        assert found.message == f"BDD node limit 20 exceeded; {advice}"
 
     @pytest.mark.parametrize("kind", TaskKind)
     def test_a_result_too_large(self, kind: TaskKind) -> None:

@@ -88,7 +88,7 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
     try:
         return Result(_bounded(_WORK[kind](request, limits, ThrottledReports(on_report)), limits.result_bytes))
     except NodeLimitError as error:
-        return Failure(Reason.NODE_LIMIT, str(error))
+        return Failure(Reason.NODE_LIMIT, f"{error}, up to {limits.nodes} on this server")
     except MemoryError:
         return Failure(Reason.MEMORY_LIMIT, f"the task needs more than {limits.memory_bytes} bytes of memory")
     except _ResultTooLargeError:

@@ -11,7 +11,7 @@ _log = logging.getLogger(__name__)
 
 
 class ViewEndpoint(ServedEndpoint):
-    """The live view of a bridge; a `Endpoint` of the daemon.
+    """The live view of a bridge; an `Endpoint` of the daemon.
 
     Args:
         operations: The daemon.

@@ -104,7 +104,7 @@ class LastTaken:
     """Transition that each component took last, after any number of entries, since the model began.
 
     Args:
-        tracker: Lights that report which transitions an entry takes; in the initial state.
+        tracker: Tracker of the transitions that entries take; in the initial state.
         documents: The entries.
     """
 

@@ -1,4 +1,4 @@
-// Ties the parts of the page to what the server tells.
+// Connects the parts of the page to the data from the server.
 
 import { startComponents } from "./components.js";
 import { Connection } from "./connection.js";

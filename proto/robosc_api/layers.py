@@ -35,11 +35,11 @@ class Layer(grpc.aio.ServerInterceptor):
         method: str = details.method
         made = self._made.get(method)
         if made is None or made[0] is not inner:
-            made = self._made[method] = inner, self.around(inner, method)
+            made = self._made[method] = inner, self.wrap(inner, method)
         return made[1]
 
     @abstractmethod
-    def around(self, inner: Any, method: str) -> Any:
+    def wrap(self, inner: Any, method: str) -> Any:
         """Wrap a handler.
 
         Args:

@@ -32,7 +32,7 @@ class MalformedRequests(Layer):
         self._limit = limit
         self._prefixes = tuple(f"/{service}/" for service in services)
 
-    def around(self, inner: Any, method: str) -> Any:
+    def wrap(self, inner: Any, method: str) -> Any:
         """Wrap a handler in a check of its requests."""
         if inner.request_deserializer is None or not method.startswith(self._prefixes):
             return inner

@@ -38,7 +38,7 @@ class RequestTimeouts(Layer):
         self._first = _Timeout(limit_s)
         self._next = {method: _Timeout(seconds) for method, seconds in (idle_s or {}).items()}
 
-    def around(self, inner: Any, method: str) -> Any:
+    def wrap(self, inner: Any, method: str) -> Any:
         """Wrap a handler in a wait for its request."""
         if inner.request_streaming and method not in self._next:
             return inner

@@ -40,7 +40,7 @@ class ResultSender:
         """Send the messages of a result as fast as they are read.
 
         Args:
-            context: Of the call (of grpc.aio), whose responses are bytes.
+            context: Context of the call (of grpc.aio), whose responses are bytes.
             messages: Serialized, each made when the one before it is on its way.
 
         Raises:
@@ -58,8 +58,8 @@ class ResultSender:
         """Count a result until its call is over; it may have to wait before it can be sent.
 
         Args:
-            context: Of the call (of grpc.aio).
-            messages: Of the result, each serialized.
+            context: Context of the call (of grpc.aio).
+            messages: Serialized messages of the result.
 
         Returns:
             To be called where it is known sooner that it has been read.

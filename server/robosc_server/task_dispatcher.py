@@ -60,6 +60,6 @@ class TaskDispatcher:
             self._metrics.cache_hit("memory")
             return found
         if isinstance(outcome, Failure):
-            told = public_failure(outcome)
-            raise RefusedError(told.reason, told.message)
+            failure = public_failure(outcome)
+            raise RefusedError(failure.reason, failure.message)
         return self._results.keep(task.key, task.kind, outcome, caller)

@@ -26,7 +26,7 @@ class ShutdownLayer(Layer):
         """Let every call end."""
         self._closing.set()
 
-    def around(self, inner: Any, method: str) -> Any:
+    def wrap(self, inner: Any, method: str) -> Any:
         """A handler that ends with the bridge."""
         answer = behaviour_of(inner)
         return with_behaviour(inner, self._ending(writing(answer) if inner.response_streaming else answer))

@@ -25,8 +25,8 @@ def exit_statuses(done: str, failed: str | None = None, service: str | None = SE
         failed: Meaning of 1; None: it does not happen.
         service: Meaning of 3; None: no server is asked.
     """
-    told = {0: done, 1: failed, 2: "wrong options", 3: service, 130: "Ctrl-C"}
-    return "exit status:\n" + "".join(f"  {status}  {what}\n" for status, what in told.items() if what is not None)
+    meanings = {0: done, 1: failed, 2: "wrong options", 3: service, 130: "Ctrl-C"}
+    return "exit status:\n" + "".join(f"  {status}  {what}\n" for status, what in meanings.items() if what is not None)
 
 
 EPILOG = exit_statuses(

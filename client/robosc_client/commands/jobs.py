@@ -315,8 +315,8 @@ def _submit(arguments: argparse.Namespace, client: Client) -> int:
     )
     if arguments.watch:
         # Print the id first, so that the job can be found after an interrupt; the JSON document comes at the end.
-        stream, told = (sys.stderr, f"submitted as {found.job.id}") if arguments.json else (sys.stdout, found.job.id)
-        stream.write(f"{told}\n")
+        stream, line = (sys.stderr, f"submitted as {found.job.id}") if arguments.json else (sys.stdout, found.job.id)
+        stream.write(f"{line}\n")
         stream.flush()
         arguments.job = found.job.id
         try:

@@ -70,7 +70,7 @@ class Guard(Layer):
 
         return refuse
 
-    def around(self, inner: Any, method: str) -> Any:
+    def wrap(self, inner: Any, method: str) -> Any:
         """Wrap a handler in the authorization of its caller."""
         rule = self._rules.get(method, Rule())
         if self._tokens is None and (rule.is_open or self._has_client_certificates):

@@ -108,28 +108,28 @@ class _Files:
 
 def _credentials(security: ServerSecurity) -> grpc.ServerCredentials:
     latest = _checked(security)
-    told: object = None
+    last_error: object = None
 
     def configuration(files: _Files) -> Any:
         return grpc.ssl_server_certificate_configuration([(files.key, files.certificate)], files.client_ca)
 
     def changed() -> Any:
         """Return a changed configuration; None: unchanged. Called for each connection."""
-        nonlocal latest, told
+        nonlocal latest, last_error
         found: object = None
         try:
             found = _read(security)
             if found == latest:
-                told = None
+                last_error = None
                 return None
             latest = _checked(security)
         except SecurityError as error:
             # The file may be half written: keep the current one. Logged once for each change, not for each connection.
-            if told != (found or str(error)):
+            if last_error != (found or str(error)):
                 _log.error("the changed certificate is not used: %s", error)
-            told = found or str(error)
+            last_error = found or str(error)
             return None
-        told = None
+        last_error = None
         _log.info("%s: reloaded", security.certificate)
         return configuration(latest)
 

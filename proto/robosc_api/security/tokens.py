@@ -160,7 +160,7 @@ class TokenFile:
     If the changed file cannot be read or is invalid, the previous tokens stay valid, and the log says so.
 
     Args:
-        path: Of the file.
+        path: Path of the file.
         clock: Seconds of a monotonic clock.
         needed: Scope that every call needs; a warning is logged if no token has it. None: no such scope.
 

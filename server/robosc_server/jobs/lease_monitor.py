@@ -131,14 +131,14 @@ class LeaseMonitor:
 
     async def _store_progress(self) -> None:
         """Write the progress of running jobs to the database, for watchers at other servers."""
-        told = {
+        reports = {
             job.record.id: (job.record.revision, job.record.progress)
             for job in self._runner.all
             if job.record.progress is not None and job.record.revision > job.stored_revision
         }
-        if told:
-            await self._store.write_progress(self._runner.replica, told)
-            for job_id, (revision, _) in told.items():
+        if reports:
+            await self._store.write_progress(self._runner.replica, reports)
+            for job_id, (revision, _) in reports.items():
                 job = self._runner.get(job_id)
                 if job is not None:
                     job.stored_revision = max(revision, job.stored_revision)

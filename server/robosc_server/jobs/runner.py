@@ -280,17 +280,17 @@ class JobRunner:
     async def _work(self, job: ActiveJob, place: Place, request: bytes) -> Outcome:
         record = job.record
 
-        async def report(told: Report) -> None:
-            self._publish_progress(job, told)
+        async def report(progress: Report) -> None:
+            self._publish_progress(job, progress)
 
         task = Task(record.kind, request, record.key, record.main_file)
         return await self._scheduler.work(place, task, self._task_limits, report)
 
-    def _publish_progress(self, job: ActiveJob, told: Report) -> None:
+    def _publish_progress(self, job: ActiveJob, progress: Report) -> None:
         """Publish the progress of a job to its watchers."""
         now = job.record
         revision = now.revision + (1 if (now.revision + 1) % STEP else 0)
-        job.record = replace(now, progress=told, revision=revision)
+        job.record = replace(now, progress=progress, revision=revision)
         self._watchers.notify(job.record)
 
     async def _requeue(self, job: ActiveJob, place: Place, pause_s: float, *, is_lost: bool = False) -> None:

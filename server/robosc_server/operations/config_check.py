@@ -267,14 +267,14 @@ def _confinement(settings: Settings) -> Iterator[tuple[Grade, str]]:
         return
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     try:
-        told = subprocess.run(
+        probe = subprocess.run(
             [sys.executable, "-P", "-m", "robosc_server.workers.sandbox"],
             env=environment,
             capture_output=True,
             timeout=_TRY_S,
             check=True,
         )
-        missing = json.loads(told.stdout)
+        missing = json.loads(probe.stdout)
     except (OSError, subprocess.SubprocessError, ValueError):
         missing = ["the confinement test could not be run"]
     grade = Grade.ERROR if settings.confinement is Confinement.REQUIRED else Grade.WARNING

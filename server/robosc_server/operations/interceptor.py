@@ -71,7 +71,7 @@ class CallInterceptor(Layer):
             self._metrics.unknown_method()
         return super().handler(inner, details)
 
-    def around(self, inner: Any, method: str) -> Any:
+    def wrap(self, inner: Any, method: str) -> Any:
         """A handler with everything around it."""
         answer = behaviour_of(inner)
         if inner.response_streaming:

@@ -102,7 +102,7 @@ def log_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT") -> str
     Args:
         fault: It, or what another process tells of it, such as a traceback. Its words are logged at the level debug
             alone; see `worker_words`.
-        reason: The caller is told, as in google.rpc.ErrorInfo.
+        reason: The reason that the caller receives, as in google.rpc.ErrorInfo.
     """
     identity = secrets.token_hex(4)
     log = structlog.get_logger()
@@ -112,7 +112,7 @@ def log_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT") -> str
         known = {"error": type(fault).__qualname__, "places": _code_locations(fault.__traceback__)}
         words = "".join(traceback.format_exception(fault))
     log.error("fault", fault=identity, reason=str(reason), **known)
-    log.debug("fault in words", fault=identity, traceback=words)
+    log.debug("fault in full", fault=identity, traceback=words)
     return identity
 
 

@@ -62,12 +62,12 @@ class OpenCalls(Layer):
         """Calls that are open, health checks aside."""
         return self._slots.taken
 
-    def around(self, inner: Any, method: str) -> Any:
-        """A handler behind a look at how many calls there are."""
+    def wrap(self, inner: Any, method: str) -> Any:
+        """Return a handler that counts its open calls and refuses those beyond the limits."""
         behaviour = behaviour_of(inner)
         identify, slots = self._identify, self._slots
 
-        # They give what the handler gives, and are none: one more coroutine would cost every call some time.
+        # These are plain functions, which return the handler's coroutine: one more coroutine would delay every call.
         def counted(request: Any, context: Any) -> Any:
             slots.take(network_of(identify(context)), context)
             return behaviour(request, context)
@@ -98,7 +98,7 @@ class _CallSlots:
 
         Args:
             caller: Name of its caller.
-            context: Of the call.
+            context: Context of the call.
 
         Raises:
             RefusedError: There is none for this caller; none is taken.

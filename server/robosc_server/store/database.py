@@ -61,7 +61,7 @@ class _Transaction[T]:
 
         Raises:
             DBAPIError: As the database says.
-            PoolTimeoutError: There is no connection to be had.
+            PoolTimeoutError: No connection is free.
         """
         for tries_left in reversed(range(_TRIES)):
             try:
@@ -120,7 +120,7 @@ class Database:
     """An engine, and threads for it.
 
     Args:
-        engine: Of the database; `close` disposes of it.
+        engine: Engine of the database; `close` disposes of it.
         readers: Threads for what only reads.
         writers: Threads for what changes something.
         answer_s: Maximum duration of a transaction, in seconds.

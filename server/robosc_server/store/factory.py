@@ -202,8 +202,8 @@ def is_in_use(given: Path) -> bool:
     """
     path = given.resolve()
     with _held_lock:
-        # Not even looked at then: a process that closes a file loses its locks there (POSIX, fcntl), and is never told
-        # of its own.
+        # The file is not even opened then: a process that closes a file loses its locks there, and cannot see its own
+        # locks (POSIX, fcntl).
         if path in _held:
             return True
         try:

@@ -144,11 +144,11 @@ class Store:
 
     async def write_progress(self, replica: str, progress: Mapping[str, tuple[int, Report]]) -> None:
         """Store the progress of running jobs; see `job_rows.write_progress`."""
-        told = {
+        reports = {
             job_id: (revision, Report(job_rows.clean(report.stage), job_rows.clean(report.message)))
             for job_id, (revision, report) in progress.items()
         }
-        await self._database.write(lambda connection: job_rows.write_progress(connection, replica, told))
+        await self._database.write(lambda connection: job_rows.write_progress(connection, replica, reports))
 
     async def active_of(self, replica: str) -> list[JobRecord]:
         """The jobs of a server that have not ended, the oldest first."""

@@ -44,7 +44,7 @@ QUICK_BYTES = 16 * 1024
 
 _REMEMBERED_BYTES = 64 * 1024
 _ALL_REMEMBERED_BYTES = 4 * 2**20
-"""Maximum size of all remembered requests, in bytes; one longer than `_REMEMBERED_BYTES` is looked at each time."""
+"""Maximum size of all remembered requests, in bytes; one longer than `_REMEMBERED_BYTES` is checked each time."""
 
 _ENTRY_BYTES = 500
 """Bytes that a remembered request takes besides its own."""

@@ -8,7 +8,7 @@ from robosc_api.jobs import TaskKind
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A request that was looked at and accepted.
+    """A checked and accepted request.
 
     Attributes:
         kind: Kind of the task.

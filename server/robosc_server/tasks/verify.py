@@ -78,7 +78,7 @@ def _verify_given(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnRe
 
 
 def _no_robot(found: FileVerification) -> str:
-    """Return the reason why nothing was looked at where nothing is wrong either."""
+    """Return the reason why nothing was verified although there is no finding; empty otherwise."""
     if found.diagnostics or found.report or found.faults:
         return ""
     return "a library has no robot that a supervisor could be for"

@@ -230,8 +230,8 @@ class DaskWorkers:
         except self._distributed.KilledWorker:
             return None
         except Exception as error:  # Any error of the worker, or of the transfer.
-            told = f"{type(error).__name__}: {error}"
-            raise WorkersError(f"the Dask cluster at {self._address} cannot run tasks: {told[:1000]}") from error
+            cause = f"{type(error).__name__}: {error}"
+            raise WorkersError(f"the Dask cluster at {self._address} cannot run tasks: {cause[:1000]}") from error
         if isinstance(content, bytes) and content[:1] == ANSWER:
             try:
                 return outcome_of(content[1:], limits)

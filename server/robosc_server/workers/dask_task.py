@@ -77,8 +77,8 @@ def run_on_cluster(
         asks += 1
         if asks % _TELL_EVERY_ASKS == 0 and kept:
             reports = [kept.popleft() for _ in range(len(kept))]
-            told = [[report.stage, report.message] for report in reports]
-            worker.log_event(topic, {"is": REPORTS, "task": name, "reports": told})
+            sent = [[report.stage, report.message] for report in reports]
+            worker.log_event(topic, {"is": REPORTS, "task": name, "reports": sent})
         state = worker.state.tasks.get(name)
         return state is None or state.state not in _UNDER_WAY
 
@@ -141,7 +141,7 @@ def outcome_of(content: bytes, limits: TaskLimits) -> Outcome:
         view = view[HEADER.size + length :]
         if len(payload) < length:
             break
-        told = reader.read(tag, payload)
-        if isinstance(told, Result | Failure):
-            return told
+        message = reader.read(tag, payload)
+        if isinstance(message, Result | Failure):
+            return message
     raise FrameError("an answer that ends too early")

@@ -53,8 +53,8 @@ class _ForkServer:
             for descriptor, _ in self._poll.poll(_FORK_PAUSE_MS if self._wanted else None):
                 if descriptor in self._pids:
                     self._reap(descriptor)
-                elif told := self._line.recv(PACKET_BYTES):
-                    self._wanted += int(told)
+                elif packet := self._line.recv(PACKET_BYTES):
+                    self._wanted += int(packet)
                 else:
                     return
             try:

@@ -118,7 +118,7 @@ class AnswerReader:
     """Reader of the frames of one answer, in two steps: it checks a header, then it decodes the payload.
 
     Args:
-        limits: Of the task.
+        limits: Limits of the task.
         clock: Seconds that never go back.
     """
 

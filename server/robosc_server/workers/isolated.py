@@ -53,7 +53,7 @@ def prepare(task_function: str = TASK_FUNCTION, *, must_be_confined: bool = Fals
         must_be_confined: True to start none on a machine without complete confinement.
 
     Raises:
-        WorkersError: None can be had.
+        WorkersError: No worker is available.
     """
     _background(task_function, must_be_confined).prepare()
 
@@ -90,7 +90,7 @@ def run_isolated(
 
     Raises:
         StoppedError: `should_stop` said so.
-        WorkersError: No process can be had.
+        WorkersError: No process can be started.
     """
     background = _background(task_function, must_be_confined)
     background.prepare()

@@ -49,7 +49,7 @@ class LocalWorkers:
 
     @property
     def capacity(self) -> int:
-        """Number of tasks that can be under way; 0 while no process can be had."""
+        """Number of tasks that can be under way; 0 while no process can be started."""
         return 0 if self._pool.is_failing else self._size
 
     @property
@@ -59,7 +59,7 @@ class LocalWorkers:
 
     @property
     def fault(self) -> str:
-        """Reason why no process can be had now, in one sentence; empty where there are some."""
+        """Reason why no process can be started now, in one sentence; empty where there are some."""
         return self._pool.fault
 
     @property
@@ -78,7 +78,7 @@ class LocalWorkers:
         """The outcome of a task; see `Workers.run`.
 
         Raises:
-            WorkersError: No process can be had.
+            WorkersError: No process can be started.
             WorkerLostError: The fork server ended under it, each time.
         """
         for _ in range(_ATTEMPTS):

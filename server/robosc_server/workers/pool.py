@@ -102,7 +102,7 @@ class WorkerPool:
         """A worker for one task; `terminate` it afterwards.
 
         Raises:
-            WorkersError: None can be had.
+            WorkersError: No process can be started.
         """
         end = monotonic() + START_S
         while (worker := self._next_live_worker()) is None:

@@ -97,12 +97,12 @@ class WorkerProcess:
             if isinstance(announced, Failure):
                 return announced
             tag, length = announced
-            told = answer.read(tag, await reader.readexactly(length))
-            if isinstance(told, Report):
+            message = answer.read(tag, await reader.readexactly(length))
+            if isinstance(message, Report):
                 # Reading pauses meanwhile, so that a worker with too many reports has to wait.
-                await on_report(told)
-            elif told is not None:
-                return told
+                await on_report(message)
+            elif message is not None:
+                return message
 
     async def _failure(self, limits: TaskLimits, kills: int) -> Failure:
         """Return the reason why the connection ended before an answer was whole."""

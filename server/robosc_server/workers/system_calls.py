@@ -69,7 +69,7 @@ _CALLS = {
     "ppoll": (271, 73),
     "select": (23, 0),
     "pselect6": (270, 72),
-    # Names of files: modules are looked for.
+    # Names of files: Python searches for modules.
     "stat": (4, 0),
     "lstat": (6, 0),
     "newfstatat": (262, 79),
@@ -151,7 +151,7 @@ def filter_program(architecture: Architecture, pid: int) -> bytes:
     """The filter of a process: instructions of 8 bytes.
 
     Args:
-        architecture: Of the machine.
+        architecture: Architecture of the machine.
         pid: The process's number, which alone it may send signals to.
     """
     conditions = _conditions(pid)

@@ -91,7 +91,7 @@ def test_a_fault_is_told_by_its_id_alone() -> None:
 def test_a_fault_stands_in_words_at_the_level_debug() -> None:
     with logged(LogLevel.DEBUG) as log:
         outcome(b"fault")
-    (line,) = log.lines("fault in words")
+    (line,) = log.lines("fault in full")
     assert MARKER in line["traceback"]
 
 
@@ -168,7 +168,7 @@ def test_a_call_that_is_cancelled_where_its_deadline_passes_has_reached_it(
         raise asyncio.CancelledError
 
     async def run() -> None:
-        handler = CallInterceptor(Metrics("1")).around(grpc.unary_unary_rpc_method_handler(stuck), f"/{SERVICE}/Unary")
+        handler = CallInterceptor(Metrics("1")).wrap(grpc.unary_unary_rpc_method_handler(stuck), f"/{SERVICE}/Unary")
         with pytest.raises(asyncio.CancelledError):
             await handler.unary_unary(b"", CancelledContext(given_s, left_s))
 

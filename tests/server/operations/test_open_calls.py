@@ -123,7 +123,7 @@ def test_nobody_from_elsewhere_takes_the_places_of_this_machines_health_checks()
             """It never ends."""
 
     calls = OpenCalls(CallLimits(1, 1), health=CallLimits(3, 1))
-    layered = calls.around(grpc.unary_unary_rpc_method_handler(lambda request, context: None), HEALTH)
+    layered = calls.wrap(grpc.unary_unary_rpc_method_handler(lambda request, context: None), HEALTH)
     # One machine with many addresses of its network, then others.
     layered.unary_unary(None, Call("2001:db8::1"))
     with pytest.raises(RefusedError) as refused:

@@ -4,7 +4,7 @@ import { byId, make, mark, quoted, say, show } from "./dom.js";
 import { count, value } from "./format.js";
 import { afterPainting } from "./frame.js";
 import { Graph } from "./graph.js";
-import { told, under } from "./told.js";
+import { received, under } from "./received.js";
 
 const SERVED = new Set(["service", "action"]);
 const WIDE_PX = 430;
@@ -139,16 +139,16 @@ export function startComponents() {
   return {
     build() {
       close();
-      const { components = [], communications = [] } = told.definition;
+      const { components = [], communications = [] } = received.definition;
       const byComponent = Map.groupBy(communications, (item) => item.component);
       cards = new Map(components.map((item, i) => [item.name, new Card(item, byComponent.get(item.name) ?? [], i, enlarge)]));
       byId("cards").replaceChildren(...[...cards.values()].map((card) => card.element));
       narrow();
     },
     paint() {
-      const components = told.update?.components ?? {};
-      const places = told.update?.communications ?? {};
-      const last = told.update?.last ?? null;
+      const components = received.update?.components ?? {};
+      const places = received.update?.communications ?? {};
+      const last = received.update?.last ?? null;
       for (const [name, card] of cards) {
         card.paint(under(components, name), places);
         if (isLastForgotten) card.graph?.setLast();

@@ -4,7 +4,7 @@ import { announce } from "./announce.js";
 import { SILENT_MS } from "./connection.js";
 import { byId, mark, say, show } from "./dom.js";
 import { ago } from "./format.js";
-import { ageS, told } from "./told.js";
+import { ageS, received } from "./received.js";
 
 const OLD_S = 2;
 
@@ -15,18 +15,18 @@ const SENTENCES = {
   connecting: () => "Connecting to the server.",
   lost: () => "Connection lost: nothing shown here is live.",
   silent: () => "The server is silent: nothing shown here is live.",
-  gone: () => `The source is lost: ${told.gone ?? "no reason was told"}`,
+  gone: () => `The source is lost: ${received.gone ?? "no reason was told"}`,
   old: () => "The bridge's loop hangs: nothing shown here is live.",
 };
 const WORDS = { connecting: "connecting", lost: "no connection", silent: "silent", gone: "source lost", old: "hangs", waiting: "waiting" };
 
 /** One of the names above; "waiting": connected, without a definition yet; "live". */
 function freshness(connection) {
-  if (!connection.isOpen) return told.definition === null ? "connecting" : "lost";
+  if (!connection.isOpen) return received.definition === null ? "connecting" : "lost";
   if (connection.silenceMs > SILENT_MS) return "silent";
-  if (told.gone !== null) return "gone";
-  if (told.definition === null) return "waiting";
-  return told.definition.source === "bridge" && ageS() > OLD_S ? "old" : "live";
+  if (received.gone !== null) return "gone";
+  if (received.definition === null) return "waiting";
+  return received.definition.source === "bridge" && ageS() > OLD_S ? "old" : "live";
 }
 
 /**
@@ -42,7 +42,7 @@ export function startFreshness(connection) {
     mark(document.documentElement, "data-freshness", now);
     const isStale = now in SENTENCES;
     const what = isStale ? SENTENCES[now]() : "";
-    const age = isStale && told.update !== null ? `The state below is ${ago(ageS())} old.` : "";
+    const age = isStale && received.update !== null ? `The state below is ${ago(ageS())} old.` : "";
     for (const place of PLACES) {
       show(byId(place), isStale);
       say(byId(`${place}-what`), what);
@@ -56,8 +56,8 @@ export function startFreshness(connection) {
 }
 
 function liveWord() {
-  if (told.definition.source === "log") return "recorded";
-  if (told.definition.source === "model") return "initial state";
-  if (told.update === null) return "connected";
-  return told.definition.source === "ros2" && ageS() > OLD_S ? `live, last change ${ago(ageS())} ago` : "live";
+  if (received.definition.source === "log") return "recorded";
+  if (received.definition.source === "model") return "initial state";
+  if (received.update === null) return "connected";
+  return received.definition.source === "ros2" && ageS() > OLD_S ? `live, last change ${ago(ageS())} ago` : "live";
 }

@@ -12,7 +12,7 @@ import { startRequests } from "./requests.js";
 import { paintRobot, paintStatus } from "./status.js";
 import { startStream } from "./stream.js";
 import { startTheme } from "./theme.js";
-import { forget, told } from "./told.js";
+import { forget, received } from "./received.js";
 import { takeToken } from "./token.js";
 
 let connection = null;
@@ -30,7 +30,7 @@ let wasLost = false;
 const receive = {
   definition(message) {
     forget();
-    told.definition = message;
+    received.definition = message;
     const now = JSON.stringify(message);
     if (wasLost) stream.note("The connection is back. What happened meanwhile is not here.");
     wasLost = false;
@@ -44,8 +44,8 @@ const receive = {
     touch("robot", "update", "map", "position");
   },
   update(message) {
-    told.update = message;
-    told.updateMs = performance.now();
+    received.update = message;
+    received.updateMs = performance.now();
     map.updated();
     orders.updated();
     touch("update", "map");
@@ -56,15 +56,15 @@ const receive = {
     touch("taken");
   },
   scan(message) {
-    told.scan = message;
+    received.scan = message;
     touch("map");
   },
   position(message) {
-    if (told.position && message.time_s < told.position.time_s) {
+    if (received.position && message.time_s < received.position.time_s) {
       stream.backTo(message.time_s);
       map.clear();
     }
-    told.position = message;
+    received.position = message;
     touch("position");
   },
   refused: (message) => orders.answered(message),
@@ -72,8 +72,8 @@ const receive = {
   gone({ why }) {
     const now = String(why ?? "");
     // It is told again and again, as a sign of life.
-    if (now !== told.gone) stream.note(`The source is lost: ${now}`);
-    told.gone = now;
+    if (now !== received.gone) stream.note(`The source is lost: ${now}`);
+    received.gone = now;
     wasLost = true;
   },
 };
@@ -104,7 +104,7 @@ connection = new Connection(`${location.protocol === "https:" ? "wss" : "ws"}://
   },
   onChange() {
     if (connection === null) return;
-    if (!connection.isOpen && told.definition !== null) {
+    if (!connection.isOpen && received.definition !== null) {
       wasLost = true;
       stream.note("The connection is lost.");
     }

@@ -5,7 +5,7 @@ import { figure } from "./format.js";
 import { touch } from "./frame.js";
 import { Path } from "./path.js";
 import { paintMap } from "./picture.js";
-import { told } from "./told.js";
+import { received } from "./received.js";
 import { Viewport } from "./viewport.js";
 
 const MOVE_PX = 40;
@@ -37,7 +37,7 @@ export function startMap() {
     follow(false);
   };
   const fit = () => {
-    const { walls = [], line = [] } = told.definition?.scene ?? {};
+    const { walls = [], line = [] } = received.definition?.scene ?? {};
     const pose = poseOf();
     view.fit([...walls.flatMap(([x1, y1, x2, y2]) => [[x1, y1], [x2, y2]]), ...line, ...path.points, ...(pose ? [pose] : [])]);
     follow(false);
@@ -110,7 +110,7 @@ export function startMap() {
 
   return {
     build() {
-      const hasScene = Boolean(told.definition.scene);
+      const hasScene = Boolean(received.definition.scene);
       show(byId("surroundings"), hasScene);
       measure();
       if (hasScene) fit();
@@ -118,7 +118,7 @@ export function startMap() {
     },
     /** The update is new. */
     updated() {
-      const pose = told.update?.drive?.pose;
+      const pose = received.update?.drive?.pose;
       if (pose) path.add(pose[0], pose[1]);
     },
     /** Another robot, or another time of a recorded run. */
@@ -128,7 +128,7 @@ export function startMap() {
     },
     paint() {
       const pose = poseOf();
-      if (!pose && !told.scan && !told.definition?.scene) return;
+      if (!pose && !received.scan && !received.definition?.scene) return;
       show(byId("surroundings"), true);
       const ratio = window.devicePixelRatio || 1;
       const { width, height } = view;
@@ -139,16 +139,16 @@ export function startMap() {
       if (isFollowing && pose) Object.assign(view, { x: pose[0], y: pose[1] });
       const context = canvas.getContext("2d");
       context.setTransform(ratio, 0, 0, ratio, 0, 0);
-      paintMap(context, view, { scene: told.definition?.scene, path: path.points, scan: told.scan, pose });
+      paintMap(context, view, { scene: received.definition?.scene, path: path.points, scan: received.scan, pose });
       words();
     },
   };
 }
 
-const poseOf = () => told.update?.drive?.pose ?? told.scan?.pose ?? null;
+const poseOf = () => received.update?.drive?.pose ?? received.scan?.pose ?? null;
 
 function inWords() {
-  const drive = told.update?.drive;
+  const drive = received.update?.drive;
   const pose = poseOf();
   const parts = [];
   if (pose) {
@@ -158,7 +158,7 @@ function inWords() {
   if (drive) parts.push(`Moves at ${figure(drive.linear_m_s, 2)} m/s, rotates at ${figure(drive.angular_rad_s, 2)} rad/s.`);
   if (Number.isFinite(drive?.battery_v)) parts.push(`Battery ${figure(drive.battery_v, 1)} V.`);
   if (drive) parts.push(drive.is_torque_on ? "Motors hold." : "Motors do not hold.");
-  const nearest = nearestOf(told.scan?.ranges_m ?? []);
+  const nearest = nearestOf(received.scan?.ranges_m ?? []);
   if (nearest) parts.push(`Nearest thing ${figure(nearest.range, 2)} m away, ${nearest.where}.`);
   return parts.join(" ") || "Nothing is known about where the robot is.";
 }

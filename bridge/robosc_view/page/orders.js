@@ -2,7 +2,7 @@
 
 import { announce } from "./announce.js";
 import { byId, make, mark, say, show } from "./dom.js";
-import { isModel, isReplay, told } from "./told.js";
+import { isModel, isReplay, received } from "./received.js";
 
 /** On the page, and before a graph in full size, which covers it. */
 const STOPS = ["stop", "large-stop"];
@@ -81,7 +81,7 @@ export function startOrders(connection, token) {
 
   return {
     paint() {
-      const { definition } = told;
+      const { definition } = received;
       const canCommand = definition?.can_command === true;
       for (const button of STOPS.map(byId)) show(button, canCommand);
       show(byId("commands"), canCommand && token !== "");
@@ -97,7 +97,7 @@ export function startOrders(connection, token) {
       }
     },
     updated() {
-      const isStopped = (told.update?.reasons ?? []).some((reason) => /operator_?stop/i.test(String(reason.code)));
+      const isStopped = (received.update?.reasons ?? []).some((reason) => /operator_?stop/i.test(String(reason.code)));
       if (isStopped && done("stop")) answer("good", "STOP was heard: the robot is stopped by an operator.");
     },
     changed() {

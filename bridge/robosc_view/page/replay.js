@@ -3,7 +3,7 @@
 import { byId, mark, say, show } from "./dom.js";
 import { count, span } from "./format.js";
 import { touch } from "./frame.js";
-import { told } from "./told.js";
+import { received } from "./received.js";
 
 const SEEK_EVERY_MS = 100;
 
@@ -16,7 +16,7 @@ export function startReplay(send) {
 
   const seek = () => {
     seekTimer = null;
-    send({ type: "seek", time_s: told.definition.log.begin_s + Number(slider.value) });
+    send({ type: "seek", time_s: received.definition.log.begin_s + Number(slider.value) });
   };
   slider.addEventListener("input", () => {
     isHeld = true;
@@ -29,24 +29,24 @@ export function startReplay(send) {
     isHeld = false;
   });
   byId("replay-play").addEventListener("click", () => {
-    send(told.position?.is_playing ? { type: "pause" } : { type: "play", speed: Number(speed.value) });
+    send(received.position?.is_playing ? { type: "pause" } : { type: "play", speed: Number(speed.value) });
   });
   speed.addEventListener("change", () => {
-    if (told.position?.is_playing) send({ type: "play", speed: Number(speed.value) });
+    if (received.position?.is_playing) send({ type: "play", speed: Number(speed.value) });
   });
 
   return {
     build() {
-      const { log } = told.definition;
+      const { log } = received.definition;
       show(byId("replay"), Boolean(log));
       if (!log) return;
       slider.max = String(Math.max(log.end_s - log.begin_s, 0.01));
       slider.value = "0";
     },
     paint() {
-      const log = told.definition?.log;
+      const log = received.definition?.log;
       if (!log) return;
-      const { position } = told;
+      const { position } = received;
       if (position && !isHeld) slider.value = String(position.time_s - log.begin_s);
       const known = position?.speed;
       if (known && document.activeElement !== speed && [...speed.options].some((option) => Number(option.value) === known)) {

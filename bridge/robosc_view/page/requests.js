@@ -1,7 +1,7 @@
 // Every request of the model: enabled, or in words why not.
 
 import { byId, make, mark, quoted, say, show } from "./dom.js";
-import { told } from "./told.js";
+import { received } from "./received.js";
 
 const NO_REASON = new Map([
   [true, "Nothing holds it back."],
@@ -47,13 +47,13 @@ export function startRequests() {
 
   return {
     build() {
-      requests = (told.definition.requests ?? []).map((event) => new Request(event));
+      requests = (received.definition.requests ?? []).map((event) => new Request(event));
       byId("requests").replaceChildren(...requests.map((request) => request.element));
       show(byId("requests-none"), requests.length === 0);
       narrow();
     },
     paint() {
-      const { update } = told;
+      const { update } = received;
       const enabled = new Set(update?.enabled ?? []);
       const disabled = new Map((update?.disabled ?? []).map((item) => [item.event, item.why ?? []]));
       let unknown = 0;

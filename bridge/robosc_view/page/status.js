@@ -2,13 +2,13 @@
 
 import { announce } from "./announce.js";
 import { byId, make, mark, quoted, say } from "./dom.js";
-import { isModel, isReplay, told } from "./told.js";
+import { isModel, isReplay, received } from "./received.js";
 
 const SOURCES = { __proto__: null, bridge: "bridge", ros2: "ROS 2", log: "recorded run", model: "model alone" };
 
 /** The definition is new. */
 export function paintRobot() {
-  const { definition } = told;
+  const { definition } = received;
   if (definition === null) return;
   say(byId("robot"), definition.robot);
   const deployment = definition.deployment === "layer" ? "supervision layer" : "controller";
@@ -22,7 +22,7 @@ let lastCauses = null;
 
 /** The update is new. */
 export function paintStatus() {
-  const { update } = told;
+  const { update } = received;
   const state = update?.state || (isReplay() ? "recorded" : isModel() ? "not executed" : "not known");
   say(byId("state-word"), state);
   mark(byId("state"), "data-state", update?.state || "unknown");
@@ -59,7 +59,7 @@ function causesOf(update) {
     causes.push({ kind: "reason", lead: "Nothing moves:", told: reason.text + until });
   }
   for (const stop of update.stops ?? []) causes.push({ kind: "stop", lead: "Nothing is requested:", told: stop });
-  if (causes.length === 0 && !isReplay() && !isModel()) causes.push(NO_CAUSE[told.definition?.source === "bridge" ? "bridge" : "other"]);
+  if (causes.length === 0 && !isReplay() && !isModel()) causes.push(NO_CAUSE[received.definition?.source === "bridge" ? "bridge" : "other"]);
   for (const warning of update.warnings ?? []) causes.push({ kind: "warning", lead: "Warning:", told: warning.text ?? warning });
   return causes;
 }

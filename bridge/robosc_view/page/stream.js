@@ -4,7 +4,7 @@ import { byId, make, mark, quoted, say, show } from "./dom.js";
 import { Entries, groupOf } from "./entries.js";
 import { clock, count, whole } from "./format.js";
 import { afterPainting, touch } from "./frame.js";
-import { isReplay } from "./told.js";
+import { isReplay } from "./received.js";
 
 const OVERSCAN = 6;
 const FIRST_KINDS = ["controllable", "uncontrollable"];

@@ -1,7 +1,7 @@
 // Data that the server has sent last. Parts of the page read it; main.js alone writes it.
 
 /** Data that the server has sent last; whatever is not there is as if nothing was told about it. */
-export const told = {
+export const received = {
   /** The `definition`; null: not yet. */
   definition: null,
   /** The latest `update`; null: not yet. */
@@ -18,20 +18,20 @@ export const told = {
 
 /** Forgets what was told about the robot, for a new definition. */
 export function forget() {
-  Object.assign(told, { update: null, updateMs: 0, scan: null, position: null, gone: null });
+  Object.assign(received, { update: null, updateMs: 0, scan: null, position: null, gone: null });
 }
 
 /** Value that an object that was told has under a name; undefined: nothing, whatever objects have by themselves. */
 export const under = (object, name) => (Object.hasOwn(object, name) ? object[name] : undefined);
 
 /** Returns true if a recorded run is shown. */
-export const isReplay = () => told.definition?.source === "log";
+export const isReplay = () => received.definition?.source === "log";
 
 /** Returns true if nothing is executed: a model in its initial state. */
-export const isModel = () => told.definition?.source === "model";
+export const isModel = () => received.definition?.source === "model";
 
 /** Age of the state that is shown, in seconds. */
 export function ageS() {
-  if (told.update === null) return 0;
-  return (told.update.age_s ?? 0) + (performance.now() - told.updateMs) / 1000;
+  if (received.update === null) return 0;
+  return (received.update.age_s ?? 0) + (performance.now() - received.updateMs) / 1000;
 }

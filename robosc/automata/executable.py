@@ -96,7 +96,7 @@ class ExecutableEvent:
         is_issued: True if the executor issues it (a request, cancel, reset or tau); the rest is received. In a layer
             a cancel is issued on the caller's behalf, which makes it uncontrollable there.
         received: Type of the data that it carries to the controller, or None.
-        moves: How its service or action moves; None for a message or tau.
+        moves: Moves of its service or action; None for a message or tau.
         participants: The components whose behaviours mention it, in source order.
         requirements: The requirements on its communication: a request needs all of them, a cancel of the executor's
             own that one of them does not hold. Empty for any other event, and for the cancel of a layer.

@@ -162,6 +162,21 @@ class ExecutableSystem:
         return found
 
     @cached_property
+    def issued(self) -> tuple[str, ...]:
+        """The events that the executor issues: requests, cancels and resets in source order, then taus."""
+        return tuple(event.name for event in self.events.values() if event.is_issued)
+
+    @cached_property
+    def received(self) -> tuple[str, ...]:
+        """The events of the environment, in source order."""
+        return tuple(event.name for event in self.events.values() if not event.is_issued)
+
+    @cached_property
+    def behaviours(self) -> tuple[tuple[str, Behaviour], ...]:
+        """Components that have a behaviour, in source order, with it."""
+        return tuple((item.name, item.behaviour) for item in self.model.components if item.behaviour)
+
+    @cached_property
     def resets_and_taus(self) -> tuple[str, ...]:
         """The silent steps that an executor takes whenever they are enabled, in its order (semantics 3.3)."""
         resets = (item.event(EventKind.RESET) for item in self.model.communications if item.kind in CALLED_KINDS)
@@ -170,11 +185,10 @@ class ExecutableSystem:
     @cached_property
     def _participants(self) -> Mapping[str, tuple[Participant, ...]]:
         found: dict[str, list[Participant]] = {}
-        for component in self.model.components:
-            if component.behaviour:
-                for event, taken in _taken(component.behaviour).items():
-                    participant = Participant(component.name, component.behaviour, is_blocking(event), taken)
-                    found.setdefault(event, []).append(participant)
+        for component, behaviour in self.behaviours:
+            for event, taken in _taken(behaviour).items():
+                participant = Participant(component, behaviour, is_blocking(event), taken)
+                found.setdefault(event, []).append(participant)
         return {event: tuple(participants) for event, participants in found.items()}
 
     def _requirements(self, communication: Communication, kind: EventKind) -> tuple[Requirement, ...]:

@@ -241,7 +241,7 @@ class Reference:
     def _state(self, now_s: float | None) -> str:
         words = ["state"]
         state = self.system.state()
-        for component, behaviour in self.layout.behaviours:
+        for component, behaviour in self.layout.executable.behaviours:
             names = [item.name for item in behaviour.states]
             words.append(str(names.index(state[component]["state"])))
             for variable in behaviour.variables:
@@ -250,7 +250,7 @@ class Reference:
             if item.kind in CALLED_KINDS:
                 place = self.system._state[communication_plant_name(item), None]
                 words.append(str(PLANT_LOCATIONS[item.kind].index(str(place))))
-        enabled = "".join(str(int(self.system.enabled(event))) for event in self.layout.issued)
+        enabled = "".join(str(int(self.system.enabled(event))) for event in self.layout.executable.issued)
         counters, executor = self.executor.counters, self.executor
         before = self.clock.now_s
         if now_s is not None:

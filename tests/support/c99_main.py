@@ -331,7 +331,7 @@ class _Program:
     def print_state(self) -> str:
         layout = self.layout
         lines = ["static void print_state(uint64_t now_us)", "{", '    printf("state");']
-        for component, behaviour in layout.behaviours:
+        for component, behaviour in layout.executable.behaviours:
             lines.append(f'    printf(" %d", (int)r.state.{layout.locations[component]});')
             for variable in behaviour.variables:
                 name, type_ = layout.variables[component, variable.name]
@@ -340,7 +340,9 @@ class _Program:
             if item.kind in CALLED_KINDS:
                 lines.append(f'    printf(" %d", (int)r.state.{layout.locations[communication_plant_name(item)]});')
         lines.append('    printf(" enabled ");')
-        lines += [f'    printf("%d", (int)@p@_enabled(&r, {layout.events[event]}));' for event in layout.issued]
+        lines += [
+            f'    printf("%d", (int)@p@_enabled(&r, {layout.events[event]}));' for event in layout.executable.issued
+        ]
         lines.append(
             '    printf(" status %d fault %d counters %u %u %u\\n", (int)@p@_status(&r, now_us), @p@_fault(&r) != 0,'
             " (unsigned)r.counters.unknown, (unsigned)r.counters.unexpected, (unsigned)r.counters.faults);"

@@ -161,7 +161,7 @@ def _unknowns(layout: Layout) -> list[str]:
 def counts(layout: Layout) -> dict[str, int]:
     """The numbers that the engine is made for."""
     model, infos = layout.model, layout.description.communications
-    uncontrollable = [event.name for event in layout.executable.events.values() if not event.is_issued]
+    uncontrollable = layout.executable.received
     return {
         "EVENT": len(layout.events),
         "COMMUNICATION": len(model.communications),
@@ -203,7 +203,7 @@ def _numbers(layout: Layout) -> list[str]:
     ):
         members = list(table.values()) or [f"{upper}_NO_{kind.upper()}S"]
         lines += [*_enumeration(f"{prefix}_{kind}_t", words, members), ""]
-    for component, behaviour in layout.behaviours:
+    for component, behaviour in layout.executable.behaviours:
         names = [layout.location_names[component, state.name] for state in behaviour.states]
         lines += [
             f"/* States of the component {component}. */",
@@ -326,7 +326,7 @@ def stored_type(type_: Type) -> str:
 
 def _state(layout: Layout) -> list[str]:
     body = []
-    for component, behaviour in layout.behaviours:
+    for component, behaviour in layout.executable.behaviours:
         body.append(f"{width(len(behaviour.states))} {layout.locations[component]}; /* state of {component} */")
         for variable in behaviour.variables:
             name, type_ = layout.variables[component, variable.name]

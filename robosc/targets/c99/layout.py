@@ -19,7 +19,7 @@ from robosc.expressions import (
     StringType,
     Type,
 )
-from robosc.model.structure import Behaviour, Communication, CommunicationKind, Deployment, EventKind, Model
+from robosc.model.structure import Communication, CommunicationKind, Deployment, EventKind, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.c99.naming import CNamer, prefix_for
 
@@ -102,16 +102,6 @@ class Layout:
     def executable(self) -> ExecutableSystem:
         """Everything that the model does."""
         return self.supervisor.executable
-
-    @property
-    def behaviours(self) -> tuple[tuple[str, Behaviour], ...]:
-        """Components that have a behaviour, in source order."""
-        return tuple((item.name, item.behaviour) for item in self.model.components if item.behaviour)
-
-    @property
-    def issued(self) -> tuple[str, ...]:
-        """Events the executor may cause: requests, cancels, resets in source order, then taus."""
-        return tuple(event.name for event in self.executable.events.values() if event.is_issued)
 
     @property
     def requests(self) -> tuple[Communication, ...]:
@@ -233,7 +223,7 @@ def _topic_word(identifier: str) -> str:
 def _name_state(layout: Layout) -> None:
     members = CNamer()
     name = layout._namer.name
-    for component, behaviour in layout.behaviours:
+    for component, behaviour in layout.executable.behaviours:
         layout.locations[component] = members.name(f"at_{component}")
         for state in behaviour.states:
             layout.location_names[component, state.name] = name(f"{layout.upper}_STATE_{component}_{state.name}")

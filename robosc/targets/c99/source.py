@@ -27,7 +27,7 @@ def source_file(unit: Unit) -> str:
     """The text of `<robot>.c`."""
     layout = unit.layout
     conditions = CConditions(unit)
-    allows = [conditions.allow_function(event) for event in layout.issued]
+    allows = [conditions.allow_function(event) for event in layout.executable.issued]
     steppers = [Stepper(unit, event) for event in layout.events if not _never_taken(layout, event)]
     steps = [item.step_function() for item in steppers]
     happens = [item.happen_function() for item in steppers if _happens(layout, item.event)]
@@ -224,7 +224,7 @@ def _dispatchers(layout: Layout) -> list[list[str]]:
     """Return the functions through which the engine asks the model."""
     prefix, function, events = layout.prefix, layout.function, layout.events
     result = [_initial(layout), _same(layout), _model_settings(layout)]
-    allowed = [(events[event], f"return {function('allows', event)}(s);") for event in layout.issued]
+    allowed = [(events[event], f"return {function('allows', event)}(s);") for event in layout.executable.issued]
     result.append(
         _switch(
             f"static bool is_allowed(const state_t *s, {prefix}_event_t event)",
@@ -310,7 +310,7 @@ def _dispatchers(layout: Layout) -> list[list[str]]:
 
 def _initial(layout: Layout) -> list[str]:
     lines = ["static void set_initial(state_t *s)", "{", "    (void)s;"]
-    for component, behaviour in layout.behaviours:
+    for component, behaviour in layout.executable.behaviours:
         lines.append(f"    s->{layout.locations[component]} = {layout.location_names[component, behaviour.initial]};")
         for variable in behaviour.variables:
             name, type_ = layout.variables[component, variable.name]
@@ -338,7 +338,7 @@ def _literal(layout: Layout, type_: Type, value: bool | int | float | str) -> st
 
 def _same(layout: Layout) -> list[str]:
     tests = []
-    for component, behaviour in layout.behaviours:
+    for component, behaviour in layout.executable.behaviours:
         tests.append(f"a->{layout.locations[component]} == b->{layout.locations[component]}")
         for variable in behaviour.variables:
             name, type_ = layout.variables[component, variable.name]

@@ -121,7 +121,7 @@ class Writer:
     def _put_state(self) -> list[str]:
         layout = self.layout
         lines = ["[[maybe_unused]] const bool is_text = as_text;", "out += '{';"]
-        for place, (component, behaviour) in enumerate(layout.behaviours):
+        for place, (component, behaviour) in enumerate(layout.executable.behaviours):
             names = ", ".join(string_literal(state.name) for state in behaviour.states)
             start = ("," if place else "") + json.dumps(component) + ':{"state":'
             lines += [
@@ -179,7 +179,7 @@ class Writer:
 
     def _put_taken(self) -> list[str]:
         layout = self.layout
-        places = {name: [state.name for state in behaviour.states] for name, behaviour in layout.behaviours}
+        places = {name: [state.name for state in behaviour.states] for name, behaviour in layout.executable.behaviours}
         cases: list[str] = []
         for event, parts in state_topic(layout.model).transitions.items():
             if event not in layout.events:

@@ -132,7 +132,7 @@ def _supervisor_title(writer: Writer) -> list[str]:
 def _class(writer: Writer) -> list[str]:
     model, conditions = writer.model, writer.conditions
     requested = [item.name for item in model.communications if ("provide", item.name) in writer.layout.methods]
-    allows = [conditions.allow_method(event) for event in writer.layout.issued]
+    allows = [conditions.allow_method(event) for event in writer.layout.executable.issued]
     description = describe(writer.layout.supervisor)
     requests, silent = _allow_names(writer, description)
     writer.stale = stale_bits([*requests, *silent], conditions.reads)
@@ -147,8 +147,10 @@ def _class(writer: Writer) -> list[str]:
         _signature(writer),
     ]
     methods += allows
-    methods += [read_method(writer, event) for event in writer.layout.received]
-    methods += [step_method(writer, event) for event in (*writer.layout.issued, *writer.layout.received)]
+    methods += [read_method(writer, event) for event in writer.layout.executable.received]
+    methods += [
+        step_method(writer, event) for event in (*writer.layout.executable.issued, *writer.layout.executable.received)
+    ]
     for identifier, batch in batches(description.communications).items():
         methods.append(receive_method(writer, identifier, tuple(event for _, event in batch)))
     methods += [provide_method(writer, name) for name in requested]
@@ -204,7 +206,7 @@ def _constructor(writer: Writer, description: Description) -> list[str]:
 
 def _restart(writer: Writer, requests: int, silent: int) -> list[str]:
     lines = ["def restart(self):", '    """Back to the initial state."""', *indent(restart_lines(requests, silent))]
-    for component, behaviour in writer.layout.behaviours:
+    for component, behaviour in writer.layout.executable.behaviours:
         lines.append(f"    self.{writer.layout.locations[component]} = {behaviour.initial!r}")
         for variable in behaviour.variables:
             attribute, _ = writer.layout.variables[component, variable.name]
@@ -215,13 +217,13 @@ def _restart(writer: Writer, requests: int, silent: int) -> list[str]:
 
 
 def _plant_attributes(writer: Writer) -> list[str]:
-    components = {component for component, _ in writer.layout.behaviours}
+    components = {component for component, _ in writer.layout.executable.behaviours}
     return [attribute for automaton, attribute in writer.layout.locations.items() if automaton not in components]
 
 
 def _state(writer: Writer) -> list[str]:
     lines = ["def state(self):", '    """State and variables of every component with a behaviour."""', "    return {"]
-    for component, behaviour in writer.layout.behaviours:
+    for component, behaviour in writer.layout.executable.behaviours:
         lines += [f"        {component!r}: {{", f"            'state': self.{writer.layout.locations[component]},"]
         lines.append("            'variables': {")
         for variable in behaviour.variables:

@@ -7,7 +7,6 @@ from robosc.automata.plants import communication_plant_name
 from robosc.expressions import Type
 from robosc.model.structure import (
     EVENT_KINDS,
-    Behaviour,
     CommunicationKind,
     EventKind,
     Model,
@@ -64,21 +63,6 @@ class Layout:
     def executable(self) -> ExecutableSystem:
         """Everything that the model does."""
         return self.supervisor.executable
-
-    @property
-    def behaviours(self) -> tuple[tuple[str, Behaviour], ...]:
-        """Components that have a behaviour, in source order."""
-        return tuple((item.name, item.behaviour) for item in self.model.components if item.behaviour)
-
-    @property
-    def issued(self) -> tuple[str, ...]:
-        """Events the executor may cause: requests, cancels, resets in source order, then taus."""
-        return tuple(event.name for event in self.executable.events.values() if event.is_issued)
-
-    @property
-    def received(self) -> tuple[str, ...]:
-        """Events of the environment, in source order."""
-        return tuple(event.name for event in self.executable.events.values() if not event.is_issued)
 
 
 def make_layout(supervisor: Supervisor) -> Layout:

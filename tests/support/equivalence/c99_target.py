@@ -148,7 +148,7 @@ class C99Target:
     def _observation(self, words: list[str], issued: list[Issued], log: list[Entry]) -> Observation:
         left = iter(words)
         state: dict[str, Any] = {}
-        for component, behaviour in self._layout.behaviours:
+        for component, behaviour in self._layout.executable.behaviours:
             place = behaviour.states[int(next(left))].name
             variables = {item.name: _value(item.type, next(left)) for item in behaviour.variables}
             state[component] = {"state": place, "variables": variables}
@@ -163,13 +163,15 @@ class C99Target:
             if item.kind in CALLED_KINDS
         }
         assert next(left) == "enabled"
-        flags = next(left) if self._layout.issued else ""
+        flags = next(left) if self._layout.executable.issued else ""
         named = dict(zip(left, left, strict=False))
         return Observation(
             issued=tuple(issued),
             log=tuple(log),
             state=state,
-            enabled=frozenset(event for event, flag in zip(self._layout.issued, flags, strict=True) if flag == "1"),
+            enabled=frozenset(
+                event for event, flag in zip(self._layout.executable.issued, flags, strict=True) if flag == "1"
+            ),
             locations=locations,
             status=(_STATUSES[int(named["status"])].value, named["fault"] == "1"),
         )

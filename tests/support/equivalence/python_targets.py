@@ -107,9 +107,7 @@ class PythonTarget:
         self._model = model
         self._system = system
         self._runtime = runtime
-        self._events = tuple(
-            event.name for event in ExecutableSystem(model, Deployment.CONTROLLER).events.values() if event.is_issued
-        )
+        self._events = ExecutableSystem(model, Deployment.CONTROLLER).issued
         self._servers = [item.name for item in model.communications if _is_server(item)]
         self._clock = runtime.ManualClock()
         self._log = runtime.MemoryLog() if has_log else runtime.NullLog()

@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
 
+from robosc.automata.plants import PLANT_LOCATIONS
 from robosc.supervisor import Supervisor
-from robosc.targets.c99.layout import PLANT_LOCATIONS
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.definition import (
     DefinitionError,

@@ -14,7 +14,7 @@ from functools import cached_property
 import msgspec
 
 from robosc.automata.lowering import to_automata
-from robosc.automata.plants import communication_plant, is_blocking
+from robosc.automata.plants import PLANT_LOCATIONS, communication_plant, is_blocking
 from robosc.automata.structure import System
 from robosc.expressions import Type
 from robosc.model.structure import (
@@ -22,7 +22,6 @@ from robosc.model.structure import (
     ISSUED_KINDS,
     Behaviour,
     Communication,
-    CommunicationKind,
     Component,
     Deployment,
     EventKind,
@@ -31,7 +30,7 @@ from robosc.model.structure import (
     Transition,
 )
 
-CALLED_KINDS = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
+CALLED_KINDS = frozenset(PLANT_LOCATIONS)
 """The kinds of communication whose plant has more than one location."""
 
 

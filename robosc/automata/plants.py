@@ -66,6 +66,10 @@ def _call(busy: str) -> tuple[tuple[str, EventKind, str], ...]:
     )
 
 
+PLANT_LOCATIONS = {kind: _protocol(kind)[0] for kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)}
+"""Locations of the plants of services and actions, by kind: those of the kinds with more than one."""
+
+
 def component_plant(name: str, behaviour: Behaviour) -> Automaton:
     """The plant of a component's behaviour.
 

@@ -9,7 +9,7 @@ from random import Random
 from typing import Any
 
 from robosc.automata.executable import CALLED_KINDS
-from robosc.automata.plants import communication_plant_name
+from robosc.automata.plants import PLANT_LOCATIONS, communication_plant_name
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.clock import ManualClock
 from robosc.execution.runtime.executor import Executor
@@ -30,7 +30,7 @@ from robosc.expressions import (
 from robosc.model.structure import CommunicationKind, ObjectValue
 from robosc.supervisor import Supervisor
 from robosc.targets import generate
-from robosc.targets.c99.layout import PLANT_LOCATIONS, Layout, event_data, make_layout
+from robosc.targets.c99.layout import Layout, event_data, make_layout
 from support.c99_main import batch_types, events_back, test_program
 
 GCC = shutil.which("gcc")

@@ -3,9 +3,9 @@
 from pathlib import Path
 from random import Random
 
+from robosc.automata.plants import PLANT_LOCATIONS
 from robosc.supervisor import Supervisor
 from robosc.targets import generate
-from robosc.targets.c99.layout import PLANT_LOCATIONS
 from support.generated import imported
 
 

@@ -5,7 +5,7 @@ from importlib import resources
 
 from robosc._version import __version__
 from robosc.automata.executable import CALLED_KINDS
-from robosc.automata.plants import communication_plant_name
+from robosc.automata.plants import PLANT_LOCATIONS, communication_plant_name
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import (
     ArrayType,
@@ -22,7 +22,7 @@ from robosc.expressions import (
 from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.supervisor import Supervisor
 from robosc.targets.c99.layer import request_declarations
-from robosc.targets.c99.layout import PLANT_LOCATIONS, Layout, data_that_comes, event_data, width
+from robosc.targets.c99.layout import Layout, data_that_comes, event_data, width
 from robosc.targets.c99.provide import request_field, request_struct
 from robosc.targets.c99.step import unknown_name
 from robosc.targets.c99.text import comment, safe

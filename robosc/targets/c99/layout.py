@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from robosc.automata.executable import CALLED_KINDS, ExecutableSystem
-from robosc.automata.plants import communication_plant_name
+from robosc.automata.plants import PLANT_LOCATIONS, communication_plant_name
 from robosc.errors import InternalError
 from robosc.execution.interpreter import describe
 from robosc.execution.runtime.protocol import Description
@@ -22,12 +22,6 @@ from robosc.expressions import (
 from robosc.model.structure import Communication, CommunicationKind, Deployment, EventKind, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.c99.naming import CNamer, prefix_for
-
-PLANT_LOCATIONS = {
-    CommunicationKind.SERVICE: ("idle", "waiting", "ready", "failed"),
-    CommunicationKind.ACTION: ("idle", "executing", "ready", "failed"),
-}
-"""The locations of the plants, in the order of their numbers in C."""
 
 # Names of the engine itself after the prefix.
 _ENGINE_NAMES = """

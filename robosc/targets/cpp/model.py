@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from robosc.automata.executable import CALLED_KINDS
-from robosc.automata.plants import communication_plant_name
+from robosc.automata.plants import PLANT_LOCATIONS, communication_plant_name
 from robosc.expressions import (
     ArrayType,
     BooleanType,
@@ -19,7 +19,7 @@ from robosc.expressions import (
 )
 from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.targets.c99.header import batch, batch_parameters
-from robosc.targets.c99.layout import PLANT_LOCATIONS, Layout, event_data
+from robosc.targets.c99.layout import Layout, event_data
 from robosc.targets.c99.provide import Field, request_field
 from robosc.targets.c99.text import comment, string_literal
 from robosc.targets.c99.unit import Unit

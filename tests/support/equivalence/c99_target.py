@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from robosc.automata.executable import CALLED_KINDS
-from robosc.automata.plants import communication_plant_name
+from robosc.automata.plants import PLANT_LOCATIONS, communication_plant_name
 from robosc.execution.interpreter import describe
 from robosc.execution.runtime.middleware_messages import is_finite
 from robosc.execution.runtime.runner import Status
@@ -16,7 +16,7 @@ from robosc.expressions import BooleanType, DoubleType, EnumType, StringType, Ty
 from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets.c99.layer import request_parameters
-from robosc.targets.c99.layout import PLANT_LOCATIONS, event_data, make_layout
+from robosc.targets.c99.layout import event_data, make_layout
 from support.c99 import SANITIZERS, compiled, data_words, microseconds, settings_words
 from support.c99_layer import REFUSALS, caller_place, compiled_layer, layer_settings_words
 from support.c99_layer_main import TOKENS

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
+from robosc.automata.plants import PLANT_LOCATIONS
 from robosc.certification import make_supervisor
 from robosc.supervisor import Supervisor
-from robosc.targets.c99.layout import PLANT_LOCATIONS
 from support import rclcpp_nodes
 from support.models import EXAMPLES, bundle_of
 from support.node_logs import comparable, entries_of, replayed

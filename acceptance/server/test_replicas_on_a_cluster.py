@@ -4,7 +4,7 @@ import subprocess
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -197,5 +197,6 @@ def test_a_server_is_killed_and_the_others_finish_its_jobs(site: Site, ours: Cli
     assert [job.attempts for job in done] == [2] + [1] * len(waiting)
     assert theirs.get_job(endless.id).state is JobState.CANCELLED
     for job, task in zip(waiting, tasks, strict=True):
-        assert ours.job_result(job.id) == theirs.generate(task.bundle, task.target)
+        # A job's result does not say what it was asked for.
+        assert ours.job_result(job.id) == replace(theirs.generate(task.bundle, task.target), target="")
     assert eventually(lambda: not busy(site.cluster))

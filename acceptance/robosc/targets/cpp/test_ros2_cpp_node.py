@@ -271,7 +271,7 @@ def test_a_wrong_parameter_is_one_clear_error(maze_node: Path, parameter: str, e
 
 
 def test_states_and_prefix(maze_node: Path) -> None:
-    lines = [f"message /robot1/scan {' '.join(['3.0'] * 360)}", *["wait publish /robot1/state"] * 3, END]
+    lines = [f"message /robot1/scan {' '.join(['3.0'] * 360)}", *["wait publish /robot1/state"] * 40, END]
     done = run(maze_node, lines, "topic_prefix:=/robot1/", "publish_state:=true", "period:=0.001")
     assert done.returncode == 0, done.stderr
     found = sent(done.stdout)

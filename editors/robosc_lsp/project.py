@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 
 from lsprotocol import types as lsp
@@ -22,8 +23,11 @@ from robosc.model.check import Checked, Inspected, inspect
 from robosc.source import Bundle, Location, SourceFile
 from robosc_lsp.texts import Text
 
-_MOST_FILES = 1_000
+MAXIMUM_FILES = 1_000
 """Maximum number of files that are searched for uses of a name."""
+
+_IGNORED = "COLCON_IGNORE"
+"""File in a folder that colcon has built, which holds copies."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,21 +234,31 @@ class Project:
         real = os.path.realpath(path)
         return self._by_path.get(real) or from_fs_path(real) or ""
 
+    def has_too_many_files(self) -> bool:
+        """Return True if the folders hold more files than are searched."""
+        return next(islice(self._files(), MAXIMUM_FILES, None), None) is not None
+
     def _saved(self) -> Iterator[str]:
+        for file in islice(self._files(), MAXIMUM_FILES):
+            yield self._uri(file)
+
+    def _files(self) -> Iterator[Path]:
+        """Yield the models of all folders: those of the editor with all below them, of open files, of libraries."""
         folders = list(self.folders)
         for uri in self._open:
             path = _path(uri)
             if path is not None:
                 folders += [path.parent, path.parent.parent / "shared"]
-        count = 0
-        for folder in dict.fromkeys(folders):
-            for file in (
-                sorted(folder.rglob(f"*{SUFFIX}")) if folder in self.folders else sorted(folder.glob(f"*{SUFFIX}"))
-            ):
-                count += 1
-                if count > _MOST_FILES:
-                    return
-                yield self._uri(file)
+        for folder in dict.fromkeys((*folders, *self.library_paths)):
+            if folder in self.folders:
+                for here, below, names in folder.walk():
+                    if _IGNORED in names:
+                        below.clear()
+                        continue
+                    below[:] = sorted(name for name in below if name[0] != "." and name != "node_modules")
+                    yield from (here / name for name in sorted(names) if name.endswith(SUFFIX))
+            else:
+                yield from sorted(folder.glob(f"*{SUFFIX}"))
 
 
 @lru_cache(maxsize=256)

@@ -11,12 +11,19 @@ import logging
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 from lsprotocol import types as lsp
-from pygls.exceptions import JsonRpcInvalidParams
+from pygls.exceptions import (
+    JsonRpcException,
+    JsonRpcInvalidParams,
+    JsonRpcInvalidRequest,
+    JsonRpcServerNotInitialized,
+)
 from pygls.lsp.server import LanguageServer
 from pygls.protocol import LanguageServerProtocol, lsp_method
+from pygls.protocol.json_rpc import JsonRPCNotification
 from pygls.uris import to_fs_path
 
 from robosc import __version__
@@ -40,7 +47,7 @@ from robosc_lsp.convert import (
     symbol,
 )
 from robosc_lsp.messages import SynthesisResponse
-from robosc_lsp.project import Analysis, Project, place_of
+from robosc_lsp.project import MAXIMUM_FILES, Analysis, Project, place_of
 from robosc_lsp.synthesis_queue import SynthesisQueue, run_synthesis
 
 _LOG = logging.getLogger(__name__)
@@ -56,8 +63,32 @@ _FIX_TIME_S = 0.3
 class _Protocol(LanguageServerProtocol):
     """Protocol that leaves texts to `Project`, since pygls splits lines differently.
 
-    Handlers of notifications are plain functions: pygls never releases the futures of asynchronous ones.
+    Handlers of notifications are plain functions: pygls never releases the futures of asynchronous ones. Every request
+    gets a response, also those that pygls only logs: with wrong parameters, before `initialize`, after `shutdown`.
     """
+
+    _is_initialized = False
+
+    def structure_message(self, data: dict[str, Any]) -> Any:
+        """Return the message of JSON data; a request with wrong parameters is answered, and ignored from then on."""
+        try:
+            return super().structure_message(data)
+        except JsonRpcException as error:
+            if "method" not in data or not isinstance(data.get("id"), int | str):
+                raise
+            self._send_response(data["id"], error=error.to_response_error())
+            return JsonRPCNotification(method="$/answered", jsonrpc=self.VERSION, params=None)
+
+    def handle_message(self, message: Any) -> None:
+        """Handle a message, unless it is a request that comes too early or too late, which is refused."""
+        method, is_request = getattr(message, "method", None), hasattr(message, "id") and hasattr(message, "method")
+        if is_request and not self._is_initialized and method != lsp.INITIALIZE:
+            self._send_response(message.id, error=JsonRpcServerNotInitialized().to_response_error())
+        elif is_request and self._shutdown:
+            self._send_response(message.id, error=JsonRpcInvalidRequest().to_response_error())
+        else:
+            self._is_initialized = self._is_initialized or method == lsp.INITIALIZE
+            super().handle_message(message)
 
     @lsp_method(lsp.TEXT_DOCUMENT_DID_OPEN)
     def lsp_text_document__did_open(self, params: lsp.DidOpenTextDocumentParams) -> None:
@@ -343,6 +374,11 @@ class Server(LanguageServer):
                         f"'{definition.name}' occurs in line {line} of {name}, where errors hide its meaning: "
                         "fix them first"
                     )
+        if self.project.has_too_many_files():
+            raise JsonRpcInvalidParams(
+                f"the editor's folders hold more than {MAXIMUM_FILES} models, and '{definition.name}' may occur in any "
+                "of them: open a smaller folder"
+            )
         for path in self.project.unreadable():
             if definition.name.encode() in path.read_bytes():
                 raise JsonRpcInvalidParams(f"'{definition.name}' occurs in {path.name}, which is not UTF-8")

@@ -163,7 +163,7 @@ class _Names:
             if last == "requirement":
                 yield from self._values(None)
         elif self._is_property_wanted():
-            yield from self._properties(self._provided())
+            yield from self._properties(self._provided(), _written_properties(self._place.before))
         elif self._is_target_wanted():
             yield from self._variables(self._own)
         elif last == "in" or "an expression" in expected or "'true'" in expected:
@@ -296,10 +296,12 @@ class _Names:
         else:
             yield from self._properties(self._type_of(chain))
 
-    def _properties(self, type_: Type | None) -> Iterator[Candidate]:
+    def _properties(self, type_: Type | None, written: frozenset[str] = frozenset()) -> Iterator[Candidate]:
         if self._scope is None or not isinstance(type_, ObjectType):
             return
         for name in self._scope.types.property_names(type_):
+            if name in written:
+                continue
             shown = _shown(self._scope.types.property_type(type_, name))
             is_key = self._is_property_wanted()
             yield Candidate(f"{spelled(name)}:" if is_key else spelled(name), DefinitionKind.PROPERTY, shown)
@@ -411,6 +413,19 @@ class _Names:
             # What is sent is of the type that the enum is made from.
             return self._scope.types.sources.get(type_.name)
         return type_
+
+
+def _written_properties(tokens: Sequence[str]) -> frozenset[str]:
+    """The properties that the object value which is open has before this place."""
+    found: set[str] = set()
+    depth = 0
+    for before, token in zip(reversed(tokens[:-1]), reversed(tokens[1:]), strict=True):
+        depth += (token == "}") - (token == "{")
+        if depth < 0:
+            break
+        if token == ":" and not depth:
+            found.add(name_of(before))
+    return frozenset(found)
 
 
 def _up_to_expression(tokens: Sequence[str]) -> Sequence[str]:

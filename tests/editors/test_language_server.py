@@ -9,6 +9,7 @@ from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 
 from robosc.formatting import format_text
+from robosc_lsp.project import Project
 from support.editor import Editor, part_of, position_of, with_edits
 from support.editor_models import LIBRARY, ROBOT
 
@@ -345,6 +346,12 @@ def test_nothing_is_renamed_while_a_use_may_be_hidden(editor: Editor, tmp_path: 
         "robot L { component Base from parts import Base // für calm\n }".encode("latin-1")
     )
     with pytest.raises(JsonRpcException, match=r"'calm' occurs in latin\.rscd, which is not UTF-8"):
+        rename(editor, "walker.rscd", "Base.|calm", "quiet")
+
+
+def test_nothing_is_renamed_where_not_all_files_are_searched(editor: Editor, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Project, "has_too_many_files", lambda project: True)
+    with pytest.raises(JsonRpcException, match="hold more than 1000 models, and 'calm' may occur in any of them"):
         rename(editor, "walker.rscd", "Base.|calm", "quiet")
 
 

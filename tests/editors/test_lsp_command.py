@@ -4,11 +4,13 @@ import gc
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import tracemalloc
 from pathlib import Path
+from typing import Any
 
 import pytest
 from lsprotocol import types as lsp
@@ -121,6 +123,28 @@ def test_nonsense_is_survived(given: bytes) -> None:
     answered = b'"id": 99' in written.getvalue()
     # The rest is taken for its body there.
     assert answered == (b"99999" not in given), written.getvalue()
+
+
+INITIALIZE: dict[str, Any] = {"capabilities": {}, "processId": None, "rootUri": None}
+PLACE = {"textDocument": {"uri": "file:///a.rscd"}, "position": {"line": 0, "character": 0}}
+
+
+def test_every_request_gets_a_response() -> None:
+    given = [
+        message(id=1, method="textDocument/hover", params=PLACE),
+        message(id=2, method="initialize", params=INITIALIZE),
+        message(id="three", method="textDocument/hover", params={}),
+        message(id=4, method="textDocument/hover", params=PLACE),
+        message(id=5, method="shutdown"),
+        message(id=6, method="textDocument/hover", params=PLACE),
+        message(method="exit"),
+    ]
+    written = Written()
+    make_server().start_io(io.BytesIO(b"".join(given)), written)
+    bodies = re.findall(rb"\r\n\r\n({.*?})(?=Content-Length|$)", written.getvalue(), re.DOTALL)
+    responses = {found["id"]: found for found in map(json.loads, bodies) if "id" in found}
+    codes = {name: found.get("error", {}).get("code") for name, found in responses.items()}
+    assert codes == {1: -32002, 2: None, "three": -32602, 4: None, 5: None, 6: -32600}
 
 
 def synthesis_of(editor: ProcessEditor) -> int:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lsprotocol import types as lsp
 
-from robosc_lsp.project import Project
+from robosc_lsp.project import MAXIMUM_FILES, Project
 
 NAMES = ("robot.rscd", "parts.rscd", "more.rscd")
 TEXTS = {
@@ -62,3 +62,30 @@ def test_what_is_known_is_that_of_the_texts_now(steps: list[tuple[str, int, bool
             assert mine is not None and its is not None
             assert mine.inspected.checked.diagnostics == its.inspected.checked.diagnostics
             assert mine.names.pattern() == its.names.pattern() and mine.uris == its.uris
+
+
+def searched(project: Project) -> set[str]:
+    return {analysis.uri.rpartition("/")[2] for analysis in project.analyses()}
+
+
+def test_folders_are_searched_without_copies_and_packages(tmp_path: Path) -> None:
+    folders = {"src": "a.rscd", "src/deep": "b.rscd", ".git": "c.rscd", "node_modules/x": "d.rscd", "build/e": "e.rscd"}
+    for folder, name in folders.items():
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / name).write_text("library L { }", encoding="utf-8")
+    (tmp_path / "build" / "COLCON_IGNORE").touch()
+    libraries = tmp_path.parent / f"{tmp_path.name}-libraries"
+    libraries.mkdir()
+    (libraries / "f.rscd").write_text("library F { }", encoding="utf-8")
+    project = Project("utf-16", [tmp_path])
+    project.library_paths = (libraries,)
+    assert searched(project) == {"a.rscd", "b.rscd", "f.rscd"}
+
+
+def test_too_many_files_are_noticed(tmp_path: Path) -> None:
+    project = Project("utf-16", [tmp_path])
+    for number in range(MAXIMUM_FILES):
+        (tmp_path / f"{number}.rscd").touch()
+    assert not project.has_too_many_files()
+    (tmp_path / "one_more.rscd").touch()
+    assert project.has_too_many_files()

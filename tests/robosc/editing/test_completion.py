@@ -167,3 +167,24 @@ def test_what_a_condition_of_a_message_is_about_is_known() -> None:
 
 def test_the_text_that_is_completed_is_sound() -> None:
     assert check(bundle_of(TYPED.format(**SOUND))).model is not None
+
+
+MOVING = (
+    "robot R {{ datatype object Part {{ u: double v: double }} "
+    "datatype object Twist {{ x: double y: double part: Part }} "
+    'component C {{ incoming message go with identifier: "go", type: Twist }} '
+    "provide go with {{ {written} | }} }}"
+)
+
+
+@pytest.mark.parametrize(
+    ("written", "expected"),
+    [
+        ("", {"x:", "y:", "part:"}),
+        ("x: 1.0,", {"y:", "part:"}),
+        ("part: { u: 0.5 }, x: 1.0,", {"y:"}),
+        ("x: 1.0, part: { u: 0.5,", {"v:"}),
+    ],
+)
+def test_a_property_is_offered_once(written: str, expected: set[str]) -> None:
+    assert set(offered(MOVING.format(written=written))) == expected

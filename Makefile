@@ -9,7 +9,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 # Another environment: colcon wants older packages than ours.
 COLCON := .venv-colcon
-# What looks at the files of deploy/ and makes the site of docs/, and what images are made of.
+# Tools that check the files of deploy/ and make the site of docs/; wheels that images are made of.
 CHECKERS := .venv-checkers
 WHEELS := out/wheels
 

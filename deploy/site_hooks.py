@@ -111,7 +111,7 @@ class _Links:
         text, target, section = match[1], match[2], match[3] or ""
         source = posixpath.normpath(posixpath.join(posixpath.dirname(self._source), target))
         place = source.removeprefix("docs/") if source.startswith("docs/") else f"{_OUTSIDE}/{source}"
-        # Of a page that docs/ should have, MkDocs itself says that it is not there.
+        # MkDocs itself reports a page that is missing in docs/.
         if source.startswith("docs/") or self._files.get_file_from_path(place):
             return f"[{text}]({posixpath.relpath(place, posixpath.dirname(self._place))}{section})"
         if not (TOP / source).exists():

@@ -89,7 +89,7 @@ def make_endpoints(configuration: Configuration, operations: Operations, limits:
         endpoints.append(GroundLink(operations, ground))
     page = view_settings(configuration)
     if page is not None:
-        # Where nobody asks for the page, nothing of it is loaded.
+        # The page's modules are loaded only where somebody asks for the page.
         from robosc_view import ViewEndpoint
 
         endpoints.append(ViewEndpoint(operations, page))

@@ -187,7 +187,7 @@ class Lifecycle:
             return
         if self.state is State.STANDBY:
             self._begin()
-        # What the first steps of the supervisor lead to is known at the end of this cycle.
+        # The supervisor's first steps have their result at the end of this cycle.
         self._orders.wait(Until.STARTED, order)
 
     def _why_not_start(self) -> str:

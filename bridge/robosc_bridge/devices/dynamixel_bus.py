@@ -35,7 +35,7 @@ def exchange_limit_s(answer_limit_s: float) -> float:
 
 _EMPTY_STATUS = 11  # Bytes of an answer without data.
 
-# What a device is asked for to have all older answers behind it: address and length, alternating. Whole registers
+# Reads that let a device send all older answers first: address and length, alternating. Whole registers
 # without gaps, which every device has, of lengths that no request of a driver has; so many that with the usual limits
 # an answer must be 0.7 s late to be taken for one to a later request.
 _SETTLING = (

@@ -79,7 +79,7 @@ class DynamixelPort:
         """At most so many bytes, waiting for the first."""
         if not self._found and not self._is_over:
             limit_s = self._answer_end_s - self._host.monotonic()
-            # What came while this thread did not run still counts: one look after the end, and no more.
+            # Bytes that came while this thread did not run still count: one look after the end, and no more.
             self._is_over = limit_s <= 0.0
             self._found = self.line.read(limit_s)
             if self._found:

@@ -189,7 +189,7 @@ def _drive(
             if key == PRESENT:
                 continue
             requested.press(key, now_s)
-            # What is requested goes out with the key, not with the next period.
+            # A request goes out with the key, not with the next period.
             next_s, zeros_left = now_s, _ZEROS
             _obey(client, key, status_line, resuming)
         resuming.poll()

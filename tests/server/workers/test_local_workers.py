@@ -275,13 +275,13 @@ class TestNothingIsLeft:
 
     def test_workers_end_also_where_a_burial_ends_that_very_moment(self) -> None:
         async def run() -> None:
-            supply = WorkerPool(TASK_FUNCTION, 1, must_be_confined=False)
-            termination = supply._begin(asyncio.sleep(0))
+            pool = WorkerPool(TASK_FUNCTION, 1, must_be_confined=False)
+            termination = pool._begin(asyncio.sleep(0))
             while not termination.done():
                 await asyncio.sleep(0)
             # It is done, and what follows from that is at its turn only when this here waits.
-            assert supply._terminations == {termination}
-            await supply.__aexit__()
-            assert not supply._terminations
+            assert pool._terminations == {termination}
+            await pool.__aexit__()
+            assert not pool._terminations
 
         asyncio.run(run())

@@ -137,6 +137,11 @@ class Project:
         """Drop all analyses, which are made again on demand."""
         self._known.clear()
 
+    def reread(self) -> None:
+        """Drop everything that was read from saved files, which other programs may have changed."""
+        self.forget()
+        self._packages = None
+
     def text(self, uri: str) -> Text | None:
         """Return an open or saved text; None if there is none."""
         if uri in self._open:
@@ -195,7 +200,7 @@ class Project:
         return sorted(found)
 
     def _interfaces(self) -> Mapping[str, tuple[str, ...]]:
-        """Return the types of each installed ROS package; searched once."""
+        """Return the types of each installed ROS package."""
         if self._packages is None:
             self._packages = {}
             for folder in self.interface_paths:

@@ -35,6 +35,7 @@ from robosc.editing.outline import folds, parts
 from robosc.errors import Diagnostic, LanguageError, RelatedPlace, Severity
 from robosc.formatting import format_text
 from robosc.language.bundle import SUFFIX
+from robosc.language.interfaces import INTERFACE_KINDS
 from robosc.language.words import spelled
 from robosc.source import Bundle, Location, SourceFile
 from robosc_lsp.convert import (
@@ -278,7 +279,9 @@ class Server(LanguageServer):
         capabilities = self.client_capabilities.workspace
         watched = capabilities.did_change_watched_files if capabilities is not None else None
         if watched is not None and watched.dynamic_registration:
-            options = lsp.DidChangeWatchedFilesRegistrationOptions([lsp.FileSystemWatcher(f"**/*{SUFFIX}")])
+            suffixes = (SUFFIX, *(f".{kind}" for kind in INTERFACE_KINDS))
+            watchers = [lsp.FileSystemWatcher(f"**/*{suffix}") for suffix in suffixes]
+            options = lsp.DidChangeWatchedFilesRegistrationOptions(watchers)
             registration = lsp.Registration("watched-files", lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES, options)
             await self.client_register_capability_async(lsp.RegistrationParams([registration]))
 
@@ -575,12 +578,12 @@ def make_server(
 
     @feature(lsp.TEXT_DOCUMENT_DID_SAVE)
     def did_save(_: lsp.DidSaveTextDocumentParams) -> None:
-        server.project.forget()
+        server.project.reread()
         server.schedule_analysis()
 
     @feature(lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES)
     def did_change_files(_: lsp.DidChangeWatchedFilesParams) -> None:
-        server.project.forget()
+        server.project.reread()
         server.schedule_analysis()
 
     @feature(lsp.TEXT_DOCUMENT_HOVER)

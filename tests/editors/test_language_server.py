@@ -620,13 +620,15 @@ def test_types_of_an_installed_ament_index_are_offered(tmp_path: Path, monkeypat
         assert complete(editor, "r.rscd", "Wheel from |")[:1] == ["robot_msgs"]
 
 
-def test_types_in_folders_that_are_named_are_offered(tmp_path: Path) -> None:
+def test_types_in_named_folders_are_offered_also_new_ones(tmp_path: Path) -> None:
     messages = tmp_path / "mine" / "own_msgs" / "msg"
     messages.mkdir(parents=True)
     (messages / "Wanted.msg").write_text("bool data\n")
     with Editor(tmp_path, "--synthesis-seconds", "0", "--interface-path", str(tmp_path / "mine")) as editor:
         editor.open("robot.rscd", "robot R { interface x use W }")
         assert "Wanted" in complete(editor, "robot.rscd", "use W|")
+        editor.save("mine/own_msgs/msg/Added.msg", "bool data\n")
+        assert {"Added", "Wanted"} <= set(complete(editor, "robot.rscd", "use W|"))
 
 
 def test_in_comments_nothing_is_offered(editor: Editor) -> None:

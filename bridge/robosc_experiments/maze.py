@@ -1,12 +1,12 @@
 """The maze solver: a controller that leads a robot out of a maze, the wall on its right hand."""
 
-import time
 from pathlib import Path
 
 from robosc.model.structure import Deployment
 from robosc_experiments.scenario import Outcome, Say, ScenarioError
 from robosc_experiments.serial import EXAMPLES, Rig, Setting, running, scene_of
-from robosc_experiments.tail import LineCount, latest
+from robosc_experiments.tail import LineCount
+from robosc_experiments.watch import Watch
 from robosc_simulated.motion import Motion
 from robosc_simulated.motion_checks import check_maze
 
@@ -26,7 +26,6 @@ WORLD_LIMIT_S = 1200.0
 """Time limit of the world, in seconds: at 0.1 m/s that is a way of more than 80 m, rotations included."""
 
 LIMIT_S = 240.0
-_LOOK_S = 0.1
 
 
 def run_maze(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: int = 0, model: Path = MODEL) -> Outcome:
@@ -60,19 +59,10 @@ def run_maze(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
 
 def _until_out(rig: Rig, say: Say) -> None:
     """Wait until the robot is there, or has had time enough."""
-    events = LineCount(rig.setting.event_log)
-    begin_s = time.monotonic()
-    while rig.simulator.ask("goal") == "not yet":
-        rig.require()
-        now = latest(rig.setting.motion)
-        passed_s = time.monotonic() - begin_s
-        say(
-            f"x {now.x_m:+.2f} m  y {now.y_m:+.2f} m  {events.poll():5} events  "
-            f"{now.world_s:6.1f} s of the world in {passed_s:4.1f} s"
-        )
-        if now.world_s > WORLD_LIMIT_S or passed_s > LIMIT_S:
+    watch = Watch(rig.setting.motion, LineCount(rig.setting.event_log).poll, rig.require, say, step_s=LIMIT_S)
+    for now in watch.samples("in the maze", LIMIT_S):
+        if rig.simulator.ask("goal") != "not yet" or now.world_s > WORLD_LIMIT_S:
             return
-        time.sleep(_LOOK_S)
 
 
 def way_figures(motion: Motion) -> dict[str, float]:

@@ -4,12 +4,10 @@ Nothing but the starting of programs differs between ROS 2 and ROS 1: that is a 
 the computer's clock; where the world passes N times as fast, a controller decides N times as often.
 """
 
-import math
 import os
 import sys
-import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,15 +18,16 @@ from robosc.language import load_bundle
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor, encode
 from robosc.targets import generate, write_files
-from robosc_experiments.line import BOX, FREE_M, HELD_S, line_figures
+from robosc_experiments.line import BOX, line_figures
 from robosc_experiments.line import MODEL as LINE_MODEL
 from robosc_experiments.maze import LIMIT_S, WORLD_LIMIT_S, way_figures
 from robosc_experiments.processes import Program, finish
 from robosc_experiments.records import Recorded
 from robosc_experiments.scenario import Connection, Outcome, Say, ScenarioError
 from robosc_experiments.serial import EXAMPLES, scene_of
-from robosc_experiments.tail import LineCount, MotionState, latest
-from robosc_simulated.motion_checks import SETTLE_S, Halt, check_line, check_maze
+from robosc_experiments.tail import LineCount
+from robosc_experiments.watch import FREE_M, Watch
+from robosc_simulated.motion_checks import SETTLE_S, check_line, check_maze
 from robosc_simulated.scene import scene_names
 
 HELPERS = EXAMPLES / "robosc_examples"
@@ -52,7 +51,6 @@ The world does not know of it, and passes meanwhile.
 """
 
 STEP_LIMIT_S = 60.0
-_LOOK_S = 0.02
 _PERIOD_S = 0.1
 _FINEST_PERIOD_S = 0.005
 _SIMULATOR_LIMIT_S = 60.0
@@ -295,7 +293,7 @@ def run_maze(
         stage.helper("rotator")
         stage.supervisor_node()
         stage.start_world()
-        watch = _Watch(stage, say)
+        watch = _watch(stage, say)
         for now in watch.samples("in the maze", LIMIT_S):
             if stage.simulator.ask("goal") != "not yet" or now.world_s > WORLD_LIMIT_S:
                 break
@@ -343,14 +341,14 @@ def run_line(
         panel = stage.helper("stop_panel", is_asked=True)
         stage.supervisor_node("careless_line_follower")
         stage.start_world()
-        watch = _Watch(stage, say)
+        watch = _watch(stage, say)
         box = f"obstacle {BOX}"
         watch.drive("along the line")
         stage.simulator.tell(f"{box} back")
-        watch.wait_until_still("the box on the line", lambda: stage.simulator.tell(f"{box} away"), is_told=False)
+        watch.stand("for the box on the line", lambda: stage.simulator.tell(f"{box} away"), is_told=False)
         watch.drive("without the box")
         panel.tell("stop")
-        watch.wait_until_still("the stop button", lambda: panel.tell("resume"))
+        watch.stand("after the stop button", lambda: panel.tell("resume"))
         watch.drive("after the resume button")
         figures = stage.finish()
     motion = setting.read_motion()
@@ -359,80 +357,17 @@ def run_line(
     return setting.outcome("line", setting.middleware.connection, faults, {**figures, **line_figures(place, motion)})
 
 
-class _Watch:
-    """Watch over what the robot does.
+def _watch(stage: Stage, say: Say) -> Watch:
+    setting = stage.setting
+    # The node makes its log when it has started.
+    counts: list[LineCount] = []
 
-    Attributes:
-        halts: Times when it had to stand still.
-        faults: Things that it did not do in time; nothing is waited for after the first.
-    """
+    def events() -> int:
+        if not counts:
+            counts.extend(LineCount(path) for path in setting.events.glob("*.jsonl"))
+        return sum(count.poll() for count in counts)
 
-    def __init__(self, stage: Stage, say: Say) -> None:
-        self.halts: list[Halt] = []
-        self.faults: list[str] = []
-        self._stage = stage
-        self._say = say
-        # The node makes its log when it has started.
-        self._events: LineCount | None = None
-        self._begin_s = time.monotonic()
-
-    def samples(self, what: str, limit_s: float) -> Iterator[MotionState]:
-        """Yield the state of the robot again and again, until the limit."""
-        end_s = time.monotonic() + limit_s
-        while time.monotonic() < end_s:
-            self._stage.require()
-            now = latest(self._stage.setting.motion)
-            self._say(
-                f"{what}: x {now.x_m:+.2f} m  y {now.y_m:+.2f} m  {self._count()} events  "
-                f"{now.world_s:.1f} s of the world in {time.monotonic() - self._begin_s:.1f} s"
-            )
-            yield now
-            time.sleep(_LOOK_S)
-
-    def _count(self) -> int:
-        """Entries of the log so far."""
-        if self._events is None:
-            found = list(self._stage.setting.events.glob("*.jsonl"))
-            if not found:
-                return 0
-            self._events = LineCount(found[0])
-        return self._events.poll()
-
-    def drive(self, what: str) -> None:
-        """Wait until it has driven some way."""
-        if self.faults:
-            return
-        before = latest(self._stage.setting.motion)
-        driven_m = 0.0
-        for now in self.samples(what, STEP_LIMIT_S):
-            driven_m += math.dist((before.x_m, before.y_m), (now.x_m, now.y_m))
-            before = now
-            if driven_m >= FREE_M:
-                return
-        self.faults.append(f"the robot did not drive {what} within {STEP_LIMIT_S:g} s")
-
-    def wait_until_still(self, why: str, release: Callable[[], object], *, is_told: bool = True) -> None:
-        """Wait until it has stood still for a while; then it may go on.
-
-        Args:
-            why: Reason, for a person.
-            release: Function that lets it go on.
-            is_told: True if it has just been told to stand still; else it is to see for itself.
-        """
-        if self.faults:
-            return
-        told_s = latest(self._stage.setting.motion).world_s
-        begin_s: float | None = None
-        for now in self.samples(f"stands for {why}", STEP_LIMIT_S):
-            if not now.is_standing:
-                begin_s = None
-            elif begin_s is None:
-                begin_s = now.world_s
-            elif now.world_s - begin_s >= self._stage.setting.settle_s + HELD_S:
-                self.halts.append(Halt(told_s if is_told else begin_s, now.world_s, why))
-                release()
-                return
-        self.faults.append(f"the robot did not stand still for {why} within {STEP_LIMIT_S:g} s")
+    return Watch(setting.motion, events, stage.require, say, step_s=STEP_LIMIT_S, settle_s=setting.settle_s)
 
 
 def _setting(

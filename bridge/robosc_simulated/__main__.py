@@ -13,12 +13,13 @@ import threading
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import FrameType
 
 from robosc_bridge.configuration.document import MAXIMUM_BYTES, read_file
 from robosc_bridge.configuration.problems import ConfigurationError
-from robosc_simulated.commands import UnknownCommandError, execute
+from robosc_simulated.commands import execute, obey_input
 from robosc_simulated.error_monitor import ErrorMonitor
 from robosc_simulated.floor import Track, oval, parse_track
 from robosc_simulated.lidar import LIDARS
@@ -85,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if robot.camera is not None:
                 print(f"camera {robot.camera.path}")
             sys.stdout.flush()
-            threading.Thread(target=_listen, args=(robot,), name="commands", daemon=True).start()
+            threading.Thread(target=obey_input, args=(partial(execute, robot),), name="commands", daemon=True).start()
             # Nor without end: a signal that comes just before a wait begins does not end it.
             while not received and not errors.has_crashed:
                 time.sleep(_POLL_S)
@@ -111,18 +112,6 @@ def _robot(options: argparse.Namespace, recorder: Recorder | None) -> SimulatedT
         recorder=recorder,
         patience_s=options.wait,
     )
-
-
-def _listen(robot: SimulatedTurtleBot3) -> None:
-    """Obey standard input to its end, or until it cannot be read; the robot is served on after it."""
-    with contextlib.suppress(ValueError, OSError):
-        for line in sys.stdin:
-            try:
-                answer = execute(robot, line)
-            except UnknownCommandError as error:
-                answer = f"error: {error}"
-            if answer:
-                print(answer, flush=True)
 
 
 def _scene(options: argparse.Namespace) -> Scene:

@@ -1,5 +1,7 @@
 """Commands to a simulated robot as lines of text, for a simulator in a process of its own."""
 
+import contextlib
+import sys
 from collections.abc import Callable
 from dataclasses import fields
 
@@ -44,6 +46,22 @@ _MOST_GARBAGE = 4096
 
 class UnknownCommandError(ValueError):
     """There is no such command, or not with such values."""
+
+
+def obey_input(obey: Callable[[str], str]) -> None:
+    """Obey the lines of standard input to its end, or until it cannot be read; answers are printed.
+
+    Args:
+        obey: Function that does what a line says, and returns what there is to tell, as `execute`.
+    """
+    with contextlib.suppress(ValueError, OSError):
+        for line in sys.stdin:
+            try:
+                answer = obey(line)
+            except UnknownCommandError as error:
+                answer = f"error: {error}"
+            if answer:
+                print(answer, flush=True)
 
 
 def execute(robot: SimulatedTurtleBot3, line: str) -> str:

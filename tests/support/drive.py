@@ -56,40 +56,16 @@ class Tap:
         self.device.plug_in()
 
 
-@dataclass
-class Rig:
-    """A simulated robot and the driver of its base.
+class Driven:
+    """A drive base on a host, for subclasses to say which."""
 
-    Attributes:
-        robot: The simulated one.
-        base: Its driver, of the kind `kind`.
-        kind: `opencr`, `dynamixel` or `mavlink-rover`.
-        tap: On its line; understands the packets of Dynamixel only.
-        host: On which both run.
-    """
-
-    robot: SimulatedTurtleBot3
     base: OpenCrBase | DynamixelBase | MavlinkRover
-    kind: str
-    tap: Tap
     host: Host
 
     def start(self) -> None:
         """Open it and switch torque on."""
         self.base.open()
         self.base.set_torque(True)
-
-    def hurry(self, answer_limit_s: float = ANSWER_LIMIT_S) -> None:
-        """From now on, time-outs as on a robot, or as given; a MAVLink rover is not asked for anything."""
-        assert not isinstance(self.base, MavlinkRover)
-        bus = self.base._bus
-        assert bus is not None
-        bus._port.answer_limit_s = answer_limit_s
-        self.base._exchange_limit_s = exchange_limit_s(answer_limit_s)
-
-    def take_time(self) -> None:
-        """From now on, time-outs that a busy machine does not meet."""
-        self.hurry(PATIENT_S)
 
     def drive(self, velocity: Velocity = STANDSTILL, seconds: float = 0.0) -> DriveReading:
         """Exchange for so long; the last reading."""
@@ -116,6 +92,37 @@ class Rig:
         while not condition():
             assert self.host.monotonic() < end_s, f"not within {limit_s} s"
             self.host.sleep(0.001)
+
+
+@dataclass
+class Rig(Driven):
+    """A simulated robot and the driver of its base.
+
+    Attributes:
+        robot: The simulated one.
+        base: Its driver, of the kind `kind`.
+        kind: `opencr`, `dynamixel` or `mavlink-rover`.
+        tap: On its line; understands the packets of Dynamixel only.
+        host: On which both run.
+    """
+
+    robot: SimulatedTurtleBot3
+    base: OpenCrBase | DynamixelBase | MavlinkRover
+    kind: str
+    tap: Tap
+    host: Host
+
+    def hurry(self, answer_limit_s: float = ANSWER_LIMIT_S) -> None:
+        """From now on, time-outs as on a robot, or as given; a MAVLink rover is not asked for anything."""
+        assert not isinstance(self.base, MavlinkRover)
+        bus = self.base._bus
+        assert bus is not None
+        bus._port.answer_limit_s = answer_limit_s
+        self.base._exchange_limit_s = exchange_limit_s(answer_limit_s)
+
+    def take_time(self) -> None:
+        """From now on, time-outs that a busy machine does not meet."""
+        self.hurry(PATIENT_S)
 
     def goals_rad_s(self) -> tuple[float, float]:
         """Return the commanded speeds of the wheels' motors in rad/s, forward positive; 0 without torque."""

@@ -5,11 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from robosc_bridge.devices.interface import (
-    STANDSTILL,
-    DriveReading,
-    Velocity,
-)
+from robosc_bridge.devices.interface import Velocity
 from robosc_bridge.devices.mavlink_rover import MavlinkRover
 from robosc_bridge.devices.robots import Body
 from robosc_bridge.driver_registry import make_drive_base
@@ -17,6 +13,7 @@ from robosc_bridge.host import Host, Thread
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 from robosc_simulated import BODIES, DatagramLine, Rover, SimulatedLine, Timebase, World, room
 from robosc_simulated.virtual_host import VirtualHost
+from support.drive import Driven
 
 BODY = Body(0.5, 2.0, BODIES["burger"].wheel_separation_m)
 FORWARD = Velocity(0.2)
@@ -25,7 +22,7 @@ KEY = bytes(range(32))
 
 
 @dataclass
-class Bench:
+class Bench(Driven):
     """A simulated rover in a world, and drivers of it."""
 
     rover: Rover
@@ -35,33 +32,6 @@ class Bench:
     base: MavlinkRover
     path: str
     host: Host
-
-    def start(self) -> None:
-        self.base.open()
-        self.base.set_torque(True)
-
-    def drive(self, velocity: Velocity = STANDSTILL, seconds: float = 0.0) -> DriveReading:
-        end_s = self.host.monotonic() + seconds
-        while True:
-            reading = self.base.exchange(velocity)
-            if self.host.monotonic() >= end_s:
-                return reading
-            self.host.sleep(0.01)
-
-    def drive_until(
-        self, is_so: Callable[[DriveReading], bool], velocity: Velocity = STANDSTILL, limit_s: float = 5.0
-    ) -> DriveReading:
-        end_s = self.host.monotonic() + limit_s
-        while not is_so(reading := self.base.exchange(velocity)):
-            assert self.host.monotonic() < end_s, f"not within {limit_s} s; the last reading is {reading}"
-            self.host.sleep(0.01)
-        return reading
-
-    def until(self, condition: Callable[[], bool], limit_s: float = 5.0) -> None:
-        end_s = self.host.monotonic() + limit_s
-        while not condition():
-            assert self.host.monotonic() < end_s, f"not within {limit_s} s"
-            self.host.sleep(0.001)
 
     def later(self, seconds: float, act: Callable[[], None]) -> Thread:
         """Let something happen in a thread of its own after a time."""

@@ -9,14 +9,13 @@ Addresses are written as MAVLink programs do:
 
 import contextlib
 import errno
-import os
 import select
 import socket
-import threading
 import time
 
 from robosc_bridge.errors import LineBusyError, LineDeniedError, LineError, LineLostError, LineMissingError
 from robosc_bridge.host import NetworkPort
+from robosc_bridge.transport.polled_line import PolledLine
 
 SCHEMES = ("udpin", "udpout", "tcp")
 _CONNECT_LIMIT_S = 1.0
@@ -28,7 +27,7 @@ def is_network_address(address: str) -> bool:
     return address.partition(":")[0] in SCHEMES
 
 
-class NetworkLine(NetworkPort):
+class NetworkLine(PolledLine, NetworkPort):
     """An open socket.
 
     Args:
@@ -46,7 +45,6 @@ class NetworkLine(NetworkPort):
     """
 
     def __init__(self, address: str) -> None:
-        self.path = address
         scheme, place = _parsed(address)
         self.is_datagram = scheme != "tcp"
         self._is_listening = scheme == "udpin"
@@ -66,13 +64,7 @@ class NetworkLine(NetworkPort):
         except OSError as error:
             self._socket.close()
             raise _not_opened(address, error) from error
-        self._woken, self._waker = os.pipe()
-        os.set_blocking(self._waker, False)
-        self._poll = select.poll()
-        self._poll.register(self._socket.fileno(), select.POLLIN)
-        self._poll.register(self._woken, select.POLLIN)
-        self._guard = threading.Lock()
-        self._is_open = True
+        super().__init__(address, self._socket.fileno())
 
     @property
     def port(self) -> int:
@@ -92,10 +84,7 @@ class NetworkLine(NetworkPort):
             LineLostError: The connection is gone.
         """
         self._check_open()
-        readable = dict(self._poll.poll(max(limit_s, 0.0) * 1000))
-        if self._woken in readable:
-            os.read(self._woken, 4096)
-        if self._socket.fileno() not in readable:
+        if not self._is_readable(limit_s):
             return b""
         try:
             data, self._sender = self._socket.recvfrom(_DATAGRAM)
@@ -161,26 +150,8 @@ class NetworkLine(NetworkPort):
             with contextlib.suppress(BlockingIOError):
                 left = left[self._socket.send(left) :]
 
-    def wake(self) -> None:
-        """Let a `read` that waits in another thread return; safe at any time."""
-        with self._guard:
-            if self._is_open:
-                with contextlib.suppress(BlockingIOError):
-                    os.write(self._waker, b"\0")
-
-    def close(self) -> None:
-        """Give it back; never raises, and may be called again."""
-        with self._guard:
-            if not self._is_open:
-                return
-            self._is_open = False
-            self._socket.close()
-            os.close(self._woken)
-            os.close(self._waker)
-
-    def _check_open(self) -> None:
-        if not self._is_open:
-            raise LineLostError(self.path, "the line is closed")
+    def _close_file(self) -> None:
+        self._socket.close()
 
 
 def _parsed(address: str) -> tuple[str, tuple[str, int]]:

@@ -5,7 +5,6 @@ import errno
 import os
 import select
 import termios
-import threading
 import time
 from types import TracebackType
 from typing import Self
@@ -13,13 +12,14 @@ from typing import Self
 import serial
 
 from robosc_bridge.errors import LineBusyError, LineDeniedError, LineError, LineLostError, LineMissingError
+from robosc_bridge.transport.polled_line import PolledLine
 
 _CHUNK = 4096
 # How a line says that it is gone: an OSError, pyserial's own (an OSError, too) or that of termios (which is none).
 _FAILURES = (OSError, termios.error)
 
 
-class SerialLine:
+class SerialLine(PolledLine):
     """An open serial line.
 
     Args:
@@ -34,7 +34,6 @@ class SerialLine:
     """
 
     def __init__(self, path: str, baud: int) -> None:
-        self.path = path
         self.baud = baud
         try:
             self._port = serial.Serial(path, baud, timeout=0, exclusive=True)
@@ -45,14 +44,7 @@ class SerialLine:
         with contextlib.suppress(ValueError, NotImplementedError):
             self._port.set_low_latency_mode(True)
         os.set_blocking(self._port.fileno(), False)
-        self._woken, self._waker = os.pipe()
-        os.set_blocking(self._waker, False)
-        self._poll = select.poll()  # Unlike `select`, it takes any number of a file.
-        self._poll.register(self._port.fileno(), select.POLLIN)
-        self._poll.register(self._woken, select.POLLIN)
-        # Another thread may wake the line while it is being closed: its file's number may be somebody else's then.
-        self._guard = threading.Lock()
-        self._is_open = True
+        super().__init__(path, self._port.fileno())
 
     def read(self, limit_s: float) -> bytes:
         """Return the bytes that have come, waiting for the first one.
@@ -68,10 +60,7 @@ class SerialLine:
         """
         self._check_open()
         try:
-            readable = dict(self._poll.poll(max(limit_s, 0.0) * 1000))
-            if self._woken in readable:
-                os.read(self._woken, _CHUNK)
-            if self._port.fileno() not in readable:
+            if not self._is_readable(limit_s):
                 return b""
             found = os.read(self._port.fileno(), _CHUNK)
         except BlockingIOError:
@@ -146,29 +135,9 @@ class SerialLine:
             if getattr(error, "errno", None) not in (errno.EINVAL, errno.ENOTTY):
                 raise self._lost(error) from error
 
-    def wake(self) -> None:
-        """Let a `read` that waits in another thread return; safe at any time."""
-        with self._guard:
-            if self._is_open:
-                # A full pipe: it is awake already.
-                with contextlib.suppress(BlockingIOError):
-                    os.write(self._waker, b"\0")
-
-    def close(self) -> None:
-        """Give it back; never raises, and may be called again."""
-        with self._guard:
-            if not self._is_open:
-                return
-            self._is_open = False
-            with contextlib.suppress(*_FAILURES):
-                self._port.close()
-            os.close(self._woken)
-            os.close(self._waker)
-
-    def _check_open(self) -> None:
-        # Of a closed line, the numbers of its files may be somebody else's, and pyserial only notes what is to be set.
-        if not self._is_open:
-            raise LineLostError(self.path, "the line is closed")
+    def _close_file(self) -> None:
+        with contextlib.suppress(*_FAILURES):
+            self._port.close()
 
     def _lost(self, error: Exception) -> LineLostError:
         if isinstance(error, LineLostError):

@@ -13,12 +13,13 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Protocol
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_simulated.commands import UnknownCommandError
+from robosc_simulated.commands import obey_input
 from robosc_simulated.error_monitor import ErrorMonitor
 from robosc_simulated.lidar import LIDARS
 from robosc_simulated.motion import MotionRecorder
@@ -138,7 +139,7 @@ def serve(options: argparse.Namespace, make_face: MakeNode) -> int:
                 stack.enter_context(contextlib.closing(MotionRecorder(robot.world, stream)))
             node = stack.enter_context(make_face(robot, pacer, ended))
             print(READY, flush=True)
-            threading.Thread(target=_listen, args=(robot,), name="commands", daemon=True).start()
+            threading.Thread(target=obey_input, args=(partial(execute, robot),), name="commands", daemon=True).start()
             run(robot, pacer, node, lambda: ended.is_set() or errors.has_crashed)
     except (MissingRosError, ServingError, OSError, ValueError) as error:
         print(f"the robot cannot be simulated: {error}", file=sys.stderr)
@@ -180,18 +181,6 @@ def make_robot(options: argparse.Namespace) -> tuple[RosRobot, Pacer]:
         seed=options.seed,
     )
     return robot, Pacer(robot)
-
-
-def _listen(robot: RosRobot) -> None:
-    """Obey standard input to its end, or until it cannot be read; the robot is served on after it."""
-    with contextlib.suppress(ValueError, OSError):
-        for line in sys.stdin:
-            try:
-                answer = execute(robot, line)
-            except UnknownCommandError as error:
-                answer = f"error: {error}"
-            if answer:
-                print(answer, flush=True)
 
 
 def parser(prog: str, description: str) -> argparse.ArgumentParser:

@@ -11,14 +11,12 @@ from collections.abc import Iterable, Sequence
 from functools import cache
 from itertools import permutations
 
+from robosc.automata.compile import subjects_read
 from robosc.automata.state import Subject
 from robosc.automata.structure import System
 from robosc.expressions import (
-    Expression,
     PathStep,
     Received,
-    StateTest,
-    VariableRead,
     leaves,
     simple_parts,
 )
@@ -52,28 +50,17 @@ def hyperedges(system: System) -> tuple[frozenset[Subject], ...]:
             for edge in automaton.edges:
                 if edge.event == event.name:
                     touched.add(Subject(automaton.name))
-                    touched |= _read(edge.guard)
+                    touched |= subjects_read(edge.guard)
                     for update in edge.updates:
                         touched.add(Subject(automaton.name, update.variable))
-                        touched |= _read(update.expression)
+                        touched |= subjects_read(update.expression)
         found[frozenset(touched)] = None
     for condition in (*(item.condition for item in system.conditions), *system.invariants):
-        found[frozenset(_read(condition))] = None
+        found[subjects_read(condition)] = None
         # What is compared belongs closer together than what a long condition merely lists.
         for part in simple_parts(condition):
-            found[frozenset(_read(part))] = None
+            found[subjects_read(part)] = None
     return tuple(edge for edge in found if len(edge) > 1)
-
-
-def _read(expression: Expression) -> set[Subject]:
-    found = set[Subject]()
-    for leaf in leaves(expression):
-        match leaf:
-            case VariableRead(component=component, variable=variable):
-                found.add(Subject(component, variable))
-            case StateTest(component=component):
-                found.add(Subject(component))
-    return found
 
 
 def input_targets(system: System) -> dict[tuple[str, tuple[PathStep, ...]], set[Subject]]:

@@ -3,7 +3,7 @@
 import math
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -471,12 +471,19 @@ def microseconds(seconds: float | None) -> int:
     return _MASK if seconds is None else round(seconds * 1e6)
 
 
-def compare(supervisor: Supervisor, program: Path, dice: Random, runs: int, length: int) -> list[str]:
+def compare(
+    supervisor: Supervisor,
+    program: Path,
+    dice: Random,
+    runs: int,
+    length: int,
+    reference_of: Callable[[Supervisor, Random], Reference] = Reference,
+) -> list[str]:
     """Let both execute random commands; all lines, which were the same."""
     commands: list[str] = []
     lines: list[str] = []
     for _ in range(runs):
-        reference = Reference(supervisor, dice)
+        reference = reference_of(supervisor, dice)
         for _ in range(length):
             reference.act()
         commands += reference.commands

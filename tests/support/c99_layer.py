@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -23,7 +24,7 @@ from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
 from robosc.targets.c99.layer import request_parameters
 from robosc.targets.c99.layout import Layout, event_data
-from support.c99 import Reference, _hex, built, data_words, microseconds, replay
+from support.c99 import Reference, _hex, built, compare, data_words, microseconds
 from support.c99_layer_main import CALLBACKS, TOKENS, layer_program
 from support.c99_main import batch_types, events_back
 
@@ -382,15 +383,5 @@ class LayerReference(Reference):
         self._told(["e", microseconds(self.clock.now_s), number, int(outcome == "cancelled"), token])
 
 
-def compare_layer(supervisor: Supervisor, program: Path, dice: Random, runs: int, length: int) -> list[str]:
-    """Let both execute random commands; all lines, which were the same."""
-    commands: list[str] = []
-    lines: list[str] = []
-    for _ in range(runs):
-        reference = LayerReference(supervisor, dice)
-        for _ in range(length):
-            reference.act()
-        commands += reference.commands
-        lines += reference.lines
-    replay(program, commands, lines)
-    return lines
+compare_layer = partial(compare, reference_of=LayerReference)
+"""Let both execute random commands, as `compare`."""

@@ -26,7 +26,7 @@ from robosc.targets.c99.layout import Layout, data_that_comes, event_data, width
 from robosc.targets.c99.provide import request_field, request_struct
 from robosc.targets.c99.step import unknown_name
 from robosc.targets.c99.text import comment, safe
-from robosc.targets.c99.unit import Unit, declared
+from robosc.targets.c99.unit import Unit, declared, plain_type
 from robosc.targets.code.text import indent
 from robosc.targets.model_text import requirement_text
 
@@ -309,19 +309,9 @@ def _meaning(type_: Type) -> str:
             return "object"
 
 
-def stored_type(type_: Type) -> str:
+def _stored_type(type_: Type) -> str:
     """The C type of the member that holds a variable."""
-    match type_:
-        case BooleanType():
-            return "bool"
-        case IntegerType():
-            return "int32_t"
-        case DoubleType():
-            return "double"
-        case EnumType(values=values):
-            return width(len(values))
-        case _:
-            return "const char *"
+    return width(len(type_.values)) if isinstance(type_, EnumType) else plain_type(type_)
 
 
 def _state(layout: Layout) -> list[str]:
@@ -330,7 +320,7 @@ def _state(layout: Layout) -> list[str]:
         body.append(f"{width(len(behaviour.states))} {layout.locations[component]}; /* state of {component} */")
         for variable in behaviour.variables:
             name, type_ = layout.variables[component, variable.name]
-            body.append(f"{declared(stored_type(type_), name)}; /* {component}.{variable.name} */")
+            body.append(f"{declared(_stored_type(type_), name)}; /* {component}.{variable.name} */")
     for item in layout.model.communications:
         if item.kind in CALLED_KINDS:
             body.append(f"uint8_t {layout.locations[communication_plant_name(item)]}; /* {item.kind} {item.name} */")

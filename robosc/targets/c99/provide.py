@@ -14,7 +14,7 @@ from robosc.model.structure import Communication, ObjectValue, ProvidedValue
 from robosc.targets.c99.expressions import ATOM
 from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.text import comment
-from robosc.targets.c99.unit import Reading, Unit, declared
+from robosc.targets.c99.unit import Reading, Unit, declared, plain_type
 from robosc.targets.code.expressions import TRUE_CODE, Sort
 from robosc.targets.code.text import indent
 from robosc.targets.model_text import provide_text
@@ -64,7 +64,7 @@ def _extend(unit: Unit, found: Field, provided: ProvidedValue) -> None:
 def request_struct(found: Field) -> list[str]:
     """The members of the struct that carries a request's data."""
     if not isinstance(found.type, ObjectType):
-        return [f"bool {found.flag};", f"{declared(_request_type(found.type), found.value)};"]
+        return [f"bool {found.flag};", f"{declared(plain_type(found.type), found.value)};"]
     lines = []
     for name, (member, part) in found.parts.items():
         if isinstance(part.type, ObjectType):
@@ -73,20 +73,8 @@ def request_struct(found: Field) -> list[str]:
                 inner = ["char nothing;"]
             lines += ["struct {", *indent(inner), f"}} {member}; /* {name} */"]
         else:
-            lines += [f"bool {part.flag};", f"{declared(_request_type(part.type), member)}; /* {name} */"]
+            lines += [f"bool {part.flag};", f"{declared(plain_type(part.type), member)}; /* {name} */"]
     return lines
-
-
-def _request_type(type_: Type) -> str:
-    match type_:
-        case BooleanType():
-            return "bool"
-        case IntegerType():
-            return "int32_t"
-        case DoubleType():
-            return "double"
-        case _:
-            return "const char *"
 
 
 def provide_function(unit: Unit, item: Communication) -> list[str]:
@@ -193,5 +181,5 @@ def _non_default(found: Field, place: str) -> list[str]:
 
 
 def _differs(found: Field, place: str, member: str) -> str:
-    test = {"bool": "", "int32_t": " != 0", "double": " != 0.0"}.get(_request_type(found.type), "[0] != '\\0'")
+    test = {"bool": "", "int32_t": " != 0", "double": " != 0.0"}.get(plain_type(found.type), "[0] != '\\0'")
     return f"{place}.{found.flag} && {place}.{member}{test}"

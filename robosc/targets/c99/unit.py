@@ -160,6 +160,19 @@ class Unit:
         return operation("if there", is_there, code, absent).typed(inner, unknown_as(code.sort))
 
 
+def plain_type(type_: Type) -> str:
+    """The C type of a value that is no enum, array or object."""
+    match type_:
+        case BooleanType():
+            return "bool"
+        case IntegerType():
+            return "int32_t"
+        case DoubleType():
+            return "double"
+        case _:
+            return "const char *"
+
+
 def declared(c_type: str, name: str) -> str:
     """A declaration of one name."""
     return f"{c_type}{name}" if c_type.endswith("*") else f"{c_type} {name}"

@@ -3,7 +3,8 @@
 All updates of a step read the state before it: a copy, of which a compiler keeps what is needed.
 """
 
-from robosc.automata.executable import Participant
+from collections.abc import Sequence
+
 from robosc.expressions import (
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
@@ -16,19 +17,19 @@ from robosc.expressions import (
 )
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
-from robosc.model.structure import Behaviour, Transition, Update, Variable, is_tau
+from robosc.model.structure import Update, Variable, is_tau
 from robosc.targets.c99.expressions import ATOM, c_type, low_text
 from robosc.targets.c99.layout import event_data, width
 from robosc.targets.c99.naming import CNamer
 from robosc.targets.c99.received import Reader
 from robosc.targets.c99.text import comment
 from robosc.targets.c99.unit import Lvalue, Reading, Unit, declared
-from robosc.targets.code.conditions import accepted
 from robosc.targets.code.expressions import Code, Sort
+from robosc.targets.code.steps import Branch, StepWriter
 from robosc.targets.code.text import indent
 
 
-class Stepper:
+class Stepper(StepWriter):
     """Writes what one event does.
 
     Args:
@@ -44,8 +45,8 @@ class Stepper:
         self._namer = CNamer(frozenset({"data", "notes", "s", "old", "skipped", "r"}))
         self._received: dict[Path, Code] = {}
         self._may_skip = False
-        self._executable = unit.layout.executable.events[event]
         self._reading = Reading(unit, "old.", self._read, self.data)
+        super().__init__(unit.layout.executable.events[event], self._reading)
 
     @property
     def parameters(self) -> list[str]:
@@ -62,9 +63,7 @@ class Stepper:
         """The function that takes the event: how many updates were skipped, or REFUSED."""
         parameters = self.parameters
         with self.unit.uses_apart() as used:
-            body = [*self._refusals(), *self._plant()]
-            for participant in self._executable.participants:
-                body += self._block(participant)
+            body = [*self._refusals(), *self._plant(), *self._components()]
         self.unit.used |= used
         reads_old = any(word == "&old" or word.startswith("old.") for word in used)
         head = ", ".join(["state_t *s", *parameters])
@@ -130,46 +129,24 @@ class Stepper:
     def _read(self, path: Path) -> Code:
         return self._received[path]
 
-    def _refusals(self) -> list[str]:
-        """Refuse where the event is not accepted, before anything changes."""
-        lines = []
-        if (moves := self._executable.moves) is not None:
-            lines += self._reading.unless(self._reading.in_one_of(moves.plant, moves.sources), "return REFUSED;")
-        if self._executable.is_issued:
-            for words, code in accepted(self._executable, self._reading):
-                lines += [*comment(words), *self._reading.unless(code, "return REFUSED;")]
-        return lines
+    def _refuse_outside(self, automaton: str, locations: tuple[str, ...]) -> list[str]:
+        return self._reading.unless(self._reading.in_one_of(automaton, locations), "return REFUSED;")
 
-    def _plant(self) -> list[str]:
-        moves = self._executable.moves
-        return [] if moves is None or moves.target is None else [self._move(moves.plant, moves.target)]
+    def _refuse_unless(self, words: str, condition: Code) -> list[str]:
+        return [*comment(words), *self._reading.unless(condition, "return REFUSED;")]
 
-    def _move(self, automaton: str, target: str) -> str:
+    def _move(self, automaton: str, sources: tuple[str, ...], target: str) -> list[str]:
         layout = self.unit.layout
-        return f"s->{layout.locations[automaton]} = {layout.location_names[automaton, target]};"
+        return [f"s->{layout.locations[automaton]} = {layout.location_names[automaton, target]};"]
 
-    def _block(self, participant: Participant) -> list[str]:
-        """Return the statements of what one component does."""
-        component, behaviour = participant.component, participant.behaviour
+    def _choice(self, component: str, branches: Sequence[Branch], states: int) -> list[str]:
         lines: list[str] = []
-        for states, transition in participant.branches:
-            body = self._transition(component, behaviour, states, transition)
-            if body and len(states) == len(behaviour.states):
+        for inside, body in branches:
+            if len(inside) == states:
                 lines += body
-            elif body:
-                test = self._reading.in_one_of(component, states)
+            else:
+                test = self._reading.in_one_of(component, inside)
                 lines += [f"if ({self.unit.text(test)}) {{", *indent(body), "}"]
-        return lines
-
-    def _transition(
-        self, component: str, behaviour: Behaviour, states: tuple[str, ...], transition: Transition
-    ) -> list[str]:
-        variables = {variable.name: variable for variable in behaviour.variables}
-        lines = []
-        for update in transition.updates:
-            lines += self._update(component, variables[update.variable], update)
-        if transition.target is not None and states != (transition.target,):
-            lines.append(self._move(component, transition.target))
         return lines
 
     def _update(self, component: str, variable: Variable, update: Update) -> list[str]:

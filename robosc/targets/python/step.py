@@ -4,9 +4,8 @@ All updates of a step read the state before it. The generated code writes attrib
 other, so whatever is read after it may have been written is first copied to a local variable.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
-from robosc.automata.executable import Participant
 from robosc.expressions import (
     ArrayType,
     DoubleType,
@@ -20,8 +19,7 @@ from robosc.expressions import (
 )
 from robosc.expressions.text import expression_text
 from robosc.model.received import Path, converted_paths
-from robosc.model.structure import Behaviour, Transition, Update, Variable
-from robosc.targets.code.conditions import accepted
+from robosc.model.structure import Update, Variable
 from robosc.targets.code.expressions import (
     FALSE_CODE,
     TRUE_CODE,
@@ -35,6 +33,7 @@ from robosc.targets.code.expressions import (
     literal,
     place,
 )
+from robosc.targets.code.steps import Branch, StepWriter
 from robosc.targets.code.text import indent
 from robosc.targets.paths import path_text, path_type
 from robosc.targets.python.changes import noted_change, noted_write
@@ -121,10 +120,11 @@ def step_method(writer: Writer, event: str) -> list[str]:
     return lines
 
 
-class _StepWriter:
+class _StepWriter(StepWriter):
     """Writes the step method of one event."""
 
     def __init__(self, writer: Writer, event: str) -> None:
+        super().__init__(writer.layout.executable.events[event], writer.scope)
         self.writer = writer
         self.event = event
         self.namer = PythonNamer(("self", "skipped"))
@@ -134,13 +134,12 @@ class _StepWriter:
         self.may_skip = False
         root = _event_type(writer, event) if self.paths else None
         self.scope = Scope(writer.used.add, writer.model, self._variable, self._location, self._received, root)
-        self._executable = writer.layout.executable.events[event]
 
     def method(self) -> list[str]:
         """The whole method."""
         self._name_received()
         self._copy_what_is_overwritten()
-        body = [line for participant in self._executable.participants for line in self._block(participant)]
+        body = self._components()
         parameters = "".join(f", {code.word}" for code in self.received.values())
         lines = [f"def {self.writer.layout.methods['step', self.event]}(self{parameters}):"]
         lines.append(f"    {docstring(f'Take {self.event}.')}")
@@ -158,26 +157,16 @@ class _StepWriter:
             type_ = path_type(self.writer.model, root, path)
             self.received[path] = place(name, type_, received_unknown(type_, path))
 
-    def _refusals(self) -> list[str]:
-        """Return None where the event is not accepted, before anything changes."""
-        lines = []
-        if (moves := self._executable.moves) is not None:
-            sources = moves.sources
-            test = f"!= {sources[0]!r}" if len(sources) == 1 else f"not in {sources!r}"
-            lines += [f"if {self.writer.scope.location(moves.plant)} {test}:", "    return None"]
-        if self._executable.is_issued:
-            for words, code in accepted(self._executable, self.writer.scope):
-                refused = code_text(self.scope.negated(code))
-                lines += [*comment(words), f"if {refused}:", "    return None"]
-        return lines
+    def _refuse_outside(self, automaton: str, locations: tuple[str, ...]) -> list[str]:
+        test = f"!= {locations[0]!r}" if len(locations) == 1 else f"not in {locations!r}"
+        return [f"if {self.writer.scope.location(automaton)} {test}:", "    return None"]
 
-    def _plant(self) -> list[str]:
-        """Move the plant of a service or action."""
-        moves = self._executable.moves
-        if moves is None or (target := moves.target) is None:
-            return []
-        location = self.writer.scope.location(moves.plant)
-        if target in moves.sources:
+    def _refuse_unless(self, words: str, condition: Code) -> list[str]:
+        return [*comment(words), f"if {code_text(self.scope.negated(condition))}:", "    return None"]
+
+    def _move(self, automaton: str, sources: tuple[str, ...], target: str) -> list[str]:
+        location = self.writer.scope.location(automaton)
+        if target in sources:
             return noted_write(location, literal(repr(target), Sort.ENUM), self.writer.stale)
         return [f"{location} = {target!r}", *noted_change(location, self.writer.stale)]
 
@@ -223,39 +212,19 @@ class _StepWriter:
     def _received(self, path: tuple[PathStep, ...]) -> Code:
         return self.received[path]
 
-    def _block(self, participant: Participant) -> list[str]:
-        """Return the statements of what one component does."""
-        component, behaviour = participant.component, participant.behaviour
+    def _choice(self, component: str, branches: Sequence[Branch], states: int) -> list[str]:
         lines: list[str] = []
         location = self.writer.scope.location(component)
-        tested: set[str] = set()
-        for states, transition in participant.branches:
-            body = self._transition(component, behaviour, states, transition)
-            if not body:
-                continue
-            if len(states) == len(behaviour.states):
+        tested = 0
+        for inside, body in branches:
+            if len(inside) == states:
                 lines += body
-            elif len(tested) + len(states) == len(behaviour.states):
+            elif tested + len(inside) == states:
                 lines += ["else:", *indent(body)]
             else:
-                test = f"== {states[0]!r}" if len(states) == 1 else f"in {states!r}"
+                test = f"== {inside[0]!r}" if len(inside) == 1 else f"in {inside!r}"
                 lines += [f"{'elif' if tested else 'if'} {location} {test}:", *indent(body)]
-                tested.update(states)
-        return lines
-
-    def _transition(
-        self, component: str, behaviour: Behaviour, states: tuple[str, ...], transition: Transition
-    ) -> list[str]:
-        variables = {variable.name: variable for variable in behaviour.variables}
-        lines = []
-        for update in transition.updates:
-            lines += self._update(component, variables[update.variable], update)
-        if transition.target is not None and states != (transition.target,):
-            location = self.writer.scope.location(component)
-            if transition.target in states:
-                lines += noted_write(location, literal(repr(transition.target), Sort.ENUM), self.writer.stale)
-            else:
-                lines += [f"{location} = {transition.target!r}", *noted_change(location, self.writer.stale)]
+                tested += len(inside)
         return lines
 
     def _update(self, component: str, variable: Variable, update: Update) -> list[str]:

@@ -38,7 +38,8 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
         "variables": {"synthesis": variables[0], "code_only": variables[1]},
         "components": len(supervisor.model.components),
         "communications": len(supervisor.model.communications),
-        "requirements": len(supervisor.model.requirements),
+        "requirements": len(supervisor.model.requirements) + len(supervisor.model.invariants),
+        "state_invariants": len(supervisor.model.invariants),
         "states": int(certificate.states),
         "transitions": None if certificate.transitions is None else int(certificate.transitions),
         "added": {event: told(diagram, formula, components) for event, diagram, formula in added},
@@ -67,7 +68,7 @@ def summary_text(supervisor: Supervisor) -> str:
     rows = [
         ("events", f"{len(system.events)}: {controllable} controllable, {len(system.events) - controllable} not"),
         ("variables", f"{synthesis + code_only}: {synthesis} in synthesis, {code_only} code-only"),
-        ("requirements", f"{len(supervisor.model.requirements)}"),
+        ("requirements", _requirements(supervisor.model)),
         ("controlled", f"{certificate.states} states{transitions}"),
     ]
     lines = [f"{supervisor.model.name}: a supervisor exists ({supervisor.deployment})"]
@@ -148,6 +149,12 @@ def added_lines(supervisor: Supervisor, system: System) -> list[str]:
 def _wrapped(text: str) -> list[str]:
     """The text in rows; names are never broken."""
     return textwrap.wrap(text, _WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+
+
+def _requirements(model: Model) -> str:
+    invariants = len(model.invariants)
+    of_these = f", {invariants} of them state invariant{'s' * (invariants > 1)}" if invariants else ""
+    return f"{len(model.requirements) + invariants}{of_these}"
 
 
 def _variables(model: Model) -> tuple[int, int]:

@@ -1,7 +1,19 @@
-"""Parts of a model as a user writes them, for comments in generated code."""
+"""Parts of a model as a user writes them, for comments and pages of generated code."""
 
 from robosc.expressions.text import expression_text
-from robosc.model.structure import ObjectValue, Provide, ProvidedValue, Requirement
+from robosc.model.structure import Invariant, Model, ObjectValue, Provide, ProvidedValue, Requirement
+from robosc.targets.code.text import printable
+
+
+def requirement_texts(model: Model) -> list[str]:
+    """Every requirement of a model as a user writes it: on requests first, then what always or never holds."""
+    return [*map(requirement_text, model.requirements), *map(_invariant_text, model.invariants)]
+
+
+def requirements_chapter(model: Model) -> str:
+    """The requirements as a chapter of a Markdown page, with an empty line behind it; empty where there are none."""
+    texts = [printable(text) for text in requirement_texts(model)]
+    return "\n".join(["## Requirements of the model", "", "```", *texts, "```", "", ""]) if texts else ""
 
 
 def requirement_text(requirement: Requirement) -> str:
@@ -12,6 +24,10 @@ def requirement_text(requirement: Requirement) -> str:
     return (
         f"requirement {group} needs {words}" if requirement.form == "needs" else f"requirement {words} disables {group}"
     )
+
+
+def _invariant_text(invariant: Invariant) -> str:
+    return f"requirement {'never' if invariant.is_never else 'always'} {expression_text(invariant.expression)}"
 
 
 def provide_text(statement: Provide) -> str:

@@ -28,7 +28,7 @@ from robosc.targets.c99.step import unknown_name
 from robosc.targets.c99.text import comment, safe
 from robosc.targets.c99.unit import Unit, declared, plain_type
 from robosc.targets.code.text import indent
-from robosc.targets.model_text import requirement_text
+from robosc.targets.model_text import requirement_texts
 
 
 def head(supervisor: Supervisor, begin: str = "/* ", rest: str = "   ", end: str = " */") -> str:
@@ -125,9 +125,10 @@ def _about(layout: Layout) -> list[str]:
         f"How: {certificate.method}.",
     ]
     lines = [line for text in words for line in comment(text)]
-    if layout.model.requirements:
+    requirements = requirement_texts(layout.model)
+    if requirements:
         lines += ["", "/* Requirements of the model:"]
-        lines += [f"     {safe(requirement_text(item))}" for item in layout.model.requirements]
+        lines += [f"     {safe(text)}" for text in requirements]
         lines[-1] += " */"
     return lines
 

@@ -4,6 +4,7 @@ from robosc.model.structure import CommunicationKind, EventKind
 from robosc.targets.c99.header import batch, receive_head, reply_head
 from robosc.targets.c99.layer import request_heads
 from robosc.targets.c99.unit import Unit
+from robosc.targets.model_text import requirements_chapter
 
 _BUILD = """\
 ## Build
@@ -26,7 +27,7 @@ The supervisor of {name} and its executor as portable C99: no allocation, no rec
 `{prefix}.h` documents the functions, `main.c` shows them at work.
 
 {build}
-## Use
+{requirements}## Use
 
 1. `{prefix}_init` with settings (NULL: the default ones) and callbacks, then `{prefix}_start`.
 2. `{prefix}_tick` once a period: at most one request is issued, through a callback.
@@ -59,7 +60,7 @@ recursion, no global variable. It decides nothing: what the caller sends is let 
 now, else held back. `{prefix}.h` documents the functions, `main.c` shows them at work.
 
 {build}
-## Use
+{requirements}## Use
 
 1. `{prefix}_init` with settings (NULL: the default ones) and callbacks, then `{prefix}_start`.
 2. What the caller sends goes to the first functions below, never to the robot: the layer sends it on through `publish`,
@@ -106,6 +107,7 @@ def readme_file(unit: Unit) -> str:
         name=layout.model.name,
         prefix=layout.prefix,
         build=_BUILD.format(prefix=layout.prefix),
+        requirements=requirements_chapter(layout.model),
         upper=layout.upper,
         functions="\n".join(f"{function};" for function in functions) or "/* Nothing comes. */",
     )

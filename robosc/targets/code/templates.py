@@ -8,7 +8,7 @@ import jinja2
 from robosc._version import __version__
 from robosc.supervisor import Supervisor
 from robosc.targets.code.text import printable
-from robosc.targets.model_text import requirement_text
+from robosc.targets.model_text import requirement_texts
 
 
 def environment(*packages: str, filters: Mapping[str, Callable[..., object]]) -> jinja2.Environment:
@@ -43,5 +43,5 @@ def shared_values(supervisor: Supervisor, package: str) -> dict[str, object]:
             field: printable(str(getattr(supervisor.certificate, field)))
             for field in ("safe", "controllable", "nonblocking", "maximally_permissive", "method", "states")
         },
-        "requirements": [printable(requirement_text(item)) for item in supervisor.model.requirements],
+        "requirements": [printable(text) for text in requirement_texts(supervisor.model)],
     }

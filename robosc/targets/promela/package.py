@@ -3,6 +3,7 @@
 from robosc.supervisor import Supervisor
 from robosc.targets.code.naming import package_name
 from robosc.targets.files import GeneratedFiles
+from robosc.targets.model_text import requirements_chapter
 from robosc.targets.promela.model import promela_model
 from robosc.targets.registry import GenerateOptions
 
@@ -37,7 +38,8 @@ ltl comes_back {{ [] <> ({example}) }}
 Where two of these names would be the same, the later one in the file ends in `_2`. A run that ends, since nothing can
 happen any more, counts as one that stays in its last state for ever. A step of the model may be several steps of
 spin, in which nothing that has a name above changes: properties must not speak of the next step (`X`).
-"""
+
+{requirements}"""
 
 
 def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles:
@@ -55,5 +57,6 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
     )
     text = promela_model(system, supervisor.added)
     example = next((line.split()[1] for line in text.splitlines() if line.startswith("#define in_")), "true")
-    readme = _README.format(name=supervisor.model.name, file=file, example=example)
-    return GeneratedFiles({file: f"{head}\n\n{text}", "README.md": readme})
+    requirements = requirements_chapter(supervisor.model)
+    readme = _README.format(name=supervisor.model.name, file=file, example=example, requirements=requirements)
+    return GeneratedFiles({file: f"{head}\n\n{text}", "README.md": f"{readme.rstrip()}\n"})

@@ -10,7 +10,7 @@ from robosc.expressions import DoubleType
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets.code.text import indent, printable
-from robosc.targets.model_text import requirement_text
+from robosc.targets.model_text import requirement_texts
 from robosc.targets.python.bundle import bundle, section_title
 from robosc.targets.python.changes import (
     asked_lines,
@@ -120,12 +120,9 @@ def _supervisor_title(writer: Writer) -> list[str]:
         f" {certificate.nonblocking}, maximally permissive {certificate.maximally_permissive}.",
         f"How: {printable(certificate.method)}.",
     ]
-    if model.requirements:
-        lines += [
-            "",
-            "Requirements of the model:",
-            *(f"  {printable(requirement_text(r))}" for r in model.requirements),
-        ]
+    requirements = requirement_texts(model)
+    if requirements:
+        lines += ["", "Requirements of the model:", *(f"  {printable(text)}" for text in requirements)]
     return lines
 
 

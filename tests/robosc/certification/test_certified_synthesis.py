@@ -46,6 +46,18 @@ def test_the_examples_get_a_certified_supervisor(name: str, deployment: Deployme
     assert f"{found.states} states, {found.transitions} transitions" in summary_text(outcome.supervisor)
 
 
+def test_what_always_holds_counts_as_a_requirement() -> None:
+    open_ended = COUNTER.rstrip().removesuffix("}")
+    counts = []
+    for more in ("", "requirement always C.n <= 90 }", "requirement count needs C.n < 9 requirement never C.n = 8 }"):
+        outcome = make_supervisor(bundle_of(f"{open_ended} {more}" if more else COUNTER))
+        assert outcome.supervisor is not None
+        shown = summary_json(outcome.supervisor)
+        (line,) = (line for line in summary_text(outcome.supervisor).splitlines() if "  requirements " in line)
+        counts.append((shown["requirements"], shown["state_invariants"], line.split(maxsplit=1)[1]))
+    assert counts == [(1, 0, "1"), (2, 1, "2, 1 of them state invariant"), (3, 1, "3, 1 of them state invariant")]
+
+
 def test_the_same_bundle_gives_the_same_bytes() -> None:
     outcome = [
         make_supervisor(example_bundle("navigation/navigation"), engine=engine) for engine in ("cudd", "autoref")

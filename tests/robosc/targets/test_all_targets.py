@@ -77,6 +77,42 @@ def test_each_target_gives_what_it_gives_alone() -> None:
     assert files_of(outcome, ALL) == files
 
 
+STRICT = """robot Strict {
+    component Arm {
+        incoming message lift with type: none
+        outgoing message lowered with type: none
+        behaviour {
+            variable lifts: integer(0..9)
+            initial marked state down { on request to lift goto up }
+            state up { on response from lowered do lifts := lifts + 1 goto down }
+        }
+    }
+    component Lid {
+        incoming message open with type: none
+        outgoing message shut with type: none
+        behaviour {
+            initial marked state closed { on request to open goto opened }
+            state opened { on response from shut goto closed }
+        }
+    }
+    requirement {lift, open} needs Arm.lifts < 9
+    requirement Arm.up or Arm.lifts = 7 disables open
+    requirement never Arm.up and Lid.opened
+    requirement always Arm.lifts <= 8
+}"""
+
+
+@pytest.mark.parametrize("name", [info.name for info in available_targets() if info.name != "cif"])
+def test_every_target_tells_every_requirement(name: str) -> None:
+    """Only in CIF they are no words but statements of the model itself."""
+    files = files_of(outcome_of(STRICT), name)
+    requirements = [line.strip() for line in STRICT.splitlines() if line.strip().startswith("requirement ")]
+    pages = [text for path, text in files.items() if path.endswith("README.md")] or ["\n".join(files.values())]
+    for page in pages:
+        shown = {line.strip(" /*#") for line in page.splitlines()}
+        assert [text for text in requirements if text not in shown] == []
+
+
 def test_what_refuses_is_left_out_and_told() -> None:
     refusing("cobol")
     files = files_of(outcome_of(MAZE.read_text(encoding="utf-8")), ALL)

@@ -29,6 +29,7 @@ from pygls.uris import to_fs_path
 from robosc import __version__
 from robosc.editing.completion import Candidate, complete
 from robosc.editing.definitions import Definition, DefinitionKind
+from robosc.editing.findings import no_supervisor
 from robosc.editing.fixes import fixes
 from robosc.editing.hover import holder_of, hover_text
 from robosc.editing.outline import folds, parts
@@ -237,9 +238,7 @@ class Server(LanguageServer):
             for item in found.findings
         ]
         if found.reason and analysis.whole is not None:
-            place = analysis.whole.definition.location
-            fix = "Run `robosc synth` for an explanation."
-            items.append(Diagnostic(Severity.WARNING, "no-supervisor", found.reason.rstrip("."), place, fix))
+            items.append(no_supervisor(found.reason, analysis.whole.definition.location))
         return tuple(items)
 
     def _begin_synthesis(self, uri: str, analysis: Analysis) -> None:

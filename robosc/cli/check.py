@@ -33,7 +33,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--synthesize",
         action="store_true",
         help="also synthesize, to find what only that can tell: no supervisor at all, events that can never happen, "
-        "requirements that never restrict, requests that compete",
+        "states that are never reached, requirements that never restrict, requests that compete",
     )
     add_deployment_argument(parser)
     add_engine_options(parser)

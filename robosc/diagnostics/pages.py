@@ -48,6 +48,8 @@ class Stage(StrEnum):
     """Checking the model: names, types, behaviours."""
     SYNTHESIS = "synthesis"
     """Synthesis, which alone knows the controlled system."""
+    EXPLANATION = "explanation"
+    """`robosc explain-synthesis`, which goes through what the controlled system does."""
     TARGET = "target"
     """Making a supervisor or a package for one kind of use."""
 
@@ -226,8 +228,9 @@ Every finding of RoboSC has a code, which stays the same from version to version
 behind the message, and `robosc explain CODE` prints its chapter of this document. An *error* makes a model unusable. A
 *warning* is very likely a mistake; `robosc check --strict` fails for one. A *note* is worth knowing.
 
-The *stage* tells who finds it: reading the *text*, checking the *model*, the *synthesis* of the supervisor, or what is
-made for one *target* or deployment. In the examples the finding is reported at the line that ends in `// <- here`.
+The *stage* tells who finds it: reading the *text*, checking the *model*, the *synthesis* of the supervisor, its
+*explanation* by `robosc explain-synthesis`, or what is made for one *target* or deployment. In the examples the finding
+is reported at the line that ends in `// <- here`.
 """
 
 

@@ -47,12 +47,13 @@ class ControlledSystem:
 
         Raises:
             SynthesisCancelled: The work is to end.
-            KeyError: A question names an event that there is not.
+            KeyError: A question names an event or a location that there is not.
         """
         return Answers(
             never=tuple(self._never(questions.events)),
             unused=self._unused(questions.restrictions),
             together=self._together(questions.rivals),
+            unreached=tuple(self._unreached(questions.locations)),
         )
 
     def _possible(self, event: str) -> Any:
@@ -68,6 +69,12 @@ class ControlledSystem:
         for event in events:
             if self._possible(event) == self._manager.false:
                 yield self._causes.of(self._steps[event])
+
+    def _unreached(self, locations: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+        for automaton, location in locations:
+            self._monitor.check_stop()
+            if self._reachable & self._encoding.in_location(automaton, location) == self._manager.false:
+                yield automaton, location
 
     # Restrictions
 

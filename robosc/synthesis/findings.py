@@ -10,6 +10,7 @@
   requirement where synthesis keeps away from states because of it, as it does for one that must always hold (or
   never): what counts is whether the controlled system would do more without it. All that are reported can go
   together. What never is requested is never restricted.
+- `unreachable-state`: a state that its component never is in, whether or not its behaviour alone has a way there.
 - `competing-requests`: two communications of one kind (topics, services and actions have name spaces of their own)
   with one identifier that can be requested in one state, with a shortest run to such a state. Only for the
   controller: in a layer it is the existing controller that chooses.
@@ -23,6 +24,7 @@ from robosc.automata.structure import EventCondition, System
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.model.places import Places
 from robosc.model.structure import (
+    Behaviour,
     CommunicationKind,
     Component,
     Deployment,
@@ -50,6 +52,11 @@ def questions_about(model: Model, system: System, deployment: Deployment) -> Que
             *(Restriction(invariants=(place,)) for place in range(len(model.invariants))),
         ),
         rivals=_rivals(model) if deployment is Deployment.CONTROLLER else (),
+        locations=tuple(
+            (component.name, state.name)
+            for component in model.components
+            for state in (component.behaviour.states if component.behaviour else ())
+        ),
     )
 
 
@@ -94,6 +101,7 @@ def findings(model: Model, places: Places, answers: Answers) -> tuple[Diagnostic
         *_never_taken(model, places, never),
         *(_unused(model, places, number) for number in answers.unused),
         *(_competing(model, places, pair) for pair in answers.together),
+        *(_unreached(model, places, component, state) for component, state in answers.unreached),
     )
 
 
@@ -231,3 +239,29 @@ def _after(trace: Sequence[str]) -> str:
         return "in the initial state"
     shown = ", ".join(trace[:MAXIMUM_EVENTS])
     return f"after {shown}" + (f", ... ({len(trace)} in all)" if len(trace) > MAXIMUM_EVENTS else "")
+
+
+# States that are never reached
+
+
+def _unreached(model: Model, places: Places, component: str, state: str) -> Diagnostic:
+    behaviour = model.component(component).behaviour
+    if behaviour is not None and state not in _led_to(behaviour):
+        why, fix = "no transition leads there", "Give it a transition that leads there, or remove it."
+    else:
+        why = "what would lead there never happens under the supervisor"
+        fix = "Relax what is required, or remove the state: what stops the way is told by 'robosc explain-synthesis'."
+    place = places.states[component, state]
+    return _warning("unreachable-state", f"{component} never gets to '{state}': {why}", place, fix)
+
+
+def _led_to(behaviour: Behaviour) -> frozenset[str]:
+    """The states to which a behaviour's transitions lead, whatever their guards."""
+    found, waiting = {behaviour.initial}, [behaviour.initial]
+    while waiting:
+        state = waiting.pop()
+        for item in behaviour.transitions:
+            if item.source in (None, state) and item.target is not None and item.target not in found:
+                found.add(item.target)
+                waiting.append(item.target)
+    return frozenset(found)

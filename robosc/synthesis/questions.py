@@ -62,11 +62,13 @@ class Questions:
         events: Events of which to tell whether they can ever happen.
         restrictions: Restrictions of which to tell whether they ever restrict.
         rivals: Groups of events of which no two should be possible together.
+        locations: Automata with one of their locations, of which to tell whether they are ever in it.
     """
 
     events: tuple[str, ...] = ()
     restrictions: tuple[Restriction, ...] = ()
     rivals: tuple[tuple[str, ...], ...] = ()
+    locations: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +94,10 @@ class Answers:
         never: Events that can never happen.
         unused: Places in `Questions.restrictions` of those that never restrict.
         together: Rivals that are possible together, by group, then by the second, then by the first.
+        unreached: Automata with a location in which they never are.
     """
 
     never: tuple[NeverEnabled, ...] = ()
     unused: tuple[int, ...] = ()
     together: tuple[EnabledTogether, ...] = ()
+    unreached: tuple[tuple[str, str], ...] = ()

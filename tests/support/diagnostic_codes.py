@@ -11,11 +11,11 @@ SOURCE = Path(__file__).parents[2] / "robosc"
 
 _LOOKS_LIKE_A_CODE = re.compile(r"[a-z0-9]+(-[a-z0-9]+)+")
 
-_IS_ONE_WORD = re.compile(r"[a-z0-9]+")
+_IS_A_CODE = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 
 NO_CODES = frozenset(
     {
-        *("utf-8", "utf-8-sig", "robosc-supervisor", "explain-synthesis", "only-uncontrollable", "unreachable-state"),
+        *("utf-8", "utf-8-sig", "robosc-supervisor", "explain-synthesis"),
         *("ssh-ed25519", "check-log", "triangle-up"),
         *(info.name for info in available_targets()),
     }
@@ -25,8 +25,11 @@ NO_CODES = frozenset(
 # The pages themselves, and the models that a new robot begins with.
 _ELSEWHERE = ("diagnostics", "starter")
 
-REPORTERS = {"error": 0, "warning": 0, "note": 0, "_warning": 0, "Diagnostic": 1}
+REPORTERS = {"error": 0, "warning": 0, "note": 0, "_warning": 0, "Diagnostic": 1, "Remark": 0, "_shown": 0}
 """Functions that take a code, and at which position."""
+
+_MAKERS = frozenset({"Diagnostic", "Remark", "_shown"})
+"""Those of them that take nothing else: the names of others are those of a logger's methods, too."""
 
 
 def trees() -> Iterator[tuple[str, ast.Module]]:
@@ -37,23 +40,31 @@ def trees() -> Iterator[tuple[str, ast.Module]]:
             yield place.as_posix(), ast.parse(path.read_text(encoding="utf-8"))
 
 
+def outer_trees() -> Iterator[tuple[str, ast.Module]]:
+    """Every module outside of the core, with its name."""
+    root = SOURCE.parent
+    for folder in ("editors/robosc_lsp", "server", "client", "bridge"):
+        for path in sorted((root / folder).rglob("*.py")):
+            yield path.relative_to(root).as_posix(), ast.parse(path.read_text(encoding="utf-8"))
+
+
 def reportable_codes() -> frozenset[str]:
     """Every code that stands in the source.
 
     A code may reach its finding by ways that no syntax tree shows (a variable, a table, a parameter), so every text
     that looks like one counts: words of lower case with hyphens between them are nothing else in this source. A code of
-    one word counts where it is given to a `Diagnostic` as it stands.
+    one word counts where it is given to what makes a finding or remark as it stands, and outside of the core (in the
+    language server, service, client and bridge) any code does.
     """
     given = {
         argument.value
-        for _, tree in trees()
+        for _, tree in (*trees(), *outer_trees())
         for node in ast.walk(tree)
         if isinstance(node, ast.Call)
-        and isinstance(node.func, ast.Name)
-        and node.func.id == "Diagnostic"
+        and _name_of(node) in _MAKERS
         and isinstance(argument := _code_argument(node), ast.Constant)
         and isinstance(argument.value, str)
-        and _IS_ONE_WORD.fullmatch(argument.value)
+        and _IS_A_CODE.fullmatch(argument.value)
     }
     found = given | {
         node.value
@@ -74,12 +85,16 @@ def assembled_codes() -> tuple[str, ...]:
     )
 
 
-def _code_argument(call: ast.Call) -> ast.expr | None:
+def _name_of(call: ast.Call) -> str:
     match call.func:
         case ast.Name(id=name) | ast.Attribute(attr=name):
-            position = REPORTERS.get(name)
+            return name
         case _:
-            return None
+            return ""
+
+
+def _code_argument(call: ast.Call) -> ast.expr | None:
+    position = REPORTERS.get(_name_of(call))
     keyword = next((item.value for item in call.keywords if item.arg == "code"), None)
     if position is None or keyword is not None:
         return keyword

@@ -9,9 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from robosc.certification import make_supervisor
+from robosc.automata import to_automata
+from robosc.certification import OutcomeStatus, make_supervisor
 from robosc.diagnostics import Block, Page, Stage, codes, document, page, pages, parse_page
+from robosc.editing.findings import no_supervisor
 from robosc.errors import Diagnostic, InternalError, LanguageError, Severity
+from robosc.explanation import explain_synthesis
+from robosc.language import parse
 from robosc.language.bundle import MAXIMUM_BYTES, decode_source
 from robosc.language.interfaces import find_interfaces, interface_folders
 from robosc.model import check
@@ -43,8 +47,26 @@ def findings(item: Page, blocks: tuple[Block, ...]) -> tuple[Diagnostic, ...]:
                 checked.model_or_raise()
             return raised.value.diagnostics
         return checked.diagnostics
+    if item.stage is Stage.EXPLANATION:
+        return remarks(bundle)
     deployment = Deployment.LAYER if item.stage is Stage.TARGET else Deployment.CONTROLLER
-    return make_supervisor(bundle, deployment=deployment).diagnostics
+    made = make_supervisor(bundle, deployment=deployment)
+    if made.status is not OutcomeStatus.EMPTY:
+        return made.diagnostics
+    robot = parse(bundle.main).tree
+    assert robot is not None
+    return (*made.diagnostics, no_supervisor(made.reason, robot.name.location))
+
+
+def remarks(bundle: Bundle) -> tuple[Diagnostic, ...]:
+    """Return the warnings of an explanation as findings."""
+    checked = check(bundle)
+    model = checked.model_or_raise()
+    system = to_automata(model, Deployment.CONTROLLER)
+    explanation = explain_synthesis(model, checked.places, system, deployment=Deployment.CONTROLLER)
+    return tuple(
+        Diagnostic(Severity.WARNING, remark.kind, remark.message, remark.location, "") for remark in explanation.remarks
+    )
 
 
 def marked(blocks: tuple[Block, ...]) -> list[tuple[str, int]]:
@@ -92,7 +114,7 @@ def test_an_example_is_reported_with_its_code_at_the_mark(item: Page) -> None:
 
 
 def test_all_examples_bear_a_mark_where_there_is_a_place() -> None:
-    assert [item.code for item in SHOWN if not marked(item.example)] == ["no-robot"]
+    assert [item.code for item in SHOWN if not marked(item.example)] == ["deadlock", "no-robot", "only-uncontrollable"]
 
 
 @pytest.mark.parametrize("item", PAGES, ids=lambda item: item.code)

@@ -12,7 +12,7 @@ import pytest
 from robosc.automata import EventCondition, Semantics, System
 from robosc.automata.compile import NO_DATA, State, compile_expression
 from robosc.automata.controlled import controlled_graph
-from robosc.automata.state import subjects
+from robosc.automata.state import Subject, subjects
 from robosc.automata.structure import Assignment, DiscreteVariable
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import TRUE, Binary, Expression, IntegerType, StateTest, Unary
@@ -83,7 +83,9 @@ class Twin:
             never=tuple(self._cause(event) for event in questions.events if self._is_never(event)),
             unused=self._unused(questions.restrictions),
             together=tuple(pair for group in questions.rivals for pair in self._pairs(group)),
+            unreached=tuple(item for item in questions.locations if not self._is_reached(*item)),
         )
+        self.met["unreached"] += len(found.unreached)
         self.met.update(f"{item.cause} {item.is_reached}" for item in found.never)
         self.met["unused"] += len(found.unused)
         self.met["together"] += len(found.together)
@@ -92,6 +94,10 @@ class Twin:
 
     def _is_never(self, event: str) -> bool:
         return not any(self.can_happen(state, event) for state in self.supervisor.reachable)
+
+    def _is_reached(self, automaton: str, location: str) -> bool:
+        place = self._places[Subject(automaton)]
+        return any(state[place] == location for state in self.supervisor.reachable)
 
     def _cause(self, event: str) -> NeverEnabled:
         enabled, condition = self.semantics.enabled, self.semantics.condition
@@ -201,7 +207,7 @@ def with_invariants(system: System, seed: int) -> System:
 
 
 def random_questions(system: System, seed: int) -> Questions:
-    """Every event, every condition by itself and some together, and two groups of rivals."""
+    """Every event, location and condition by itself, some conditions together, and two groups of rivals."""
     dice = Random(seed)
     events = [event.name for event in system.events]
     places = range(len(system.conditions))
@@ -214,7 +220,8 @@ def random_questions(system: System, seed: int) -> Questions:
     lasting = [Restriction(invariants=(place,)) for place in range(len(system.invariants))]
     mixed = [Restriction(tuple(places[:1]), tuple(range(len(system.invariants)))[:1])]
     groups = tuple(tuple(dice.sample(events, min(len(events), size))) for size in (2, 4))
-    return Questions(tuple(events), (*single, *watching, *several, *lasting, *mixed), groups)
+    locations = tuple((item.name, location) for item in system.automata for location in item.locations)
+    return Questions(tuple(events), (*single, *watching, *several, *lasting, *mixed), groups, locations)
 
 
 def without_traces(answers: Answers) -> object:
@@ -222,6 +229,7 @@ def without_traces(answers: Answers) -> object:
         answers.never,
         answers.unused,
         [(pair.first, pair.second, len(pair.trace)) for pair in answers.together],
+        answers.unreached,
     )
 
 
@@ -261,6 +269,7 @@ def test_random_systems(record_property: Callable[[str, object], None]) -> None:
         "invariant unused",
         "together",
         "long",
+        "unreached",
     )
     assert all(met[kind] for kind in wanted), met
 

@@ -23,7 +23,9 @@ from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle, marke
 from support.random_supervisors import random_supervisor
 
 LIMIT = 5_000
-CODES = ("never-enabled", "unused-requirement", "competing-requests")
+OF_EVENTS = ("never-enabled", "unused-requirement", "competing-requests")
+OF_STATES = ("unreachable-state",)
+CODES = OF_EVENTS + OF_STATES
 
 INTERFACES = "interface i use S from p"
 DOOR = """component Door {
@@ -84,18 +86,23 @@ def robot(*parts: str) -> str:
     return "\n".join(["robot R {", INTERFACES, *parts, "}"])
 
 
-def found(text: str, deployment: Deployment = Deployment.CONTROLLER) -> tuple[Diagnostic, ...]:
-    """The findings of a model that has a supervisor; the two engines agree on them."""
+def found(
+    text: str, deployment: Deployment = Deployment.CONTROLLER, codes: tuple[str, ...] = OF_EVENTS
+) -> tuple[Diagnostic, ...]:
+    """The findings of a model that has a supervisor; the two engines agree on them.
+
+    What never happens leaves states unreached: those are told as well, and are looked at by themselves.
+    """
     made = [make_supervisor(bundle_of(text), deployment=deployment, engine=name) for name in ("auto", "autoref")]
     assert made[0].status is OutcomeStatus.SUPERVISOR
     assert made[0].diagnostics == made[1].diagnostics
-    return tuple(item for item in made[0].diagnostics if item.code in CODES)
+    return tuple(item for item in made[0].diagnostics if item.code in codes)
 
 
-def only(text: str, deployment: Deployment = Deployment.CONTROLLER) -> Diagnostic:
+def only(text: str, deployment: Deployment = Deployment.CONTROLLER, codes: tuple[str, ...] = OF_EVENTS) -> Diagnostic:
     """The one finding of a model, at the place that is marked in its text."""
     plain, line, column = marked_place(text)
-    diagnostics = found(plain, deployment)
+    diagnostics = found(plain, deployment, codes)
     assert len(diagnostics) == 1, [str(item) for item in diagnostics]
     assert diagnostics[0].location is not None
     assert (diagnostics[0].location.line, diagnostics[0].location.column) == (line, column)
@@ -372,6 +379,38 @@ def test_a_long_run_is_cut(height: int) -> None:
 # What is sound, and what has no supervisor
 
 
+def test_a_state_that_no_transition_leads_to() -> None:
+    text = DOOR.replace("marked state opened", "marked state §ajar { on request to shut } marked state opened")
+    item = only(robot(text), codes=CODES)
+    assert (item.code, str(item.severity)) == ("unreachable-state", "warning")
+    assert item.message == "Door never gets to 'ajar': no transition leads there"
+
+
+def test_states_that_only_lead_to_each_other() -> None:
+    more = "marked state x { on request to open goto y } marked state y { on request to shut goto x }"
+    items = found(robot(DOOR.replace("marked state opened", f"{more} marked state opened")), codes=CODES)
+    assert [item.message for item in items] == [
+        f"Door never gets to '{state}': no transition leads there" for state in "xy"
+    ]
+
+
+def test_a_state_that_the_supervisor_keeps_away_from() -> None:
+    door = DOOR.replace(
+        "to shut goto closed }",
+        "to shut goto closed on response from up goto wide } marked state wide { on request to shut goto closed }",
+    )
+    items = found(robot(SWITCH, door, "requirement open needs Switch.off and Switch.on_"), codes=OF_STATES)
+    assert [item.message for item in items] == [
+        f"Door never gets to '{state}': what would lead there never happens under the supervisor"
+        for state in ("opened", "wide")
+    ]
+    assert "explain-synthesis" in items[0].fix
+
+
+def test_a_transition_of_the_whole_behaviour_leads_from_every_state() -> None:
+    assert found(robot(SWITCH), codes=CODES) == ()
+
+
 @pytest.mark.parametrize(("name", "deployment"), EXAMPLE_DEPLOYMENTS)
 def test_the_examples_have_none_of_these(name: str, deployment: Deployment) -> None:
     made = make_supervisor(example_bundle(name), deployment=deployment)
@@ -410,6 +449,10 @@ def places_of(model: Model) -> Places:
         if item.behaviour:
             rows = range(len(item.behaviour.transitions))
             places.transitions[item.name] = tuple(Location(f"t{number}", row + 1, 1) for row in rows)
+            places.states.update(
+                ((item.name, state.name), Location(f"s{number}", row + 1, 1))
+                for row, state in enumerate(item.behaviour.states)
+            )
     return places
 
 
@@ -463,7 +506,16 @@ class Twin:
         }
         if deployment is Deployment.CONTROLLER:
             expected |= {("competing-requests", place) for place in self._competing(places)}
-        return expected
+        return expected | {("unreachable-state", place) for place in self._unreached(places)}
+
+    def _unreached(self, places: Places) -> set[Location]:
+        been = {
+            (subject.automaton, state[number])
+            for subject, number in self._places.items()
+            if subject.variable is None
+            for state in self.supervisor.reachable
+        }
+        return {place for state, place in places.states.items() if state not in been}
 
     def _never(self, places: Places) -> set[Location]:
         never = {event.name for event in self.system.events}.difference(*self.enabled)

@@ -10,9 +10,13 @@ others, Statistical Inference under Order Restrictions, 1972, section 1.2). Loop
 state.
 """
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.abc import MetaPathFinder
 from itertools import pairwise
+from threading import get_ident
+from types import ModuleType
 from typing import Any
 
 MAXIMUM_STATES = 150
@@ -36,6 +40,37 @@ _GAP, _LAYER_GAP, _MARGIN = 14.0, 22.0, 12.0
 _LOOP = 24.0
 _SWEEPS = 8
 _ITERATIONS = 50
+
+
+class _WithoutMatplotlib(MetaPathFinder):
+    """Finder by which one thread finds no Matplotlib; other threads do."""
+
+    def __init__(self) -> None:
+        self._thread = get_ident()
+
+    def find_spec(self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> None:
+        """Find nothing.
+
+        Raises:
+            ModuleNotFoundError: It is Matplotlib, for the thread.
+        """
+        if fullname == "matplotlib" and get_ident() == self._thread:
+            raise ModuleNotFoundError("Matplotlib is not loaded for a layout", name=fullname)
+
+
+def _load_igraph() -> Any:
+    """Import igraph, when something is drawn: without the extra `view` only who wants a drawing is told so.
+
+    igraph would import Matplotlib where it is installed, which looks through all fonts of a new machine first: a page
+    would wait many seconds for what it does not need.
+    """
+    finder = _WithoutMatplotlib()
+    sys.meta_path.insert(0, finder)
+    try:
+        import igraph
+    finally:
+        sys.meta_path.remove(finder)
+    return igraph
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,9 +223,7 @@ class _Drawing:
 
     def _order(self) -> list[list[int]]:
         """The boxes of each layer from left to right, as igraph orders them."""
-        # Imported here: without the extra `view` only who wants a drawing is told so.
-        import igraph
-
+        igraph = _load_igraph()
         edges = [(upper, lower) for upper, box in enumerate(self._boxes) for lower in box.below]
         graph = igraph.Graph(n=len(self._boxes), edges=edges, directed=True)
         layout = graph.layout_sugiyama(layers=[box.layer for box in self._boxes], maxiter=_ITERATIONS)

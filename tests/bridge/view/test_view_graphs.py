@@ -1,5 +1,7 @@
 """Drawings in which nothing hides anything else, the same each time."""
 
+import subprocess
+import sys
 from itertools import combinations, pairwise
 from random import Random
 from typing import Any
@@ -134,3 +136,22 @@ def test_what_nobody_could_read_is_not_drawn() -> None:
     arrows = [Arrow(n, "s0", "s0", "x", "silent") for n in range(MAXIMUM_EDGES + 1)]
     assert layout(many[:1], arrows) is None
     assert layout(many[:MAXIMUM_STATES], []) is not None
+
+
+def test_a_drawing_looks_through_no_fonts() -> None:
+    """igraph would load Matplotlib, which takes many seconds on a machine whose fonts it has not seen."""
+    code = """
+import sys, threading
+from robosc_view.graphs import Node, layout, _WithoutMatplotlib
+layout([Node("a", True, True)], [])
+assert "igraph" in sys.modules
+print("matplotlib" in sys.modules, any(isinstance(item, _WithoutMatplotlib) for item in sys.meta_path))
+# Who draws pictures in another thread meanwhile gets what it asks for.
+sys.meta_path.insert(0, _WithoutMatplotlib())
+thread = threading.Thread(target=lambda: __import__("matplotlib"))
+thread.start()
+thread.join()
+print("matplotlib" in sys.modules)
+"""
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == ["False", "False", "True"]

@@ -14,12 +14,14 @@ from typing import get_args
 import msgspec
 
 from robosc._version import __version__
+from robosc.cli.running import Parser
 from robosc.errors import LanguageError, RoboscError
 from robosc.execution.runtime.event_log import EventLog, NullLog, open_event_log
 from robosc.language import load_bundle
 from robosc.model import check
 from robosc.model.layers import layer_findings
 from robosc.model.structure import Deployment, Model
+from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
 from robosc_bridge.configuration import init, load, map_channels, schema
 from robosc_bridge.configuration.structure import TURTLEBOTS
 from robosc_bridge.configuration.template import DriveDriver, ScannerDriver
@@ -63,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="robosc-bridge", description=__doc__, epilog=_EPILOG)
+    parser = Parser(prog="robosc-bridge", description=__doc__, epilog=_EPILOG)
     parser.add_argument("--version", action="version", version=f"robosc-bridge {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
@@ -73,7 +75,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     _configuration_argument(run)
     _deployment_argument(run)
-    run.add_argument("--server", metavar="HOST:PORT", help="a synthesis server that makes the supervisor of the model")
+    run.add_argument(
+        "--server",
+        type=_server,
+        metavar="HOST[:PORT]",
+        help=f"a synthesis server that makes the supervisor of the model (default port: {SYNTHESIS_PORT})",
+    )
     run.add_argument(
         "--keep",
         metavar="FOLDER",
@@ -125,6 +132,13 @@ def _parser() -> argparse.ArgumentParser:
     add_health_command(commands)
     add_commands(commands)
     return parser
+
+
+def _server(text: str) -> str:
+    try:
+        return with_port(text, SYNTHESIS_PORT)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def _model_argument(parser: argparse.ArgumentParser, text: str) -> None:

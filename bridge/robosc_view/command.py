@@ -46,7 +46,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     source = parser.add_argument_group("what is shown").add_mutually_exclusive_group()
-    source.add_argument("--bridge", type=_address, metavar="HOST:PORT", help="a bridge, by its gRPC service")
+    source.add_argument("--bridge", type=_bridge, metavar="HOST[:PORT]", help="a bridge, by its gRPC service")
     source.add_argument("--ros2", action="store_true", help="a generated ROS 2 node, by its topic /state")
     source.add_argument("--log", type=Path, metavar="FILE", help="an event log, which is replayed; needs --model")
     parser.add_argument("--namespace", default="", metavar="NAME", help="with --ros2: what stands before /state")
@@ -145,6 +145,16 @@ def _from_environment(name: str) -> Path | None:
 _ADDRESS_PATTERN = re.compile(r"(\[[0-9A-Fa-f:.%]+\]|[A-Za-z0-9._-]+):([0-9]{1,5})\Z")
 
 
+def _bridge(text: str) -> str:
+    # Imported here: gRPC comes with it, which the help of all commands does not need.
+    from robosc_api.security.addresses import BRIDGE_PORT, with_port
+
+    try:
+        return with_port(text, BRIDGE_PORT)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
 def _address(text: str) -> str:
     match = _ADDRESS_PATTERN.match(text)
     if not match or int(match[2]) > 65535:
@@ -175,7 +185,7 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc_view.sources import ViewError, require_view
 
     if not (arguments.bridge or arguments.ros2 or arguments.log or arguments.model):
-        raise UsageError("what is shown? --bridge HOST:PORT, --ros2, --log FILE --model FILE, or --model FILE alone")
+        raise UsageError("what is shown? --bridge HOST, --ros2, --log FILE --model FILE, or --model FILE alone")
     if arguments.log is not None and arguments.model is None:
         raise UsageError("--log needs --model: the model that the log is of")
     if arguments.model is not None and arguments.bridge is not None:

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Mapping
-from contextlib import aclosing
+from contextlib import aclosing, suppress
 from types import TracebackType
 from typing import Any, Concatenate, Self
 
@@ -10,6 +10,7 @@ import grpc
 import grpc.aio
 
 from robosc_api.security import Credentials, SecurityError, open_async_channel
+from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
 from robosc_client import operations
 from robosc_client.calls import CHANNEL_OPTIONS, WATCH_INTERRUPTED, JobPages, JobWatch, Operation, RetriedCall
 from robosc_client.convert.failures import failure_of
@@ -71,10 +72,10 @@ class AsyncClient:
         sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
         channel_options: Mapping[str, Any] | None = None,
     ) -> None:
-        """Prepare a connection to `HOST:PORT`, inside of a running event loop; it is made with the first request.
+        """Prepare a connection to a server, inside of a running event loop; it is made with the first request.
 
         Args:
-            address: `HOST:PORT`.
+            address: `HOST:PORT`, or `HOST` for the port 50051; or any other name of gRPC, such as `unix:/run/robosc`.
             credentials: Certificates and token; None: neither.
             retries: Policy for repeating calls.
             sleep: Function that waits for so many seconds without holding up others.
@@ -83,6 +84,9 @@ class AsyncClient:
         Raises:
             CredentialsError: A file with them cannot be used, or a token would be sent in the clear.
         """
+        # The names of gRPC that are no such addresses stay what they are.
+        with suppress(ValueError):
+            address = with_port(address, SYNTHESIS_PORT)
         self._address = address
         self._retries = retries
         self._sleep = sleep

@@ -3,13 +3,14 @@
 import threading
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from types import TracebackType
 from typing import Any, Concatenate, Self
 
 import grpc
 
 from robosc_api.security import Credentials, SecurityError, open_channel
+from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
 from robosc_client import operations
 from robosc_client.calls import CHANNEL_OPTIONS, WATCH_INTERRUPTED, JobPages, JobWatch, Operation, RetriedCall
 from robosc_client.convert.failures import failure_of
@@ -69,10 +70,10 @@ class Client:
         sleep: Callable[[float], None] = time.sleep,
         channel_options: Mapping[str, Any] | None = None,
     ) -> None:
-        """Prepare a connection to `HOST:PORT`; it is made with the first request.
+        """Prepare a connection to a server; it is made with the first request.
 
         Args:
-            address: `HOST:PORT`.
+            address: `HOST:PORT`, or `HOST` for the port 50051; or any other name of gRPC, such as `unix:/run/robosc`.
             credentials: Certificates and token; None: neither.
             retries: Policy for repeating calls.
             sleep: Function that waits for so many seconds.
@@ -81,6 +82,9 @@ class Client:
         Raises:
             CredentialsError: A file with them cannot be used, or a token would be sent in the clear.
         """
+        # The names of gRPC that are no such addresses stay what they are.
+        with suppress(ValueError):
+            address = with_port(address, SYNTHESIS_PORT)
         self._address = address
         self._retries = retries
         self._sleep = sleep

@@ -1,25 +1,20 @@
-"""Entry point of the command `robosc-client`, which handles Ctrl-C even while gRPC is loaded or closed."""
+"""Entry point of the command `robosc-client`."""
 
-import os
-import sys
+from collections.abc import Callable
 from typing import NoReturn
 
-_INTERRUPTED = 130
+from robosc.cli.starting import start
 
 
 def entry() -> NoReturn:
     """Run the command and leave with its exit status."""
-    try:
-        from robosc_client.main import main
+    start("robosc-client", _load)
 
-        status = main()
-        if status != _INTERRUPTED:
-            sys.exit(status)
-    except KeyboardInterrupt:
-        sys.stderr.write("robosc-client: interrupted\n")
-    # Threads of gRPC may wait for ever after a second interrupt; nothing else is left to do.
-    sys.stderr.flush()
-    os._exit(_INTERRUPTED)
+
+def _load() -> Callable[[], int]:
+    from robosc_client.main import main
+
+    return main
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robosc.cli.output import UsageError
+from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
 
 if TYPE_CHECKING:
     from tomlkit import TOMLDocument
@@ -29,7 +30,6 @@ MAXIMUM_BYTES = 64 * 1024
 MAXIMUM_TOKEN_BYTES = 4096
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}\Z")
-_ADDRESS = re.compile(r"(\[[0-9A-Fa-f:.%]+\]|[A-Za-z0-9._-]+):([0-9]{1,5})\Z")
 _PATHS = ("ca", "certificate", "key", "token_file")
 
 
@@ -70,12 +70,6 @@ class Profiles:
 
     default: str | None
     by_name: dict[str, Profile]
-
-
-def is_address(text: str) -> bool:
-    """Return True if a text is HOST:PORT."""
-    match = _ADDRESS.match(text)
-    return match is not None and 0 < int(match[2]) <= 65535
 
 
 def settings_folder() -> Path:
@@ -184,8 +178,12 @@ def _profile(file: Path, name: str, entry: Any) -> Profile:
 
     if not _NAME.match(name):
         raise refused("its name must have at most 64 letters, digits, '.', '-' and '_'")
-    if not isinstance(entry, dict) or not isinstance(entry.get("server"), str) or not is_address(entry["server"]):
-        raise refused("'server' must be HOST:PORT")
+    if not isinstance(entry, dict) or not isinstance(entry.get("server"), str):
+        raise refused("'server' must be HOST or HOST:PORT")
+    try:
+        server = with_port(entry["server"], SYNTHESIS_PORT)
+    except ValueError as error:
+        raise refused("'server' must be HOST or HOST:PORT") from error
     if not isinstance(entry.get("tls", False), bool):
         raise refused("'tls' must be true or false")
     for key, value in entry.items():
@@ -198,7 +196,7 @@ def _profile(file: Path, name: str, entry: Any) -> Profile:
         paths = {key: file.parent / Path(entry[key]).expanduser() for key in _PATHS if key in entry}
     except RuntimeError as error:
         raise refused("a path begins with '~' and the name of an unknown user") from error
-    return Profile(server=entry["server"], tls=entry.get("tls", False), **paths)
+    return Profile(server=server, tls=entry.get("tls", False), **paths)
 
 
 def _is_unicode(text: str) -> bool:

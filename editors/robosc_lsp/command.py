@@ -4,8 +4,10 @@ import argparse
 import logging
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 from robosc import __version__
+from robosc.cli.starting import start
 
 _MISSING = "the language server needs pygls: pip install 'robosc[lsp]'"
 
@@ -62,7 +64,12 @@ def _seconds(text: str) -> float:
     return seconds
 
 
-def entry() -> int:
+def entry() -> NoReturn:
+    """Run the command and leave with its exit status."""
+    start("robosc-lsp", lambda: main)
+
+
+def main() -> int:
     """Serve one editor until it exits; return 0, or 1 if the server cannot run."""
     command_line = parser()
     arguments = command_line.parse_args()
@@ -86,4 +93,4 @@ def entry() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(entry())
+    entry()

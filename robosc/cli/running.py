@@ -27,7 +27,21 @@ class WrongArguments(SystemExit):
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that says what is wrong in its exception, too; so do those of its commands."""
+    """A parser that says what is wrong in its exception, too; so do those of its commands.
+
+    One that has commands, and is given nothing at all, prints its help.
+    """
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse arguments; none at all where a command must be named ask for help.
+
+        Raises:
+            SystemExit: They are wrong, or ask for help.
+        """
+        if self._subparsers is not None and not list(sys.argv[1:] if args is None else args):
+            self.print_help()
+            self.exit()
+        return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
         """Tell what is wrong.

@@ -1,7 +1,7 @@
 import pytest
 
 from robosc_api.security import is_loopback_host, is_loopback_peer, joined
-from robosc_api.security.addresses import split_address
+from robosc_api.security.addresses import split_address, with_port
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.9.9.9", "localhost", "::1", "[::1]"])
@@ -37,3 +37,27 @@ def test_addresses_are_taken_apart_and_put_together() -> None:
     for wrong in ("robot", ":1", "robot:70000", "::1:5", "a b:1", "robot:1\n"):
         with pytest.raises(ValueError, match="not HOST:PORT"):
             split_address(wrong)
+
+
+@pytest.mark.parametrize(
+    ("given", "whole"),
+    [
+        ("localhost", "localhost:50051"),
+        ("lab.example", "lab.example:50051"),
+        ("127.0.0.1", "127.0.0.1:50051"),
+        ("[::1]", "[::1]:50051"),
+        ("robot-7:1", "robot-7:1"),
+        ("[::1]:65535", "[::1]:65535"),
+    ],
+)
+def test_an_address_without_a_port_has_the_services_own(given: str, whole: str) -> None:
+    assert with_port(given, 50051) == whole
+
+
+# A number alone is more likely a port than a host; without brackets nobody knows where an IPv6 address ends.
+@pytest.mark.parametrize(
+    "wrong", ["", ":1", "50051", "::1", "a b", "robot:", "robot:x", "robot:0", "robot:70000", "robot\n", "a:1\n", "x/y"]
+)
+def test_what_is_no_address_of_a_service(wrong: str) -> None:
+    with pytest.raises(ValueError, match="neither HOST nor HOST:PORT: "):
+        with_port(wrong, 50051)

@@ -3,33 +3,8 @@
 import subprocess
 import sys
 
-import pytest
-
 from support.answers import job, watched
 from support.scripted_service import scripted
-
-CODE = """
-import os, signal, sys
-class Interrupt:
-    def find_spec(self, name, path=None, target=None):
-        if name == {moment!r}:
-            os.kill(os.getpid(), signal.SIGINT)
-sys.meta_path.insert(0, Interrupt())
-sys.argv = ['robosc-client', 'check', 'model.rscd', '--server', '127.0.0.1:1']
-from robosc_client.command import entry
-entry()
-"""
-
-
-@pytest.mark.parametrize("moment", ["robosc_client.main", "grpc", "robosc_api.v1"])
-def test_ctrl_c_while_modules_are_loaded(moment: str) -> None:
-    """The interrupt comes in the very moment in which a module is looked for."""
-    result = subprocess.run(
-        [sys.executable, "-c", CODE.format(moment=moment)], capture_output=True, text=True, timeout=60, check=False
-    )
-    assert result.returncode == 130
-    assert result.stderr == "robosc-client: interrupted\n"
-
 
 BEGINNING = """
 import sys

@@ -115,7 +115,7 @@ def test_comments_stay(capfd: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "server = 1", "default = 'x'", "[profiles.lab]", "[profiles.lab]\nserver = 'x'", "profiles = 3", "[", "\udcff",
+        "server = 1", "default = 'x'", "[profiles.lab]", "[profiles.lab]\nserver = 'x:'", "profiles = 3", "[", "\udcff",
         "[profiles.'a b']\nserver = 'x:1'", "[profiles.lab]\nserver = 'x:1'\ncolour = 'red'",
         "x = '" + "x" * 70_000 + "'", "[profiles.lab]\nserver = 'x:1'\ntls = 1",
         "[profiles.lab]\nserver = 'x:1'\nca = 5", "a = " + "[" * 5000,
@@ -161,6 +161,18 @@ def test_whom_a_token_is_sent_to(
     assert target("--profile", "own") == ("127.0.0.2:1", Credentials(token_file=own))
     assert target("--profile", "none") == ("b:1", Credentials(is_secure=True))
     assert target("--profile", "own", "--token-file", str(given)) == ("127.0.0.2:1", Credentials(token_file=given))
+
+
+def test_an_address_without_a_port_has_the_default_one(capfd: pytest.CaptureFixture[str]) -> None:
+    assert target("--server", "localhost") == ("localhost:50051", Credentials())
+    assert run(capfd, "profile", "add", "added", "--server", "[::1]")[0] == 0
+    assert target("--profile", "added")[0] == "[::1]:50051"
+    profiles_file().write_text("[profiles.written]\nserver = 'lab.example'\n", encoding="utf-8")
+    assert target("--profile", "written")[0] == "lab.example:50051"
+    profiles_file().write_text("[profiles.wrong]\nserver = 'lab:'\n", encoding="utf-8")
+    status, _, err = run(capfd, "version", "--profile", "wrong")
+    assert status == 2
+    assert "profile 'wrong': 'server' must be HOST or HOST:PORT" in err
 
 
 def test_what_a_profile_says_is_relative_to_its_file() -> None:

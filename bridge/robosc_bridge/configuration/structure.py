@@ -16,6 +16,13 @@ _OptionName = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_]{0,39}(?![\s\S])", ti
 _Address = Annotated[
     str, Meta(pattern=r"^(\[[0-9a-fA-F:.]{2,45}\]|[A-Za-z0-9._-]{1,253}):[0-9]{1,5}(?![\s\S])", title="HOST:PORT")
 ]
+_ServerAddress = Annotated[
+    str,
+    Meta(
+        pattern=r"^(\[[0-9a-fA-F:.]{2,45}\]|(?![0-9]+(?![\s\S]))[A-Za-z0-9._-]{1,253})(:[0-9]{1,5})?(?![\s\S])",
+        title="HOST or HOST:PORT",
+    ),
+]
 _Option = bool | int | float | str
 
 
@@ -238,8 +245,8 @@ class SupervisorSource(_Section, frozen=True):
     """Source of the supervisor, besides the file on the command line."""
 
     server: Annotated[
-        _Address | None,
-        Meta(description="HOST:PORT of the synthesis server; null: none is asked."),
+        _ServerAddress | None,
+        Meta(description="HOST or HOST:PORT of the synthesis server (default port: 50051); null: none is asked."),
     ] = None
     ca: Annotated[
         _Text | None, Meta(description="File with certificates (PEM) that are believed there; null: without TLS.")

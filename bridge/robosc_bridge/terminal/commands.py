@@ -3,7 +3,6 @@
 import argparse
 import json
 import os
-import re
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -16,13 +15,13 @@ from robosc_api.security import (
     credentials_of,
     issue_token,
 )
+from robosc_api.security.addresses import BRIDGE_PORT, with_port
 
-ADDRESS_VARIABLE, ADDRESS = "ROBOSC_BRIDGE", "127.0.0.1:50061"
+ADDRESS_VARIABLE, ADDRESS = "ROBOSC_BRIDGE", f"127.0.0.1:{BRIDGE_PORT}"
 DONE, REFUSED, WRONG = 0, 1, 2
 
 EPILOG = "exit status: 0 done; 1 the bridge refuses, or a fault has stopped it; 2 wrong use, or no bridge answers"
 
-_ADDRESS = re.compile(r"(\[[0-9A-Fa-f:.%]+\]|[A-Za-z0-9._-]+):([0-9]{1,5})\Z")
 _COMMANDS = {
     "start": "execute the supervisor, in standby or after a fault",
     "standby": "bring the robot to rest and let the motors go",
@@ -73,19 +72,19 @@ def _finish(parser: argparse.ArgumentParser, work: Callable[[Any, argparse.Names
     parser.add_argument(
         "--address",
         type=_address,
-        metavar="HOST:PORT",
+        metavar="HOST[:PORT]",
         default=os.environ.get(ADDRESS_VARIABLE) or ADDRESS,
-        help=f"address of the bridge (default: ${ADDRESS_VARIABLE}, or {ADDRESS})",
+        help=f"address of the bridge (default: ${ADDRESS_VARIABLE}, or {ADDRESS}; default port: {BRIDGE_PORT})",
     )
     add_client_arguments(parser)
     parser.set_defaults(run=lambda arguments: _connected(arguments, work))
 
 
 def _address(text: str) -> str:
-    match = _ADDRESS.match(text)
-    if not match or not 0 < int(match[2]) <= 65535:
-        raise argparse.ArgumentTypeError(f"not HOST:PORT: '{text}'")
-    return text
+    try:
+        return with_port(text, BRIDGE_PORT)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def _connected(arguments: argparse.Namespace, work: Callable[[Any, argparse.Namespace], int]) -> int:

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from robosc.cli.output import UsageError
 from robosc_api.security import Credentials, add_client_arguments
+from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
 from robosc_client import Client
-from robosc_client.profiles import Profile, is_address, read_profiles, require_profile
+from robosc_client.profiles import Profile, read_profiles, require_profile
 
 PROFILE_VARIABLE = "ROBOSC_PROFILE"
 
@@ -39,6 +40,9 @@ EPILOG = exit_statuses(
 
 MODEL_EPILOG = exit_statuses("done; the model has no errors", "the model has errors, or no supervisor exists")
 
+ADDRESS, ADDRESS_HELP = "HOST[:PORT]", f"address of the server (default port: {SYNTHESIS_PORT})"
+"""Placeholder and help of an argument for the server's address."""
+
 _ENDLESS_S = 1e9
 
 _FIELDS = ("ca", "certificate", "key", "token_file")
@@ -56,7 +60,7 @@ def add_connection_arguments(
     """
     parser.epilog, parser.formatter_class = epilog, argparse.RawDescriptionHelpFormatter
     server = parser.add_mutually_exclusive_group()
-    server.add_argument("--server", type=address, metavar="HOST:PORT", help="address of the server")
+    server.add_argument("--server", type=address, metavar=ADDRESS, help=ADDRESS_HELP)
     server.add_argument(
         "--profile",
         metavar="NAME",
@@ -105,15 +109,16 @@ def _profile(arguments: argparse.Namespace) -> Profile | None:
     known = read_profiles()
     name = arguments.profile or os.environ.get(PROFILE_VARIABLE) or known.default
     if name is None:
-        raise UsageError("no server is given: use --server HOST:PORT or a profile (see robosc-client profile --help)")
+        raise UsageError("no server is given: use --server HOST or a profile (see robosc-client profile --help)")
     return require_profile(known, name)
 
 
 def address(text: str) -> str:
-    """HOST:PORT, for a parser."""
-    if not is_address(text):
-        raise argparse.ArgumentTypeError(f"not HOST:PORT: '{text}'")
-    return text
+    """HOST:PORT of HOST or HOST:PORT, for a parser."""
+    try:
+        return with_port(text, SYNTHESIS_PORT)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def seconds(text: str) -> float:

@@ -8,7 +8,7 @@ from robosc.cli.arguments import given_path
 from robosc.cli.output import ExitCode, UsageError, print_json
 from robosc_api.security import Credentials, SecurityError, check_credentials
 from robosc_api.security.addresses import is_loopback_host, split_address
-from robosc_client.commands.connection import address, exit_statuses
+from robosc_client.commands.connection import ADDRESS, ADDRESS_HELP, address, exit_statuses
 from robosc_client.profiles import (
     MAXIMUM_TOKEN_BYTES,
     Profile,
@@ -35,7 +35,7 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
 
     add = actions.add_parser("add", help="add a server")
     add.add_argument("name", metavar="NAME", help="name of the profile")
-    add.add_argument("--server", type=address, required=True, metavar="HOST:PORT", help="address of the server")
+    add.add_argument("--server", type=address, required=True, metavar=ADDRESS, help=ADDRESS_HELP)
     add.add_argument("--tls", action="store_true", help="use TLS, and trust the system's certificate authorities")
     for name, what in (
         ("ca", "use TLS, and trust only these certificates (PEM)"),

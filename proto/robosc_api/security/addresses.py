@@ -7,6 +7,32 @@ from urllib.parse import unquote
 
 _ADDRESS = re.compile(r"(?:\[([0-9A-Fa-f:.%]+)\]|([A-Za-z0-9._-]+)):([0-9]{1,5})\Z")
 
+_HOST = re.compile(r"(?:\[[0-9A-Fa-f:.%]+\]|(?![0-9]+\Z)[A-Za-z0-9._-]+)\Z")
+
+SYNTHESIS_PORT, BRIDGE_PORT = 50051, 50061
+"""Ports of a synthesis server and of a bridge, where an address names none."""
+
+
+def with_port(address: str, port: int) -> str:
+    """`HOST:PORT` of the address of a service, which is that or `HOST` alone.
+
+    Args:
+        address: The address; an IPv6 address is in brackets.
+        port: Port that it has where it names none.
+
+    Raises:
+        ValueError: It is no such address.
+    """
+    if _HOST.match(address):
+        return f"{address}:{port}"
+    try:
+        is_usable = split_address(address)[1] > 0
+    except ValueError:
+        is_usable = False
+    if not is_usable:
+        raise ValueError(f"neither HOST nor HOST:PORT: '{address}'")
+    return address
+
 
 def split_address(address: str) -> tuple[str, int]:
     """Host and port of `HOST:PORT`, an IPv6 address in brackets.

@@ -170,8 +170,21 @@ def test_values_of_a_wrong_kind_are_told(text: str, expected: str) -> None:
 
 @pytest.mark.parametrize("address", ["localhost", "host:", "host:123456", "ho st:1", ":1", "host:1\n", "[zz]:1"])
 def test_addresses_are_host_and_port(address: str) -> None:
-    (line,) = errors_of(f"supervisor: {{server: {json.dumps(address)}}}\n")
+    (line,) = errors_of(f"view: {{address: {json.dumps(address)}}}\n")
     assert "it must be a text like HOST:PORT" in line
+
+
+@pytest.mark.parametrize(
+    "address", ["host:", "host:123456", "ho st:1", ":1", "host:1\n", "host\n", "[zz]:1", "50051", ""]
+)
+def test_the_server_is_a_host_with_or_without_a_port(address: str) -> None:
+    (line,) = errors_of(f"supervisor: {{server: {json.dumps(address)}}}\n")
+    assert "it must be a text like HOST or HOST:PORT" in line
+    for right in ("localhost", "lab.example:1", "[::1]"):
+        assert (
+            parse(f"{HEAD}supervisor: {{server: '{right}'}}\n".encode(), "c.yaml").configuration.supervisor.server
+            == right
+        )
 
 
 @pytest.mark.parametrize(

@@ -86,12 +86,12 @@ class TestWishes:
         assert robosc_bridge(["stop", "--address", address]) == 0
         assert daemon.commands() == [OperatorCommand.STOP]
 
-    @pytest.mark.parametrize("wrong", ["robot", "robot:0", "robot:70000", ":1", "a b:1"])
+    @pytest.mark.parametrize("wrong", ["50061", "robot:0", "robot:70000", ":1", "a b:1"])
     def test_wrong_addresses_are_wrong_use(self, wrong: str, capsys: pytest.CaptureFixture[str]) -> None:
         with pytest.raises(SystemExit) as caught:
             main(["stop", "--address", wrong])
         assert caught.value.code == 2
-        assert "not HOST:PORT" in capsys.readouterr().err
+        assert "neither HOST nor HOST:PORT" in capsys.readouterr().err
 
     def test_as_a_program_with_the_address_in_the_environment(self, daemon: FakeDaemon, address: str) -> None:
         done = bridge("stop", ROBOSC_BRIDGE=address)

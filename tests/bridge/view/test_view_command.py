@@ -99,7 +99,7 @@ def test_wrong_use(files: tuple[Path, Path], tmp_path: Path) -> None:
     assert "line 1" in why("--log", model, "--model", model)
     assert "there is no scene" in why("--log", log, "--model", model, "--scene", "nowhere")
     assert "other machines" in why("--log", log, "--model", model, "--address", "0.0.0.0:0")
-    for words in (("--ros2", "--bridge", "127.0.0.1:1"), ("--bridge", "x"), ("--ros2", "--address", "h:99999")):
+    for words in (("--ros2", "--bridge", "127.0.0.1:1"), ("--bridge", "x:"), ("--ros2", "--address", "h:99999")):
         with pytest.raises(SystemExit):
             arguments(*words)
 

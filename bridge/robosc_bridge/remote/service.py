@@ -233,6 +233,9 @@ class BridgeService(convert.BridgeServiceServicer):
             await context.abort(grpc.StatusCode.RESOURCE_EXHAUSTED, f"there are {most} {what} already")
         self._counts[what] += 1
         try:
+            # With the first message, gRPC would note them as sent only after it: a call that is ended in between could
+            # not be given a status any more.
+            await context.send_initial_metadata(())
             yield
         finally:
             self._counts[what] -= 1

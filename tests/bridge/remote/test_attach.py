@@ -7,7 +7,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +52,20 @@ def attached(stub: Any, **hello: Any) -> Attachment:
 
 
 class TestHello:
+    def test_the_metadata_come_before_every_message(self, stub: Any) -> None:
+        """A call that ends while its first message is being sent can be given a status."""
+        is_begun = threading.Event()
+
+        def messages() -> Iterator[Any]:
+            assert is_begun.wait(PATIENCE_S)
+            yield pb.AttachRequest(hello=pb.Hello(name="arm"))
+
+        call = stub.Attach(messages(), timeout=PATIENCE_S)
+        call.initial_metadata()
+        is_begun.set()
+        assert next(call).HasField("welcome")
+        call.cancel()
+
     def test_a_program_is_there_as_long_as_its_stream(self, daemon: FakeDaemon, stub: Any) -> None:
         program = Attachment(stub, name="arm", serves=["open", "carry"])
         assert program.receive().welcome.operator_timeout_s == 2.5

@@ -464,7 +464,6 @@ class TestExitCodes:
         "arguments",
         [
             ["--server", "localhost:1", "--profile", "lab"],
-            ["--server", "localhost"],
             ["--server", "localhost:0"],
             ["--server", "localhost:65536"],
             ["--server", "unix:/tmp/x"],

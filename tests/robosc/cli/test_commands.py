@@ -212,7 +212,7 @@ def test_wrong_use_is_one_line_and_status_2(
     assert words in error
 
 
-@pytest.mark.parametrize("arguments", [[], ["chek"], ["explore", LINE_FOLLOWER, "--limit", "0"], ["check"]])
+@pytest.mark.parametrize("arguments", [["chek"], ["explore", LINE_FOLLOWER, "--limit", "0"], ["check"]])
 def test_the_parser_refuses_with_status_2(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as raised:
         main(arguments)

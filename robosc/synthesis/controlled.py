@@ -1,6 +1,7 @@
 """Answers to questions about the controlled system, on predicates: no state is ever looked at by itself."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
 from typing import Any
 
 from robosc.expressions import Expression
@@ -9,7 +10,7 @@ from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import FixedPoint, Problem, allowed, initial_states, safe_states
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.questions import Answers, EnabledTogether, NeverEnabled, Questions, Restriction
+from robosc.synthesis.questions import Answers, EnabledTogether, NeverEnabled, Questions, Restriction, Unprompted
 from robosc.synthesis.runs import ShortestRuns
 from robosc.synthesis.transitions import Steps
 
@@ -54,6 +55,7 @@ class ControlledSystem:
             unused=self._unused(questions.restrictions),
             together=self._together(questions.rivals),
             unreached=tuple(self._unreached(questions.locations)),
+            unprompted=tuple(self._unprompted(questions.prompted, questions.prompts)),
         )
 
     def _possible(self, event: str) -> Any:
@@ -160,16 +162,85 @@ class ControlledSystem:
         invariants = [item for place, item in enumerate(system.invariants) if place not in dropped]
         return Problem(steps, safe_states(self._encoding, invariants) if dropped else self._problem.safe)
 
+    # Prompts
+
+    def _unprompted(self, events: Sequence[str], prompts: frozenset[str]) -> Iterator[Unprompted]:
+        """Those of some events that can happen again and again while no prompt does.
+
+        A loop that was told already tells of the events that are in it.
+        """
+        inside = [steps for steps in self._problem.steps if steps.event.name not in prompts]
+        told: set[str] = set()
+        for event in events:
+            if event in told:
+                continue
+            steps = self._steps[event]
+            states = self._again(steps, inside)
+            if states == self._manager.false:
+                continue
+            state, loop = self._loop(steps, inside, states)
+            told.update(loop)
+            yield Unprompted(event, self._runs.trace_to(state), loop)
+
+    def _loop(self, steps: Steps, inside: Sequence[Steps], states: Any) -> tuple[Any, tuple[str, ...]]:
+        """Return a state from which an event, and some that follow it, lead back to it; and these events.
+
+        Where nothing leads back, a state further on is tried; there is no way back from that one, so it ends.
+
+        Args:
+            steps: The event.
+            inside: The events that may follow it.
+            states: States that `_again` has found for them.
+        """
+        run = self._runs.run_to(states)
+        while True:
+            assert run is not None  # noqa: S101  # From everywhere in these states there is a way to one of them.
+            state = self._encoding.state(run.states[-1])
+            runs = self._runs_from(steps.image(state), inside)
+            back = runs.run_to(state)
+            if back is not None:
+                return state, (steps.event.name, *back.events)
+            run = runs.run_to(states)
+
+    def _again(self, steps: Steps, inside: Sequence[Steps]) -> Any:
+        """Return the states in which an event can happen, and then again and again, by some events alone.
+
+        Source: E. A. Emerson and C.-L. Lei, "Efficient model checking in fragments of the propositional mu-calculus",
+        LICS 1986, pp. 267-278: the largest set from which the event leads to where the set can be reached.
+        """
+        found, narrowed = self._manager.true, self._possible(steps.event.name)
+        while narrowed != found:
+            found = narrowed
+            narrowed = found & steps.some(self._leading_to(found, inside))
+        return found
+
+    def _leading_to(self, states: Any, events: Sequence[Steps]) -> Any:
+        """Return the states of the controlled system from which some events lead to others, or that are such."""
+        found, wider = self._manager.false, states
+        while wider != found:
+            found = wider
+            for steps in events:
+                self._monitor.check_stop()
+                wider = wider | (self._reachable & allowed(steps, self._good) & steps.some(wider))
+        return found
+
     # Rivals
 
     def _together(self, groups: Iterable[Sequence[str]]) -> tuple[EnabledTogether, ...]:
         pairs = list(self._pairs(groups))
         if not pairs:
             return ()
-        possible = {name: self._reachable & allowed(steps, self._good) for name, steps in self._steps.items()}
-        start = initial_states(self._encoding) & self._good
-        runs = ShortestRuns(self._encoding, self._monitor, self._problem.steps, possible, start)
+        runs = self._runs
         return tuple(EnabledTogether(first, second, runs.trace_to(states)) for first, second, states in pairs)
+
+    @cached_property
+    def _runs(self) -> ShortestRuns:
+        """Runs from the initial states."""
+        return self._runs_from(initial_states(self._encoding) & self._good, self._problem.steps)
+
+    def _runs_from(self, start: Any, events: Sequence[Steps]) -> ShortestRuns:
+        possible = {name: self._reachable & allowed(steps, self._good) for name, steps in self._steps.items()}
+        return ShortestRuns(self._encoding, self._monitor, events, possible, start)
 
     def _pairs(self, groups: Iterable[Sequence[str]]) -> Iterator[tuple[str, str, Any]]:
         """Rivals that are possible together, and where: the first `MAXIMUM_TOGETHER` of them."""

@@ -147,6 +147,13 @@ class Encoding:
         """Return the predicate that is true where an automaton is in a location."""
         return self.equals(self.subjects[Subject(automaton)], location)
 
+    def state(self, values: Sequence[Value]) -> Any:
+        """Return the predicate that is true in one state, given as values in the order of `subjects`."""
+        return self.all_of(
+            self.equals(self.subjects[subject], value)
+            for subject, value in zip(subjects(self.system), values, strict=True)
+        )
+
     def any_of(self, predicates: Iterable[Any]) -> Any:
         """Return the predicate that is true where one of the predicates is true."""
         result = self.manager.false

@@ -11,6 +11,10 @@
   never): what counts is whether the controlled system would do more without it. All that are reported can go
   together. What never is requested is never restricted.
 - `unreachable-state`: a state that its component never is in, whether or not its behaviour alone has a way there.
+- `unprompted-request`: a service or action that can be requested again and again while nothing happens but requests,
+  their replies and silent steps: no message of the robot, by which somebody or something would ask for it. It is a
+  note, since a patrol is meant to go on for ever. A loop is told once, for the request in it that is declared first.
+  Only for the controller: in a layer it is the existing controller that asks.
 - `competing-requests`: two communications of one kind (topics, services and actions have name spaces of their own)
   with one identifier that can be requested in one state, with a shortest run to such a state. Only for the
   controller: in a layer it is the existing controller that chooses.
@@ -25,6 +29,7 @@ from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.model.places import Places
 from robosc.model.structure import (
     Behaviour,
+    Communication,
     CommunicationKind,
     Component,
     Deployment,
@@ -34,7 +39,7 @@ from robosc.model.structure import (
     is_tau,
 )
 from robosc.source import Location
-from robosc.synthesis.questions import Answers, Cause, EnabledTogether, NeverEnabled, Questions, Restriction
+from robosc.synthesis.questions import Answers, Cause, EnabledTogether, NeverEnabled, Questions, Restriction, Unprompted
 
 MAXIMUM_EVENTS = 12
 """Events of a run that a message shows."""
@@ -45,18 +50,33 @@ MAXIMUM_NAMES = 5
 
 def questions_about(model: Model, system: System, deployment: Deployment) -> Questions:
     """Return the questions that `findings` needs answered about the controlled system of a model's automata."""
+    is_controller = deployment is Deployment.CONTROLLER
     return Questions(
         events=tuple(event.name for event in system.events),
         restrictions=(
             *_restrictions(model, system),
             *(Restriction(invariants=(place,)) for place in range(len(model.invariants))),
         ),
-        rivals=_rivals(model) if deployment is Deployment.CONTROLLER else (),
+        rivals=_rivals(model) if is_controller else (),
         locations=tuple(
             (component.name, state.name)
             for component in model.components
             for state in (component.behaviour.states if component.behaviour else ())
         ),
+        prompted=tuple(item.event(EventKind.REQUEST) for item in _called(model)) if is_controller else (),
+        prompts=frozenset(
+            event
+            for item in model.communications
+            if item.kind is CommunicationKind.OUTGOING_MESSAGE
+            for event in item.events
+        ),
+    )
+
+
+def _called(model: Model) -> tuple[Communication, ...]:
+    """The services and actions of a model."""
+    return tuple(
+        item for item in model.communications if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
     )
 
 
@@ -102,6 +122,7 @@ def findings(model: Model, places: Places, answers: Answers) -> tuple[Diagnostic
         *(_unused(model, places, number) for number in answers.unused),
         *(_competing(model, places, pair) for pair in answers.together),
         *(_unreached(model, places, component, state) for component, state in answers.unreached),
+        *(_unprompted(model, places, item) for item in answers.unprompted),
     )
 
 
@@ -237,8 +258,29 @@ def _after(trace: Sequence[str]) -> str:
     """Return the words for when it happens: a run, cut where it is long."""
     if not trace:
         return "in the initial state"
-    shown = ", ".join(trace[:MAXIMUM_EVENTS])
-    return f"after {shown}" + (f", ... ({len(trace)} in all)" if len(trace) > MAXIMUM_EVENTS else "")
+    return f"after {_shown(trace)}"
+
+
+def _shown(events: Sequence[str]) -> str:
+    """Return events in order, cut where there are many."""
+    shown = ", ".join(events[:MAXIMUM_EVENTS])
+    return shown + (f", ... ({len(events)} in all)" if len(events) > MAXIMUM_EVENTS else "")
+
+
+# Requests that nobody asks for
+
+
+def _unprompted(model: Model, places: Places, found: Unprompted) -> Diagnostic:
+    first, *others = [item.name for item in _called(model) if item.event(EventKind.REQUEST) in found.loop]
+    return Diagnostic(
+        Severity.NOTE,
+        "unprompted-request",
+        f"'{first}' can be requested again and again with no message of the robot in between, {_after(found.trace)}: "
+        f"{_shown(found.loop)}, and so on",
+        places.communications[first],
+        "Let a message ask for it and a requirement wait for that; or leave it, if the robot shall go on by itself.",
+        tuple(RelatedPlace("requested in the same loop", places.communications[name]) for name in others),
+    )
 
 
 # States that are never reached

@@ -63,12 +63,16 @@ class Questions:
         restrictions: Restrictions of which to tell whether they ever restrict.
         rivals: Groups of events of which no two should be possible together.
         locations: Automata with one of their locations, of which to tell whether they are ever in it.
+        prompted: Events of which to tell whether they can happen again and again without a prompt.
+        prompts: The events that are prompts.
     """
 
     events: tuple[str, ...] = ()
     restrictions: tuple[Restriction, ...] = ()
     rivals: tuple[tuple[str, ...], ...] = ()
     locations: tuple[tuple[str, str], ...] = ()
+    prompted: tuple[str, ...] = ()
+    prompts: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +91,21 @@ class EnabledTogether:
 
 
 @dataclass(frozen=True, slots=True)
+class Unprompted:
+    """An event that can happen again and again without a prompt.
+
+    Attributes:
+        event: The event.
+        trace: Events of a shortest run to a state from which it can.
+        loop: The event, and those that follow until it can happen again, none of them a prompt.
+    """
+
+    event: str
+    trace: tuple[str, ...]
+    loop: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Answers:
     """Answers that were found; each part in the order of its questions.
 
@@ -95,9 +114,11 @@ class Answers:
         unused: Places in `Questions.restrictions` of those that never restrict.
         together: Rivals that are possible together, by group, then by the second, then by the first.
         unreached: Automata with a location in which they never are.
+        unprompted: Events that need no prompt to happen again and again, without those of an earlier loop.
     """
 
     never: tuple[NeverEnabled, ...] = ()
     unused: tuple[int, ...] = ()
     together: tuple[EnabledTogether, ...] = ()
     unreached: tuple[tuple[str, str], ...] = ()
+    unprompted: tuple[Unprompted, ...] = ()

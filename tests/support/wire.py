@@ -126,7 +126,7 @@ class SdkPort(PortHandler):  # type: ignore[misc]
 
     def set_speed(self, baud: int) -> None:
         """Open it anew at a speed."""
-        self._settle()
+        self.settle()
         self._read = self._line.sent
         assert self.setBaudRate(baud)
         # As it comes it spins while it waits, and a simulator in the same process starves.
@@ -150,5 +150,6 @@ class SdkPort(PortHandler):  # type: ignore[misc]
         assert is_over or self.getTimeSinceStart() < 1000 * PATIENCE_S, "the line hangs"
         return is_over
 
-    def _settle(self) -> None:
+    def settle(self) -> None:
+        """Wait until all that was written has been heard: the kernel carries it from end to end when it has time."""
         wait_until(lambda: self._line.has_answered(self._written))

@@ -1,12 +1,19 @@
 """A world that waits for its host."""
 
+import fcntl
 import os
+import sys
+import termios
 
 import pytest
 
 from robosc.execution.runtime.clock import ManualClock
 from robosc_simulated import SimulatedTurtleBot3
 from robosc_simulated.timebase import Timebase
+from support.waiting import wait_until
+
+# As much as the line discipline holds.
+_HELD = 4095
 
 
 def test_time_passes_until_the_patience_is_over_and_goes_on_when_the_host_is_heard() -> None:
@@ -45,11 +52,13 @@ def test_any_byte_of_the_host_lets_a_robots_world_go_on() -> None:
     with SimulatedTurtleBot3("burger", "opencr", "lds01", clock=ManualClock(), factor=2.0, patience_s=0.5) as robot:
         robot.advance(3.0)
         assert robot.time.world_s() == pytest.approx(0.5)
-        for path in (robot.base_path, robot.scanner_path):
+        for line in (robot.base_line, robot.scanner_line):
             before_s = robot.time.world_s()
-            port = os.open(path, os.O_RDWR | os.O_NOCTTY)
+            port = os.open(line.path, os.O_RDWR | os.O_NOCTTY)
             try:
                 os.write(port, b"b")
+                # The kernel carries it when it has time, and time passes meanwhile.
+                wait_until(lambda line=line: line.received == 1)  # type: ignore[misc]
                 robot.advance(3.0)
             finally:
                 os.close(port)
@@ -59,24 +68,39 @@ def test_any_byte_of_the_host_lets_a_robots_world_go_on() -> None:
 def test_the_world_waits_for_a_host_that_does_not_read_what_its_lidar_sends() -> None:
     with SimulatedTurtleBot3("burger", "opencr", "lds01", clock=ManualClock(), patience_s=0.5) as robot:
         base, scanner = (os.open(path, os.O_RDWR | os.O_NOCTTY) for path in (robot.base_path, robot.scanner_path))
+        taken = 0
+
+        def unread() -> int:
+            return int.from_bytes(fcntl.ioctl(scanner, termios.FIONREAD, bytes(4)), sys.byteorder)
+
+        def advance(seconds: float) -> None:
+            """Let time pass; the kernel, which carries bytes from end to end when it has time, keeps up."""
+            robot.advance(seconds)
+            wait_until(lambda: unread() == min(robot.scanner_line.sent - taken, _HELD))
+
+        def read(most: int) -> None:
+            nonlocal taken
+            taken += len(os.read(scanner, most))
+
+        def live(seconds: float) -> float:
+            begin_s = robot.time.world_s()
+            for _ in range(round(seconds / 0.05)):
+                heard = robot.base_line.received
+                os.write(base, b"b")
+                wait_until(lambda heard=heard: robot.base_line.received > heard)  # type: ignore[misc]
+                advance(0.05)
+            return robot.time.world_s() - begin_s
+
         try:
-
-            def live(seconds: float) -> float:
-                begin_s = robot.time.world_s()
-                for _ in range(round(seconds / 0.05)):
-                    os.write(base, b"b")
-                    robot.advance(0.05)
-                return robot.time.world_s() - begin_s
-
             # It has not read anything yet: it may have no use for a LiDAR.
             assert live(2.0) == pytest.approx(2.0)
-            # More than once: what the kernel still carries from end to end hides that something was read.
+            # More than once: what the kernel holds behind a full line hides that something was read.
             for _ in range(8):
-                assert os.read(scanner, 100)
-                robot.advance(0.005)
+                read(100)
+                advance(0.005)
             assert live(2.0) < 0.6
-            while len(os.read(scanner, 4096)) == 4096:
-                pass
+            while taken < robot.scanner_line.sent:
+                read(4096)
             assert live(0.3) == pytest.approx(0.3, abs=0.06)
         finally:
             os.close(base)

@@ -46,6 +46,7 @@ def drive_off(robot: SimulatedTurtleBot3) -> float:
     for device_id in (1, 2):
         goals.addParam(device_id, [100, 0, 0, 0])
     goals.txPacket()
+    port.settle()
     port.closePort()
     return 100 * 7.913672e-4
 
@@ -54,7 +55,7 @@ def drive_off(robot: SimulatedTurtleBot3) -> float:
 def test_it_drives_as_far_as_its_time_passes(factor: float) -> None:
     with SimulatedTurtleBot3(base="dynamixel", walls=Walls(()), factor=factor, clock=ManualClock()) as robot:
         speed_m_s = drive_off(robot)
-        # What was written is heard in the first step, and the wheels have their speed soon.
+        # The wheels have their speed soon.
         robot.advance(0.2)
         x_m = robot.world.pose[0]
         robot.advance(0.5)

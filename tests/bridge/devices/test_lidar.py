@@ -25,11 +25,13 @@ from robosc_bridge.driver_registry import Kind, available_drivers, make_range_sc
 from robosc_bridge.errors import LineError, LineLostError, LineMissingError
 from robosc_bridge.transport.serial_line import SerialLine
 from support.lidar_frames import lds01_frame, lds02_frame, lds03_frame
-from support.pty_end import LIMIT_S, PtyEnd, SkippingClock
-from support.waiting import wait_until
+from support.pty_end import LIMIT_S, HeldHost, PtyEnd
+from support.waiting import PATIENCE_S, wait_until
 
 START_LDS03 = bytes.fromhex("aa 55 f0 0f")
 STOP_LDS03 = bytes.fromhex("aa 55 f5 0a")
+NEVER_S = 3600.0
+"""Longer than any test waits."""
 
 
 def _lds01_revolution(distance_mm: int) -> list[bytes]:
@@ -72,7 +74,7 @@ class Rig:
     def __init__(self, kit: Kit, **arguments: Any) -> None:
         self.kit = kit
         self.pty = PtyEnd()
-        self.clock = SkippingClock()
+        self.clock = HeldHost(self.pty)
         self.lidar = kit.make(self.pty.path, host=self.clock, **arguments)
         self.lidar.open()
 
@@ -127,17 +129,17 @@ class Waiting:
     def __init__(self, lidar: Lidar[Any]) -> None:
         self.outcome: Scan | Exception | None = None
         self._lidar = lidar
-        self._thread = threading.Thread(target=self._run)
+        self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def _run(self) -> None:
         try:
-            self.outcome = self._lidar.receive(LIMIT_S)
+            self.outcome = self._lidar.receive(NEVER_S)
         except LineError as error:
             self.outcome = error
 
-    def end(self, limit_s: float = LIMIT_S / 2) -> Scan | Exception | None:
-        self._thread.join(limit_s)
+    def end(self) -> Scan | Exception | None:
+        self._thread.join(PATIENCE_S)
         assert not self._thread.is_alive()
         return self.outcome
 

@@ -30,8 +30,10 @@ class Stranger:
 
     def __init__(self, address: str, source: str = "", settings: Mapping[int, int] | None = None) -> None:
         host, _, port = address.rpartition(":")
+        # The thread that answers sends, too: a frame must not get into the middle of another one.
+        self._sending = threading.Lock()
         self.line = socket.create_connection((host, int(port)), source_address=(source, 0))
-        self.line.sendall(_PREFACE)
+        self._send(_PREFACE)
         told = b"".join(struct.pack(">HI", number, value) for number, value in (settings or {}).items())
         self.send(SETTINGS, 0, 0, told)
         self.is_open = True
@@ -40,8 +42,8 @@ class Stranger:
         self._thread.start()
 
     def send(self, kind: int, flags: int, stream: int, content: bytes) -> None:
-        """A frame."""
-        self.line.sendall(struct.pack(">I", len(content))[1:] + struct.pack(">BBI", kind, flags, stream) + content)
+        """A frame; nobody takes it where the server has ended the connection."""
+        self._send(struct.pack(">I", len(content))[1:] + struct.pack(">BBI", kind, flags, stream) + content)
 
     def call(
         self, stream: int, path: str, metadata: Mapping[str, str] | None = None, flags: int = END_OF_HEADERS
@@ -77,6 +79,10 @@ class Stranger:
             self.line.shutdown(socket.SHUT_RDWR)
         self._thread.join(_PATIENCE_S)
         self.line.close()
+
+    def _send(self, content: bytes) -> None:
+        with self._sending, suppress(ConnectionError):
+            self.line.sendall(content)
 
     def _answer(self) -> None:
         data = b""

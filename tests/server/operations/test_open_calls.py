@@ -1,6 +1,7 @@
 """Tests of the limit on open calls, with real calls: silent ones, watches, answers that nobody reads."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from robosc_api.failures import reason_of
 from robosc_api.security import Quota, Scope, make_token
 from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc, synthesis_pb2_grpc
 from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_server import application
 from robosc_server.failures import RefusedError
 from robosc_server.operations.open_calls import HEALTH_CALLS_PER_CALLER, CallLimits, OpenCalls
 from robosc_server.tasks.task import Reason
@@ -27,13 +29,46 @@ HEALTH = "/grpc.health.v1.Health/Check"
 INITIAL_WINDOW = 4
 
 
+@contextmanager
+def looked_into(**settings: Any) -> Iterator[tuple[str, Callable[[], bool]]]:
+    """Run a server that waits for requests as long as a test takes.
+
+    Yields:
+        Its address, and a function that returns True once no call is open there: a server sees the end of a call, and
+        of a connection, only after its caller.
+    """
+    made: list[OpenCalls] = []
+
+    def noted(*arguments: Any) -> OpenCalls:
+        made.append(OpenCalls(*arguments))
+        return made[0]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(application, "OpenCalls", noted)
+        server = served(given_workers=StartedWorkers(), request_seconds=600.0, **settings)
+        with server as address:
+            patch.undo()
+            yield address, lambda: eventually(lambda: made[0].count == 0)
+
+
 @pytest.fixture(scope="module")
-def small() -> Iterator[str]:
-    """A server with few places, that waits for requests as long as a test takes."""
-    with served(
-        given_workers=StartedWorkers(), open_calls=6, open_calls_per_caller=4, request_seconds=600.0
-    ) as address:
-        yield address
+def shared() -> Iterator[tuple[str, Callable[[], bool]]]:
+    """A server with few places."""
+    with looked_into(open_calls=6, open_calls_per_caller=4) as server:
+        yield server
+
+
+@pytest.fixture
+def all_are_free(shared: tuple[str, Callable[[], bool]]) -> Callable[[], bool]:
+    """A function that returns True once all places of that server are free."""
+    return shared[1]
+
+
+@pytest.fixture
+def small(shared: tuple[str, Callable[[], bool]], all_are_free: Callable[[], bool]) -> str:
+    """The address of that server, whose places are free whatever other tests took."""
+    assert all_are_free()
+    return shared[0]
 
 
 def version(address: str, **more: Any) -> Any:
@@ -71,7 +106,7 @@ def hold(stranger: Stranger, count: int, path: str = GET_VERSION, metadata: dict
         stranger.call(2 * number + 1, path, metadata)
 
 
-def test_a_caller_has_its_places_and_no_more(small: str) -> None:
+def test_a_caller_has_its_places_and_no_more(small: str, all_are_free: Callable[[], bool]) -> None:
     with strangers(small, 2, source="127.0.0.2") as (first, second):
         hold(first, 4)
         hold(second, 3)
@@ -79,6 +114,7 @@ def test_a_caller_has_its_places_and_no_more(small: str) -> None:
         assert any(each.was_told(b"limit of 4 open calls") for each in (first, second))
         # Another one, by its address.
         assert is_answered(small)
+    assert all_are_free()
     with strangers(small, 1) as (ours,):
         # One more than there are places for: when it is refused, the others have theirs.
         hold(ours, 5)
@@ -137,20 +173,30 @@ def test_nobody_from_elsewhere_takes_the_places_of_this_machines_health_checks()
     layered.unary_unary(None, Call("::1"))
 
 
-def test_calls_that_are_over_give_their_places_back(small: str) -> None:
+def test_calls_that_are_over_give_their_places_back(small: str, all_are_free: Callable[[], bool]) -> None:
     bundle = pb.Bundle(main=pb.SourceFile(name="robot.rscd", text="until /nowhere/at all"))
     with grpc.insecure_channel(small) as channel:
         stub = STUB(channel)
         jobs = JOBS(channel)
+
+        def has_room() -> bool:
+            try:
+                stub.GetVersion(pb.GetVersionRequest(), timeout=PATIENCE_S)
+            except grpc.RpcError:
+                return False
+            return True
+
         for _ in range(10):
             # Answered, refused, past its deadline, cancelled.
-            version(small)
+            assert has_room()
             with pytest.raises(grpc.RpcError, match="there is no job"):
                 next(jobs.WatchJob(jobs_pb2.WatchJobRequest(id="none"), timeout=PATIENCE_S))
             with pytest.raises(grpc.RpcError, match="DEADLINE_EXCEEDED"):
                 stub.Check(pb.CheckRequest(bundle=bundle), timeout=0.01)
             stub.Synthesize(pb.SynthesizeRequest(bundle=bundle), timeout=PATIENCE_S).cancel()
-        assert eventually(lambda: is_answered(small))
+            # The server has met all of these when it answers another one on their line, and sees their ends later.
+            assert eventually(has_room)
+            assert all_are_free()
 
 
 def test_an_answer_that_nobody_reads_keeps_its_place(small: str) -> None:
@@ -170,13 +216,14 @@ def test_a_token_says_how_many(tmp_path: Path) -> None:
     file = tmp_path / "tokens"
     file.write_text("\n".join(entries))
     file.chmod(0o600)
-    with served(given_workers=StartedWorkers(), open_calls_per_caller=4, request_seconds=600.0, tokens=file) as address:
+    with looked_into(open_calls_per_caller=4, tokens=file) as (address, all_are_free):
         few, usual = (tuple(token.items()) for token in tokens)
         with strangers(address, 1) as (stranger,):
             hold(stranger, 3, metadata=tokens[0])
             assert eventually(lambda: stranger.ended == 1)
             assert "limit of 2 open calls" in refusal(address, metadata=few)[1]
             assert is_answered(address, metadata=usual)
+        assert all_are_free()
         with strangers(address, 1) as (stranger,):
             hold(stranger, 5, metadata=tokens[1])
             assert eventually(lambda: stranger.ended == 1)

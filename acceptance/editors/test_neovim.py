@@ -16,7 +16,7 @@ from support.waiting import eventually
 
 needs_neovim = pytest.mark.skipif(NVIM is None, reason="needs Neovim: apt-get install neovim")
 
-WORDS_ELSEWHERE = frozenset({"always", "constant", "else", "never", "then"})
+WORDS_ELSEWHERE = frozenset({"always", "constant", "else", "never", "not", "then"})
 """Words that are names where they mean nothing: what begins an item or parts an expression is shown as a word."""
 
 

@@ -27,7 +27,7 @@ properties:
   EG p  EF p  EX p      in some run: the same
   A[p U q]  E[p U q]    in every run, in some run: p until q, and q comes
   enabled(c.request)    the event can happen
-  !p, p and q, p or q, p => q
+  !p or not p, p and q, p or q, p => q
   name: p               a property with a name
 
 E is a condition of the language over component states and synthesis variables; service.location and

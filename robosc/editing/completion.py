@@ -8,6 +8,7 @@ from robosc.editing.definitions import DefinitionKind
 from robosc.editing.place import Place, name_of, place_at
 from robosc.expressions import ArrayType, EnumType, ObjectType, Type, type_text
 from robosc.language import parse
+from robosc.language.negation import NOT
 from robosc.language.tokens import tokenize
 from robosc.language.words import RESERVED_WORDS, spelled
 from robosc.model.check import Inspected
@@ -94,7 +95,11 @@ def complete(
         # They may be names of communications, too, and were taken for such.
         expected = (*expected, "an expression")
     behind = _BEGUN.sub("", text[offset : offset + _AHEAD], count=1)
-    found = [*_Names(place, behind, inspected, surroundings).candidates(expected), *_words(place, expected)]
+    names = list(_Names(place, behind, inspected, surroundings).candidates(expected))
+    if place.last() == NOT and "an expression" in expected and all(item.text != NOT for item in names):
+        # With nothing of that name, it can only be the operator.
+        expected = ("an expression",)
+    found = [*names, *_words(place, expected)]
     chosen: dict[str, Candidate] = {}
     for item in found:
         chosen.setdefault(item.text, item)
@@ -110,7 +115,7 @@ def _words(place: Place, expected: Iterable[str]) -> Iterator[Candidate]:
         elif item == "a type":
             words += _TYPES
         elif item == "an expression":
-            words += ("true", "false", "if")
+            words += ("true", "false", "if", NOT)
         elif item.startswith("'") and item[1:-1].isidentifier():
             words.append(item[1:-1])
     if place.last() == "requirement":

@@ -103,10 +103,6 @@ class _Line:
             left = " " * self._before[-1:].isidentifier()
             right = " " * bool(re.match(r"\w", self._line[end : end + 1]))
             yield from self._changed(f"Write '{_WORDS[token]}'", self._begin, end, f"{left}{_WORDS[token]}{right}")
-        elif fix == "Write '!' for 'not'.":
-            word = re.search(r"\bnot\s*\Z", self._before)
-            if word is not None:
-                yield from self._changed("Write '!'", word.start(), self._begin, "!")
         elif fix.startswith(("Remove ", "Write '=' once")):
             yield from self._changed(f"Remove '{token}'", self._begin, self._end, "")
         elif fix.startswith("Write 'incoming message' or"):

@@ -9,6 +9,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from robosc.language import syntax
+from robosc.language.negation import NOT, is_negation
 from robosc.language.precedence import LEVELS
 from robosc.language.tokens import Kind, Tokens
 
@@ -206,9 +207,9 @@ class _Expressions:
     def _operand(self, run: _Run) -> _Frame | None:
         """Walk over an operand, up to what follows a name; the frame that it opens, if it does."""
         texts = self.texts
-        while texts[self.place] in ("!", "-"):
+        while texts[self.place] in ("!", "-") or is_negation(texts, self.kinds, self.place):
             self.place += 1
-            self.tight[self.place] = 1
+            self.tight[self.place] = texts[self.place - 1] != NOT
         index = self.place
         token = texts[index]
         if token == "(":

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from robosc.language import precedence, syntax
 from robosc.language.cursor import Cursor, Fault
 from robosc.language.limits import MAXIMUM_NESTING
+from robosc.language.negation import NOT, is_negation
 from robosc.language.tokens import Kind
 from robosc.language.words import unescape
 
@@ -13,7 +14,7 @@ _OPERATORS = frozenset().union(*precedence.LEVELS) | {"=>"}
 _BASIC_TYPES = {str(name): name for name in syntax.BasicTypeName}
 _CONVERSIONS = ("integer", "double")
 _QUANTIFIERS = ("any", "all")
-_NAME, _NUMBER, _STRING = int(Kind.NAME), int(Kind.NUMBER), int(Kind.STRING)
+_NAME, _NUMBER, _STRING, _END = int(Kind.NAME), int(Kind.NUMBER), int(Kind.STRING), int(Kind.END)
 
 
 class _Group(NamedTuple):
@@ -56,6 +57,12 @@ class ExpressionParser(Cursor):
         kind, token = self.kinds[index], self.texts[index]
         return kind in (_NAME, _NUMBER, _STRING) or token in _OPERAND_SIGNS
 
+    def is_negation(self, index: int) -> bool:
+        """Return True if the word `not`, at a token where an operand begins, is the operator, not a name."""
+        if self.kinds[index + 1] == _END:
+            self.possible("an expression", ahead=1)
+        return is_negation(self.texts, self.kinds, index)
+
     def _run(self) -> syntax.Expression:
         """Operands and operators in turns; parentheses are matched with a stack, so their depth costs no recursion."""
         texts = self.texts
@@ -65,8 +72,8 @@ class ExpressionParser(Cursor):
         while True:
             index = self.place
             token = texts[index]
-            if token in ("!", "-"):
-                group.signs.append((token, self.at(index)))
+            if token in ("!", "-") or (token == NOT and self.is_negation(index)):
+                group.signs.append(("-" if token == "-" else "!", self.at(index)))
                 self.place = index + 1
                 continue
             if token == "(":
@@ -109,7 +116,7 @@ class ExpressionParser(Cursor):
             del signs[1:]
         for (sign, _), (following, place) in pairwise(signs):
             if sign == "-" and following == "!":
-                message = "'-' cannot stand before '!'; expected a number"
+                message = "'-' cannot stand before '!' or 'not'; expected a number"
                 self.report("syntax-error", message, place, "Remove the '-'.")
         for sign, location in reversed(signs):
             tree = syntax.Unary(sign, tree, location)

@@ -114,8 +114,6 @@ def fix_syntax(before: str, token: str, expected: Sequence[str]) -> str:
     """
     if token in _FOREIGN:
         return _FOREIGN[token]
-    if before == "not" and ("an operator" in expected or "an expression" in expected):
-        return "Write '!' for 'not'."
     if token == "=" and before == "=":
         return "Write '=' once: it compares."
     if not token.isascii():

@@ -143,12 +143,19 @@ class ExpressionChecker:
             return ()
         return (RelatedPlace(f"'{name}' is declared here", component.declared[name]),)
 
-    def _mismatch(self, tree: syntax.Expression, found: Type, needed: str, because: RelatedPlace | None = None) -> None:
+    def _mismatch(
+        self,
+        tree: syntax.Expression,
+        found: Type,
+        needed: str,
+        because: RelatedPlace | None = None,
+        fix: str = "Write an expression of the needed type.",
+    ) -> None:
         self._findings.error(
             "type-mismatch",
             f"this is {_article(_plain_text(found))}, but {needed}",
             tree.location,
-            "Write an expression of the needed type.",
+            fix,
             *self._declaration(tree),
             *((because,) if because else ()),
         )
@@ -163,7 +170,8 @@ class ExpressionChecker:
             return None
         if tree.operator == "!":
             if not isinstance(operand.type, BooleanType):
-                self._mismatch(tree.operand, operand.type, "'!' takes a boolean")
+                fix = "Put what is negated in parentheses, as in '!(a = b)', or negate a boolean."
+                self._mismatch(tree.operand, operand.type, "'!' (or 'not') takes a boolean", fix=fix)
                 return None
             return Typed(Unary("not", operand.expression), _BOOLEAN)
         if not is_numeric(operand.type):

@@ -14,6 +14,7 @@ from robosc.language import syntax
 from robosc.language.cursor import Fault, TooManyFaults
 from robosc.language.expression_parser import ExpressionParser
 from robosc.language.limits import FRAMES_PER_LEVEL, MAXIMUM_NESTING, MAXIMUM_SYNTAX_ERRORS
+from robosc.language.negation import NOT
 from robosc.language.tokens import Kind, Places, Tokens, tokenize
 from robosc.recursion import allow_depth
 from robosc.source import Location, SourceFile
@@ -166,6 +167,12 @@ class _PropertyParser(ExpressionParser):
     def _call_of(self, operator: str, index: int, *operands: syntax.Expression) -> syntax.Call:
         return syntax.Call(syntax.Name(f"{operator}()", self.at(index)), operands)
 
+    def is_negation(self, index: int) -> bool:
+        """As in a model; but here `service` and `action` begin operands, no condition follows one, and `U` may."""
+        following = self.texts[index + 1]
+        begins_operand = self.texts[index] == NOT and following in ("service", "action", "if")
+        return begins_operand or (following != "U" and super().is_negation(index))
+
     def _primary(self, *, is_negative: bool = False) -> syntax.Expression:
         index = self.place
         token, following = self.texts[index], self.texts[index + 1]
@@ -193,10 +200,11 @@ class _PropertyParser(ExpressionParser):
         """Parse the operand of one preceding operator: an operand behind signs, like that of `!`."""
         index = self.place
         token = self.texts[index]
-        if token in ("!", "-"):
+        if token in ("!", "-") or self.is_negation(index):
             self.place = index + 1
             self.deeper(index)
-            tree: syntax.Expression = syntax.Unary(token, self._operand(), self.at(index))
+            sign = "-" if token == "-" else "!"
+            tree: syntax.Expression = syntax.Unary(sign, self._operand(), self.at(index))
             self.shallower()
             return tree
         if token != "(":

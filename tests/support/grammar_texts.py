@@ -17,7 +17,7 @@ from support.textx_parser import metamodel
 WORDS = tuple(
     """
     a b x far always never any all in then else min max length abs clamp qos depth max_age stamped when constant
-    identifier type reliable sensor latched until _x9 Value order androids ifs ^a ^state ^always ^value ^in ^then x1
+    not identifier type reliable sensor latched until _x9 Value order androids ifs ^a ^state ^always ^value ^in ^then x1
     """.split()
 )
 """Free names; most of them are words of part B, or nearly a word."""
@@ -36,6 +36,7 @@ _SAMPLES: dict[str, tuple[str, ...]] = {
     "Minus": ("-",),
     "Slash": ("/",),
     "NotSign": ("!",),
+    "NotWord": ("not",),
     "Equals": ("=",),
     "Colon": (":",),
     "Dot": (".",),

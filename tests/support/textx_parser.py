@@ -49,11 +49,16 @@ class Parsed:
     stopped: bool
 
 
-def parse(file: SourceFile) -> Parsed:
-    """The syntax tree of a file."""
+def parse(file: SourceFile, *, has_not: bool = True) -> Parsed:
+    """The syntax tree of a file.
+
+    Args:
+        file: The file.
+        has_not: False for the language as it was before `not` became an operator.
+    """
     with _deep_recursion():
         try:
-            root = metamodel().model_from_str(file.text)
+            root = metamodel(has_not=has_not).model_from_str(file.text)
         except TextXSyntaxError as error:
             return Parsed(None, (Finding("syntax-error", int(error.line), int(error.col)),), True)
         converter = _Converter(file)
@@ -63,9 +68,10 @@ def parse(file: SourceFile) -> Parsed:
 
 
 @cache
-def metamodel() -> Any:
-    """The grammar, ready to read."""
+def metamodel(*, has_not: bool = True) -> Any:
+    """The grammar, ready to read; with or without the operator `not`."""
     grammar = GRAMMAR.read_text(encoding="utf-8").replace("RESERVED", "|".join(sorted(RESERVED_WORDS)))
+    grammar = grammar.replace("NOT_WORD", "not(?![A-Za-z_0-9])" if has_not else "(?!)")
     return metamodel_from_str(grammar, autokwd=True, memoization=True, use_regexp_group=False)
 
 
@@ -267,7 +273,8 @@ class _Converter:
 
     def _unary(self, node: Any) -> syntax.Expression:
         if node.operator:
-            return syntax.Unary(node.operator, self._unary(node.operand), self._first(node, node.operator))
+            sign = "!" if node.operator == "not" else node.operator
+            return syntax.Unary(sign, self._unary(node.operand), self._first(node, node.operator))
         if _kind(node) == "Not":
             return self._unary(node.negation)
         return self._primary(node.primary, is_negative=_kind(node.parent) == "Negation")

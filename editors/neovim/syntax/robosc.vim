@@ -6,7 +6,7 @@ endif
 syntax case match
 syntax keyword roboscWord action always and array behaviour boolean cancel component constant datatype default
 syntax keyword roboscWord disables do double else enum error false feedback from goto if import incoming initial
-syntax keyword roboscWord integer interface library links marked message needs never none object on or outgoing
+syntax keyword roboscWord integer interface library links marked message needs never none not object on or outgoing
 syntax keyword roboscWord provide request requirement response robot service state string then to transition true
 syntax keyword roboscWord use value variable with
 " A word of the language as a name.

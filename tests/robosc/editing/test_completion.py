@@ -188,3 +188,26 @@ MOVING = (
 )
 def test_a_property_is_offered_once(written: str, expected: set[str]) -> None:
     assert set(offered(MOVING.format(written=written))) == expected
+
+
+NEGATED = """robot R {
+    component Door {
+        incoming message open with type: none
+        behaviour { variable NAME: boolean initial marked state closed { transition if not | } }
+    }
+    requirement open needs not ?
+}"""
+
+
+def test_behind_not_stands_an_operand() -> None:
+    for text in (NEGATED.replace("?", ""), NEGATED.replace("|", "").replace("?", "|")):
+        found = offered(text.replace("NAME", "jammed"))
+        assert {"Door", "true", "not", "any"} <= found.keys()
+        assert not {"and", "or"} & found.keys()
+    assert "jammed" in offered(NEGATED.replace("NAME", "jammed").replace("?", ""))
+    assert "closed" in offered(NEGATED.replace("|", "").replace("not ?", "not Door.|").replace("NAME", "jammed"))
+
+
+def test_behind_what_is_called_not_stands_an_operator_too() -> None:
+    found = offered(NEGATED.replace("NAME", "not").replace("?", ""))
+    assert {"Door", "true", "not", "and", "or"} <= found.keys()

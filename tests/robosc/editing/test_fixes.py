@@ -47,7 +47,6 @@ def titles_and_texts(text: str) -> dict[str, str]:
         ("C.a and !C.b", "C.a & !C.b", "Write 'and'"),
         ("C.a and !C.b and C.n", "C.a and !C.b&&C.n", "Write 'and'"),
         ("!C.b and", "!C.b or", None),
-        ("!C.b", "not C.b", "Write '!'"),
         ("C.n = 2", "C.n == 2", "Remove '='"),
         ("type: none", "type: none;", "Remove ';'"),
         ("!C.b", "!C.b)", "Remove ')'"),

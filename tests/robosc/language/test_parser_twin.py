@@ -78,6 +78,9 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
     if token in OPTIONS:
         # The grammar does not tell that an option stands once.
         return True
+    if token == "if" and tokens.texts[at - 1] == "not":
+        # Without its end it is no conditional, so that `not` is a name.
+        return True
     # What follows tells that `3 needs x` wants a name, and `integer < x` something else than this word.
     is_next = offset(text, *stops) == tokens.starts[at + 1]
     return is_next and (following == "needs" or token in ("integer", "double"))
@@ -163,6 +166,33 @@ EXPRESSIONS = (
     "!-a",
     "-!a",
     "!!a",
+    "not a",
+    "not not not",
+    "not (a) = not b",
+    "!not !a",
+    "-not a",
+    "not - 1",
+    "not -> a",
+    "not.not[not]",
+    "not in",
+    "not then",
+    "not constant",
+    "not ^then",
+    "not 'x'",
+    "not 5",
+    "not integer",
+    "not double(not)",
+    "not value",
+    "f(not, not a, not not)",
+    "any(not in not[not..not a]: not not)",
+    "if not then not else not",
+    "if not then then not else else",
+    "not if a then b else c",
+    "not if not if then then b else c then not else d",
+    "not if any(x in a: not if x then y else z) then b else c",
+    "not if a",
+    "not if a and not if b",
+    "if a then b else not if c",
     "- - 2147483648",
     "-2147483648",
     "2147483648",
@@ -316,6 +346,21 @@ def test_words_as_names(word: str) -> None:
         assert trees[0] is None
 
 
+def test_not_takes_no_meaning_from_a_text() -> None:
+    """What the grammar without the operator reads is still read like that, but for calls, whose function is none."""
+    read = 0
+    for seed in range(300):
+        random = Random(seed)
+        tokens = ["not" if token in WORDS and random.random() < 0.4 else token for token in grammar_tokens(random, 60)]
+        text = joined(tokens, random)
+        before = textx_parser.parse(SourceFile("model.rscd", text), has_not=False).tree
+        calls = [part for part in parts(before) if isinstance(part, syntax.Call) and part.function.text == "not"]
+        if before is not None and not calls:
+            assert compare(text) == before
+            read += "not" in tokens
+    assert read > 50
+
+
 REQUIREMENTS = {
     "always needs x": False,
     "always disables m": False,
@@ -346,6 +391,13 @@ REQUIREMENTS = {
     "always !x": True,
     "never !x disables m": None,
     "always x": True,
+    "not needs not": False,
+    "not disables not": False,
+    "not not disables not": False,
+    "not x needs m": None,
+    "never not x": True,
+    "always not": True,
+    "never not if x then y else z": True,
     "always always": True,
     "never always.always": True,
     "always never disables m": None,

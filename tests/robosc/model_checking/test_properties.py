@@ -54,6 +54,12 @@ def faults(text: str, model: Model = MODEL) -> list[str]:
         ("AG (A.G or A.X)", "AG (A.G or A.X)"),
         ("!AG !A.G", "!AG !A.G"),
         ("AG !EF A.X", "AG !EF A.X"),
+        ("not AG not A.G", "!AG !A.G"),
+        ("AG not(EF A.X)", "AG !EF A.X"),
+        ("not A G not not A.X", "!AG !!A.X"),
+        ("A[not A.G U not E[not A.X U A.G]]", "A[!A.G U !E[!A.X U A.G]]"),
+        ("invariant not service call.waiting", "AG (!service call.waiting)"),
+        ("not if A.G then A.X else not (A.n > 1)", "!(if A.G then A.X else !(A.n > 1))"),
         ("AG (A.G => EF A.X)", "AG (!A.G or EF A.X)"),
         ("A[A.G U A.X]", "A[A.G U A.X]"),
         ("E[A.G and A.n < 2 U EG A.X]", "E[A.G and A.n < 2 U EG A.X]"),
@@ -87,6 +93,27 @@ def test_meaning(text: str, meaning: str) -> None:
         assert read(meaning) == meaning
 
 
+NAMED_NOT = model_of("""robot R { component not { behaviour {
+    variable not: integer(0..2)
+    initial marked state U { transition if not = 0 goto not_ }
+    marked state not_ { transition if not = 1 goto U }
+} } }""")
+
+
+@pytest.mark.parametrize(
+    ("text", "meaning"),
+    [
+        ("A[not.U U not.not = 1]", "A[not.U U not.not = 1]"),
+        ("AG not.U", "AG not.U"),
+        ("not not.U", "!not.U"),
+        ("not: not.U", "not.U"),
+        ("invariant not.not - 1 = 0", "AG (not.not - 1 = 0)"),
+    ],
+)
+def test_what_is_called_not_keeps_its_name(text: str, meaning: str) -> None:
+    assert read(text, NAMED_NOT) == read(meaning, NAMED_NOT)
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -100,7 +127,9 @@ def test_meaning(text: str, meaning: str) -> None:
         "§A.heard = 3",
         "AG A.n §= 3",
         "AG §A.n",
-        "not §AG A.G",
+        "§not",
+        "AG not §U",
+        "not §A.n = 3",
         "AG A.G §&& A.X",
         "EF enabled(§mode.request)",
         "EF enabled(mode§)",

@@ -1,0 +1,84 @@
+"""The word `not` where an operand begins: an operator before what could not follow a name, else a name.
+
+So a model in which something is called `not` keeps its meaning, and `^not` is always a name.
+"""
+
+from collections.abc import Sequence
+
+from robosc.language.tokens import Kind
+
+NOT = "not"
+
+_NAME, _NUMBER, _STRING = int(Kind.NAME), int(Kind.NUMBER), int(Kind.STRING)
+_BEGIN_OPERANDS = frozenset({"(", "!", "true", "false", "value"})
+_CONVERSIONS = frozenset({"integer", "double"})
+_BEHIND_OPERANDS = frozenset({"then", "else", "in"})
+_BETWEEN = frozenset({",", ":", "..", "in"})
+"""What parts arguments, slices and quantifiers in brackets."""
+_BINARY = frozenset({"or", "and", "=", "!=", ">", ">=", "<", "<=", "+", "*", "/", "=>"})
+
+
+def is_negation(texts: Sequence[str], kinds: Sequence[int], index: int) -> bool:
+    """Return True if the word `not`, at a token where an operand begins, is the operator.
+
+    Args:
+        texts: The tokens, as written, with ends behind the last.
+        kinds: Their kinds.
+        index: The token.
+    """
+    if texts[index] != NOT:
+        return False
+    following, kind = texts[index + 1], kinds[index + 1]
+    if kind == _NAME:
+        # The constant of the next item: `constant A: E = not constant B: E = red`.
+        begins_item = following == "constant" and kinds[index + 2] == _NAME and texts[index + 3] == ":"
+        return following not in _BEHIND_OPERANDS and not begins_item
+    if following == "if":
+        return _is_conditional(texts, kinds, index + 1)
+    if following in _CONVERSIONS:
+        return texts[index + 2] == "("
+    return kind in (_NUMBER, _STRING) or following in _BEGIN_OPERANDS
+
+
+def _is_conditional(texts: Sequence[str], kinds: Sequence[int], index: int) -> bool:
+    """Return True if the `if` at a token has a `then`: else it is the condition of a provide statement.
+
+    Operands and what stands behind them take turns, which tells the word `then` from a name.
+    """
+    conditions = depth = 0
+    is_operand_next = True
+    while True:
+        token, kind = texts[index], kinds[index]
+        if is_operand_next:
+            if token == "if":
+                conditions += 1
+            elif token in ("(", "["):
+                depth += 1
+            elif token == ")" and texts[index - 1] == "(":
+                # A call without arguments.
+                depth -= 1
+                is_operand_next = False
+            elif token == NOT and kind == _NAME:
+                is_operand_next = texts[index + 1] == "if" or is_negation(texts, kinds, index)
+            elif token in _CONVERSIONS or kind in (_NAME, _NUMBER, _STRING) or token in ("true", "false", "value"):
+                is_operand_next = False
+            elif token not in ("!", "-"):
+                return False
+        elif token == "then":
+            conditions -= 1
+            if not conditions:
+                return True
+            is_operand_next = True
+        elif token in _BINARY or token in ("-", ".", "else") or (depth and token in _BETWEEN):
+            is_operand_next = True
+        elif token in ("(", "["):
+            depth += 1
+            is_operand_next = True
+        elif token in (")", "]") and depth:
+            depth -= 1
+        else:
+            return False
+        index += 1
+
+
+__all__ = ["NOT", "is_negation"]

@@ -1,0 +1,79 @@
+"""Interface definitions of ROS distributions that come with RoboSC: models are checked without an installed ROS.
+
+A file of the folder `shipped` has one definition after the other: its name, such as `std_msgs/msg/Bool`, then its
+lines, each behind a blank. `deploy/collect_interfaces.py` writes them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+
+@dataclass(frozen=True, slots=True)
+class Distribution:
+    """A ROS distribution.
+
+    Attributes:
+        title: Its name, e.g. `ROS 2 Jazzy`.
+        version: 1 for ROS 1, 2 for ROS 2.
+        file: File of its definitions, as far as they differ from those of `base`.
+        base: Distribution that it is compared with, or None.
+    """
+
+    title: str
+    version: int
+    file: str
+    base: "Distribution | None" = None
+
+    @property
+    def definitions(self) -> Mapping[str, str]:
+        """Texts of its definitions by name, e.g. `std_msgs/msg/Bool`."""
+        return _definitions(self)
+
+
+JAZZY = Distribution("ROS 2 Jazzy", 2, "ros2_jazzy.txt")
+HUMBLE = Distribution("ROS 2 Humble", 2, "ros2_humble.txt", JAZZY)
+NOETIC = Distribution("ROS 1 Noetic", 1, "ros1_noetic.txt", JAZZY)
+
+DISTRIBUTIONS = (JAZZY, HUMBLE, NOETIC)
+"""The distributions; of those of one version, the first is what findings speak of."""
+
+
+@cache
+def _definitions(distribution: Distribution) -> Mapping[str, str]:
+    text = (files(__package__) / "shipped" / distribution.file).read_text(encoding="utf-8")
+    return read_shipped(text, {} if distribution.base is None else distribution.base.definitions)
+
+
+@cache
+def shipped_types() -> Mapping[str, tuple[str, ...]]:
+    """The types that come with RoboSC, of any distribution, by package; both sorted."""
+    found: dict[str, set[str]] = {}
+    for distribution in DISTRIBUTIONS:
+        for name in distribution.definitions:
+            package, _, type_ = name.split("/")
+            found.setdefault(package, set()).add(type_)
+    return {package: tuple(sorted(found[package])) for package in sorted(found)}
+
+
+def read_shipped(text: str, base: Mapping[str, str]) -> dict[str, str]:
+    """Return the definitions of a file by name.
+
+    Args:
+        text: The file's text.
+        base: Definitions that it is based on.
+    """
+    found = dict(base)
+    lines: dict[str, list[str]] = {}
+    name = ""
+    for line in text.splitlines():
+        if line.startswith("-"):
+            del found[line[1:]]
+        elif line.startswith(" "):
+            lines[name].append(line[1:])
+        elif line and not line.startswith("#"):
+            name = line
+            lines[name] = []
+    found.update((name, "\n".join(body)) for name, body in lines.items())
+    return dict(sorted(found.items()))

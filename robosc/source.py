@@ -69,9 +69,11 @@ class Bundle:
     Attributes:
         main: The file with the robot (or the library that is being checked).
         libraries: Other files, sorted by name.
-        searched: Places where libraries were looked for, in words for an error message.
+        searched: Places where libraries were looked for, in words for an error message; empty where nothing was looked
+            for, definitions neither.
         interfaces: Definitions of middleware types that the files use, named like `std_msgs/msg/Bool.msg`, as far as
-            they were found; they are checked against but are no part of the model.
+            they were found, with all that they are made of, and the types of a package that lacks one, named like
+            `std_msgs/types.txt`; they are checked against but are no part of the model.
     """
 
     main: SourceFile

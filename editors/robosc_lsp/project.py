@@ -14,6 +14,7 @@ from robosc.editing.completion import Surroundings
 from robosc.editing.names import Names
 from robosc.editing.outline import Part, outline
 from robosc.errors import Diagnostic, LanguageError, Severity
+from robosc.interfaces import shipped_types
 from robosc.language import load_bundle, parse, read_source, syntax
 from robosc.language.bundle import SUFFIX
 from robosc.language.interfaces import INTERFACE_KINDS, interface_folders
@@ -200,7 +201,7 @@ class Project:
         return sorted(found)
 
     def _interfaces(self) -> Mapping[str, tuple[str, ...]]:
-        """Return the types of each installed ROS package."""
+        """Return the types of each ROS package that is installed or comes with RoboSC."""
         if self._packages is None:
             self._packages = {}
             for folder in self.interface_paths:
@@ -208,6 +209,9 @@ class Project:
                     for file in sorted(folder.glob(f"*/{kind}/*.{kind}")):
                         package = file.parent.parent.name
                         self._packages[package] = (*self._packages.get(package, ()), file.stem)
+            # Those that come with RoboSC, of packages that are not installed.
+            for package, types in shipped_types().items():
+                self._packages.setdefault(package, types)
         return self._packages
 
     def _analysed(self, uri: str, text: Text) -> Analysis:

@@ -49,7 +49,7 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
         type=given_path,
         metavar="DIR",
         help="another folder with ROS packages whose .msg, .srv and .action files the model is checked against (may be "
-        "repeated; always searched: those of an installed ROS)",
+        "repeated; always searched: an installed ROS, packages around the model, and common ones of RoboSC itself)",
     )
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
 

@@ -51,7 +51,7 @@ class _Line:
 
     def fixes(self, found: Diagnostic) -> Iterator[Fix]:
         match found.code:
-            case "unknown-name":
+            case "unknown-name" | "unknown-field" | "unknown-ros-type" | "field-type-mismatch":
                 for name in _WRITE.findall(found.fix):
                     yield self._written(name)
             case "ambiguous-name":

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from robosc.errors import Diagnostic, LanguageError, Severity
-from robosc.language.interfaces import find_interfaces
+from robosc.language.interfaces import find_interfaces, nearby_folders
 from robosc.language.scan import declared_libraries, imported_libraries
 from robosc.source import Bundle, Location, SourceFile
 
@@ -27,7 +27,8 @@ def load_bundle(
 
     Libraries are looked for in the model's folder, its sibling `../shared` and `library_paths`. Only files
     that declare a library which is imported, directly or by another library, become part of the bundle: a
-    broken library that nothing imports is nobody's error.
+    broken library that nothing imports is nobody's error. Definitions of middleware types are also looked for in the
+    packages around the model.
 
     Args:
         model: The model's file.
@@ -60,10 +61,11 @@ def load_bundle(
             chosen[file.name] = file
             wanted.extend(imported_libraries(file.text))
     libraries = tuple(chosen[name] for name in sorted(chosen))
+    packages = (*interface_paths, *nearby_folders(model))
     return Bundle(
         main=main,
         libraries=libraries,
-        interfaces=find_interfaces((file.text for file in (main, *libraries)), interface_paths),
+        interfaces=find_interfaces((file.text for file in (main, *libraries)), packages),
         searched=tuple(_shown(folder, model) for folder in folders),
     )
 

@@ -23,7 +23,7 @@ from robosc.model.communications import (
 from robosc.model.constants import Constants
 from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Findings
-from robosc.model.interfaces import check_fields
+from robosc.model.interfaces import InterfaceChecker
 from robosc.model.own_requests import OwnRequests
 from robosc.model.places import Places
 from robosc.model.restrictions import Restrictions
@@ -144,7 +144,7 @@ class _RobotChecker:
         self.findings = findings
         self._types = Types(findings)
         self._unit = make_unit(tree, findings)
-        self._interfaces = bundle.interfaces
+        self._bundle = bundle
         self._libraries = Libraries(bundle, self._unit, findings)
         self.parts = parts_of(self._unit, self._libraries, findings)
         self.places = Places(tree.name.location)
@@ -183,7 +183,7 @@ class _RobotChecker:
             if tree is not None:
                 check_synthesis_variables(tree, behaviour, communications, self._types, self.findings)
                 partial_updates(tree, behaviour, self.findings)
-        check_fields(communications.values(), self._interfaces, self.places.communications, self._types, self.findings)
+        InterfaceChecker(self._bundle, self._types, self.findings).check(trees, communications, self._unit)
         self._check_requests(communications, marked, requirements)
         self._check_empty(communications)
         self.places.objects.update(self._types.object_places)

@@ -1,72 +1,286 @@
-"""Communications against the definitions of their middleware types, where those are at hand (language A.5)."""
+"""Communications against the definitions of their middleware types (language A.5).
 
-from collections.abc import Iterable, Iterator, Mapping
-from itertools import chain
+Whatever a generated node would refuse at its start is told here, and is an error for the packages of ROS that have such
+nodes (`robosc.targets.ros.errors`): a supervisor can be made all the same, for whatever runs without ROS.
+"""
 
-from robosc.expressions import EnumType, NoneType, ObjectType, Type, type_text
-from robosc.model.findings import Findings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from robosc.expressions import Type
+from robosc.interfaces import DISTRIBUTIONS, INTERFACE_KINDS, Part
+from robosc.interfaces.catalogue import Catalogue, FoundInterfaces
+from robosc.language import syntax
+from robosc.language.words import spelled
+from robosc.model.communications import CommunicationTree
+from robosc.model.findings import Findings, did_you_mean
+from robosc.model.message_fields import Fault, FieldChecker, Language, Message
 from robosc.model.structure import Communication, CommunicationKind
 from robosc.model.types import Types
-from robosc.source import Location, SourceFile
+from robosc.model.units import Unit
+from robosc.source import Bundle, Location
 
-_MAXIMUM_SHOWN = 6
-
-_ENDINGS = {
+_KINDS = {
     CommunicationKind.INCOMING_MESSAGE: "msg",
     CommunicationKind.OUTGOING_MESSAGE: "msg",
     CommunicationKind.SERVICE: "srv",
     CommunicationKind.ACTION: "action",
 }
+_WORDS = {"msg": "message", "srv": "service", "action": "action"}
+_ARTICLES = {"msg": "a message", "srv": "a service", "action": "an action"}
 
 
-def fields_of(text: str) -> tuple[tuple[str, ...], ...]:
-    """The field names of each part of a definition: one part of a message, two of a service, three of an action."""
-    parts: list[list[str]] = [[]]
-    for line in text.splitlines():
-        words = line.partition("#")[0].split()
-        if words and words[0].startswith("---"):
-            parts.append([])
-        # A constant is `type NAME=value`, a field with a default `type name value`.
-        elif len(words) >= 2 and "=" not in words[1] and words[2:3] != ["="]:
-            parts[-1].append(words[1])
-    return tuple(map(tuple, parts))
+@dataclass(frozen=True, slots=True)
+class _Outcome:
+    """Outcome of the comparisons that nodes of one kind make at their start.
+
+    Attributes:
+        catalogue: The interfaces that they know.
+        faults: Faults that keep them from starting.
+        unknown: Messages that could not be compared, with the places where they matter.
+    """
+
+    catalogue: Catalogue
+    faults: tuple[Fault, ...]
+    unknown: Mapping[str, Location]
 
 
-def check_fields(
-    communications: Iterable[Communication],
-    interfaces: Iterable[SourceFile],
-    places: Mapping[str, Location],
-    types: Types,
-    findings: Findings,
-) -> None:
-    """A basic type stands for the field `data`, else for the only field: report where that leaves a doubt."""
-    texts = {file.name: file.text for file in interfaces}
-    for item in communications:
-        if item.interface is None:
-            continue
-        ending = _ENDINGS[item.kind]
-        text = texts.get(f"{item.interface.package}/{ending}/{item.interface.type}.{ending}")
-        parts = () if text is None else fields_of(text)
-        for type_, fields in zip(_types_sent(item), chain(parts), strict=False):
-            basic = types.sources[type_.name] if isinstance(type_, EnumType) else type_
-            if basic is None or isinstance(basic, ObjectType | NoneType) or "data" in fields or len(fields) == 1:
-                continue
-            has = f"the fields {', '.join(fields[:_MAXIMUM_SHOWN])}" if fields else "no field"
-            more = ", ..." if len(fields) > _MAXIMUM_SHOWN else ""
-            findings.error(
-                "ambiguous-field",
-                f"{type_text(basic)} could be any part of {item.interface.package}/{item.interface.type}, which has "
-                f"{has}{more}",
-                places[item.name],
-                "Make an object type with the field that is meant as its property.",
+type _ByLanguage = Mapping[Language, tuple[Fault, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Linked:
+    """A communication with the interface that it is linked to.
+
+    Attributes:
+        communication: The communication.
+        tree: Its declaration.
+        interface: Definition of the interface's name in the model.
+    """
+
+    communication: Communication
+    tree: syntax.Communication
+    interface: syntax.Interface
+
+    @property
+    def kind(self) -> str:
+        """Folder of the interface in its package."""
+        return _KINDS[self.communication.kind]
+
+    @property
+    def package(self) -> str:
+        """Package of the interface."""
+        return self.interface.package.text
+
+    @property
+    def type(self) -> str:
+        """Type of the interface in its package."""
+        return self.interface.type.text
+
+    def parts(self) -> Iterator[tuple[Type | None, Location]]:
+        """Yield the types of the data, with their places, in the order of the definition's parts."""
+        tree, item = self.tree, self.communication
+        match tree:
+            case syntax.Message():
+                yield item.request if item.request is not None else item.response, tree.type.location
+            case syntax.Service():
+                yield item.request, tree.request.location
+                yield item.response, tree.response.location
+            case syntax.Action():
+                yield item.request, tree.request.location
+                yield item.response, tree.response.location
+                yield item.feedback, tree.feedback.location
+
+
+class InterfaceChecker:
+    """Checker of communications against their interfaces.
+
+    Args:
+        bundle: Texts with the definitions that were found; what is missing comes with RoboSC, if it has it.
+        types: Types of the model.
+        findings: Findings to which faults are reported.
+    """
+
+    def __init__(self, bundle: Bundle, types: Types, findings: Findings) -> None:
+        found = FoundInterfaces({file.name: file.text for file in bundle.interfaces})
+        self._are_searched = bool(bundle.searched)
+        self._catalogues = tuple(Catalogue(distribution, found) for distribution in DISTRIBUTIONS)
+        self._types = types
+        self._findings = findings
+        self._noted: set[str] = set()
+
+    def check(
+        self, trees: Iterable[CommunicationTree], communications: Mapping[str, Communication], unit: Unit
+    ) -> dict[str, Catalogue]:
+        """Report what does not fit.
+
+        Returns:
+            For each communication that fits, with the interface that it is linked to, a catalogue in which it does.
+
+
+        Args:
+            trees: Declarations of the communications.
+            communications: Those that are sound, by name.
+            unit: The file that is checked, whose interfaces that nothing is linked to are looked up, too.
+        """
+        linked = [_Linked(*found) for item in trees if (found := _linked(item, communications)) is not None]
+        used = {id(item.interface) for item in linked}
+        fitting = {item.communication.name: self._checked(item) for item in linked}
+        for interface in unit.interfaces.values():
+            if id(interface) not in used:
+                self._check_unused(interface)
+        return {name: catalogue for name, catalogue in fitting.items() if catalogue is not None}
+
+    def _checked(self, item: _Linked) -> Catalogue | None:
+        """Report what does not fit; the first catalogue in which something fits."""
+        outcomes: dict[tuple[int, Language], _Outcome] = {}
+        for catalogue in self._catalogues:
+            for language in Language:
+                key = (catalogue.distribution.version, language)
+                found = _outcome(item, catalogue, language, self._types)
+                if found is not None and (key not in outcomes or len(found.faults) < len(outcomes[key].faults)):
+                    outcomes[key] = found
+        if not outcomes:
+            self._note_missing(item.package, f"{item.package}/{item.type}", item.interface.package.location)
+            return None
+        fitting = next((outcome for outcome in outcomes.values() if not outcome.faults), None)
+        if fitting is None:
+            # Told are the faults of the version that comes nearest.
+            told = [outcome for (_, language), outcome in outcomes.items() if language is Language.PYTHON]
+            for fault in min(told, key=lambda outcome: len(outcome.faults)).faults:
+                # Data that has no meaning is an error; what only ROS could not do is one for packages of ROS.
+                report = self._findings.error if fault.code == "ambiguous-field" else self._findings.warning
+                report(fault.code, fault.message + fault.hint, fault.location, fault.fix, *fault.related)
+            return None
+        for type_, location in fitting.unknown.items():
+            self._note_missing(type_.partition("/")[0], type_, location)
+        ros1, ros2 = (
+            {language: outcome.faults for (other, language), outcome in outcomes.items() if other == version}
+            for version in (1, 2)
+        )
+        self._report_limits(ros1, ros2)
+        return fitting.catalogue
+
+    def _note_missing(self, package: str, type_: str, location: Location) -> None:
+        if any(catalogue.knows(package) for catalogue in self._catalogues):
+            package = type_
+        # Where nothing was looked for, nothing was missed.
+        if self._are_searched and package not in self._noted:
+            self._noted.add(package)
+            self._findings.note(
+                "definition-not-found",
+                f"not checked against {package} (its definitions were not found)",
+                location,
+                "Source the ROS workspace that has it, or name the folder of its package with -I.",
             )
 
+    def _report_limits(self, ros1: _ByLanguage, ros2: _ByLanguage) -> None:
+        """Report what keeps some nodes from starting, while others can; both are empty where nothing is known."""
+        for one, version, code in ((ros2, 1, "ros1-only"), (ros1, 2, "ros2-only")):
+            if one and all(one.values()):
+                for fault in one[Language.PYTHON]:
+                    self._only(fault, code, version)
+        python1, python2 = (one.get(Language.PYTHON) for one in (ros1, ros2))
+        if python2 and not ros2[Language.CPP] and python1 == ():
+            for fault in python2:
+                self._limited(fault, "not-in-ros2-python", "a node of ROS 2 in Python cannot start with that")
+        elif python2 != () and python1 != ():
+            for one in (ros2, ros1):
+                if one and not one[Language.CPP]:
+                    for fault in one[Language.PYTHON]:
+                        self._limited(fault, "cpp-only", "only a node in C++ can start with that")
+                    return
 
-def _types_sent(communication: Communication) -> Iterator[Type | None]:
-    """The types of a communication in the order of its definition's parts."""
-    if communication.kind in (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSAGE):
-        yield communication.request if communication.request is not None else communication.response
-    else:
-        yield communication.request
-        yield communication.response
-        yield communication.feedback
+    def _only(self, fault: Fault, code: str, version: int) -> None:
+        message = f"in ROS {3 - version}, {fault.message}; only in ROS {version} it fits"
+        fix = f"Nothing needs fixing if the robot runs ROS {version}; packages for the other one are refused."
+        self._findings.note(code, message, fault.location, fix, *fault.related)
+
+    def _limited(self, fault: Fault, code: str, limit: str) -> None:
+        self._findings.warning(code, f"{fault.message}; {limit}", fault.location, fault.fix, *fault.related)
+
+    def _check_unused(self, interface: syntax.Interface) -> None:
+        """Look for an interface that nothing is linked to among all kinds."""
+        package, type_ = interface.package.text, interface.type.text
+        knowing = [catalogue for catalogue in self._catalogues if catalogue.knows(package)]
+        if any(catalogue.has(kind, package, type_) for catalogue in self._catalogues for kind in INTERFACE_KINDS):
+            return
+        if knowing:
+            fault = _unknown_type(interface, knowing[0], INTERFACE_KINDS)
+            self._findings.warning(fault.code, fault.message + fault.hint, fault.location, fault.fix)
+        else:
+            self._note_missing(package, f"{package}/{type_}", interface.package.location)
+
+
+def _outcome(item: _Linked, catalogue: Catalogue, language: Language, types: Types) -> _Outcome | None:
+    """Compare a communication as nodes of one kind do at their start; None where the interface is not known."""
+    definition = catalogue.definition(item.kind, item.package, item.type)
+    if definition is None:
+        kinds = [kind for kind in INTERFACE_KINDS if catalogue.has(kind, item.package, item.type)]
+        if item.kind in kinds or not (kinds or catalogue.knows(item.package)):
+            return None
+        return _Outcome(catalogue, (_unknown_type(item.interface, catalogue, (item.kind,)),), {})
+    unknown: dict[str, Location] = {}
+    checker = FieldChecker(catalogue, language, types, unknown)
+    name = catalogue.described(item.kind, item.package, item.type)
+    found: list[Fault] = []
+    for part, (type_, location) in zip(definition, item.parts(), strict=False):
+        if type_ is not None:
+            found += checker.faults(type_, Message(name, part), location)
+    if item.communication.frame is not None:
+        found += _header_faults(item, definition[0], name, catalogue)
+    return _Outcome(catalogue, tuple(dict.fromkeys(found)), unknown)
+
+
+def _linked(
+    item: CommunicationTree, communications: Mapping[str, Communication]
+) -> tuple[Communication, syntax.Communication, syntax.Interface] | None:
+    communication = communications.get(item.tree.name.text)
+    link = item.tree.link
+    interface = None if link is None else item.part.unit.interfaces.get(link.text)
+    return None if communication is None or interface is None else (communication, item.tree, interface)
+
+
+def headers_of(part: Part, catalogue: Catalogue, *, is_action: bool) -> tuple[tuple[str, ...], ...]:
+    """The paths to the headers that a node stamps: the message's own; in an action else those of its fields."""
+    if catalogue.has_header(part):
+        return (("header",),)
+    if not is_action:
+        return ()
+    return tuple(
+        (name, "header")
+        for name, item in part.fields.items()
+        if item.array is None
+        and item.is_message
+        and (inner := catalogue.message(item.type)) is not None
+        and catalogue.has_header(inner)
+    )
+
+
+def _header_faults(item: _Linked, part: Part, name: str, catalogue: Catalogue) -> Sequence[Fault]:
+    is_action = item.communication.kind is CommunicationKind.ACTION
+    unknown = [field for field in part.fields.values() if "/" in field.type and catalogue.message(field.type) is None]
+    if headers_of(part, catalogue, is_action=is_action) or (is_action and unknown):
+        return ()
+    place = next(option.location for option in item.tree.options if option.key == "stamped")
+    stamped = f"{item.type}Stamped"
+    has_stamped = catalogue.definition(item.kind, item.package, stamped) is not None
+    fix = f"Use '{stamped}' from {item.package}, or remove" if has_stamped else "Use a type with a header, or remove"
+    message = f"'stamped' fills in a header, and {name} has none"
+    return (Fault("no-header", message, "", place, f"{fix} 'stamped'."),)
+
+
+def _unknown_type(interface: syntax.Interface, catalogue: Catalogue, kinds: Sequence[str]) -> Fault:
+    package, type_ = interface.package.text, interface.type.text
+    place = interface.type.location
+    what = _WORDS[kinds[0]] if len(kinds) == 1 else "message, service or action"
+    text = f"{catalogue.described_package(package)} has no {what} '{type_}'"
+    other = next((kind for kind in INTERFACE_KINDS if kind not in kinds and catalogue.has(kind, package, type_)), None)
+    if other is not None:
+        fix = f"Link it to {_ARTICLES[other]}, or use a type that is {_ARTICLES[kinds[0]]}."
+        return Fault("unknown-ros-type", text, f"; it is {_ARTICLES[other]}", place, fix)
+    near = did_you_mean(type_, [name for kind in kinds for name in catalogue.types(kind, package)])
+    if near is not None:
+        return Fault("unknown-ros-type", text, f"; did you mean '{near}'?", place, f"Write '{spelled(near)}'.")
+    fix = f"Use a type that {package} has, or name the folder with a version that has it with -I."
+    return Fault("unknown-ros-type", text, "", place, fix)

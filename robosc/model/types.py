@@ -52,6 +52,7 @@ class Types:
         sources: Source type of each enum by model name.
         value_places: Place where each value of an enum is defined, by model name and value.
         property_places: Place where each property of an object is defined, by model name and property.
+        property_type_places: Place where its type is written.
     """
 
     def __init__(self, findings: Findings) -> None:
@@ -61,6 +62,7 @@ class Types:
         self.sources: dict[str, Type] = {}
         self.value_places: dict[tuple[str, str], Location] = {}
         self.property_places: dict[tuple[str, str], Location] = {}
+        self.property_type_places: dict[tuple[str, str], Location] = {}
         self._findings = findings
         self._open: list[str] = []
         self._properties: dict[str, dict[str, Type]] = {}
@@ -142,6 +144,7 @@ class Types:
         properties: dict[str, Property] = {}
         for item in tree.properties:
             self.property_places.setdefault((key, item.name.text), item.name.location)
+            self.property_type_places.setdefault((key, item.name.text), item.type.location)
             found = self.resolve(item.type, unit, in_object=True)
             if found is not None:
                 properties.setdefault(item.name.text, Property(item.name.text, found))

@@ -71,7 +71,7 @@ def load(
         name: Name of that text in findings.
         library_paths: More folders with libraries, as `-L` of the command line.
         interface_paths: Folders with ROS packages whose .msg, .srv and .action files the model is checked against, as
-            `-I` of the command line; those of an installed ROS are always searched.
+            `-I` of the command line; those of an installed ROS and around the model are always searched.
 
     Raises:
         TypeError: Neither a file nor a text is given, or both are.

@@ -11,7 +11,7 @@ from pygls.exceptions import JsonRpcException
 from robosc.formatting import format_text
 from robosc_lsp.project import Project
 from support.editor import Editor, part_of, position_of, with_edits
-from support.editor_models import LIBRARY, ROBOT
+from support.editor_models import LIBRARY, ROBOT, write_definitions
 
 # Nothing can keep it from getting to where nothing leads back from.
 FALL = """robot Fall {
@@ -44,6 +44,11 @@ TRAP = """robot Trap {
     requirement come needs Base.home
 }
 """
+
+
+@pytest.fixture(autouse=True)
+def definitions(tmp_path: Path) -> None:
+    write_definitions(tmp_path)
 
 
 @pytest.fixture

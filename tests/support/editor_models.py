@@ -1,5 +1,7 @@
 """Robots in files, for tests of editors: a name in one is used in another, and comments count more than they show."""
 
+from pathlib import Path
+
 LIBRARY = """// 🤖🤖 parts of robots
 library parts {
     interface twist use Twist from geometry_msgs
@@ -40,3 +42,10 @@ ROBOT = """robot Walker {
     provide power with { data: true, level: 0.7, times: most } if Button.off
 }
 """
+
+
+def write_definitions(folder: Path) -> None:
+    """Write the definition of the service that the robot has, where it is found beside the robot."""
+    package = folder / "robot_interfaces" / "srv"
+    package.mkdir(parents=True)
+    (package / "Power.srv").write_text("bool data\nfloat64 level\nint32 times\n---\n", "utf-8")

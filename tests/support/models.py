@@ -52,9 +52,9 @@ EMPTY = """robot R {
 
 
 def bundle_of(text: str, **libraries: str) -> Bundle:
-    """A bundle of a model's text and libraries by file name (without the ending)."""
+    """A bundle of a model's text and libraries by file name (without the ending), of which no file was looked for."""
     files = tuple(SourceFile(f"{name}.rscd", source) for name, source in sorted(libraries.items()))
-    return Bundle(SourceFile("model.rscd", text), files, (".",))
+    return Bundle(SourceFile("model.rscd", text), files)
 
 
 def checked(text: str, **libraries: str) -> Checked:

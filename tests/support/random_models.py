@@ -116,7 +116,7 @@ class _Author:
         scan, kind, level, twist = (f"{prefix}{name}" for name in ("Scan", "Kind", "Level", "Twist"))
         self._types = {"scan": scan, "kind": kind, "level": level, "twist": twist, "link": f"{prefix}link"}
         parts = [
-            f"interface {prefix}link use LaserScan from sensor_msgs",
+            f"interface {prefix}link use Sample from own_msgs",
             f"datatype object {scan} {{ ranges: array(double) size: integer name: string on_: boolean "
             f"inner: {twist} }}",
             f"datatype object {twist} {{ x: double ^value: integer }}",

@@ -3,13 +3,14 @@
 from functools import partial
 
 from robosc.targets.cpp.package import generate_package
-from robosc.targets.registry import GENERAL_ERRORS, Target, TargetInfo
+from robosc.targets.registry import Target, TargetInfo
+from robosc.targets.ros.errors import ROS1_CPP_ERRORS
 from robosc.targets.ros1_cpp.package import MIDDLEWARE
 
 TARGET = Target(
     TargetInfo("ros1-cpp", "a complete ROS 1 package (catkin): a roscpp node around the supervisor in C99"),
     partial(generate_package, MIDDLEWARE),
-    errors=GENERAL_ERRORS | {"invalid-identifier"},
+    errors=ROS1_CPP_ERRORS,
 )
 
 __all__ = ["TARGET"]

@@ -3,13 +3,14 @@
 from functools import partial
 
 from robosc.targets.cpp.package import generate_package
-from robosc.targets.registry import GENERAL_ERRORS, Target, TargetInfo
+from robosc.targets.registry import Target, TargetInfo
+from robosc.targets.ros.errors import ROS2_CPP_ERRORS
 from robosc.targets.ros2_cpp.package import MIDDLEWARE
 
 TARGET = Target(
     TargetInfo("ros2-cpp", "a complete ROS 2 package (ament_cmake): an rclcpp node around the supervisor in C99"),
     partial(generate_package, MIDDLEWARE),
-    errors=GENERAL_ERRORS | {"invalid-identifier"},
+    errors=ROS2_CPP_ERRORS,
 )
 
 __all__ = ["TARGET"]

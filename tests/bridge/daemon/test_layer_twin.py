@@ -42,7 +42,7 @@ MODEL = """
 robot Driven {
     interface twist use Twist from geometry_msgs
     interface turning use Turn from motion_msgs
-    interface trigger use Trigger from std_srvs
+    interface trigger use Ask from own_srvs
     datatype object Vector { x: double }
     datatype object Twist { linear: Vector }
     component Eyes {

@@ -41,7 +41,7 @@ robot Driven {
     interface twist use Twist from geometry_msgs
     interface laser use LaserScan from sensor_msgs
     interface turning use Turn from motion_msgs
-    interface trigger use Trigger from std_srvs
+    interface trigger use Ask from own_srvs
     datatype object Vector { x: double z: double }
     datatype object Twist { linear: Vector angular: Vector }
     datatype object Scan { ranges: array(double) }

@@ -29,7 +29,7 @@ from support.effort import examples
 
 MODEL = """
 robot Helped {
-    interface trigger use Trigger from std_srvs
+    interface trigger use Ask from own_srvs
     interface fetching use Fetch from kitchen_msgs
     datatype object Place { x: double name: string }
     datatype object Far { left: integer }

@@ -31,7 +31,7 @@ def bundle_of(blocks: tuple[Block, ...]) -> Bundle:
     (main,) = (block for block in blocks if block.library is None)
     libraries = [block for block in blocks if block.library is not None]
     files = tuple(SourceFile(f"{block.library}{n}.rscd", block.text) for n, block in enumerate(libraries))
-    return Bundle(SourceFile("model.rscd", main.text), files, (".",))
+    return Bundle(SourceFile("model.rscd", main.text), files)
 
 
 def findings(item: Page, blocks: tuple[Block, ...]) -> tuple[Diagnostic, ...]:
@@ -39,7 +39,9 @@ def findings(item: Page, blocks: tuple[Block, ...]) -> tuple[Diagnostic, ...]:
     bundle = bundle_of(blocks)
     # The definitions of ROS's own types come with what the tests are installed with.
     texts = (file.text for file in bundle.files)
-    bundle = replace(bundle, interfaces=find_interfaces(texts, interface_folders()))
+    # Some packages of other pages are made up, and nobody looked for them.
+    searched = (".",) if item.code == "definition-not-found" else ()
+    bundle = replace(bundle, searched=searched, interfaces=find_interfaces(texts, interface_folders()))
     if item.stage in (Stage.TEXT, Stage.MODEL):
         checked = check(bundle)
         if checked.model is None:

@@ -136,7 +136,7 @@ def test_synthesis_variables_are_found_through_updates() -> None:
 
 
 LIBRARY = """library Lib {
-    interface twist use Twist from geometry_msgs
+    interface twist use Vector3 from geometry_msgs
     datatype object Twist { x: double }
     datatype enum Level from double to { value > 1 -> high default -> low }
     component Unused { outgoing message nothing with type: none }

@@ -289,11 +289,12 @@ def test_part_a_readings_of_always_and_never() -> None:
 
 
 def test_options_reach_the_model() -> None:
+    when = 'when: value.header.frame_id = "", '
     text = (
         "robot R { interface t use TwistStamped from geometry_msgs interface s use LaserScan from sensor_msgs "
-        "datatype object Twist { v: double } component C { "
+        "datatype object Twist { header: Header } datatype object Header { frame_id: string } component C { "
         "outgoing message scan with max_age: 0.5, type: Twist, depth: 3 links s "
-        'incoming message go with identifier: "/cmd", type: Twist, stamped: "base", when: value.v > 0, qos: latched '
+        'incoming message go with identifier: "/cmd", type: Twist, stamped: "base", ' + when + "qos: latched "
         "links t incoming message halt with qos: latched, identifier: \"/cmd\", type: Twist, stamped: 'base' links t } }"
     )
     model = model_of(text)
@@ -304,7 +305,7 @@ def test_options_reach_the_model() -> None:
     assert halt.when is None
     layer = make_supervisor(bundle_of(text), deployment=Deployment.LAYER)
     assert layer.supervisor is not None
-    ambiguous = make_supervisor(bundle_of(text.replace("when: value.v > 0, ", "")), deployment=Deployment.LAYER)
+    ambiguous = make_supervisor(bundle_of(text.replace(when, "")), deployment=Deployment.LAYER)
     assert [item.code for item in ambiguous.diagnostics if item.severity == "error"] == ["ambiguous-layer-topic"]
 
 

@@ -28,7 +28,7 @@ def bundle_of(starter: Starter, main: str | None = None) -> Bundle:
     name = main or starter.model
     sources = [SourceFile(file, text) for file, text in starter.files.items() if file.endswith(".rscd")]
     others = tuple(item for item in sources if item.name != name)
-    return Bundle(next(item for item in sources if item.name == name), others, (".",))
+    return Bundle(next(item for item in sources if item.name == name), others)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,0 +1,242 @@
+"""Comparison of the model's types with the fields of a middleware type, as a generated node compares them at its start.
+
+`robosc.targets.ros.runtime.messages` is what Python nodes do, `robosc/targets/cpp/runtime/values.hpp` what compilers of
+C++ nodes do.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+
+from robosc.errors import RelatedPlace
+from robosc.expressions import (
+    ArrayType,
+    BooleanType,
+    DoubleType,
+    EnumType,
+    IntegerType,
+    NoneType,
+    ObjectType,
+    StringType,
+    Type,
+    type_text,
+)
+from robosc.interfaces import TIMES, Field, Part
+from robosc.interfaces.catalogue import Catalogue
+from robosc.language.words import spelled
+from robosc.model.findings import did_you_mean
+from robosc.model.types import Types
+from robosc.source import Location
+
+_MAXIMUM_SHOWN = 6
+"""Fields that one finding lists."""
+
+_INTEGERS = frozenset(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))
+_PYTHON_FIELDS: dict[type[Type], frozenset[str]] = {
+    BooleanType: frozenset({"bool"}),
+    StringType: frozenset({"string", "wstring"}),
+    DoubleType: frozenset({"float32", "float64"}),
+    IntegerType: _INTEGERS | {"char"},
+}
+_BASIC_NAMES = {"bool": "boolean", "string": "string", "wstring": "string", "float32": "double", "float64": "double"}
+
+
+class Language(StrEnum):
+    """Language of a generated node."""
+
+    PYTHON = "Python"
+    CPP = "C++"
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A difference that keeps a node from starting.
+
+    Attributes:
+        code: Code of the finding.
+        message: Description of what is wrong, without a hint.
+        hint: Hint about what might be meant; may be empty.
+        location: Place in the model.
+        fix: Sentence on how to fix it.
+        related: Other places that explain it.
+    """
+
+    code: str
+    message: str
+    hint: str
+    location: Location
+    fix: str
+    related: tuple[RelatedPlace, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A part of an interface.
+
+    Attributes:
+        name: Name of the interface in words.
+        part: Its fields.
+    """
+
+    name: str
+    part: Part
+
+
+class FieldChecker:
+    """Checker of data types against messages.
+
+    Args:
+        catalogue: The interfaces.
+        language: Language of the node.
+        types: Types of the model.
+        unknown: Filled with the messages whose definition is not known, each with a place where it matters.
+    """
+
+    def __init__(self, catalogue: Catalogue, language: Language, types: Types, unknown: dict[str, Location]) -> None:
+        self._catalogue = catalogue
+        self._language = language
+        self._types = types
+        self._unknown = unknown
+
+    def faults(self, type_: Type, message: Message, location: Location) -> Iterator[Fault]:
+        """Yield what keeps data of a type from crossing as a message.
+
+        Args:
+            type_: Type of the data.
+            message: The message.
+            location: Place where the type is written.
+        """
+        basic = self._source(type_)
+        if isinstance(basic, ObjectType):
+            yield from self._object(basic, message, location)
+        elif not isinstance(basic, NoneType):
+            field = basic_field(message.part)
+            if field is None:
+                yield _ambiguous(type_text(basic), message, location)
+            else:
+                yield from self._field(field, basic, message.name, location, location)
+
+    def _source(self, type_: Type) -> Type:
+        return self._types.sources[type_.name] if isinstance(type_, EnumType) else type_
+
+    def _object(self, type_: ObjectType, message: Message, used: Location) -> Iterator[Fault]:
+        for item in self._types.objects[type_.name].properties:
+            place = self._types.property_places[type_.name, item.name]
+            field = message.part.fields.get(item.name)
+            if field is None:
+                yield _unknown_field(item.name, message, place, used)
+            else:
+                written = self._types.property_type_places[type_.name, item.name]
+                yield from self._field(field, item.type, message.name, written, used)
+
+    def _field(self, field: Field, type_: Type, owner: str, place: Location, used: Location) -> Iterator[Fault]:
+        """Yield what keeps a property from standing for a field."""
+        source = self._source(type_)
+        is_array = isinstance(source, ArrayType)
+        inner = self._source(source.element) if isinstance(source, ArrayType) else source
+        if isinstance(source, NoneType) or (is_array and field.array is not None and isinstance(inner, NoneType)):
+            return
+        if (
+            is_array is (field.array is None)
+            or isinstance(inner, ArrayType)
+            or isinstance(inner, ObjectType) is not field.is_message
+        ):
+            yield self._misfit(field, source, owner, place, used)
+        elif isinstance(inner, ObjectType):
+            yield from self._nested(field, inner, place)
+        elif not self._fits(field.type, inner):
+            yield self._misfit(field, source, owner, place, used)
+
+    def _nested(self, field: Field, type_: ObjectType, place: Location) -> Iterator[Fault]:
+        part = self._catalogue.message(field.type)
+        if part is None:
+            self._unknown.setdefault(field.type, place)
+            return
+        package, _, name = self._catalogue.resolved(field.type).partition("/")
+        message = Message(self._catalogue.described("msg", package, name) if name else field.type, part)
+        if field.type in TIMES and self._language is Language.CPP and self._catalogue.distribution.version == 1:
+            # The classes of roscpp call them otherwise than those of rospy.
+            fields = {f"{name.removesuffix('s')}": found for name, found in part.fields.items()}
+            message = Message(message.name, Part(fields, {}))
+        yield from self._object(type_, message, place)
+
+    def _fits(self, field_type: str, type_: Type) -> bool:
+        is_ros1 = self._catalogue.distribution.version == 1
+        if field_type in _PYTHON_FIELDS[type(type_)]:
+            return self._language is Language.PYTHON or field_type != "wstring"
+        if isinstance(type_, IntegerType) and field_type == "byte":
+            return is_ros1 or self._language is Language.CPP
+        if self._language is Language.PYTHON:
+            return False
+        # In C++, ROS 1 stores a bool in a byte, and a byte is a number.
+        if isinstance(type_, IntegerType):
+            return is_ros1 and field_type == "bool"
+        return isinstance(type_, BooleanType) and field_type in {"uint8", *(() if is_ros1 else ("byte", "char"))}
+
+    def _misfit(self, field: Field, type_: Type, owner: str, place: Location, used: Location) -> Fault:
+        wanted = self._wanted(field)
+        return Fault(
+            "field-type-mismatch",
+            f"the field '{field.name}' of {owner} is {field.type_text}, not {type_text(type_)}",
+            "",
+            place,
+            f"Write '{wanted}'." if wanted else self._advice(field),
+            _used_here(place, used),
+        )
+
+    def _wanted(self, field: Field) -> str:
+        """The type in the model that a field needs; empty for what only an object type can be."""
+        for element in ("boolean", "integer", "double", "string"):
+            kind = {"boolean": BooleanType, "integer": IntegerType, "double": DoubleType, "string": StringType}[element]
+            if not field.is_message and self._fits(field.type, kind()):
+                return f"array({element})" if field.array else element
+        return ""
+
+    def _advice(self, field: Field) -> str:
+        if not field.is_message:
+            return "Remove the property: no type of the model is read from such a field."
+        fields = self._catalogue.message(field.type)
+        names = "" if fields is None else f", such as {_listed(fields.fields)}"
+        kind = "an array of an object type" if field.array else "an object type"
+        return f"Make {kind} with the fields of {field.type} that are meant{names}."
+
+
+def basic_field(part: Part) -> Field | None:
+    """The field that stands for a basic type: `data`, else the only one; None where there is none, or doubt."""
+    if "data" in part.fields:
+        return part.fields["data"]
+    return next(iter(part.fields.values())) if len(part.fields) == 1 else None
+
+
+def _used_here(place: Location, used: Location) -> tuple[RelatedPlace, ...]:
+    return () if place == used else (RelatedPlace("it crosses the middleware from here", used),)
+
+
+def _listed(names: Iterable[str]) -> str:
+    found = list(names)
+    return ", ".join(found[:_MAXIMUM_SHOWN]) + (", ..." if len(found) > _MAXIMUM_SHOWN else "")
+
+
+def _ambiguous(basic: str, message: Message, location: Location) -> Fault:
+    has = f"the fields {_listed(message.part.fields)}" if message.part.fields else "no field"
+    return Fault(
+        "ambiguous-field",
+        f"{basic} could be any part of {message.name}, which has {has}",
+        "",
+        location,
+        "Make an object type with the field that is meant as its property.",
+    )
+
+
+def _unknown_field(name: str, message: Message, place: Location, used: Location) -> Fault:
+    fields, constants = message.part.fields, message.part.constants
+    text = f"{message.name} has no field '{name}'"
+    related = _used_here(place, used)
+    if name in constants:
+        hint = f"; it is a constant, {constants[name]}"
+        return Fault("unknown-field", text, hint, place, "Remove the property, and write the value instead.", related)
+    near = did_you_mean(name, fields)
+    if near is not None:
+        return Fault("unknown-field", text, f"; did you mean '{near}'?", place, f"Write '{spelled(near)}'.", related)
+    hint = f"; it has {_listed(fields)}" if fields else "; it has none"
+    return Fault("unknown-field", text, hint, place, "Remove the property, or give it the name of a field.", related)

@@ -75,7 +75,7 @@ def test_the_commands_are_understood(command: str) -> None:
 def test_the_bridges_commands_are_understood(command: str) -> None:
     words = shlex.split(command)
     parser, arguments = (
-        (bridge._parser(), words[1:]) if words[0] == "robosc-bridge" else (simulated._parser(), words[3:])
+        (bridge.make_parser(), words[1:]) if words[0] == "robosc-bridge" else (simulated._parser(), words[3:])
     )
     parsed = parser.parse_args(arguments)
     model = getattr(parsed, "model", None)

@@ -54,7 +54,7 @@ _EPILOG = "exit status: 0 all is well, or the bridge was told to end; 1 a fault 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns the exit status."""
-    arguments = _parser().parse_args(argv)
+    arguments = make_parser().parse_args(argv)
     try:
         status: int = arguments.run(arguments)
     except (BridgeError, RoboscError, OSError) as error:
@@ -64,7 +64,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     return status
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
+    """The parser of the whole command line."""
     parser = Parser(prog="robosc-bridge", description=__doc__, epilog=_EPILOG)
     parser.add_argument("--version", action="version", version=f"robosc-bridge {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")

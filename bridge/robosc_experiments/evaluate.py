@@ -13,6 +13,7 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from robosc.cli.arguments import suggest
 from robosc.cli.output import ExitCode, ProgressLine, UsageError, print_json
 from robosc.model.structure import Deployment
 from robosc.source import visible
@@ -97,12 +98,13 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="connection of the supervisor with the robot: serial lines and the bridge, or generated nodes on ROS 2 or "
         "ROS 1 (may be repeated; default: serial)",
     )
-    parser.add_argument(
+    scene = parser.add_argument(
         "--scene",
         metavar="NAME|FILE",
         help="the world, for one experiment (default: maze-rooms; line-oval, then line-curves); --list-scenes of "
         "'python -m robosc_simulated' names those that come with it",
     )
+    suggest(scene, _scene_names)
     parser.add_argument(
         "--speed",
         type=_speed,
@@ -125,6 +127,12 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     )
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     parser.set_defaults(run=run)
+
+
+def _scene_names() -> tuple[str, ...]:
+    from robosc_simulated.scene import scene_names
+
+    return scene_names()
 
 
 def _speed(text: str) -> float:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robosc.cli.arguments import add_given_supervisor_options
+from robosc.cli.arguments import add_given_supervisor_options, suggest
 from robosc.cli.output import CommandError, ExitCode, UsageError
 
 if TYPE_CHECKING:
@@ -59,17 +59,24 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "state, and again whenever its files change",
     )
     add_given_supervisor_options(parser, "stands")
-    parser.add_argument(
+    scene = parser.add_argument(
         "--scene",
         metavar="NAME|FILE",
         help="a scene of the simulator, whose walls and line the map shows, from where the robot began",
     )
+    suggest(scene, _scene_names)
     parser.add_argument(
         "--scene-seed", type=int, default=0, metavar="N", help="of what the scene leaves to chance (default: 0)"
     )
     _add_serving(parser)
     _add_client(parser)
     parser.set_defaults(run=run)
+
+
+def _scene_names() -> tuple[str, ...]:
+    from robosc_simulated.scene import scene_names
+
+    return scene_names()
 
 
 def _add_serving(parser: argparse.ArgumentParser) -> None:

@@ -1,6 +1,7 @@
 """Arguments that several commands share."""
 
 import argparse
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,16 @@ def given_path(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("the name of a file or folder is empty")
     return Path(text)
+
+
+def suggest(action: argparse.Action, values: Callable[[], Iterable[str]]) -> None:
+    """Tell what a shell offers for the value of an argument that takes other values, too.
+
+    Args:
+        action: The argument.
+        values: Function that returns the values when the script for the shell is made.
+    """
+    action.suggestions = values  # type: ignore[attr-defined]
 
 
 def add_model_arguments(parser: argparse.ArgumentParser) -> None:
@@ -91,12 +102,13 @@ def add_given_supervisor_options(parser: argparse.ArgumentParser, stands: str) -
 
 def add_engine_argument(parser: argparse.ArgumentParser) -> None:
     """The engine for decision diagrams."""
-    parser.add_argument(
+    engine = parser.add_argument(
         "--engine",
         default="auto",
         metavar="NAME",
         help="engine for decision diagrams: cudd, autoref (plain Python), or auto: the fastest installed (the default)",
     )
+    suggest(engine, lambda: ("auto", "cudd", "autoref"))
 
 
 def add_engine_options(parser: argparse.ArgumentParser) -> None:

@@ -3,6 +3,7 @@
 import argparse
 import sys
 
+from robosc.cli.arguments import suggest
 from robosc.cli.output import ExitCode, UsageError, print_json
 
 
@@ -15,7 +16,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "why it matters for the robot, an example, and how to fix it.",
     )
     what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("code", nargs="?", metavar="CODE", help="the code to explain, e.g. unknown-name")
+    code = what.add_argument("code", nargs="?", metavar="CODE", help="the code to explain, e.g. unknown-name")
+    suggest(code, _codes)
     what.add_argument("--list", action="store_true", help="print every code with its severity and one line")
     what.add_argument("--all", action="store_true", help="print everything about every code as one Markdown document")
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
@@ -43,6 +45,12 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         _explain(arguments.code, as_json=arguments.json)
     return ExitCode.OK
+
+
+def _codes() -> list[str]:
+    from robosc.diagnostics import pages
+
+    return [item.code for item in pages()]
 
 
 def _explain(code: str, *, as_json: bool) -> None:

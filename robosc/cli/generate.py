@@ -12,6 +12,7 @@ from robosc.cli.arguments import (
     add_model_arguments,
     given_path,
     read_bundle,
+    suggest,
 )
 from robosc.cli.output import ExitCode, UsageError, print_json
 from robosc.errors import UnsupportedModelError
@@ -52,6 +53,12 @@ class _OneTarget(argparse.Action):
         setattr(namespace, self.dest, values)
 
 
+def _target_names() -> list[str]:
+    from robosc.targets import ALL, available_targets
+
+    return [*(target.name for target in available_targets()), ALL]
+
+
 def _list_targets(arguments: argparse.Namespace) -> int:
     from robosc.targets import ALL, TargetInfo, available_targets
 
@@ -82,13 +89,14 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments for what to generate, and where to."""
-    parser.add_argument(
+    target = parser.add_argument(
         "--target",
         action=_OneTarget,
         required=True,
         metavar="NAME",
         help="target to generate: see --list-targets; all for every one",
     )
+    suggest(target, _target_names)
     parser.add_argument("--list-targets", action=_ListTargets, nargs=0, help="list what can be generated")
     parser.add_argument(
         "-o",

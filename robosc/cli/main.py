@@ -12,6 +12,7 @@ from robosc._version import __version__
 from robosc.cli import (
     check,
     check_log,
+    completion,
     doc,
     explain,
     explain_synthesis,
@@ -30,13 +31,14 @@ from robosc.cli.running import Parser, guarded, parse
 __all__ = ["guarded", "main", "make_parser", "parse"]
 
 _COMMANDS = (
-    new, check, format_, synth, verify, sign, explore, generate, explain_synthesis, explain, doc, plot, check_log
+    new, check, format_, synth, verify, sign, explore, generate, explain_synthesis, explain, doc, plot, check_log,
+    completion,
 )  # fmt: skip
 """In the order of `robosc --help`."""
 
 _NAMES = (
     "new", "check", "format", "synth", "verify", "key", "sign", "explore", "generate", "explain-synthesis", "explain",
-    "doc", "plot", "check-log",
+    "doc", "plot", "check-log", "completion",
 )  # fmt: skip
 """Names of the commands: a call of one of them needs no search for commands of other packages."""
 
@@ -77,11 +79,17 @@ def make_parser(plugins: Sequence[Plugin] = ()) -> Parser:
         doc,
         plot,
         check_log,
+        completion,
     ):
         command.add_parser(commands)
     for plugin in plugins:
         plugin.add_parser(commands)
     return parser
+
+
+def make_whole_parser() -> Parser:
+    """The parser with the commands of all other packages that can be loaded."""
+    return make_parser([plugin for plugin in wanted_plugins((), _NAMES) if plugin.module is not None])
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -22,8 +22,8 @@ exit status:
 """
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Ask; returns the exit status."""
+def make_parser() -> Parser:
+    """The parser of the command."""
     parser = Parser(
         prog="robosc-server health",
         description="Query the gRPC health check of the server that was started with the same settings.",
@@ -37,7 +37,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--alive", action="store_true", help="succeed on any answer, also NOT_SERVING")
     parser.add_argument("--timeout", type=_seconds, default=4.0, metavar="S", help="timeout in seconds (default: 4)")
     add_settings_arguments(parser)
-    given = parser.parse_args(argv)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Ask; returns the exit status."""
+    given = make_parser().parse_args(argv)
     try:
         condition = _ask(settings_of(given), given.service, given.timeout, is_alive_enough=given.alive)
     except SettingsError as error:

@@ -15,6 +15,7 @@ from robosc.cli.arguments import (
     add_verify_limit_argument,
     given_path,
     read_bundle,
+    suggest,
 )
 from robosc.cli.output import CommandError, ExitCode, UsageError, print_diagnostics, print_json, write_bytes
 from robosc.cli.properties import add_arguments as add_property_arguments
@@ -125,7 +126,7 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         parser.add_argument("job", metavar="JOB", help="the job's id")
 
     listing = commands.add_parser("list", help="list jobs, newest first")
-    listing.add_argument(
+    state = listing.add_argument(
         "--state",
         action="append",
         default=[],
@@ -133,12 +134,14 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         metavar="STATE",
         help=f"list only jobs in this state: {', '.join(JobState)} (may be repeated)",
     )
-    listing.add_argument(
+    suggest(state, lambda: JobState)
+    kind = listing.add_argument(
         "--kind",
         type=_one_of(TaskKind, {"synth": TaskKind.SYNTHESIZE}),
         metavar="KIND",
         help=f"list only jobs of this kind: {', '.join(TaskKind)} (or synth)",
     )
+    suggest(kind, lambda: TaskKind)
     listing.add_argument(
         "--all", action="store_true", help="list the jobs of all owners (needs a token with the scope admin)"
     )

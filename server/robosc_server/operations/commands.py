@@ -15,6 +15,7 @@ from robosc_server.operations.settings import (
     config_file_of,
     default_text,
     format_value,
+    make_parser,
     settings_of,
     source_of,
 )
@@ -49,17 +50,33 @@ def run_command(words: Sequence[str]) -> int | None:
     return guarded("robosc-server", lambda: command(words[1:]), as_json="--json" in words)
 
 
+def make_whole_parser() -> Parser:
+    """The parser of all command lines, which shells complete them by; each command has its own for itself."""
+    from robosc_server import health_check
+
+    parser = make_parser()
+    commands = parser.add_subparsers(metavar="COMMAND")
+    for made in (health_check.make_parser(), _token_parser(), _check_parser(), _example_parser()):
+        name = made.prog.rpartition(" ")[2]
+        commands.add_parser(name, parents=[made], add_help=False, help=made.description)
+    return parser
+
+
 def _health(argv: Sequence[str]) -> int:
     from robosc_server.health_check import main
 
     return main(argv)
 
 
-def new_token(argv: Sequence[str]) -> int:
-    """Print a new token, and to standard error the line for the file of tokens; the exit status."""
+def _token_parser() -> Parser:
     parser = Parser(prog="robosc-server token", description="Create a token for a caller.", allow_abbrev=False)
     add_token_arguments(parser, (Scope.SYNTHESIZE,), has_quotas=True)
-    arguments = parser.parse_args(argv)
+    return parser
+
+
+def new_token(argv: Sequence[str]) -> int:
+    """Print a new token, and to standard error the line for the file of tokens; the exit status."""
+    arguments = _token_parser().parse_args(argv)
     try:
         token, line = issue_token(arguments)
     except SecurityError as error:
@@ -77,23 +94,22 @@ def new_token(argv: Sequence[str]) -> int:
     return 0
 
 
-def print_example(argv: Sequence[str]) -> int:
-    """Print a file with every setting; the exit status."""
-    parser = Parser(
+def _example_parser() -> Parser:
+    return Parser(
         prog="robosc-server example-config",
         description="Print a settings file that has the description and default of each setting as comments.",
         allow_abbrev=False,
     )
-    parser.parse_args(argv)
+
+
+def print_example(argv: Sequence[str]) -> int:
+    """Print a file with every setting; the exit status."""
+    _example_parser().parse_args(argv)
     sys.stdout.write(example_file())
     return 0
 
 
-def check_config(argv: Sequence[str]) -> int:
-    """Print whether a server could start with such settings; the exit status."""
-    # The database's library takes longer to import than other commands take in all.
-    from robosc_server.operations.config_check import Grade, check_settings
-
+def _check_parser() -> Parser:
     parser = Parser(
         prog="robosc-server check-config",
         description="Check whether a server can start with these settings: address, certificates, tokens, database and "
@@ -104,7 +120,15 @@ def check_config(argv: Sequence[str]) -> int:
     )
     parser.add_argument("--json", action="store_true", help="print one JSON document: ok, settings, findings, problems")
     add_settings_arguments(parser)
-    arguments = parser.parse_args(argv)
+    return parser
+
+
+def check_config(argv: Sequence[str]) -> int:
+    """Print whether a server could start with such settings; the exit status."""
+    # The database's library takes longer to import than other commands take in all.
+    from robosc_server.operations.config_check import Grade, check_settings
+
+    arguments = _check_parser().parse_args(argv)
     try:
         settings = settings_of(arguments)
     except SettingsError as error:

@@ -546,8 +546,8 @@ def config_file_of(arguments: argparse.Namespace) -> Path | None:
     return Path(variable) if variable else None
 
 
-def load_settings(argv: Sequence[str] | None = None) -> Settings:
-    """The settings of a command line; leaves the program with status 2 where they are wrong."""
+def make_parser() -> Parser:
+    """The parser of the command line that serves."""
     parser = Parser(
         prog="robosc-server",
         description="Check models, synthesize supervisors and generate packages over gRPC.",
@@ -557,8 +557,13 @@ def load_settings(argv: Sequence[str] | None = None) -> Settings:
     )
     parser.add_argument("--version", action="version", version=f"robosc-server {__version__}")
     add_settings_arguments(parser)
+    return parser
+
+
+def load_settings(argv: Sequence[str] | None = None) -> Settings:
+    """The settings of a command line; leaves the program with status 2 where they are wrong."""
     try:
-        return settings_of(parser.parse_args(argv))
+        return settings_of(make_parser().parse_args(argv))
     except SettingsError as error:
         for problem in error.problems:
             sys.stderr.write(f"robosc-server: {problem}\n")

@@ -14,6 +14,7 @@ from robosc.cli import (
     check_log,
     completion,
     doc,
+    doctor,
     explain,
     explain_synthesis,
     explore,
@@ -32,13 +33,13 @@ __all__ = ["guarded", "main", "make_parser", "parse"]
 
 _COMMANDS = (
     new, check, format_, synth, verify, sign, explore, generate, explain_synthesis, explain, doc, plot, check_log,
-    completion,
+    doctor, completion,
 )  # fmt: skip
 """In the order of `robosc --help`."""
 
 _NAMES = (
     "new", "check", "format", "synth", "verify", "key", "sign", "explore", "generate", "explain-synthesis", "explain",
-    "doc", "plot", "check-log", "completion",
+    "doc", "plot", "check-log", "doctor", "completion",
 )  # fmt: skip
 """Names of the commands: a call of one of them needs no search for commands of other packages."""
 
@@ -79,6 +80,7 @@ def make_parser(plugins: Sequence[Plugin] = ()) -> Parser:
         doc,
         plot,
         check_log,
+        doctor,
         completion,
     ):
         command.add_parser(commands)

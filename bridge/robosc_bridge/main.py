@@ -24,7 +24,7 @@ from robosc.model.structure import Deployment, Model
 from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
 from robosc_bridge.configuration import init, load, map_channels, schema
 from robosc_bridge.configuration.structure import TURTLEBOTS
-from robosc_bridge.configuration.template import DriveDriver, ScannerDriver
+from robosc_bridge.configuration.template import UDEV_RULES, DriveDriver, ScannerDriver
 from robosc_bridge.daemon.assembly import assemble, check_settings, safety_limits
 from robosc_bridge.daemon.endpoints import make_endpoints
 from robosc_bridge.daemon.keyboard import Keyboard
@@ -46,6 +46,9 @@ from robosc_bridge.health_check import add_command as add_health_command
 from robosc_bridge.terminal.commands import add_commands
 
 OK, FAULT, WRONG_USE = 0, 1, 2
+
+UDEV_FOLDERS = tuple(map(Path, ("/etc/udev/rules.d", "/run/udev/rules.d", "/usr/lib/udev/rules.d")))
+"""Folders of udev rules."""
 
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
@@ -119,6 +122,13 @@ def make_parser() -> Parser:
     first.add_argument("--robot", choices=TURTLEBOTS, default="burger")
     first.add_argument("--drive", choices=get_args(DriveDriver), default="opencr")
     first.add_argument("--scanner", choices=get_args(ScannerDriver), default="lds02")
+    for name, what in (("drive", "drive"), ("scanner", "LiDAR")):
+        first.add_argument(
+            f"--{name}-port",
+            metavar="PATH",
+            help=f"serial port of the {what} (default: its name by the udev rules of deploy/udev where these are "
+            "installed, else the kernel's usual one)",
+        )
     first.add_argument(
         "-o", "--output", metavar="FILE", type=Path, help="file to write; standard output if it is left out"
     )
@@ -188,7 +198,15 @@ def _check(arguments: argparse.Namespace) -> int:
 
 
 def _init(arguments: argparse.Namespace) -> int:
-    text = init(arguments.robot, arguments.drive, arguments.scanner, _model(arguments.model))
+    text = init(
+        arguments.robot,
+        arguments.drive,
+        arguments.scanner,
+        _model(arguments.model),
+        drive_port=arguments.drive_port,
+        scanner_port=arguments.scanner_port,
+        has_udev_names=any((folder / UDEV_RULES).is_file() for folder in UDEV_FOLDERS),
+    )
     if arguments.output is None:
         sys.stdout.write(text)
     else:

@@ -1,6 +1,7 @@
 """A first configuration for a robot and a model: obvious mappings are made, the others are left to be filled in."""
 
 import json
+import re
 from collections.abc import Iterator
 from textwrap import wrap
 from typing import Literal
@@ -28,15 +29,35 @@ PORTS: dict[str, str] = {
 }
 """Usual port of each device; the LiDAR's adapter is the first of its kind."""
 
+UDEV_RULES = "60-robosc.rules"
+UDEV_PORTS: dict[str, str] = {
+    "opencr": "/dev/robosc-opencr",
+    "dynamixel": "/dev/robosc-u2d2",
+    "lds01": "/dev/robosc-lds",
+    "lds02": "/dev/robosc-lds",
+    "lds03": "/dev/robosc-lds",
+}
+"""Port of each device by the udev rules of deploy/udev, whatever the order of plugging in."""
+
 SCAN_TIMEOUTS_S: dict[str, float] = {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
 """Three revolutions of each LiDAR."""
 
+_PLAIN_PATH = re.compile(r"/[A-Za-z0-9/._-]+")
 _WIDTH = 110
 _IN, _OUT = CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSAGE
 _SKILLS = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 
 
-def init(robot: TurtleBot, drive: DriveDriver, scanner: ScannerDriver, model: Model) -> str:
+def init(
+    robot: TurtleBot,
+    drive: DriveDriver,
+    scanner: ScannerDriver,
+    model: Model,
+    *,
+    drive_port: str | None = None,
+    scanner_port: str | None = None,
+    has_udev_names: bool = False,
+) -> str:
     """Return the text of a configuration, with every setting and its meaning.
 
     An entry that cannot be guessed has no value there: such a file cannot be loaded, and the error lists the entry.
@@ -46,14 +67,18 @@ def init(robot: TurtleBot, drive: DriveDriver, scanner: ScannerDriver, model: Mo
         drive: Driver that reaches its wheels.
         scanner: Driver of its LiDAR.
         model: Model whose communications are to be mapped.
+        drive_port: Port of the drive; None: the usual one.
+        scanner_port: Port of the LiDAR; None: the usual one.
+        has_udev_names: True if the usual ports are those of the udev rules.
     """
+    ports = UDEV_PORTS if has_udev_names else PORTS
     lines = [
         f"# Configuration of the RoboSC bridge for {model.name}. All settings are shown.",
         "",
         f"robot: {robot}",
         "",
-        *_device("drive", drive),
-        *_device("scanner", scanner),
+        *_device("drive", drive, drive_port or ports[drive]),
+        *_device("scanner", scanner, scanner_port or ports[scanner]),
         *_sections(scanner),
         "# What each communication of the model is mapped to.",
         *_channels(model, drive),
@@ -113,12 +138,13 @@ def _guesses(item: Communication) -> Iterator[tuple[set[str], tuple[Communicatio
     yield {"emergency_stop/resume"}, (_OUT,), kinds.EmergencyStopChannel(event="resume")
 
 
-def _device(section: str, driver: str) -> list[str]:
+def _device(section: str, driver: str, port: str) -> list[str]:
+    is_stable = port == UDEV_PORTS[driver]
     return [
         f"{section}:",
         f"  driver: {driver}",
-        "  # Best a stable name below /dev/serial/by-id.",
-        f"  port: {PORTS[driver]}",
+        f"  # {'Its name by the udev rules' if is_stable else 'Best a stable name'}; alike devices: /dev/serial/by-id.",
+        f"  port: {port if _PLAIN_PATH.fullmatch(port) else json.dumps(port)}",
         "",
     ]
 

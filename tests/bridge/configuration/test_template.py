@@ -1,5 +1,6 @@
 import itertools
 import json
+from pathlib import Path
 from typing import get_args
 
 import msgspec
@@ -14,7 +15,7 @@ from robosc_bridge.configuration import Configuration, ConfigurationError, init,
 from robosc_bridge.configuration import template as template_module
 from robosc_bridge.configuration.document import parse_document
 from robosc_bridge.configuration.structure import TurtleBot
-from robosc_bridge.configuration.template import quoted
+from robosc_bridge.configuration.template import UDEV_RULES, DriveDriver, ScannerDriver, quoted
 from support.models import EXAMPLES, bundle_of
 
 COMBINATIONS = list(
@@ -107,6 +108,27 @@ def test_every_setting_has_its_default_but_what_the_lidar_decides() -> None:
     found = parse(init("burger", "opencr", "lds03", example("maze_solver")).encode(), "c.yaml").configuration
     assert found.safety == msgspec.structs.replace(default.safety, scan_timeout_s=0.3)
     assert msgspec.structs.replace(found, safety=default.safety, channels={}) == default
+
+
+@pytest.mark.parametrize(("drive", "board"), [("opencr", "opencr"), ("dynamixel", "u2d2")])
+def test_ports_have_their_names_by_the_udev_rules(drive: DriveDriver, board: str) -> None:
+    rules = (Path(__file__).parents[3] / "deploy" / "udev" / UDEV_RULES).read_text(encoding="utf-8")
+    for scanner in get_args(ScannerDriver):
+        text = init("burger", drive, scanner, example("maze_solver"), has_udev_names=True)
+        found = parse_document(text.encode(), "c.yaml").value
+        assert isinstance(found, dict)
+        for section, name in (("drive", f"robosc-{board}"), ("scanner", "robosc-lds")):
+            assert found[section]["port"] == f"/dev/{name}"
+            assert f'SYMLINK+="{name}"' in rules
+        assert text.count("# Its name by the udev rules") == 2
+
+
+@pytest.mark.parametrize("port", ["/tmp/base", "udpout:127.0.0.1:1", "/dev/a b", "/dev/x: # y", "/dev/\u00e4\n"])
+def test_ports_that_are_given_stand_there(port: str) -> None:
+    text = init("burger", "opencr", "lds02", example("maze_solver"), drive_port=port, scanner_port=port)
+    found = parse_document(text.encode(), "c.yaml").value
+    assert isinstance(found, dict)
+    assert (found["drive"]["port"], found["scanner"]["port"]) == (port, port)
 
 
 def test_every_setting_is_written_with_what_it_means() -> None:

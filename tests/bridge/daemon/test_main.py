@@ -67,6 +67,21 @@ def configured(bridge: Bridge, folder: Path) -> Path:
     return file
 
 
+def test_ports_are_those_of_the_machine_or_those_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("robosc_bridge.main.UDEV_FOLDERS", (tmp_path / "none", tmp_path))
+
+    def ports(*more: str) -> list[str]:
+        assert main(["init", "--model", str(MODEL), *more]) == 0
+        return re.findall(r"^  port: (.*)$", capsys.readouterr().out, re.MULTILINE)
+
+    assert ports() == ["/dev/ttyACM0", "/dev/ttyUSB0"]
+    (tmp_path / "60-robosc.rules").touch()
+    assert ports() == ["/dev/robosc-opencr", "/dev/robosc-lds"]
+    assert ports("--drive-port", "/tmp/base") == ["/tmp/base", "/dev/robosc-lds"]
+
+
 def test_what_is_not_tied_is_listed(bridge: Bridge, tmp_path: Path) -> None:
     file = tmp_path / "bridge.yaml"
     file.write_text(

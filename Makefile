@@ -16,7 +16,7 @@ WHEELS := out/wheels
 # Without bytecode on disk, every program that the tests start would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test acceptance smoke soak mutants faults fuzz lint format bindings lock benchmark environment colcon checkers docs pictures images extension vscode clean help
+.PHONY: demo test acceptance smoke soak mutants faults fuzz lint format bindings lock benchmark environment colcon checkers docs pictures images dist extension vscode clean help
 
 help:
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -52,6 +52,13 @@ $(WHEELS)/.ready: deploy/requirements-build.txt deploy/requirements-server.txt d
 	PYTHON=$(BIN)/python sh deploy/make_image_wheels.sh $(WHEELS)
 	PYTHONPATH=tests $(BIN)/python -m support.containers
 	@touch $@
+
+DIST := out/dist
+DIST_MACHINE := $(shell uname -m)
+DIST_EXTRAS := client server bridge view plot simulation lsp signing
+
+dist: $(READY) ## make out/dist: the wheel, wheels for a machine without network, checksums; DIST_MACHINE=aarch64 for a Raspberry Pi
+	PYTHON=$(BIN)/python EXTRAS='$(DIST_EXTRAS)' MACHINE=$(DIST_MACHINE) sh deploy/make_dist.sh $(DIST)
 
 NPM := npm --no-audit --no-fund --loglevel=error
 VSCODE := acceptance/vscode/node_modules/code-server/lib/vscode

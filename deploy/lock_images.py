@@ -1,12 +1,13 @@
 """Writes the locks of the images: of requirements.lock, the lines that each of them needs, with their hashes.
 
-python deploy/lock_images.py    # in the project's environment, whose packages say what they need
+python deploy/lock_images.py            # in the project's environment, whose packages say what they need
+python deploy/lock_images.py bridge     # prints the lock of these extras
 """
 
 import re
 import sys
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from importlib import metadata
 from pathlib import Path
 
@@ -28,9 +29,12 @@ _HEADER = """\
 """
 
 
-def main() -> int:
-    """Write the locks; returns the exit status."""
+def main(extras: Sequence[str] = ()) -> int:
+    """Write the locks of the images, or print that of some extras; returns the exit status."""
     entries = locked(LOCK.read_text("utf-8"))
+    if extras:
+        sys.stdout.write(lock_of(entries, closure(requirements(extras)), f"the extras {', '.join(extras)} need"))
+        return 0
     for name, needed in wanted().items():
         what = "builds the wheels of the images" if name == "build" else f"the image of the {name} holds"
         (FOLDER / f"requirements-{name}.txt").write_text(lock_of(entries, needed, what), "utf-8")
@@ -39,12 +43,18 @@ def main() -> int:
 
 def wanted() -> dict[str, set[str]]:
     """Return the packages in each lock, by lock."""
+    return {"build": closure(BUILD), **{name: closure(requirements(extras)) for name, extras in EXTRAS.items()}}
+
+
+def requirements(extras: Iterable[str]) -> list[str]:
+    """Return what the project requires with some extras.
+
+    Raises:
+        KeyError: It has no such extra.
+    """
     project = tomllib.loads((LOCK.parent / "pyproject.toml").read_text("utf-8"))["project"]
-    result = {"build": closure(BUILD)}
-    for name, extras in EXTRAS.items():
-        optional = project["optional-dependencies"]
-        result[name] = closure([*project["dependencies"], *(text for extra in extras for text in optional[extra])])
-    return result
+    optional = project["optional-dependencies"]
+    return [*project["dependencies"], *(text for extra in extras for text in optional[extra])]
 
 
 def locked(text: str) -> dict[str, str]:
@@ -87,4 +97,4 @@ def closure(requirements: Iterable[str]) -> set[str]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

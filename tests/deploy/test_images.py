@@ -96,6 +96,16 @@ def test_the_locks_of_the_images_are_lines_of_the_lock() -> None:
         assert lock == {package: entries[package] for package in needed}, f"{name}: python deploy/lock_images.py"
 
 
+def test_the_lock_of_some_extras_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    program = runpy.run_path(str(TOP / "deploy" / "lock_images.py"))
+    assert program["main"](["bridge", "view"]) == 0
+    assert program["locked"](capsys.readouterr().out) == program["locked"](
+        (TOP / "deploy" / "requirements-bridge.txt").read_text()
+    )
+    with pytest.raises(KeyError):
+        program["main"](["nonsense"])
+
+
 def test_what_a_dockerfile_says_is_read() -> None:
     (stage,) = parse_dockerfile(
         'ARG A=b:1\nFROM ${A} AS one\n# no\nENV X=1 \\\n    Y=$X/2\nHEALTHCHECK --interval=3s CMD ["a", "b"]\n'

@@ -6,7 +6,7 @@ import * as vscode from "vscode";
 import { program, workingFolder } from "./settings";
 
 /** Command by which a user gets what the extension needs. */
-export const INSTALL = "pip install 'robosc[lsp,view]'";
+export const INSTALL = "pip install 'robosc-VERSION-py3-none-any.whl[lsp,view]'";
 
 /** Outcome of a program that has ended. */
 export interface Ended {

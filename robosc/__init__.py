@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from robosc.pipeline.synthesis import Synthesis, synthesize
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
     from robosc.pipeline.verifying import verify
+    from robosc.pipeline.walking import Trouble, TroubleKind
     from robosc.synthesis import UnknownEngineError
     from robosc.targets import GenerateOptions, OverwriteError, UnknownTargetError
 
@@ -99,6 +100,8 @@ _HOMES = {
     "SynthesisStatus": "pipeline.results",
     "SystemSupervisor": "pipeline.systems",
     "SystemSynthesis": "pipeline.systems",
+    "Trouble": "pipeline.walking",
+    "TroubleKind": "pipeline.walking",
     "UnknownCodeError": "diagnostics",
     "UnknownEngineError": "synthesis",
     "UnknownEventError": "pipeline.simulation",
@@ -153,6 +156,8 @@ __all__ = [
     "SynthesisStatus",
     "SystemSupervisor",
     "SystemSynthesis",
+    "Trouble",
+    "TroubleKind",
     "UnknownCodeError",
     "UnknownEngineError",
     "UnknownEventError",

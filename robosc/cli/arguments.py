@@ -40,7 +40,9 @@ def suggest(action: argparse.Action, values: Callable[[], Iterable[str]]) -> Non
     action.suggestions = values  # type: ignore[attr-defined]
 
 
-def add_model_arguments(parser: argparse.ArgumentParser) -> None:
+def add_model_arguments(
+    parser: argparse.ArgumentParser, json_help: str = "print one JSON document for machines"
+) -> None:
     """The model, its library folders and `--json`."""
     parser.add_argument("model", type=given_path, metavar="MODEL", help="the model's file, e.g. robot.rscd")
     parser.add_argument(
@@ -62,7 +64,7 @@ def add_model_arguments(parser: argparse.ArgumentParser) -> None:
         help="another folder with ROS packages whose .msg, .srv and .action files the model is checked against (may be "
         "repeated; always searched: an installed ROS, packages around the model, and common ones of RoboSC itself)",
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
+    parser.add_argument("--json", action="store_true", help=json_help)
 
 
 def add_deployment_argument(parser: argparse.ArgumentParser) -> None:

@@ -22,6 +22,7 @@ from robosc.cli import (
     new,
     plot,
     sign,
+    simulate,
     synth,
     verify,
 )
@@ -32,14 +33,14 @@ from robosc.cli.running import Parser, guarded, parse
 __all__ = ["guarded", "main", "make_parser", "parse"]
 
 _COMMANDS = (
-    new, check, format_, synth, verify, sign, explore, generate, explain_synthesis, explain, doc, plot, check_log,
-    doctor, completion,
+    new, check, format_, synth, simulate, verify, sign, explore, generate, explain_synthesis, explain, doc, plot,
+    check_log, doctor, completion,
 )  # fmt: skip
 """In the order of `robosc --help`."""
 
 _NAMES = (
-    "new", "check", "format", "synth", "verify", "key", "sign", "explore", "generate", "explain-synthesis", "explain",
-    "doc", "plot", "check-log", "doctor", "completion",
+    "new", "check", "format", "synth", "simulate", "verify", "key", "sign", "explore", "generate", "explain-synthesis",
+    "explain", "doc", "plot", "check-log", "doctor", "completion",
 )  # fmt: skip
 """Names of the commands: a call of one of them needs no search for commands of other packages."""
 
@@ -71,6 +72,7 @@ def make_parser(plugins: Sequence[Plugin] = ()) -> Parser:
         check,
         format_,
         synth,
+        simulate,
         verify,
         sign,
         explore,

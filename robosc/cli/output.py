@@ -62,15 +62,19 @@ def prepare_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-_ESCAPED = {code: f"\\u{code:04x}" for code in (*range(0x7F, 0xA0), 0x200E, 0x200F, *range(0x202A, 0x202F))}
+ESCAPED = {code: f"\\u{code:04x}" for code in (*range(0x7F, 0xA0), 0x200E, 0x200F, *range(0x202A, 0x202F))}
 """Characters that JSON allows in its strings, but that would move a terminal's cursor or turn its text round."""
 
 
 def print_json(document: Mapping[str, object]) -> None:
     """One JSON document on standard output, keys in the order given."""
     # What cannot be encoded is escaped, and in JSON by JSON's own rules.
-    is_unicode = codecs.lookup(sys.stdout.encoding or "ascii").name.startswith("utf")
-    sys.stdout.write(json_text(document, is_ascii=not is_unicode).translate(_ESCAPED))
+    sys.stdout.write(json_text(document, is_ascii=not has_unicode_output()).translate(ESCAPED))
+
+
+def has_unicode_output() -> bool:
+    """Return True if standard output takes every character."""
+    return codecs.lookup(sys.stdout.encoding or "ascii").name.startswith("utf")
 
 
 def print_diagnostics(diagnostics: Sequence[Diagnostic], bundle: Bundle | None) -> None:

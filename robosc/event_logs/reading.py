@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol
 
 from robosc.errors import RoboscError
 from robosc.event_logs.entries import LogEntry, LoggedRun
@@ -52,7 +52,28 @@ def read_log(path: str | Path) -> LoggedRun:
         size = file.stat().st_size
         if size > MAXIMUM_BYTES:
             raise LogError(f"{path} has {size} bytes; a log of more than {MAXIMUM_BYTES} is not read")
-        return _Reading(str(path)).read(stream)
+        return read_log_stream(stream, str(path))
+
+
+class LineStream(Protocol):
+    """A file or pipe that is read line by line, in bytes."""
+
+    def readline(self, size: int, /) -> bytes:
+        """Return the next line, or as much of it as was asked for; nothing at the end."""
+
+
+def read_log_stream(stream: LineStream, name: str) -> LoggedRun:
+    """Read a log, as `read_log` does, from something that is open; it waits for the end of a pipe.
+
+    Args:
+        stream: The log, at its beginning.
+        name: Name of the log, for messages.
+
+    Raises:
+        LogError: It is no event log, or too large.
+        OSError: It cannot be read.
+    """
+    return _Reading(name).read(stream)
 
 
 class _Reading:
@@ -65,7 +86,7 @@ class _Reading:
         self._torn: list[tuple[int, str]] = []
         self._state: Mapping[str, Any] = {}
 
-    def read(self, stream: Any) -> LoggedRun:
+    def read(self, stream: LineStream) -> LoggedRun:
         number, is_ended, read_bytes = 0, True, 0
         while content := stream.readline(MAXIMUM_LINE_BYTES + 1):
             number += 1

@@ -4,35 +4,37 @@ Whoever simulates plays the robot and the executor: uncontrollable events come w
 controllable ones are taken where they are allowed.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from robosc.automata.plants import communication_plant_name
+from robosc.automata.plants import communication_plant, communication_plant_name
 from robosc.certification.supervisor_file import StateInWords
 from robosc.errors import RoboscError, UnknownNameError
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.interpreter.received import EnumChoice
 from robosc.execution.runtime.protocol import Reading
-from robosc.expressions import (
-    ArrayType,
-    BooleanType,
-    DoubleType,
-    EnumType,
-    IntegerType,
-    NoneType,
-    ObjectType,
-    StringType,
-    Type,
-    type_text,
-    values,
-)
+from robosc.explanation.blocked import Requests
 from robosc.expressions.text import automaton_text, expression_text
-from robosc.model.findings import did_you_mean
-from robosc.model.structure import CommunicationKind, EventKind, Model, is_tau
+from robosc.model.structure import CommunicationKind
 from robosc.pipeline.conditions import unknown_event
-from robosc.pipeline.supervisors import SupervisorLike, supervisor_of
+from robosc.pipeline.files import FileAccessError, given_path, write_whole
+from robosc.pipeline.loading import FileName
+from robosc.pipeline.received_data import (
+    NO_DATA,
+    DataError,
+    DataField,
+    GivenData,
+    RandomData,
+    data_fields,
+    received_type,
+)
+from robosc.pipeline.saved_runs import ModelOfTest, event_log, pytest_module
+from robosc.pipeline.supervisors import Supervisor, SupervisorLike, supervisor_of
+from robosc.pipeline.walking import ALL_TROUBLE, Trouble, TroubleKind, Walker
 from robosc.tables import html_table
+
+__all__ = ["NO_DATA", "DataError", "EventNotPossibleError", "Run", "Step", "UnknownEventError", "simulate"]
 
 
 class UnknownEventError(UnknownNameError):
@@ -41,20 +43,6 @@ class UnknownEventError(UnknownNameError):
 
 class EventNotPossibleError(RoboscError, ValueError):
     """An event that cannot happen in the current state; the message says why."""
-
-
-class DataError(RoboscError, ValueError):
-    """Data that an event does not carry; the message says what it carries."""
-
-
-class _NoData:
-    """Placeholder for data that was not given, which is something else than None."""
-
-    def __repr__(self) -> str:
-        return "NO_DATA"
-
-
-NO_DATA = _NoData()
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +56,9 @@ class Step:
         provided: Data that a request sends, by the model's `provide`; None where the middleware's default is sent, or
             where it is unknown.
         skipped: Variables that kept their value, because what they were to take was unknown.
-        unknown: Parts of the data that were unknown or moved into their range, in words.
+        unknown: Descriptions of what was unknown or moved into its range: parts of the data, what a request sends.
+        is_controllable: True if it is one that the controller takes by itself.
+        given: Data as it was given.
     """
 
     event: str
@@ -77,6 +67,8 @@ class Step:
     provided: Any = field(default=None, hash=False)
     skipped: tuple[str, ...] = ()
     unknown: tuple[str, ...] = ()
+    is_controllable: bool = False
+    given: Any = field(default=NO_DATA, hash=False)
 
     def __str__(self) -> str:
         return f"{self.event}: {self.state}"
@@ -90,19 +82,45 @@ class Run:
     """
 
     def __init__(self, supervisor: SupervisorLike) -> None:
-        given = supervisor_of(supervisor)
+        given = self._supervisor = supervisor_of(supervisor)
         self._model = given.model
         self._system = InterpretedSystem(given)
+        self._requests = Requests(given.executable, given.added)
+        self._request_events = frozenset(self._requests.events)
         events = given.executable.automata.events
         self._events = {event.name: event.is_controllable for event in events}
-        components = {item.name for item in given.model.components}
+        self._components = frozenset(item.name for item in given.model.components)
         self._calls = {
-            item.name: automaton_text(communication_plant_name(item), components)
+            item.name: automaton_text(communication_plant_name(item), self._components)
             for item in given.model.communications
             if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
         }
-        self._history: list[Step] = []
-        self._initial = _values(self.state)
+        self._marked = {
+            **{
+                item.name: {state.name for state in item.behaviour.states if state.is_marked}
+                for item in given.model.components
+                if item.behaviour
+            },
+            **{
+                name: set(communication_plant(given.model.communication(item)).marked)
+                for item, name in self._calls.items()
+            },
+        }
+        # The steps, each with the state before it; and those that were taken back, the last one first.
+        self._taken: list[tuple[Step, Any]] = []
+        self._undone: list[tuple[Step, Any]] = []
+        self._initial = self.state
+        self._walker = Walker(self, self._system, given.model, RandomData(given.model))
+
+    @property
+    def supervisor(self) -> Supervisor:
+        """The supervisor of the system."""
+        return self._supervisor
+
+    @property
+    def initial(self) -> StateInWords:
+        """The initial state."""
+        return self._initial
 
     @property
     def events(self) -> tuple[str, ...]:
@@ -113,6 +131,18 @@ class Run:
     def enabled(self) -> tuple[str, ...]:
         """Controllable events that are allowed now, in source order."""
         return tuple(name for name, is_own in self._events.items() if is_own and self._system.enabled(name))
+
+    @property
+    def possible(self) -> tuple[str, ...]:
+        """Every event that can happen now, in source order: `enabled`, and those of the environment."""
+        return tuple(filter(self._can_happen, self._events))
+
+    @property
+    def is_marked(self) -> bool:
+        """True if the state counts as completed: every component, service and action is in a marked location."""
+        state = self.state
+        places = {**state.components, **state.communications}
+        return all(place in self._marked[name] for name, place in places.items())
 
     @property
     def state(self) -> StateInWords:
@@ -131,7 +161,53 @@ class Run:
     @property
     def history(self) -> tuple[Step, ...]:
         """The events so far."""
-        return tuple(self._history)
+        return tuple(step for step, _ in self._taken)
+
+    @property
+    def undone(self) -> tuple[Step, ...]:
+        """The events that were taken back, in the order in which `redo` takes them again."""
+        return tuple(step for step, _ in reversed(self._undone))
+
+    def event_called(self, name: str) -> str:
+        """The event that a name stands for: itself, or of a message, service or action its first one.
+
+        Raises:
+            UnknownEventError: There is no such event; the message names the nearest one.
+        """
+        first = {item.name: item.events[0] for item in self._model.communications}
+        if name not in first and name not in self._events:
+            raise UnknownEventError(unknown_event(name, (*self._events, *first)))
+        return first.get(name, name)
+
+    def is_controllable(self, event: str) -> bool:
+        """Return True if the controller takes an event by itself.
+
+        Raises:
+            UnknownEventError: There is no such event; the message names the nearest one.
+        """
+        return self._events[self._known(event)]
+
+    def data_fields(self, event: str) -> tuple[DataField, ...]:
+        """The parts of the data that an event carries, which can be given with it.
+
+        Raises:
+            UnknownEventError: There is no such event; the message names the nearest one.
+        """
+        return data_fields(self._model, self._known(event))
+
+    def reasons(self, event: str) -> tuple[str, ...]:
+        """Return the reasons why an event cannot happen now, one sentence each; none if it can.
+
+        Raises:
+            UnknownEventError: There is no such event; the message names the nearest one.
+        """
+        if self._can_happen(self._known(event)):
+            return ()
+        if event in self._request_events:
+            places = {name: self._system.location(name) for name in self._calls}
+            blocked = self._requests.availability(self._system.state(), places).blocked
+            return next(item.why for item in blocked if item.event == event)
+        return tuple(self._hindrances(event))
 
     def step(self, event: str, data: object = NO_DATA, /, **fields: object) -> Step:
         """Take an event; where that is not possible, nothing changes.
@@ -150,29 +226,117 @@ class Run:
             EventNotPossibleError: It cannot happen in the current state; the message says why.
             DataError: It does not carry such data.
         """
-        if event not in self._events:
-            raise UnknownEventError(unknown_event(event, self._events))
+        self._known(event)
         if fields and data is not NO_DATA:
             raise DataError(f"the data of '{event}' is given either as one value or as keywords, not as both")
-        reading = self._reading(event, fields if fields else data)
-        if self._events[event] and not self._system.enabled(event):
-            raise EventNotPossibleError(f"'{event}' is not allowed now: {self._obstacle(event)}; {self._allowed()}")
-        name, _, kind = event.partition(".")
-        is_request = not is_tau(event) and kind == EventKind.REQUEST
-        # The data of a request is made of the state before it.
-        _, provided = self._system.provide(name) if is_request else (True, None)
-        skipped = self._system.step(event, reading)
-        if skipped is None:
-            raise EventNotPossibleError(f"'{event}' cannot happen now: {self._location(event)}")
+        given = fields if fields else data
+        reading = self._reading(event, given)
+        if not self._can_happen(event):
+            verb = "is not allowed" if self._events[event] else "cannot happen"
+            raise EventNotPossibleError(f"'{event}' {verb} now: {'; '.join(self.reasons(event))}; {self._allowed()}")
         unknown = reading.unknown if reading is not None else ()
-        step = Step(event, {} if reading is None else dict(reading.data), self.state, provided, skipped, unknown)
-        self._history.append(step)
+        provided = None
+        if event in self._request_events:
+            # The data of a request is made of the state before it.
+            is_known, provided = self._system.provide(event.partition(".")[0])
+            if not is_known:
+                unknown = (*unknown, "what it sends is unknown, and an executor would not issue it")
+        before = self._system.snapshot()
+        skipped = self._system.step(event, reading) or ()
+        data_seen = {} if reading is None else dict(reading.data)
+        step = Step(event, data_seen, self.state, provided, skipped, unknown, self._events[event], given)
+        self._taken.append((step, before))
+        self._undone.clear()
+        return step
+
+    def undo(self) -> Step | None:
+        """Take back the last event, and return it; None if there is none."""
+        if not self._taken:
+            return None
+        step, before = self._taken.pop()
+        self._undone.append((step, self._system.snapshot()))
+        self._system.restore(before)
+        return step
+
+    def redo(self) -> Step | None:
+        """Take the event again that was taken back last, and return it; None if there is none."""
+        if not self._undone:
+            return None
+        step, after = self._undone.pop()
+        self._taken.append((step, self._system.snapshot()))
+        self._system.restore(after)
         return step
 
     def restart(self) -> None:
         """Back to the initial state, with an empty history."""
         self._system.restart()
-        self._history.clear()
+        self._taken.clear()
+        self._undone.clear()
+        self._walker.forget()
+
+    def walk(self, steps: int, seed: int = 0) -> tuple[Step, ...]:
+        """Take events by chance, as an executor could in some world; ends early where nothing can happen.
+
+        Resets and tau transitions are taken as soon as they are allowed, and nothing is requested before the first
+        message of a sensor with a `max_age`, as an executor does. Otherwise each event that can happen is as likely
+        as the others, with data that is known, and near to the numbers that the model names.
+
+        Args:
+            steps: Number of events.
+            seed: Seed of the chance: the same one leads the same way.
+        """
+        return self._walker.walk(steps, seed)
+
+    def walk_until_trouble(
+        self, steps: int = 1000, seed: int = 0, kinds: Collection[TroubleKind] = ALL_TROUBLE
+    ) -> Trouble | None:
+        """Walk by chance until there is trouble, and return it; None if there was none.
+
+        What was found stays told: the next walk of this run goes on to something else.
+
+        Args:
+            steps: Most events to take.
+            seed: Seed of the chance.
+            kinds: Kinds of trouble to look for.
+        """
+        return self._walker.walk_until_trouble(steps, seed, kinds)
+
+    def save(self, file: FileName, model: ModelOfTest | None = None) -> Path:
+        """Write the events so far, an event log (`.jsonl`) or a test for pytest (`.py`); returns the file's path.
+
+        The log's clock counts the events, a second each. The test leads a run through the same events, and compares
+        what is enabled and the state after each.
+
+        Args:
+            file: File to write.
+            model: Model that the test is to load; needed for a test alone.
+
+        Raises:
+            FileAccessError: The file cannot be written, or its name ends in something else.
+        """
+        path = given_path(file)
+        if path.suffix == ".jsonl":
+            text = event_log(self)
+        elif path.suffix == ".py" and model is not None:
+            text = pytest_module(self, model, path)
+        else:
+            ends = "in .jsonl (an event log) or .py (a test)" if model is not None else "in .jsonl, as event logs do"
+            raise FileAccessError(f"{path}: the name of a saved run ends {ends}")
+        write_whole(path, text.encode())
+        return path
+
+    def _known(self, event: str) -> str:
+        """The event, which there is.
+
+        Raises:
+            UnknownEventError: There is not.
+        """
+        if event not in self._events:
+            raise UnknownEventError(unknown_event(event, self._events))
+        return event
+
+    def _can_happen(self, event: str) -> bool:
+        return self._system.enabled(event) if self._events[event] else self._system.is_possible(event)
 
     def _reading(self, event: str, data: object) -> Reading | None:
         """The data of an event as the model sees it; None of an event that carries none.
@@ -180,41 +344,50 @@ class Run:
         Raises:
             DataError: The event does not carry such data.
         """
-        type_ = _received_type(self._model, event)
-        if type_ is None or isinstance(type_, NoneType):
+        type_ = received_type(self._model, event)
+        if type_ is None:
             if data is not NO_DATA:
                 raise DataError(f"'{event}' carries no data, and was given {data!r:.100}")
             return None
-        raw = None if data is NO_DATA else _Data(self._model, event).value(type_, data, "value")
+        raw = None if data is NO_DATA else GivenData(self._model, event).value(type_, data)
         return self._system.read(event, raw)
 
-    def _obstacle(self, event: str) -> str:
-        """Return the reason why a controllable event is not allowed, in the model's words."""
-        name, _, kind = event.partition(".")
-        if not is_tau(event) and kind == EventKind.REQUEST:
-            components = {item.name for item in self._model.components}
-            requirements = self._model.requirements_on(name)
-            broken = [
-                expression_text(requirement.condition, components)
-                for requirement, holds in zip(requirements, self._system.requirements(name), strict=True)
-                if not holds
-            ]
-            if broken:
-                return f"it needs {' and '.join(broken)}"
-        return f"the behaviours or the supervisor forbid it in {self.state}"
+    def _hindrances(self, event: str) -> Iterator[str]:
+        """Yield the reasons why an event that is no request cannot happen."""
+        found = self._supervisor.executable.events[event]
+        if found.moves is not None:
+            name = event.partition(".")[0]
+            location = self._system.location(name)
+            if location not in found.moves.targets:
+                yield f"{self._calls[name]} is in {location}, not in {' or '.join(found.moves.targets)}"
+                return
+        for part in found.participants:
+            place = self.state.components[part.component]
+            if part.may_block and place not in part.taken:
+                yield f"{part.component} is in {place}, not in {' or '.join(part.taken)}"
+                return
+            guard, changes = (
+                (part.taken[place].guard, part.taken[place].target) if found.kind is None else (None, place)
+            )
+            if changes in (None, place) and found.kind is None:
+                yield "it would change nothing"
+                return
+            if guard is not None and not self._system.is_possible(event):
+                yield f"its condition {expression_text(guard, self._components)} does not hold"
+                return
+        if not self._system.is_possible(event):
+            yield "it would take a variable out of its range"
+        elif found.requirements and all(self._system.requirements(event.partition(".")[0])):
+            yield "its requirements hold, and a controller cancels only when one of them does not"
+        else:
+            yield "the supervisor forbids it, because of what can follow"
 
     def _allowed(self) -> str:
         enabled = self.enabled
         return f"allowed are {', '.join(enabled)}" if enabled else "nothing is allowed"
 
-    def _location(self, event: str) -> str:
-        name = event.partition(".")[0]
-        if name in self._calls:
-            return f"{self._calls[name]} is {self._system.location(name)}"
-        return f"the behaviours have no transition for it in {self.state}"
-
     def __repr__(self) -> str:
-        count = len(self._history)
+        count = len(self._taken)
         return f"<run of {self._model.name}: {count} step{'s' if count != 1 else ''}; {self._allowed()}>"
 
     def __str__(self) -> str:
@@ -225,7 +398,7 @@ class Run:
         return iter(self.history)
 
     def __len__(self) -> int:
-        return len(self._history)
+        return len(self._taken)
 
     def _repr_html_(self) -> str:
         rows = ((number, *row) for number, row in self._rows())
@@ -234,12 +407,21 @@ class Run:
     def _rows(self) -> Iterator[tuple[int, tuple[str, str]]]:
         """Yield for each step its number, the event with its data, and what it changed."""
         before = self._initial
-        for number, step in enumerate(self._history, start=1):
-            data = ", ".join(f"{name} = {_shown(value)}" for name, value in step.data.items())
-            now = _values(step.state)
-            changes = ", ".join(f"{name} = {_shown(value)}" for name, value in now.items() if before[name] != value)
-            before = now
-            yield number, (f"{step.event} ({data})" if data else step.event, changes)
+        for number, step in enumerate(self.history, start=1):
+            yield number, (event_text(step), changes_text(before, step.state))
+            before = step.state
+
+
+def event_text(step: Step) -> str:
+    """An event with the data that came with it: `level.response (value = 3)`."""
+    data = ", ".join(f"{name} = {_shown(value)}" for name, value in step.data.items())
+    return f"{step.event} ({data})" if data else step.event
+
+
+def changes_text(before: StateInWords, after: StateInWords) -> str:
+    """Changes between two states: `Base = driving, Base.charges = 2`."""
+    old = _values(before)
+    return ", ".join(f"{name} = {_shown(value)}" for name, value in _values(after).items() if old[name] != value)
 
 
 def _values(state: StateInWords) -> dict[str, Any]:
@@ -264,89 +446,3 @@ def simulate(supervisor: SupervisorLike) -> Run:
         InvalidSupervisorError: It is no supervisor.
     """
     return Run(supervisor)
-
-
-def _received_type(model: Model, event: str) -> Type | None:
-    """The declared type of what comes with an event, or None."""
-    if is_tau(event):
-        return None
-    name, _, kind = event.partition(".")
-    return model.communication(name).received_type(EventKind(kind))
-
-
-class _Data:
-    """Checks data that a person gives by hand against the types of the model."""
-
-    def __init__(self, model: Model, event: str) -> None:
-        self._objects = {item.name: {part.name: part.type for part in item.properties} for item in model.objects}
-        self._enums = {item.name: item for item in model.enums}
-        self._event = event
-
-    def value(self, type_: Type, given: object, path: str) -> object:
-        """A value as the interpreter reads it.
-
-        Args:
-            type_: Its declared type.
-            given: The value as given.
-            path: Its place in the data, for messages.
-
-        Raises:
-            DataError: It is no value of that type.
-        """
-        match type_:
-            case ObjectType(name=name):
-                return self._object(type_, self._objects[name], given, path)
-            case ArrayType(element=element):
-                return self._array(type_, element, given, path)
-            case EnumType(name=name):
-                return self._enum(type_, self._enums[name].source, given, path)
-            case BooleanType():
-                fits = values.read_boolean(given) is not None
-            case IntegerType():
-                fits = values.read_whole(given) is not None
-            case DoubleType():
-                fits = values.read_double(given) is not None
-            case StringType():
-                fits = values.read_string(given) is not None
-            case _:
-                fits = False
-        if not fits:
-            raise self._wrong(type_, given, path)
-        return given
-
-    def _object(self, type_: Type, parts: Mapping[str, Type], given: object, path: str) -> object:
-        if not isinstance(given, Mapping):
-            raise self._wrong(type_, given, path)
-        for name in given:
-            if name not in parts:
-                near = did_you_mean(str(name), parts)
-                hint = f"did you mean '{near}'?" if near else f"there are {', '.join(parts)}"
-                raise DataError(f"{path} of '{self._event}' has no property '{name}'; {hint}")
-        return {name: self.value(parts[name], item, f"{path}.{name}") for name, item in given.items()}
-
-    def _array(self, type_: Type, element: Type, given: object, path: str) -> object:
-        if isinstance(given, str | bytes | Mapping):
-            raise self._wrong(type_, given, path)
-        try:
-            elements = list(given)  # type: ignore[call-overload]  # whatever it is, it is asked for its elements
-        except TypeError:
-            raise self._wrong(type_, given, path) from None
-        return [self.value(element, item, f"{path}[{index}]") for index, item in enumerate(elements)]
-
-    def _enum(self, type_: EnumType, source: Type, given: object, path: str) -> object:
-        if isinstance(given, str):
-            if given in type_.values:
-                return EnumChoice(given)
-            if not isinstance(source, StringType):
-                near = did_you_mean(given, type_.values)
-                hint = f"did you mean '{near}'?" if near else f"there are {', '.join(type_.values)}"
-                raise DataError(f"{path} of '{self._event}' is {given!r:.100}, which is no {type_text(type_)}; {hint}")
-        try:
-            return self.value(source, given, path)
-        except DataError as error:
-            raise DataError(f"{error}, or one of {', '.join(type_.values)}") from None
-
-    def _wrong(self, type_: Type, given: object, path: str) -> DataError:
-        parts = self._objects.get(type_.name) if isinstance(type_, ObjectType) else None
-        wanted = type_text(type_) + (f" with {', '.join(parts)}" if parts else "")
-        return DataError(f"{path} of '{self._event}' is {given!r:.100}, and must be {wanted}")

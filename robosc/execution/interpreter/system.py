@@ -1,5 +1,6 @@
 """A supervisor, interpreted: plants, ranges, requirements and added conditions exactly as semantics 1 words them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,6 +101,21 @@ class InterpretedSystem:
         if successor is None or successor.leaves_range:
             return False
         return not is_tau(event) or successor.state != state
+
+    def is_possible(self, event: str) -> bool:
+        """Return True if the plants can do an event now, whatever data comes with it (KeyError: there is none)."""
+        rule = self._events[event]
+        successor = self._successor(rule, no_data)
+        return successor is not None and not (rule.is_controllable and successor.leaves_range)
+
+    def snapshot(self) -> Mapping[Place, Value]:
+        """The state as a value, to come back to."""
+        return self._state
+
+    def restore(self, snapshot: Mapping[Place, Value]) -> None:
+        """Back to a state that `snapshot` has returned."""
+        self.changes += 1
+        self._state = dict(snapshot)
 
     def enabled_requests(self) -> tuple[int, ...]:
         """Numbers of the requests that are allowed now, among all of them in source order."""

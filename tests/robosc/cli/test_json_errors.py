@@ -20,6 +20,7 @@ WRONG_USE: dict[str, list[str]] = {
     "check": ["none.rscd"],
     "format": ["none.rscd"],
     "synth": ["none.rscd"],
+    "simulate": [LINE_FOLLOWER, "--events", "none.txt"],
     "verify": [LINE_FOLLOWER],
     "explore": ["none.rscd"],
     "generate": [LINE_FOLLOWER, "--target", "pascal", "-o", "out"],

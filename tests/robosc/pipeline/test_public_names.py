@@ -12,8 +12,8 @@ FUNCTIONS = ["check", "explain", "explore", "generate", "load", "simulate", "syn
 VALUES = [
     *("Condition", "Conditions", "Deployment", "Diagnostic", "Explained", "Exploration", "Findings", "GenerateOptions"),
     *("Generation", "LoadedModel", "NoSupervisor", "Progress", "Run", "Severity", "Step", "Summary", "Supervisor"),
-    *("Synthesis", "SynthesisOptions", "SynthesisStatus", "SystemSupervisor", "SystemSynthesis", "Verification"),
-    "VerificationStatus",
+    *("Synthesis", "SynthesisOptions", "SynthesisStatus", "SystemSupervisor", "SystemSynthesis", "Trouble"),
+    *("TroubleKind", "Verification", "VerificationStatus"),
 ]
 ERRORS = [
     *("DataError", "EventNotPossibleError", "FileAccessError", "InternalError", "InvalidSupervisorError"),

@@ -1,0 +1,312 @@
+"""`robosc simulate`: lead a robot under its supervisor by hand, event by event, before there is any ROS."""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robosc.cli.arguments import add_engine_options, add_model_arguments
+from robosc.cli.given import given_supervisor
+from robosc.cli.output import ESCAPED, CommandError, ExitCode, UsageError, has_unicode_output
+from robosc.model.structure import Deployment
+from robosc.source import visible
+
+if TYPE_CHECKING:
+    from robosc.certification.supervisor_file import StateInWords
+    from robosc.pipeline.saved_runs import ModelOfTest
+    from robosc.pipeline.simulation import Run, Step
+    from robosc.pipeline.walking import Trouble
+
+DEFAULT_STEPS = 1000
+
+_DESCRIPTION = """\
+Lead the robot under its supervisor by hand: you play the world, and choose among what the controller may do. Events
+come from a file (--events), by chance (--random, --until-trouble), or as commands that are typed: 'help' tells them.
+With none of these options commands are read from standard input; on a terminal with a prompt, a history and completion.
+"""
+
+_EPILOG = """\
+a file of events has one a line, with its data as JSON or as name=value; what is left out is unknown:
+  scan.response front=0.7              properties of an object; of an enum its value, or what it is made of
+  scan.response {"front": 0.7}
+  level.response 3
+  move.request                         a request, where it is allowed
+An event log (.jsonl) is taken as well: its events happen again.
+
+trouble, for --trouble and until-trouble:
+  deadlock  no event at all can happen, in a state that is not marked
+  waiting   nothing is allowed and no service or action is under way, in a state that is not marked
+  blocked   the behaviours could do a request that requirements or the supervisor forbid
+  unknown   something was unknown: data, an update that was skipped, what a request sends
+
+exit status:
+  0  done
+  1  an event of the file, or a command, is not possible; --until-trouble found trouble; there is no supervisor
+  2  wrong use; a file that cannot be read or written
+"""
+
+
+def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "simulate",
+        help="lead the robot under its supervisor by hand, in the terminal or from a file",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_model_arguments(parser, json_help="print one JSON object a line: for each event, and at the end")
+    parser.add_argument(
+        "--deployment",
+        choices=[str(deployment) for deployment in Deployment],
+        help="deployment in which the supervisor stands (default: as a .rsup file says; for a model: controller)",
+    )
+    add_engine_options(parser)
+    group = parser.add_argument_group("what happens, in this order")
+    group.add_argument(
+        "--events", metavar="FILE", help="events of a file, one a line, or of an event log; - for standard input"
+    )
+    group.add_argument("--random", type=_count, metavar="N", help="then N events by chance")
+    group.add_argument(
+        "--until-trouble", type=_count, metavar="N", help="then events by chance, at most N, until there is trouble"
+    )
+    group.add_argument("--seed", type=int, default=0, metavar="SEED", help="seed of the chance (default: 0)")
+    group.add_argument(
+        "--trouble",
+        action="append",
+        choices=["deadlock", "waiting", "blocked", "unknown"],
+        help="kind of trouble that --until-trouble looks for (may be repeated; default: all)",
+    )
+    group.add_argument(
+        "--save",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="FILE",
+        help="write what has happened, at last: an event log (.jsonl) or a test for pytest (.py); may be repeated",
+    )
+    parser.set_defaults(run=run)
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if not 0 < value <= 1_000_000:
+        raise ValueError
+    return value
+
+
+_count.__name__ = "number of events from 1 to 1000000"
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Simulate; 0 if all that was asked for has happened, 1 if not.
+
+    Raises:
+        UsageError: A file cannot be read or written.
+        InvalidSupervisorError: The supervisor's file is malformed.
+    """
+    from robosc.pipeline.simulation import Run
+
+    for file in arguments.save:
+        if file.suffix not in (".jsonl", ".py"):
+            raise UsageError(f"{file}: the name of a saved run ends in .jsonl (an event log) or .py (a test)")
+    if arguments.trouble and arguments.until_trouble is None:
+        raise UsageError("--trouble says what --until-trouble looks for: it needs that")
+    is_scripted = arguments.events is not None or arguments.random or arguments.until_trouble
+    if not is_scripted and (arguments.json or arguments.save):
+        raise UsageError("--json and --save need events: --events, --random or --until-trouble")
+    supervisor = given_supervisor(arguments, is_json=arguments.json)
+    if supervisor is None:
+        return ExitCode.FAILED
+    if arguments.deployment not in (None, str(supervisor.deployment)):
+        raise UsageError(f"{arguments.model} was made for the deployment {supervisor.deployment}")
+    run_ = Run(supervisor)
+    if is_scripted:
+        return _script(arguments, run_)
+    from robosc.cli.simulation_shell import Shell
+
+    return Shell(run_, model_of_test(arguments)).loop(sys.stdin)
+
+
+def model_of_test(arguments: argparse.Namespace) -> "ModelOfTest":
+    """Return the model, as a saved test is to load it."""
+    from robosc.pipeline.saved_runs import ModelOfTest
+
+    return ModelOfTest(
+        arguments.model,
+        Deployment(arguments.deployment or Deployment.CONTROLLER),
+        tuple(arguments.library_path),
+        tuple(arguments.interface_path),
+    )
+
+
+def _script(arguments: argparse.Namespace, run_: "Run") -> int:
+    """Have happen what the options say, and report it."""
+    from robosc.errors import RoboscError
+    from robosc.pipeline.walking import ALL_TROUBLE, TroubleKind
+
+    report = _JsonReport(run_) if arguments.json else _TextReport(run_)
+    trouble, problem = None, ""
+    try:
+        if arguments.events is not None:
+            problem = _take_events(arguments.events, run_, report.step)
+        if not problem and arguments.random:
+            for step in run_.walk(arguments.random, arguments.seed):
+                report.step(step)
+        if not problem and arguments.until_trouble:
+            kinds = frozenset(map(TroubleKind, arguments.trouble or ())) or ALL_TROUBLE
+            before = len(run_)
+            trouble = run_.walk_until_trouble(arguments.until_trouble, arguments.seed, kinds)
+            for step in run_.history[before:]:
+                report.step(step)
+        for file in arguments.save:
+            run_.save(file, model_of_test(arguments))
+    except OSError as error:
+        raise UsageError(str(error)) from error
+    except RoboscError as error:
+        problem = str(error)
+    report.end(trouble, problem)
+    if problem:
+        sys.stdout.flush()
+        sys.stderr.write(f"robosc: {visible(problem)}\n")
+    return ExitCode.FAILED if problem or trouble is not None else ExitCode.OK
+
+
+def _take_events(name: str, run_: "Run", report: Callable[["Step"], None]) -> str:
+    """Take the events of a file; returns what is wrong with the first that is not possible.
+
+    Raises:
+        UsageError: The file cannot be read.
+    """
+    from robosc.pipeline.event_scripts import ScriptError, read_script
+    from robosc.pipeline.received_data import NO_DATA, DataError
+    from robosc.pipeline.simulation import EventNotPossibleError, UnknownEventError
+
+    shown = "standard input" if name == "-" else name
+    try:
+        if name == "-":
+            script = read_script(sys.stdin.buffer, shown, run_.supervisor.model)
+        else:
+            with Path(name).open("rb") as stream:
+                script = read_script(stream, shown, run_.supervisor.model)
+    except OSError as error:
+        raise UsageError(f"cannot read {shown}: {error.strerror or error}") from error
+    except ScriptError as error:
+        raise CommandError(str(error), ExitCode.FAILED) from error
+    for item in script:
+        if not item.event:
+            run_.restart()
+            continue
+        try:
+            arguments = () if item.data is NO_DATA else (item.data,)
+            report(run_.step(run_.event_called(item.event), *arguments))
+        except (DataError, EventNotPossibleError, UnknownEventError) as error:
+            return f"{shown}:{item.line}: {error}"
+    return ""
+
+
+class _TextReport:
+    """Report for a person."""
+
+    def __init__(self, run_: "Run") -> None:
+        self._run = run_
+        self._count = 0
+        self._state = run_.state
+
+    def step(self, step: "Step") -> None:
+        self._count += 1
+        write_lines(step_lines(self._count, step, self._state))
+        self._state = step.state
+
+    def end(self, trouble: "Trouble | None", problem: str) -> None:
+        write_lines([*([] if trouble is None else [str(trouble)]), *standing(self._run)])
+
+
+class _JsonReport:
+    """Report for a machine: one JSON object a line."""
+
+    def __init__(self, run_: "Run") -> None:
+        self._run = run_
+        self._count = 0
+
+    def step(self, step: "Step") -> None:
+        self._count += 1
+        _print_line(
+            {
+                "step": self._count,
+                "event": step.event,
+                "controllable": step.is_controllable,
+                "data": dict(step.data),
+                "provided": step.provided,
+                "skipped": list(step.skipped),
+                "unknown": list(step.unknown),
+                "state": state_json(step.state),
+            }
+        )
+
+    def end(self, trouble: "Trouble | None", problem: str) -> None:
+        run_ = self._run
+        disabled = [event for event in run_.events if run_.is_controllable(event) and event not in run_.enabled]
+        _print_line(
+            {
+                "status": "not possible" if problem else "trouble" if trouble is not None else "done",
+                "message": problem or (str(trouble) if trouble is not None else ""),
+                "trouble": None if trouble is None else trouble_json(trouble),
+                "steps": self._count,
+                "state": state_json(run_.state),
+                "marked": run_.is_marked,
+                "enabled": list(run_.enabled),
+                "disabled": [{"event": event, "why": list(run_.reasons(event))} for event in disabled],
+                "possible": list(run_.possible),
+            }
+        )
+
+
+def write_lines(lines: Iterable[str]) -> None:
+    """Write lines to standard output, as a terminal can show them."""
+    sys.stdout.write("".join(visible(line) + "\n" for line in lines))
+
+
+def _print_line(document: Mapping[str, Any]) -> None:
+    from robosc.execution.runtime.event_log import plain
+
+    text = json.dumps(plain(dict(document)), ensure_ascii=not has_unicode_output(), allow_nan=False)
+    sys.stdout.write(text.translate(ESCAPED) + "\n")
+
+
+def state_json(state: "StateInWords") -> dict[str, object]:
+    """A state as JSON values."""
+    return {
+        "components": dict(state.components),
+        "variables": dict(state.variables),
+        "communications": dict(state.communications),
+    }
+
+
+def trouble_json(trouble: "Trouble") -> dict[str, object]:
+    """Trouble as JSON values."""
+    return {"kind": str(trouble.kind), "event": trouble.event, "why": list(trouble.why), "steps": trouble.steps}
+
+
+def step_lines(number: int, step: "Step", before: "StateInWords") -> list[str]:
+    """A step in lines: the event with its data, what it changed, what a request sends, and what was unknown."""
+    from robosc.pipeline.simulation import changes_text, event_text
+
+    lines = [f"{number:4}  {': '.join(filter(None, (event_text(step), changes_text(before, step.state))))}"]
+    if step.provided is not None:
+        lines.append(f"      sends {json.dumps(step.provided, default=str)}")
+    lines += [f"      unknown: {item}" for item in step.unknown]
+    lines += [f"      unknown: {item} keeps its value" for item in step.skipped]
+    return lines
+
+
+def standing(run_: "Run") -> list[str]:
+    """Return the state and what can happen in it, in lines."""
+    others = [event for event in run_.possible if not run_.is_controllable(event)]
+    return [
+        f"now       {run_.state}{' (marked)' if run_.is_marked else ''}",
+        f"allowed   {', '.join(run_.enabled) or 'nothing'}",
+        f"can come  {', '.join(others) or 'nothing'}",
+    ]

@@ -1,0 +1,264 @@
+"""The commands of `robosc simulate`: read from a terminal with a prompt and completion, or from a file."""
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+from robosc.cli.output import ExitCode
+from robosc.cli.simulate import DEFAULT_STEPS, standing, step_lines, write_lines
+from robosc.errors import RoboscError
+from robosc.pipeline.event_scripts import parse_event
+from robosc.pipeline.received_data import NO_DATA, DataField
+from robosc.source import visible
+
+if TYPE_CHECKING:
+    from robosc.pipeline.saved_runs import ModelOfTest
+    from robosc.pipeline.simulation import Run, Step
+
+PROMPT = "> "
+
+HELP = """\
+EVENT [DATA]               an event: move.request, scan.response front=0.7, level.response 3; move for move.request
+enabled                    what can happen now, with the data that it carries
+why EVENT                  why an event cannot happen now
+state                      where everything is
+undo [N], redo [N]         take back the last events; take them again
+history                    the events so far
+restart                    begin again in the initial state
+random N [SEED]            N events by chance
+until-trouble [N] [SEED]   events by chance until there is trouble: a deadlock, a blocked request, something unknown
+save FILE                  the events so far, as an event log (.jsonl) or a test for pytest (.py)
+help, quit
+"""
+
+_MOST = 1_000_000
+
+
+class _CommandFault(Exception):
+    """A command that cannot be done; one sentence."""
+
+
+class Shell:
+    """The commands on one run.
+
+    Args:
+        run: The run.
+        model: Model that a saved test loads.
+    """
+
+    def __init__(self, run: "Run", model: "ModelOfTest") -> None:
+        self._run = run
+        self._model = model
+        self._walks = 0
+        self._commands: dict[str, Callable[[Sequence[str]], None]] = {
+            "enabled": self._enabled,
+            "why": self._why,
+            "state": self._state,
+            "undo": self._undo,
+            "redo": self._redo,
+            "history": self._history,
+            "restart": self._restart,
+            "random": self._random,
+            "until-trouble": self._until_trouble,
+            "save": self._save,
+            "help": self._help,
+        }
+
+    def loop(self, stream: TextIO) -> int:
+        """Do the commands of a stream until it ends; returns the exit status.
+
+        On a terminal what cannot be done is told, and the next command read; elsewhere it ends everything.
+        """
+        is_terminal = stream.isatty()
+        if is_terminal:
+            return self._converse()
+        for number, line in enumerate(stream, start=1):
+            try:
+                if not self.do(line):
+                    break
+            except (_CommandFault, RoboscError) as error:
+                sys.stdout.flush()
+                sys.stderr.write(f"robosc: standard input:{number}: {visible(str(error))}\n")
+                return ExitCode.FAILED
+        return ExitCode.OK
+
+    def _converse(self) -> int:
+        with contextlib.suppress(ImportError):  # Some Pythons are built without it: then lines are typed plainly.
+            import readline
+
+            readline.set_completer_delims(" =")
+            readline.set_completer(lambda text, state: self._completion(readline.get_line_buffer(), text, state))
+            is_libedit = getattr(readline, "backend", "readline") == "editline"
+            readline.parse_and_bind("bind ^I rl_complete" if is_libedit else "tab: complete")
+        write_lines(
+            [f"{self._run.supervisor.model.name}: 'help' tells the commands, Tab completes", *standing(self._run)]
+        )
+        while True:
+            try:
+                line = input(PROMPT)
+            except EOFError:
+                sys.stdout.write("\n")
+                return ExitCode.OK
+            try:
+                if not self.do(line):
+                    return ExitCode.OK
+            except (_CommandFault, RoboscError) as error:
+                write_lines([str(error)])
+
+    def do(self, line: str) -> bool:
+        """Do a command; False: it was the last one.
+
+        Raises:
+            RoboscError: It cannot be done.
+        """
+        words = line.split()
+        if not words or words[0].startswith("#"):
+            return True
+        if words[0] in ("quit", "exit"):
+            return False
+        if words[0] in self._commands:
+            self._commands[words[0]](words[1:])
+            return True
+        event, data = parse_event(line)
+        before = self._run.state
+        step = self._run.step(self._run.event_called(event), *(() if data is NO_DATA else (data,)))
+        write_lines([*step_lines(len(self._run), step, before), *standing(self._run)])
+        return True
+
+    # The commands
+
+    def _enabled(self, words: Sequence[str]) -> None:
+        _no_words("enabled", words)
+        for event in self._run.possible:
+            sign = "allowed " if self._run.is_controllable(event) else "can come"
+            write_lines([f"{sign}  {event}{_carried(self._run.data_fields(event))}"])
+
+    def _why(self, words: Sequence[str]) -> None:
+        if len(words) != 1:
+            raise _CommandFault("why which event? why EVENT")
+        event = self._run.event_called(words[0])
+        write_lines(self._run.reasons(event) or [f"{event} can happen"])
+
+    def _state(self, words: Sequence[str]) -> None:
+        _no_words("state", words)
+        write_lines(standing(self._run))
+
+    def _undo(self, words: Sequence[str]) -> None:
+        self._repeat("undo", words, self._run.undo, "taken back")
+
+    def _redo(self, words: Sequence[str]) -> None:
+        self._repeat("redo", words, self._run.redo, "taken again")
+
+    def _repeat(self, name: str, words: Sequence[str], action: "Callable[[], Step | None]", what: str) -> None:
+        (count,) = _numbers(name, words, (1,))
+        for _ in range(count):
+            step = action()
+            if step is None:
+                write_lines([f"nothing is left to be {what}"])
+                break
+            write_lines([f"{what}: {step.event}"])
+        write_lines(standing(self._run))
+
+    def _history(self, words: Sequence[str]) -> None:
+        _no_words("history", words)
+        self._tell(self._run.history, 0)
+
+    def _restart(self, words: Sequence[str]) -> None:
+        _no_words("restart", words)
+        self._run.restart()
+        write_lines(standing(self._run))
+
+    def _random(self, words: Sequence[str]) -> None:
+        count, seed = _numbers("random", words, (None, self._walks))
+        self._walks += 1
+        before = len(self._run)
+        if len(self._run.walk(count, seed)) < count:
+            self._tell(self._run.history[before:], before)
+            write_lines(["nothing more can happen"])
+        else:
+            self._tell(self._run.history[before:], before)
+        write_lines([f"seed {seed}", *standing(self._run)])
+
+    def _until_trouble(self, words: Sequence[str]) -> None:
+        count, seed = _numbers("until-trouble", words, (DEFAULT_STEPS, self._walks))
+        self._walks += 1
+        before = len(self._run)
+        trouble = self._run.walk_until_trouble(count, seed)
+        self._tell(self._run.history[before:], before)
+        write_lines([str(trouble) if trouble is not None else f"no trouble in {len(self._run) - before} steps"])
+        write_lines([f"seed {seed}", *standing(self._run)])
+
+    def _save(self, words: Sequence[str]) -> None:
+        if len(words) != 1:
+            raise _CommandFault("save to which file? save FILE, with a name that ends in .jsonl or .py")
+        write_lines([f"written to {self._run.save(Path(words[0]), self._model)}"])
+
+    def _help(self, words: Sequence[str]) -> None:
+        sys.stdout.write(HELP)
+
+    # Output and completion
+
+    def _tell(self, steps: "Iterable[Step]", number: int) -> None:
+        before = self._run.history[number - 1].state if number else self._run.initial
+        for count, step in enumerate(steps, start=number + 1):
+            write_lines(step_lines(count, step, before))
+            before = step.state
+
+    def _completion(self, line: str, text: str, state: int) -> str | None:
+        """Return one of the words that may stand where `text` is begun: what `readline` asks for, one by one."""
+        found = [word for word in self.words_after(line[: len(line) - len(text)]) if word.startswith(text)]
+        return found[state] if state < len(found) else None
+
+    def words_after(self, line: str) -> list[str]:
+        """The words that may stand after the beginning of a line."""
+        words = line.split()
+        if not words:
+            return [f"{word} " for word in (*self._run.possible, *self._commands, "quit")]
+        if words == ["why"]:
+            return [event for event in self._run.events if event not in self._run.possible]
+        if words[0] in self._commands or words[0] not in self._run.events:
+            return []
+        fields = self._run.data_fields(words[0])
+        if line.endswith("="):
+            name = words[-1].rstrip("=").rpartition(" ")[2]
+            return [f"{choice} " for item in fields if item.path == (name,) for choice in item.choices]
+        given = {word.partition("=")[0] for word in words[1:]}
+        return [
+            choice
+            for item in fields
+            for choice in ([f"{item.path[0]}="] if len(item.path) == 1 else item.choices if not item.path else ())
+            if not item.path or item.path[0] not in given
+        ]
+
+
+def _carried(fields: Sequence[DataField]) -> str:
+    told = [f"{item.name}: {' | '.join(item.choices) or item.type}" for item in fields if item.is_read]
+    return f"  ({', '.join(told)})" if told else ""
+
+
+def _no_words(name: str, words: Sequence[str]) -> None:
+    if words:
+        raise _CommandFault(f"{name} takes nothing more")
+
+
+def _numbers(name: str, words: Sequence[str], defaults: Sequence[int | None]) -> tuple[int, ...]:
+    """Return the numbers of a command: the first at least 1, the second any; a default stands for one left out.
+
+    Raises:
+        _CommandFault: They are none, or too many.
+    """
+    shown = f"{name} {'N' if defaults[0] is None else '[N]'}{' [SEED]' if len(defaults) > 1 else ''}"
+    if len(words) > len(defaults):
+        raise _CommandFault(f"too many words: {shown}")
+    found = []
+    for place, default in enumerate(defaults):
+        try:
+            number = int(words[place]) if place < len(words) else default
+        except ValueError:
+            raise _CommandFault(f"'{words[place]}' is no whole number: {shown}") from None
+        if number is None or (place == 0 and not 1 <= number <= _MOST):
+            raise _CommandFault(f"N is a number from 1 to {_MOST}: {shown}")
+        found.append(number)
+    return tuple(found)

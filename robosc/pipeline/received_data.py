@@ -1,0 +1,268 @@
+"""Data that comes with an event: checked as a person gives it, drawn by chance, and described for a form."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from random import Random
+from typing import Any
+
+import msgspec
+
+from robosc.errors import RoboscError
+from robosc.execution.interpreter.received import EnumChoice
+from robosc.expressions import (
+    MAXIMUM_INTEGER,
+    MINIMUM_INTEGER,
+    ArrayPart,
+    ArrayType,
+    BooleanType,
+    Constant,
+    DoubleType,
+    EnumType,
+    IntegerType,
+    NoneType,
+    ObjectType,
+    PathStep,
+    Received,
+    StringType,
+    Type,
+    type_text,
+    values,
+)
+from robosc.model.findings import did_you_mean
+from robosc.model.received import converted_paths
+from robosc.model.structure import EventKind, Model, is_tau
+
+MAXIMUM_ELEMENTS = 1000
+"""Elements of an array that is drawn by chance: what lies beyond them is unknown."""
+
+
+class DataError(RoboscError, ValueError):
+    """Data that an event does not carry; the message says what it carries."""
+
+
+class _NoData:
+    """Placeholder for data that was not given, which is something else than None."""
+
+    def __repr__(self) -> str:
+        return "NO_DATA"
+
+
+NO_DATA = _NoData()
+
+
+def received_type(model: Model, event: str) -> Type | None:
+    """The declared type of the data that comes with an event, or None."""
+    if is_tau(event):
+        return None
+    name, _, kind = event.partition(".")
+    type_ = model.communication(name).received_type(EventKind(kind))
+    return None if isinstance(type_, NoneType) else type_
+
+
+@dataclass(frozen=True, slots=True)
+class DataField:
+    """A part of the data that comes with an event, which a person can enter.
+
+    Attributes:
+        path: Names of the properties that lead to it; empty: it is all of the data.
+        type: Its declared type, in the model's words.
+        choices: Its values by name, of an enum or boolean; empty: others.
+        is_number: True if it is a number.
+        is_read: True if something in the model depends on it.
+    """
+
+    path: tuple[str, ...]
+    type: str
+    choices: tuple[str, ...]
+    is_number: bool
+    is_read: bool
+
+    @property
+    def name(self) -> str:
+        """Its name in the data: `value.front`."""
+        return ".".join(("value", *self.path))
+
+
+def data_fields(model: Model, event: str) -> tuple[DataField, ...]:
+    """The parts of the data that comes with an event, in the model's order; none where it carries nothing."""
+    type_ = received_type(model, event)
+    if type_ is None:
+        return ()
+    read = {tuple(step for step in path if isinstance(step, str)) for path in converted_paths(model, event)}
+    return tuple(_fields(model, type_, (), read))
+
+
+def _fields(model: Model, type_: Type, path: tuple[str, ...], read: set[tuple[str, ...]]) -> Iterator[DataField]:
+    match type_:
+        case ObjectType(name=name):
+            for item in model.object(name).properties:
+                yield from _fields(model, item.type, (*path, item.name), read)
+            return
+        case EnumType(values=names):
+            choices = tuple(names)
+        case BooleanType():
+            choices = ("false", "true")
+        case _:
+            choices = ()
+    is_read = any(other[: len(path)] == path for other in read)
+    yield DataField(path, type_text(type_), choices, isinstance(type_, IntegerType | DoubleType), is_read)
+
+
+class GivenData:
+    """Checks data that a person gives by hand against the types of the model.
+
+    Args:
+        model: The model.
+        event: An event of it.
+    """
+
+    def __init__(self, model: Model, event: str) -> None:
+        self._objects = {item.name: {part.name: part.type for part in item.properties} for item in model.objects}
+        self._enums = {item.name: item for item in model.enums}
+        self._event = event
+
+    def value(self, type_: Type, given: object, path: str = "value") -> object:
+        """A value as the interpreter reads it.
+
+        Args:
+            type_: Its declared type.
+            given: The value as given; None: it is unknown.
+            path: Its place in the data, for messages.
+
+        Raises:
+            DataError: It is no value of that type.
+        """
+        if given is None:
+            return None
+        match type_:
+            case ObjectType(name=name):
+                return self._object(type_, self._objects[name], given, path)
+            case ArrayType(element=element):
+                return self._array(type_, element, given, path)
+            case EnumType(name=name):
+                return self._enum(type_, self._enums[name].source, given, path)
+            case BooleanType():
+                fits = values.read_boolean(given) is not None
+            case IntegerType():
+                fits = values.read_whole(given) is not None
+            case DoubleType():
+                fits = values.read_double(given) is not None
+            case StringType():
+                fits = values.read_string(given) is not None
+            case _:
+                fits = False
+        if not fits:
+            raise self._wrong(type_, given, path)
+        return given
+
+    def _object(self, type_: Type, parts: Mapping[str, Type], given: object, path: str) -> object:
+        if not isinstance(given, Mapping):
+            raise self._wrong(type_, given, path)
+        for name in given:
+            if name not in parts:
+                near = did_you_mean(str(name), parts)
+                hint = f"did you mean '{near}'?" if near else f"there are {', '.join(parts)}"
+                raise DataError(f"{path} of '{self._event}' has no property '{name}'; {hint}")
+        return {name: self.value(parts[name], item, f"{path}.{name}") for name, item in given.items()}
+
+    def _array(self, type_: Type, element: Type, given: object, path: str) -> object:
+        if isinstance(given, str | bytes | Mapping):
+            raise self._wrong(type_, given, path)
+        try:
+            elements = list(given)  # type: ignore[call-overload]  # whatever it is, it is asked for its elements
+        except TypeError:
+            raise self._wrong(type_, given, path) from None
+        return [self.value(element, item, f"{path}[{index}]") for index, item in enumerate(elements)]
+
+    def _enum(self, type_: EnumType, source: Type, given: object, path: str) -> object:
+        if isinstance(given, str):
+            if given in type_.values:
+                return EnumChoice(given)
+            if not isinstance(source, StringType):
+                near = did_you_mean(given, type_.values)
+                hint = f"did you mean '{near}'?" if near else f"there are {', '.join(type_.values)}"
+                raise DataError(f"{path} of '{self._event}' is {given!r:.100}, which is no {type_text(type_)}; {hint}")
+        try:
+            return self.value(source, given, path)
+        except DataError as error:
+            raise DataError(f"{error}, or one of {', '.join(type_.values)}") from None
+
+    def _wrong(self, type_: Type, given: object, path: str) -> DataError:
+        parts = self._objects.get(type_.name) if isinstance(type_, ObjectType) else None
+        wanted = type_text(type_) + (f" with {', '.join(parts)}" if parts else "")
+        return DataError(f"{path} of '{self._event}' is {given!r:.100}, and must be {wanted}")
+
+
+class RandomData:
+    """Draws data by chance that events may carry: whatever the model reads of it is known.
+
+    Of an enum a value is drawn, of a number one that is near to a constant of the model, since that is where
+    comparisons change.
+
+    Args:
+        model: The model.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        constants = [node.value for node in _nodes(model) if isinstance(node, Constant)]
+        numbers = {item for item in constants if isinstance(item, int | float) and not isinstance(item, bool)}
+        self._doubles = sorted({0.0, *(float(item) + step for item in numbers for step in (-0.5, 0.0, 0.5))})
+        near = {0, *(int(item) + step for item in numbers for step in (-1, 0, 1))}
+        self._integers = sorted(item for item in near if MINIMUM_INTEGER <= item <= MAXIMUM_INTEGER)
+        self._strings = sorted({"", *(item for item in constants if isinstance(item, str))})
+        self._length = min(max(_indices(model), default=0) + 1, MAXIMUM_ELEMENTS)
+
+    def draw(self, event: str, dice: Random) -> object:
+        """Data of an event, as a person would give it; NO_DATA where the model reads none."""
+        type_ = received_type(self._model, event)
+        paths = converted_paths(self._model, event)
+        return NO_DATA if type_ is None or not paths else self._draw(type_, paths, dice)
+
+    def _draw(self, type_: Type, paths: Sequence[tuple[PathStep, ...]], dice: Random) -> object:
+        """A value of which the parts at some paths are known; an empty path is all of it."""
+        match type_:
+            case ObjectType(name=name):
+                found = {}
+                for item in self._model.object(name).properties:
+                    below = [path[1:] for path in paths if not path or path[0] == item.name]
+                    if below:
+                        found[item.name] = self._draw(item.type, below, dice)
+                return found
+            case ArrayType(element=element):
+                below = [path[1:] for path in paths]
+                return [self._draw(element, below, dice) for _ in range(self._length + dice.randrange(3))]
+            case EnumType(values=names):
+                return dice.choice(names)
+            case BooleanType():
+                return dice.random() < 0.5
+            case IntegerType(low=int(low), high=int(high)):
+                return dice.randint(low, high)
+            case IntegerType():
+                return dice.choice(self._integers)
+            case DoubleType():
+                return dice.choice(self._doubles)
+            case _:
+                return dice.choice(self._strings)
+
+
+def _indices(model: Model) -> Iterator[int]:
+    """Every index of an array that the model names."""
+    for node in _nodes(model):
+        match node:
+            case Received(path=path):
+                yield from (step for step in path if isinstance(step, int))
+            case ArrayPart(low=low, high=high):
+                yield from (index for index in (low, high) if index is not None)
+
+
+def _nodes(model: Model) -> Iterator[Any]:
+    """Every part of a model, itself included."""
+    stack: list[Any] = [model]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, tuple):
+            stack += node
+        elif isinstance(node, msgspec.Struct):
+            yield node
+            stack += (getattr(node, name) for name in node.__struct_fields__)

@@ -1,0 +1,197 @@
+"""Runs that are kept: as an event log, and as a test for pytest that leads a run the same way."""
+
+import math
+import os
+import pprint
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robosc.execution.runtime.event_log import json_line
+from robosc.model.structure import Deployment
+from robosc.pipeline.received_data import NO_DATA
+
+if TYPE_CHECKING:
+    from robosc.certification.supervisor_file import StateInWords
+    from robosc.pipeline.simulation import Run
+
+_WIDTH = 112
+
+
+@dataclass(frozen=True, slots=True)
+class ModelOfTest:
+    """A model, or a supervisor's file, as a test loads it.
+
+    Attributes:
+        path: Its file.
+        deployment: Deployment that its supervisor is synthesized for.
+        library_paths: More folders with libraries.
+        interface_paths: More folders with ROS packages.
+    """
+
+    path: Path
+    deployment: Deployment = Deployment.CONTROLLER
+    library_paths: tuple[Path, ...] = ()
+    interface_paths: tuple[Path, ...] = ()
+
+
+def event_log(run: "Run") -> str:
+    """Return the text of an event log of a run; its clock counts the events, a second each."""
+    return "".join(json_line(entry) for entry in _entries(run))
+
+
+def _entries(run: "Run") -> Iterator[dict[str, Any]]:
+    for number, step in enumerate(run.history, start=1):
+        told = step.provided if step.is_controllable else dict(step.data)
+        if step.unknown:
+            yield {"time": float(number), "kind": "unknown", "event": step.event, "unknown": list(step.unknown)}
+        yield {
+            "time": float(number),
+            "kind": "event",
+            "event": step.event,
+            "controllable": step.is_controllable,
+            "data": told,
+            "state": state_by_component(step.state),
+            "decision_us": 0.0,
+        }
+        if step.skipped:
+            yield {"time": float(number), "kind": "unknown", "event": step.event, "unknown": list(step.skipped)}
+
+
+def state_by_component(state: "StateInWords") -> dict[str, dict[str, Any]]:
+    """The state and variables of each component with a behaviour, as event logs and executors tell them."""
+    found: dict[str, dict[str, Any]] = {
+        name: {"state": place, "variables": {}} for name, place in state.components.items()
+    }
+    for name, value in state.variables.items():
+        component, _, variable = name.partition(".")
+        found[component]["variables"][variable] = value
+    return found
+
+
+_TEST = '''\
+"""A run of {name}, event by event: what each leads to, and what is enabled then. Saved by `robosc simulate`."""
+
+{imports}from pathlib import Path
+
+import robosc
+
+{source}
+
+INITIAL = {initial}
+ENABLED = {enabled}
+
+# Each event with its data (Ellipsis where none was given), what is enabled after it, and what it changes.
+STEPS = [
+{steps}]
+
+
+def state_of(run):
+    return {{**run.state.components, **run.state.variables, **run.state.communications}}
+
+
+def test_run():
+{supervisor}
+    run = robosc.simulate(supervisor)
+    state = dict(INITIAL)
+    assert (run.enabled, state_of(run)) == (ENABLED, state)
+    for number, (event, data, enabled, changes) in enumerate(STEPS, start=1):
+        run.step(event, *(() if data is ... else (data,)))
+        state |= changes
+        assert (run.enabled, state_of(run)) == (enabled, state), f"after event {{number}}, {{event}}"
+'''
+
+_SYNTHESIZED = """\
+    options = robosc.SynthesisOptions(deployment=robosc.Deployment.{deployment}, allow_livelock=True)
+    made = robosc.synthesize(robosc.load(MODEL{folders}), options)
+    assert made.supervisor is not None, str(made.explanation)
+    supervisor = made.supervisor"""
+
+
+def pytest_module(run: "Run", model: ModelOfTest, file: Path) -> str:
+    """Return the text of a test for pytest that leads a run through the same events.
+
+    Args:
+        run: The run.
+        model: The model that the test loads.
+        file: File that the test will stand in: the model is named as seen from there.
+    """
+    from robosc.pipeline.simulation import Run
+
+    again = Run(run.supervisor)
+    enabled, state = again.enabled, _values(again.initial)
+    initial, steps = dict(state), list[tuple[Any, ...]]()
+    for step in run.history:
+        given = _plain(step.given)
+        again.step(step.event, *(() if given is ... else (given,)))
+        now = _values(again.state)
+        changes = {name: value for name, value in now.items() if not _is_same(state[name], value)}
+        steps.append((step.event, given, again.enabled, changes))
+        state = now
+    is_file = model.path.suffix == ".rsup"
+    folders = "".join(
+        f", {name}=[{', '.join(f'FOLDER / {_seen_from(file, item)!r}' for item in paths)}]"
+        for name, paths in (("library_paths", model.library_paths), ("interface_paths", model.interface_paths))
+        if paths
+    )
+    written = "".join(textwrap.indent(_literal(step), "    ") + ",\n" for step in steps)
+    made = _SYNTHESIZED.format(folders=folders, deployment=model.deployment.name)
+    return _TEST.format(
+        name=run.supervisor.model.name,
+        imports="import math\n" if "math." in written else "",
+        source=f"FOLDER = Path(__file__).parent\nMODEL = FOLDER / {_seen_from(file, model.path)!r}",
+        initial=_literal(initial),
+        enabled=_literal(enabled),
+        steps=written,
+        supervisor="    supervisor = MODEL" if is_file else made,
+    )
+
+
+def _seen_from(file: Path, path: Path) -> str:
+    return os.path.relpath(os.path.realpath(path), os.path.realpath(file.parent))
+
+
+def _values(state: "StateInWords") -> dict[str, Any]:
+    return {**state.components, **state.variables, **state.communications}
+
+
+def _is_same(a: object, b: object) -> bool:
+    return type(a) is type(b) and a == b
+
+
+def _plain(given: Any) -> Any:
+    """Data as literals of Python; ... where none was given."""
+    if given is NO_DATA:
+        return ...
+    if isinstance(given, Mapping):
+        return {str(name): _plain(item) for name, item in given.items()}
+    if given is None or isinstance(given, bool | int | float):
+        return given
+    # A text may be of a class of its own, as the value of an enum is.
+    return str(given) if isinstance(given, str) else [_plain(item) for item in given]
+
+
+class _Text(str):
+    """A number that Python has no literal for, as the expression that stands for it."""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def _literal(value: Any) -> str:
+    return pprint.pformat(_written(value), width=_WIDTH, sort_dicts=False, compact=True)
+
+
+def _written(value: Any) -> Any:
+    match value:
+        case dict():
+            return {name: _written(item) for name, item in value.items()}
+        case list():
+            return [_written(item) for item in value]
+        case tuple():
+            return tuple(_written(item) for item in value)
+        case float() if not math.isfinite(value):
+            return _Text("math.nan" if math.isnan(value) else "math.inf" if value > 0 else "-math.inf")
+    return value

@@ -1,4 +1,4 @@
-"""Makes the picture of the README: a live view, while a supervisor leads a simulated robot through a maze.
+"""Makes the pictures of the documentation: a live view of a robot in a maze, and a model that is played with.
 
     make pictures        # needs Chromium
 
@@ -23,6 +23,16 @@ from support.browser import CHROMIUM, running_browser, visit
 PICTURES = Path(__file__).parents[1] / "docs" / "pictures"
 MODEL = EXAMPLES / "maze_solver" / "maze_solver.rscd"
 SCENE = "maze-rooms"
+PLAYED_EVENTS = {
+    "calibrate.request": "",
+    "calibrate.response": "true",
+    "calibrate.reset": "",
+    "Localisation.tau_1": "",
+    "person.response": "far",
+}
+"""Events that have happened when the picture is taken, each with the data that is chosen for it."""
+
+PLAYED = EXAMPLES / "navigation" / "navigation.rscd"
 
 SIZE = (1500, 1000)
 COLOURS = 128
@@ -43,6 +53,7 @@ def main() -> int:
     PICTURES.mkdir(exist_ok=True)
     try:
         with interruptible(), tempfile.TemporaryDirectory(prefix="robosc-pictures-") as folder:
+            print(playground(Path(folder), PICTURES / "playground.png"))
             print(live_view(Path(folder), PICTURES / "live-view.png"))
     except ScenarioError as error:
         print(f"make_pictures: {error}", file=sys.stderr)
@@ -77,6 +88,33 @@ def live_view(folder: Path, picture: Path) -> Path:
                 height = seen.page.evaluate("document.querySelector('#cards').getBoundingClientRect().bottom + 10")
                 seen.page.screenshot(path=picture, clip={"x": 0, "y": 0, "width": SIZE[0], "height": height})
         rig.finish()
+    return _small(picture)
+
+
+def playground(folder: Path, picture: Path) -> Path:
+    """Make the picture of a model that is played with; returns its file.
+
+    Args:
+        folder: Folder for the records of the program.
+        picture: File of the picture.
+    """
+    words = ["-m", "robosc.cli.main", "view", str(PLAYED), "--address", "127.0.0.1:0"]
+    with Program("view", words, folder) as view, running_browser() as browser:
+        address = view.wait_for(r"(http://\S+)")[1]
+        with visit(browser, address, SIZE, color_scheme="light", reduced_motion="reduce") as seen:
+            for event, choice in PLAYED_EVENTS.items():
+                if choice:
+                    seen.page.locator(f'form[data-event="{event}"] select').select_option(choice)
+                seen.page.locator(f'form[data-event="{event}"] button').click()
+            seen.wait(f"() => document.querySelector('#play-count').textContent.startsWith('{len(PLAYED_EVENTS)} ')")
+            seen.page.evaluate("document.activeElement.blur(), scrollTo(0, 0)")
+            seen.page.wait_for_timeout(600)
+            seen.page.screenshot(path=picture)
+    return _small(picture)
+
+
+def _small(picture: Path) -> Path:
+    """The same picture in a smaller file."""
     Image.open(picture).convert("RGB").quantize(COLOURS).save(picture, optimize=True)
     return picture
 

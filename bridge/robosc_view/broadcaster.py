@@ -46,6 +46,7 @@ class Viewer:
         self._update: str | None = None
         self._scan: str | None = None
         self._position: str | None = None
+        self._run: str | None = None
         self._answers: deque[str] = deque(maxlen=MAXIMUM_ANSWERS)
         self._events: deque[str] = deque()
         self._bytes = 0
@@ -56,7 +57,7 @@ class Viewer:
         self._lost += len(self._events)
         self._events.clear()
         self._bytes = 0
-        self._gone = self._update = self._scan = self._position = None
+        self._gone = self._update = self._scan = self._position = self._run = None
         self._definition = text
         self._news.set()
 
@@ -84,6 +85,11 @@ class Viewer:
     def show_position(self, text: str) -> None:
         """The latest position."""
         self._position = text
+        self._news.set()
+
+    def show_run(self, text: str) -> None:
+        """The latest of a run that is led by hand."""
+        self._run = text
         self._news.set()
 
     def answer(self, text: str) -> None:
@@ -116,8 +122,8 @@ class Viewer:
             found.append(self._position)
         if self._events or self._lost:
             found.append(events_text(list(self._events), self._lost))
-        found += [text for text in (self._update, self._scan) if text is not None]
-        self._definition = self._gone = self._update = self._scan = self._position = None
+        found += [text for text in (self._update, self._scan, self._run) if text is not None]
+        self._definition = self._gone = self._update = self._scan = self._position = self._run = None
         self._answers.clear()
         self._events.clear()
         self._bytes = self._lost = 0
@@ -278,6 +284,16 @@ class Broadcaster:
         self._position = position_text(time_s, speed, is_playing=is_playing)
         for viewer in self._viewers:
             viewer.show_position(self._position)
+
+    def show_run(self, text: str) -> None:
+        """Receive the message `run`."""
+        for viewer in self._viewers:
+            viewer.show_run(text)
+
+    def answer(self, text: str) -> None:
+        """Receive a message that answers a page."""
+        for viewer in self._viewers:
+            viewer.answer(text)
 
     async def _refresh(self) -> None:
         """Send updates: soon after there is something new, not too often, and at least now and then."""

@@ -1,4 +1,4 @@
-"""`robosc view`: the live view of a bridge, of a ROS 2 node, or of an event log."""
+"""`robosc view`: the live view of a bridge, of a ROS 2 node, or of an event log; a page to play with a model."""
 
 import argparse
 import contextlib
@@ -14,18 +14,25 @@ from robosc.cli.arguments import add_given_supervisor_options, suggest
 from robosc.cli.output import CommandError, ExitCode, UsageError
 
 if TYPE_CHECKING:
+    from robosc.source import Bundle
     from robosc.supervisor import Supervisor
     from robosc_bridge.daemon.view_settings import ViewSettings
     from robosc_view.definition import Robot
     from robosc_view.sources import Source
-    from robosc_view.static_model import StaticModel
+    from robosc_view.watched_model import WatchedModel
 
 _ADDRESS = "127.0.0.1:8066"
+_MOST_BYTES = (1 << 24) + 1
+_IN_LINK = "#model="
+_LINK = re.compile(r"https?://[^#]*" + _IN_LINK)
 
 _DESCRIPTION = """\
 Serve a web page that shows a robot under its supervisor: the automata with the states that they are in, variables,
 services and actions, which requests are enabled and why the others are not, and every event. The address to open is
 printed, with a token that lets its page command the robot; stopping it needs none.
+
+Of a MODEL alone it is a playground: you have its events happen, with their data, take them back, let chance go on, and
+keep the run as an event log or a test. Whenever the model's file is saved the page follows, and says what has changed.
 """
 
 _EPILOG = """\
@@ -40,12 +47,20 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     """Add the command."""
     parser = commands.add_parser(
         "view",
-        help="show a robot in a web page, live or from its event log",
+        help="show a robot in a web page, live or from its event log; play with a model",
         description=_DESCRIPTION,
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    source = parser.add_argument_group("what is shown").add_mutually_exclusive_group()
+    shown = parser.add_argument_group("what is shown")
+    shown.add_argument(
+        "played",
+        nargs="?",
+        metavar="MODEL",
+        help="a model (.rscd) or its supervisor (.rsup) to play with; - for a model on standard input; or the link "
+        "that a page has made, which holds its model",
+    )
+    source = shown.add_mutually_exclusive_group()
     source.add_argument("--bridge", type=_bridge, metavar="HOST[:PORT]", help="a bridge, by its gRPC service")
     source.add_argument("--ros2", action="store_true", help="a generated ROS 2 node, by its topic /state")
     source.add_argument("--log", type=Path, metavar="FILE", help="an event log, which is replayed; needs --model")
@@ -55,8 +70,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         type=Path,
         metavar="FILE",
         help="with --log or --ros2: the model (.rscd), which is synthesized, or its supervisor (.rsup); without it the "
-        "page of a node cannot tell which requests are enabled. Alone: what is shown is this model in its initial "
-        "state, and again whenever its files change",
+        "page of a node cannot tell which requests are enabled. Alone it is the same as MODEL",
     )
     add_given_supervisor_options(parser, "stands")
     scene = parser.add_argument(
@@ -70,7 +84,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     )
     _add_serving(parser)
     _add_client(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, text=None)
 
 
 def _scene_names() -> tuple[str, ...]:
@@ -191,8 +205,9 @@ def run(arguments: argparse.Namespace) -> int:
     """
     from robosc_view.sources import ViewError, require_view
 
+    _take_played(arguments)
     if not (arguments.bridge or arguments.ros2 or arguments.log or arguments.model):
-        raise UsageError("what is shown? --bridge HOST, --ros2, --log FILE --model FILE, or --model FILE alone")
+        raise UsageError("what is shown? MODEL, --bridge HOST, --ros2, or --log FILE --model FILE")
     if arguments.log is not None and arguments.model is None:
         raise UsageError("--log needs --model: the model that the log is of")
     if arguments.model is not None and arguments.bridge is not None:
@@ -206,6 +221,33 @@ def run(arguments: argparse.Namespace) -> int:
         return _serve(arguments, make, robot, input_end, is_shared=is_shared)
     except ViewError as error:
         raise CommandError(str(error), ExitCode.USAGE) from error
+
+
+def _take_played(arguments: argparse.Namespace) -> None:
+    """Take the MODEL that is played with: `text` is what it holds itself, `model` its file.
+
+    Raises:
+        UsageError: Something else is to be shown, too, or it holds no model.
+    """
+    if arguments.played is None:
+        return
+    if arguments.bridge or arguments.ros2 or arguments.log or arguments.model:
+        raise UsageError("MODEL is played with alone: without --bridge, --ros2, --log and --model")
+    if arguments.played == "-":
+        from robosc.language import decode_source
+
+        if arguments.end_with_input:
+            raise UsageError("--end-with-input and a model on standard input do not go together")
+        arguments.text = decode_source(sys.stdin.buffer.read(_MOST_BYTES), "standard input")
+    elif _LINK.match(arguments.played):
+        from robosc_view.playground import unpacked
+        from robosc_view.sources import RefusedError
+
+        try:
+            arguments.text = unpacked(arguments.played.partition(_IN_LINK)[2])
+        except RefusedError as error:
+            raise UsageError(str(error)) from error
+    arguments.model = Path("model.rscd" if arguments.text is not None else arguments.played)
 
 
 def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool, Robot | None]":
@@ -223,15 +265,14 @@ def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool,
         except SecurityError as error:
             raise UsageError(str(error)) from error
         return lambda: RemoteBridge(arguments.bridge, credentials, scene), True, None
+    if not arguments.ros2 and arguments.log is None:
+        return _playground(arguments, scene)
     supervisor = None if arguments.model is None else _supervisor(arguments)
     if arguments.ros2:
         from robosc_view.ros2_topic import StateTopic
 
         _require_ros2()
         return lambda: StateTopic(arguments.namespace, supervisor, scene), True, None
-    if arguments.log is None:
-        alone = _alone(arguments, supervisor, scene)
-        return lambda: alone, True, alone.robot
     from robosc_view.replay import Recording, Replay
 
     assert supervisor is not None  # noqa: S101  # `run` has seen to that.
@@ -239,34 +280,86 @@ def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool,
     return lambda: Replay(recording), False, recording.robot
 
 
-def _alone(arguments: argparse.Namespace, supervisor: "Supervisor | None", scene: Any) -> "StaticModel":
-    """The source for a model alone, which looks at its files again and again."""
-    from robosc.cli.arguments import read_bundle
-    from robosc.errors import RoboscError
-    from robosc_view.static_model import NoSupervisorError, StaticModel, file_digest, read, synthesized
-
-    assert supervisor is not None  # noqa: S101  # `run` has seen to that.
-    model: Path = arguments.model
-    if model.suffix == ".rsup":
-
-        async def read_again() -> "Supervisor":
-            return read(model)
-
-        return StaticModel(supervisor, file_digest(model), lambda: file_digest(model), read_again, scene)
-
-    def digest() -> str:
-        try:
-            return read_bundle(arguments).digest
-        except (UsageError, RoboscError) as error:
-            raise NoSupervisorError(str(error)) from error
+def _playground(arguments: argparse.Namespace, scene: Any) -> "tuple[Callable[[], Source], bool, Robot]":
+    """Return a function that makes the run of a page, that each page has its own, and the robot."""
+    from robosc.cli.simulate import model_of_test
+    from robosc_view.playground import Playground, playable
+    from robosc_view.watched_model import synthesized
 
     words = ["--deployment", arguments.deployment or "controller", "--engine", arguments.engine, "--allow-livelock"]
     words += [word for folder in arguments.library_path for word in ("--library-path", str(folder))]
     words += [word for folder in arguments.interface_path for word in ("--interface-path", str(folder))]
     words += ["--reorder"] if arguments.reorder else []
     words += [] if arguments.max_nodes is None else ["--max-nodes", str(arguments.max_nodes)]
-    seen = supervisor.certificate.bundle_sha256
-    return StaticModel(supervisor, seen, digest, lambda: synthesized((*words, "--", str(model))), scene)
+    watched = _watched(arguments, words)
+    file = None if arguments.text is not None else model_of_test(arguments)
+    return (
+        lambda: Playground(watched, file, lambda text: synthesized(words, text), scene),
+        False,
+        playable(watched.made, scene),
+    )
+
+
+def _watched(arguments: argparse.Namespace, words: list[str]) -> "WatchedModel":
+    """The model that is played with, which looks at its files again and again."""
+    from robosc.cli import synth
+    from robosc.cli.arguments import read_bundle
+    from robosc.errors import RoboscError
+    from robosc.pipeline.loading import load
+    from robosc_view.watched_model import (
+        MadeModel,
+        NoSupervisorError,
+        WatchedModel,
+        file_digest,
+        finding_text,
+        read,
+        synthesized,
+    )
+
+    model: Path = arguments.model
+    if model.suffix == ".rsup":
+
+        async def read_again() -> MadeModel:
+            return MadeModel(read(model))
+
+        seen = file_digest(model)
+        return WatchedModel(MadeModel(_supervisor(arguments)), seen, lambda: file_digest(model), read_again)
+    text: str | None = arguments.text
+    if text is None:
+        bundle = read_bundle(arguments)
+    else:
+        bundle = load(text=text, library_paths=arguments.library_path, interface_paths=arguments.interface_path)
+    deployment = arguments.deployment or "controller"
+    outcome = synth.make(
+        argparse.Namespace(**{**vars(arguments), "deployment": deployment}), bundle, allow_livelock=True
+    )
+    synth.report_problems(outcome, bundle)
+    if outcome.supervisor is None:
+        raise CommandError(f"there is no supervisor of {bundle.main.name}", ExitCode.FAILED)
+    seen = outcome.supervisor.certificate.bundle_sha256
+
+    def read_again_() -> "Bundle":
+        try:
+            return read_bundle(arguments)
+        except (UsageError, RoboscError) as error:
+            raise NoSupervisorError(str(error)) from error
+
+    async def make() -> MadeModel:
+        made = await synthesized((*words, "--", str(model)))
+        return MadeModel(made.supervisor, made.findings, _whole_text(read_again_()))
+
+    findings = tuple(finding_text(item.severity, item.message, item.code) for item in outcome.diagnostics)
+    return WatchedModel(
+        MadeModel(outcome.supervisor, findings, _whole_text(bundle)),
+        seen,
+        lambda: seen if text is not None else read_again_().digest,
+        make,
+    )
+
+
+def _whole_text(bundle: "Bundle") -> str | None:
+    """The text of a model, if that is all of it: without libraries."""
+    return None if bundle.libraries else bundle.main.text
 
 
 def _require_ros2() -> None:

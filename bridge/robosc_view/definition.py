@@ -106,6 +106,7 @@ class Robot:
         can_command: True if it can be stopped and commanded through the source.
         log: The log that is replayed; None: it is live.
         scene: Walls and line on the floor, for the map; None: not known.
+        play: Events that a page can have happen, with the data that they carry; None: it is not led by hand.
     """
 
     source: SourceKind
@@ -118,6 +119,7 @@ class Robot:
     can_command: bool
     log: LogSpan | None = None
     scene: Mapping[str, Any] | None = None
+    play: Mapping[str, Any] | None = None
 
     @property
     def requests(self) -> tuple[str, ...]:
@@ -135,6 +137,7 @@ def robot_of(
     can_command: bool,
     log: LogSpan | None = None,
     scene: Mapping[str, Any] | None = None,
+    play: Mapping[str, Any] | None = None,
 ) -> Robot:
     """Return the robot of a supervisor.
 
@@ -146,6 +149,7 @@ def robot_of(
         can_command: True if it can be stopped and commanded.
         log: The log that is replayed.
         scene: Scene for the map.
+        play: Events that a page can have happen.
     """
     model = supervisor.model
     topic = state_topic(model)
@@ -165,6 +169,7 @@ def robot_of(
         can_command=can_command,
         log=log,
         scene=scene,
+        play=play,
     )
 
 
@@ -239,6 +244,7 @@ def definition_text(robot: Robot) -> str:
         if robot.log is None
         else {"begin_s": robot.log.begin_s, "end_s": robot.log.end_s, "count": robot.log.count},
         "scene": robot.scene,
+        "play": robot.play,
     }
     return json.dumps(message, allow_nan=False, separators=(",", ":"))
 

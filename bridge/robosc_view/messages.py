@@ -3,12 +3,15 @@
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robosc.execution.runtime.event_log import Entry, plain
 from robosc.explanation.blocked import RequestAvailability, Requests, StateError
 from robosc_view.definition import Robot, definition_text
-from robosc_view.reports import EventBatch, LaserScan, Notice, Status
+from robosc_view.reports import EventBatch, LaserScan, Notice, RunReport, Status
+
+if TYPE_CHECKING:
+    from robosc.pipeline.simulation import Run
 
 MAXIMUM_TEXT = 300
 """Characters of an entry's text."""
@@ -283,6 +286,36 @@ def events_text(entries: Sequence[str], lost: int) -> str:
 def position_text(time_s: float, speed: float, *, is_playing: bool) -> str:
     """The message `position`."""
     return _text({"type": "position", "time_s": time_s, "is_playing": is_playing, "speed": speed})
+
+
+def run_text(run: "Run", entries: int, report: RunReport) -> str:
+    """The message `run`: what can happen in a run that is led by hand, and what was just done.
+
+    Args:
+        run: The run.
+        entries: Number of its entries in the event log.
+        report: Report of what was done.
+    """
+    hindered = run.hindrances()
+    undone = run.undone
+    return _text(
+        {
+            "type": "run",
+            "entries": entries,
+            "steps": len(run),
+            "undo": run.history[-1].event if len(run) else "",
+            "redo": undone[0].event if undone else "",
+            "is_marked": run.is_marked,
+            "hindered": {event: list(why) for event, why in hindered.items()},
+            "kind": report.kind,
+            "lines": list(report.lines),
+        }
+    )
+
+
+def saved_text(name: str, text: str) -> str:
+    """The message `saved`: a file for whoever asked for it."""
+    return _text({"type": "saved", "name": name, "text": text})
 
 
 def refused_text(what: str, why: str) -> str:

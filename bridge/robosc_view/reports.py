@@ -116,6 +116,19 @@ class Status:
 
 
 @dataclass(frozen=True, slots=True)
+class RunReport:
+    """Report of what was just done with a run that is led by hand.
+
+    Attributes:
+        kind: `step`, `unknown`, `trouble`, `changed` (the model) or `wrong`; empty: nothing was done.
+        lines: Sentences about it.
+    """
+
+    kind: str = ""
+    lines: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class LaserScan:
     """A revolution of the LiDAR.
 

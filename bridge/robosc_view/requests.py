@@ -2,13 +2,22 @@
 
 import json
 from dataclasses import dataclass
-from typing import Any
+from enum import StrEnum
+from typing import Any, Protocol, runtime_checkable
 
 from robosc_bridge.daemon.states import OperatorCommand
-from robosc_view.sources import Pause, Play, RefusedError, ReplayCommand, Seek
+from robosc_view.sources import Pause, Play, RefusedError, ReplayCommand, Seek, Source
 
 MAXIMUM_BYTES = 4096
 """Maximum size of one request, in bytes."""
+
+MAXIMUM_LED_BYTES = 16384
+"""The same where a run is led by hand: a link holds a model."""
+
+MAXIMUM_WALK = 5000
+"""Events of one walk."""
+
+_OF_WALKS = (("steps", 1, MAXIMUM_WALK), ("seed", 0, 2**31))
 
 SLOWEST, FASTEST = 0.01, 1000.0
 """Speeds of a replay."""
@@ -37,7 +46,87 @@ class Order:
     token: object
 
 
-PageRequest = Stop | Order | ReplayCommand
+@dataclass(frozen=True, slots=True)
+class Happen:
+    """Have an event happen in a run that is led by hand.
+
+    Attributes:
+        line: The event with its data, as in a file of events.
+    """
+
+    line: str
+
+
+class Back(StrEnum):
+    """Move in a run that is led by hand."""
+
+    UNDO = "undo"
+    REDO = "redo"
+    RESTART = "restart"
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """Take events by chance.
+
+    Attributes:
+        steps: Most events to take.
+        seed: Seed of the chance.
+        until_trouble: True if the first trouble ends it.
+    """
+
+    steps: int
+    seed: int
+    until_trouble: bool
+
+
+class Form(StrEnum):
+    """Form in which a run is kept."""
+
+    LOG = "log"
+    TEST = "test"
+
+
+@dataclass(frozen=True, slots=True)
+class Save:
+    """Keep what has happened.
+
+    Attributes:
+        form: Form in which it is kept.
+    """
+
+    form: Form
+
+
+@dataclass(frozen=True, slots=True)
+class LoadModel:
+    """Play with the model of a link.
+
+    Attributes:
+        packed: Part of the link that holds it.
+        token: Token that is shown for it: a link that somebody else has made is not to set this machine to work.
+    """
+
+    packed: str
+    token: object
+
+
+RunCommand = Happen | Back | Walk | Save | LoadModel
+
+
+@runtime_checkable
+class LedSource(Source, Protocol):
+    """A source whose run a page leads by hand."""
+
+    def lead(self, command: RunCommand) -> None:
+        """Want something of the run.
+
+        Raises:
+            RefusedError: Too much waits already.
+        """
+
+
+PageRequest = Stop | Order | ReplayCommand | RunCommand
 
 
 def parse_request(text: str) -> PageRequest:
@@ -67,7 +156,25 @@ def parse_request(text: str) -> PageRequest:
             return Play(_number(document, "speed", SLOWEST, FASTEST))
         case "pause":
             return Pause()
+        case "event":
+            return Happen(_text(document, "line"))
+        case "undo" | "redo" | "restart" as name:
+            return Back(name)
+        case "walk":
+            steps, seed = (int(_number(document, name, low, high)) for name, low, high in _OF_WALKS)
+            return Walk(steps, seed, document.get("until_trouble") is True)
+        case "save" if document.get("form") in tuple(Form):
+            return Save(Form(document["form"]))
+        case "model":
+            return LoadModel(_text(document, "packed"), document.get("token"))
     raise RefusedError("there is nothing of that type")
+
+
+def _text(document: dict[str, Any], name: str) -> str:
+    value = document.get(name)
+    if not isinstance(value, str) or not value.strip():
+        raise RefusedError(f"'{name}' must be a text")
+    return value
 
 
 def _number(document: dict[str, Any], name: str, low: float, high: float) -> float:

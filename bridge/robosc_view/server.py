@@ -24,8 +24,17 @@ from robosc_view.broadcaster import Broadcaster, RobotCache, Viewer
 from robosc_view.definition import Robot
 from robosc_view.messages import done_text, refused_text
 from robosc_view.page_files import PageFiles, read_page
-from robosc_view.requests import MAXIMUM_BYTES, Order, Stop, parse_request
-from robosc_view.sources import RefusedError, Source, ViewError
+from robosc_view.requests import (
+    MAXIMUM_BYTES,
+    MAXIMUM_LED_BYTES,
+    LedSource,
+    LoadModel,
+    Order,
+    RunCommand,
+    Stop,
+    parse_request,
+)
+from robosc_view.sources import RefusedError, ReplayCommand, Source, ViewError
 
 _log = logging.getLogger(__name__)
 
@@ -255,7 +264,8 @@ class ViewServer:
                 self._broadcasters.discard(broadcaster)
 
     async def _serve(self, request: web.Request, broadcaster: Broadcaster) -> web.StreamResponse:
-        page = web.WebSocketResponse(max_msg_size=MAXIMUM_BYTES, compress=False, heartbeat=PING_S, autoping=True)
+        largest = MAXIMUM_LED_BYTES if isinstance(broadcaster.source, LedSource) else MAXIMUM_BYTES
+        page = web.WebSocketResponse(max_msg_size=largest, compress=False, heartbeat=PING_S, autoping=True)
         page.headers.update(self._headers)
         await page.prepare(request)
         # Kept, since the request forgets it when the connection ends.
@@ -353,10 +363,23 @@ class _Session:
                 self._order(command, token)
             case command:
                 try:
-                    self._source.control_replay(command)
+                    if not isinstance(command, ReplayCommand):
+                        self._lead(command)
+                    else:
+                        self._source.control_replay(command)
                 except RefusedError as error:
                     self._viewer.answer(refused_text(type(command).__name__.lower(), str(error)))
         return self._is_in_time()
+
+    def _lead(self, command: RunCommand) -> None:
+        if not isinstance(self._source, LedSource):
+            raise RefusedError("nothing here is led by hand: only a model alone is")
+        if isinstance(command, LoadModel) and (self._access is None or not self._access.is_token(command.token)):
+            raise RefusedError(
+                "a model of a link needs the token of this start: put what follows # behind the address that the "
+                "server has printed, or start robosc view with the link"
+            )
+        self._source.lead(command)
 
     def _order(self, command: OperatorCommand, token: object) -> None:
         if self._access is None or not self._access.is_token(token):

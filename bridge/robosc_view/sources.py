@@ -51,6 +51,12 @@ class Sink(Protocol):
     def show_position(self, time_s: float, speed: float, *, is_playing: bool) -> None:
         """Receive the position of the replay of a log."""
 
+    def show_run(self, text: str) -> None:
+        """Receive the message `run` of a run that is led by hand; the latest alone counts."""
+
+    def answer(self, text: str) -> None:
+        """Receive a message that answers a page; each is told once."""
+
 
 @dataclass(frozen=True, slots=True)
 class Seek:

@@ -15,7 +15,7 @@ from robosc.pipeline.received_data import NO_DATA
 
 if TYPE_CHECKING:
     from robosc.certification.supervisor_file import StateInWords
-    from robosc.pipeline.simulation import Run
+    from robosc.pipeline.simulation import Run, Step
 
 _WIDTH = 112
 
@@ -39,25 +39,30 @@ class ModelOfTest:
 
 def event_log(run: "Run") -> str:
     """Return the text of an event log of a run; its clock counts the events, a second each."""
-    return "".join(json_line(entry) for entry in _entries(run))
+    return "".join(json_line(entry) for number, step in enumerate(run, start=1) for entry in entries_of(step, number))
 
 
-def _entries(run: "Run") -> Iterator[dict[str, Any]]:
-    for number, step in enumerate(run.history, start=1):
-        told = step.provided if step.is_controllable else dict(step.data)
-        if step.unknown:
-            yield {"time": float(number), "kind": "unknown", "event": step.event, "unknown": list(step.unknown)}
-        yield {
-            "time": float(number),
-            "kind": "event",
-            "event": step.event,
-            "controllable": step.is_controllable,
-            "data": told,
-            "state": state_by_component(step.state),
-            "decision_us": 0.0,
-        }
-        if step.skipped:
-            yield {"time": float(number), "kind": "unknown", "event": step.event, "unknown": list(step.skipped)}
+def entries_of(step: "Step", number: int) -> Iterator[dict[str, Any]]:
+    """Yield the entries of an event log that tell a step.
+
+    Args:
+        step: The step.
+        number: Its number in the run, from 1, which is its time in seconds, too.
+    """
+    told = step.provided if step.is_controllable else dict(step.data)
+    if step.unknown:
+        yield {"time": float(number), "kind": "unknown", "event": step.event, "unknown": list(step.unknown)}
+    yield {
+        "time": float(number),
+        "kind": "event",
+        "event": step.event,
+        "controllable": step.is_controllable,
+        "data": told,
+        "state": state_by_component(step.state),
+        "decision_us": 0.0,
+    }
+    if step.skipped:
+        yield {"time": float(number), "kind": "unknown", "event": step.event, "unknown": list(step.skipped)}
 
 
 def state_by_component(state: "StateInWords") -> dict[str, dict[str, Any]]:

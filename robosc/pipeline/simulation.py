@@ -195,6 +195,21 @@ class Run:
         """
         return data_fields(self._model, self._known(event))
 
+    @property
+    def locations(self) -> dict[str, str]:
+        """Location of each service and action, by its name."""
+        return {name: self._system.location(name) for name in self._calls}
+
+    def hindrances(self) -> dict[str, tuple[str, ...]]:
+        """Every event that cannot happen now, with the reasons why not, one sentence each."""
+        blocked = self._requests.availability(self._system.state(), self.locations).blocked
+        found = {item.event: item.why for item in blocked}
+        return {
+            event: found[event] if event in found else tuple(self._hindrances(event))
+            for event in self._events
+            if not self._can_happen(event)
+        }
+
     def reasons(self, event: str) -> tuple[str, ...]:
         """Return the reasons why an event cannot happen now, one sentence each; none if it can.
 
@@ -204,8 +219,7 @@ class Run:
         if self._can_happen(self._known(event)):
             return ()
         if event in self._request_events:
-            places = {name: self._system.location(name) for name in self._calls}
-            blocked = self._requests.availability(self._system.state(), places).blocked
+            blocked = self._requests.availability(self._system.state(), self.locations).blocked
             return next(item.why for item in blocked if item.event == event)
         return tuple(self._hindrances(event))
 

@@ -155,11 +155,13 @@ class Walker:
         if run.enabled or run.is_marked:
             return None
         left = run.possible
+        places = {**run.state.components, **run.state.communications}
+        where = ", ".join(f"{name} is {place}" for name, place in places.items())
         if not left:
-            return Trouble(TroubleKind.DEADLOCK, "", (f"nothing can happen in {run.state}",), count)
+            return Trouble(TroubleKind.DEADLOCK, "", (f"nothing can happen while {where}",), count)
         if any(place in ("waiting", "executing") for place in run.state.communications.values()):
             return None
-        why = f"nothing is allowed in {run.state}: it can only wait for {', '.join(left)}"
+        why = f"nothing is allowed while {where}: it can only wait for {', '.join(left)}"
         return Trouble(TroubleKind.WAITING, "", (why,), count)
 
     def _at_request(self, event: str, count: int) -> Trouble | None:
@@ -181,10 +183,7 @@ class Walker:
         """Return True if there is trouble of a kind that is looked for, and it was not told before."""
         if found is None or found.kind not in kinds:
             return False
-        # A place to wait is one place, whatever the variables there are.
-        state = self._run.state
-        place = (*state.components.values(), *state.communications.values())
-        key = (found.kind, found.event, found.why if found.event else place)
+        key = (found.kind, found.event, found.why)
         is_news = key not in self._told
         self._told.add(key)
         return is_news

@@ -51,7 +51,7 @@ def test_who_is_invited_shows_it_and_nobody_else(browser: Browser, tmp_path: Pat
             if is_invited:
                 framed = seen.page.frame_locator("iframe")
                 framed.locator("#robot", has_text="LineFollower").wait_for()
-                framed.locator("#link-word", has_text="initial state").wait_for()
+                framed.locator("#link-word", has_text="by hand").wait_for()
                 # A site without an icon, and a page that may not take the focus from the one around it.
                 assert [error for error in seen.errors if "404" not in error and "autofocus" not in error] == []
             else:

@@ -57,7 +57,7 @@ export function startFreshness(connection) {
 
 function liveWord() {
   if (received.definition.source === "log") return "recorded";
-  if (received.definition.source === "model") return "initial state";
+  if (received.definition.source === "model") return "by hand";
   if (received.update === null) return "connected";
   return received.definition.source === "ros2" && ageS() > OLD_S ? `live, last change ${ago(ageS())} ago` : "live";
 }

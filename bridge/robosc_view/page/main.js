@@ -7,21 +7,24 @@ import { startFreshness } from "./freshness.js";
 import { startMap } from "./map.js";
 import { startOrders } from "./orders.js";
 import { forgetColours } from "./picture.js";
+import { startPlay } from "./play.js";
 import { startReplay } from "./replay.js";
 import { startRequests } from "./requests.js";
 import { paintRobot, paintStatus } from "./status.js";
 import { startStream } from "./stream.js";
 import { startTheme } from "./theme.js";
-import { forget, received } from "./received.js";
+import { forget, isModel, received } from "./received.js";
 import { takeToken } from "./token.js";
 
 let connection = null;
-const orders = startOrders(() => connection, takeToken());
+const token = takeToken();
+const orders = startOrders(() => connection, token);
 const components = startComponents();
 const requests = startRequests();
 const stream = startStream();
 const map = startMap();
 const replay = startReplay((message) => connection.send(message));
+const play = startPlay((message) => connection.send(message), token);
 const lookAtFreshness = startFreshness(() => connection);
 
 let known = "";
@@ -41,7 +44,7 @@ const receive = {
       map.clear();
       touch("definition");
     }
-    touch("robot", "update", "map", "position");
+    touch("robot", "update", "map", "position", "run");
   },
   update(message) {
     received.update = message;
@@ -61,13 +64,20 @@ const receive = {
   },
   position(message) {
     if (received.position && message.time_s < received.position.time_s) {
-      stream.backTo(message.time_s);
+      stream.backTo((entry) => entry.time_s > message.time_s);
       map.clear();
     }
     received.position = message;
     touch("position");
   },
-  refused: (message) => orders.answered(message),
+  run(message) {
+    received.run = message;
+    play.told(message);
+    stream.backTo((entry) => entry.number > message.entries);
+    touch("run");
+  },
+  saved: (message) => play.saved(message),
+  refused: (message) => (isModel() ? play.refused(message) : orders.answered(message)),
   done: (message) => orders.answered(message),
   gone({ why }) {
     const now = String(why ?? "");
@@ -82,6 +92,7 @@ paints("definition", components.build);
 paints("definition", requests.build);
 paints("definition", map.build);
 paints("definition", replay.build);
+paints("definition", play.build);
 paints("robot", paintRobot);
 paints("robot", orders.paint);
 paints("update", paintStatus);
@@ -91,6 +102,7 @@ paints("taken", components.paint);
 paints("stream", stream.paint);
 paints("map", map.paint);
 paints("position", replay.paint);
+paints("run", play.paint);
 
 startTheme(() => {
   forgetColours();

@@ -117,7 +117,7 @@ function flash() {
 
 function whyNoCommands(definition, canCommand, token) {
   if (definition === null) return "";
-  if (isModel()) return "A model alone, in its initial state: nothing is executed.";
+  if (isModel()) return "A model alone: you lead it by hand, and nothing is executed.";
   if (isReplay()) return "A recorded run: nothing here moves a robot.";
   if (!canCommand) return "This view only watches: it can neither stop nor command the robot.";
   return token ? "" : "Start, standby, resume and reset need the address with the token that the server printed. Stop works without.";

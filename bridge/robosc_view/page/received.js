@@ -12,13 +12,15 @@ export const received = {
   scan: null,
   /** The latest `position` of a replay. */
   position: null,
+  /** The latest `run` of a model that is played with. */
+  run: null,
   /** Reason why the source is lost; null: it is not. */
   gone: null,
 };
 
 /** Forgets what was told about the robot, for a new definition. */
 export function forget() {
-  Object.assign(received, { update: null, updateMs: 0, scan: null, position: null, gone: null });
+  Object.assign(received, { update: null, updateMs: 0, scan: null, position: null, run: null, gone: null });
 }
 
 /** Value that an object that was told has under a name; undefined: nothing, whatever objects have by themselves. */
@@ -27,7 +29,7 @@ export const under = (object, name) => (Object.hasOwn(object, name) ? object[nam
 /** Returns true if a recorded run is shown. */
 export const isReplay = () => received.definition?.source === "log";
 
-/** Returns true if nothing is executed: a model in its initial state. */
+/** Returns true if nothing is executed: a model that is played with. */
 export const isModel = () => received.definition?.source === "model";
 
 /** Age of the state that is shown, in seconds. */

@@ -1,7 +1,7 @@
 // The header and the status panel: what the bridge is doing, and in words why nothing moves.
 
 import { announce } from "./announce.js";
-import { byId, make, mark, quoted, say } from "./dom.js";
+import { byId, make, mark, quoted, say, show } from "./dom.js";
 import { isModel, isReplay, received } from "./received.js";
 
 const SOURCES = { __proto__: null, bridge: "bridge", ros2: "ROS 2", log: "recorded run", model: "model alone" };
@@ -23,7 +23,7 @@ let lastCauses = null;
 /** The update is new. */
 export function paintStatus() {
   const { update } = received;
-  const state = update?.state || (isReplay() ? "recorded" : isModel() ? "not executed" : "not known");
+  const state = update?.state || (isReplay() ? "recorded" : isModel() ? "led by hand" : "not known");
   say(byId("state-word"), state);
   mark(byId("state"), "data-state", update?.state || "unknown");
   if (update === null) {
@@ -34,6 +34,8 @@ export function paintStatus() {
     return;
   }
   const causes = causesOf(update);
+  // Of a model alone there is nothing to tell but what is wrong with its file.
+  show(byId("status"), !isModel() || causes.length > 0);
   const key = JSON.stringify(causes);
   if (key !== lastCauses) {
     byId("causes").replaceChildren(...causes.map(causeLine));

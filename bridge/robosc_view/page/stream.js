@@ -4,7 +4,7 @@ import { byId, make, mark, quoted, say, show } from "./dom.js";
 import { Entries, groupOf } from "./entries.js";
 import { clock, count, whole } from "./format.js";
 import { afterPainting, touch } from "./frame.js";
-import { isReplay } from "./received.js";
+import { isModel, isReplay } from "./received.js";
 
 const OVERSCAN = 6;
 const FIRST_KINDS = ["controllable", "uncontrollable"];
@@ -142,6 +142,7 @@ export function startStream() {
   // turned on, the stream begins anew with what the server tells of the time before.
   const jumpTo = (first) => {
     if (first.number <= entries.highest) entries.takeBack((entry) => entry.number >= first.number);
+    if (isModel()) return;
     const before = first.number - 1 - Math.max(entries.highest, 0);
     if (before <= 0) return;
     entries.clear();
@@ -198,7 +199,7 @@ export function startStream() {
   return {
     /** Entries of a batch; before them `lost` are missing. */
     add(batch, lost) {
-      if (isReplay() && batch.length > 0) jumpTo(batch[0]);
+      if ((isReplay() || isModel()) && batch.length > 0) jumpTo(batch[0]);
       if (lost > 0) added(entries.addLost(lost, batch[0]?.time_s ?? Date.now() / 1000));
       for (const entry of batch) addKind(groupOf(entry));
       added(entries.add(batch));
@@ -208,9 +209,10 @@ export function startStream() {
       addKind("connection");
       added(entries.add([{ kind: "connection", time_s: Date.now() / 1000, text }]));
     },
-    /** The recorded run was turned back to this time. */
-    backTo(timeS) {
-      entries.takeBack((entry) => entry.time_s > timeS);
+    /** The run was turned back: entries are gone. */
+    backTo(isGone) {
+      if (!entries.all.some(isGone)) return;
+      entries.takeBack(isGone);
       change();
     },
     clear() {

@@ -5,7 +5,7 @@ from pathlib import Path
 from robosc.explanation.blocked import MAXIMUM_REASONS
 from robosc_bridge.daemon.view_settings import ADDRESS
 from robosc_bridge.remote.convert import MAXIMUM_SUPERVISOR_BYTES
-from robosc_view import broadcaster, graphs, remote_bridge, requests, ros2_topic, server
+from robosc_view import broadcaster, graphs, playground, remote_bridge, requests, ros2_topic, server
 
 DOCS = Path(__file__).parents[3] / "docs"
 PAGE = (DOCS / "live-view.md").read_text(encoding="utf-8")
@@ -16,6 +16,10 @@ def test_the_limits() -> None:
     assert f"| {server.MAXIMUM_VIEWERS}; {server.MAXIMUM_CONNECTIONS} |" in PAGE
     assert f"time for a request | {server.REQUEST_LIMIT_S:g} s |" in PAGE
     assert f"| {requests.MAXIMUM_BYTES} bytes; {server.REQUESTS_A_S:g}, {server.BURST} in a burst |" in PAGE
+    assert f"that plays with a model | {requests.MAXIMUM_LED_BYTES} bytes |" in PAGE
+    steps = f"{requests.MAXIMUM_WALK}; {playground.MAXIMUM_STEPS}; {playground.MAXIMUM_WAITING}"
+    assert f"commands of it that wait | {steps} |" in PAGE
+    assert f"about {playground.MAXIMUM_LINK} characters" in (DOCS / "playing.md").read_text(encoding="utf-8")
     assert f"wait for an answer | {server.MAXIMUM_WAITING} |" in PAGE
     assert f"| {broadcaster.MAXIMUM_EVENTS}, or {broadcaster.MAXIMUM_BYTES // 2**20} MiB |" in PAGE
     assert f"updates a second | {1 / broadcaster.UPDATE_S:g} |" in PAGE

@@ -1,7 +1,7 @@
-"""The source for a model that nothing executes: its initial state, of the model as its files are this moment.
+"""A model that is played with: its supervisor, made anew whenever its files change.
 
 A model that was changed is synthesized in a process of its own, which the next change ends. Until there is another
-supervisor the one before is shown, with why it is not the file's.
+supervisor the one before stays, with why it is not the file's.
 """
 
 import asyncio
@@ -9,71 +9,88 @@ import contextlib
 import hashlib
 import sys
 import tempfile
-import time
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from robosc.errors import RoboscError
 from robosc.supervisor import Supervisor, decode
-from robosc_bridge.daemon.states import OperatorCommand
-from robosc_view.definition import Robot, robot_of
-from robosc_view.replay import first_frame
-from robosc_view.reports import Notice, SourceKind, Status
-from robosc_view.sources import RefusedError, ReplayCommand, Sink, not_replayed
 
 LOOK_S = 0.3
 """Between two looks at the files."""
-
-_CODE = "model"
 
 
 class NoSupervisorError(Exception):
     """There is none of the model as it is; one sentence."""
 
 
-class StaticModel:
-    """A model in its initial state, for all pages.
+@dataclass(frozen=True)
+class MadeModel:
+    """A model of which there is a supervisor.
+
+    Attributes:
+        supervisor: The supervisor.
+        findings: Findings about the model, a line each; of a supervisor's file nothing is known.
+        text: Text of the model, if it is all of it: without libraries.
+    """
+
+    supervisor: Supervisor
+    findings: tuple[str, ...] = ()
+    text: str | None = None
+
+
+class WatchedModel:
+    """A model for all pages; its files are looked at while a page plays with it.
 
     Args:
-        supervisor: Supervisor of the model.
+        made: The model as it is.
         seen: Digest that its files had.
         digest: Function that returns the digest of the files; called in a thread.
-        make: Function that makes the supervisor of the files as they are.
-        scene: Scene for the map.
+        make: Function that makes the model of the files as they are.
         pause: Function that waits for the next look at the files.
 
     `digest` and `make` raise `NoSupervisorError`.
+
+    Attributes:
+        made: The model, as it was made last.
+        warning: Reason why that is not what the files say; empty: it is.
     """
 
     def __init__(
         self,
-        supervisor: Supervisor,
+        made: MadeModel,
         seen: str,
         digest: Callable[[], str],
-        make: Callable[[], Awaitable[Supervisor]],
-        scene: Any = None,
+        make: Callable[[], Awaitable[MadeModel]],
         pause: Callable[[], Awaitable[None]] = lambda: asyncio.sleep(LOOK_S),
     ) -> None:
-        self._supervisor = supervisor
+        self.made = made
+        self.warning = ""
+        self._seen = seen
         self._digest = digest
         self._make = make
-        self._scene = scene
         self._pause = pause
-        self._seen = seen
-        self._warning = ""
+        self._listeners: set[Callable[[], None]] = set()
+        self._watching: asyncio.Task[None] | None = None
 
-    @property
-    def robot(self) -> Robot:
-        """Robot that is shown."""
-        return robot_of(self._supervisor, SourceKind.MODEL, version="", can_command=False, scene=self._scene)
+    @contextlib.asynccontextmanager
+    async def listened(self, listener: Callable[[], None]) -> AsyncIterator[None]:
+        """Call a function whenever `made` or `warning` has become another."""
+        self._listeners.add(listener)
+        if self._watching is None:
+            self._watching = asyncio.create_task(self._watch())
+        try:
+            yield
+        finally:
+            self._listeners.discard(listener)
+            if not self._listeners:
+                watching, self._watching = self._watching, None
+                await _ended(watching)
 
-    async def run(self, sink: Sink) -> None:
-        """Tell the initial state, and again when the files change, until cancelled."""
-        making: asyncio.Task[Supervisor] | None = None
-        await self._show(sink)
+    async def _watch(self) -> None:
+        making: asyncio.Task[MadeModel] | None = None
         try:
             while True:
                 await self._pause()
@@ -86,55 +103,28 @@ class StaticModel:
                     await _ended(making)
                     making = asyncio.create_task(self._made())
                 if making is not None and making.done():
-                    await self._take(making, sink)
+                    self._take(making)
                     making = None
         finally:
+            if making is not None:
+                # Whoever watches next is to make it again.
+                self._seen = ""
             await _ended(making)
 
-    async def order(self, command: OperatorCommand, by: str) -> None:
-        """Not here: nothing is executed.
-
-        Raises:
-            RefusedError: Always.
-        """
-        raise RefusedError("nothing is executed here")
-
-    def control_replay(self, command: ReplayCommand) -> None:
-        """Not here.
-
-        Raises:
-            RefusedError: Always.
-        """
-        raise not_replayed()
-
-    async def _made(self) -> Supervisor:
+    async def _made(self) -> MadeModel:
         return await self._make()
 
-    async def _take(self, making: asyncio.Task[Supervisor], sink: Sink) -> None:
+    def _take(self, making: asyncio.Task[MadeModel]) -> None:
         try:
-            self._supervisor, self._warning = making.result(), ""
+            self.made, self.warning = making.result(), ""
         except NoSupervisorError as error:
-            self._warning = f"the file has changed since, and this is not what it says: {error}"
-        await self._show(sink)
-
-    async def _show(self, sink: Sink) -> None:
-        frame = first_frame(self._supervisor.model)
-        await sink.define(self.robot)
-        sink.begin({})
-        warnings = (Notice(_CODE, self._warning),) if self._warning else ()
-        sink.show(
-            Status(
-                time_s=time.time(),
-                warnings=warnings,
-                components=frame.components,
-                communications=frame.communications,
-                last={},
-            )
-        )
+            self.warning = f"the file has changed since, and this is not what it says: {error}"
+        for listener in tuple(self._listeners):
+            listener()
 
 
-async def _ended(making: asyncio.Task[Supervisor] | None) -> None:
-    """End a synthesis that nobody wants any more."""
+async def _ended(making: "asyncio.Task[MadeModel] | asyncio.Task[None] | None") -> None:
+    """End a synthesis, or a watch, that nobody wants any more."""
     if making is not None:
         making.cancel()
         await asyncio.gather(making, return_exceptions=True)
@@ -152,17 +142,22 @@ def file_digest(path: Path) -> str:
         raise NoSupervisorError(f"{path}: {error.strerror or error}") from error
 
 
-async def synthesized(words: Sequence[str]) -> Supervisor:
-    """The supervisor that `robosc synth` makes; cancelling this ends it.
+async def synthesized(words: Sequence[str], text: str | None = None) -> MadeModel:
+    """The model of which `robosc synth` makes the supervisor; cancelling this ends it.
 
     Args:
         words: Its arguments.
+        text: Text of the model, which is put into a file of its own; None: the arguments name it.
 
     Raises:
         NoSupervisorError: It makes none.
     """
     with tempfile.TemporaryDirectory(prefix="robosc-") as folder:
         made = Path(folder) / "model.rsup"
+        if text is not None:
+            given = Path(folder) / "model.rscd"
+            given.write_bytes(text.encode("utf-8", "surrogatepass"))
+            words = (*words, "--", str(given))
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-P", "-m", "robosc.cli.main", "synth", "--json", "--output", str(made), *words),
             stdin=asyncio.subprocess.DEVNULL,
@@ -178,7 +173,8 @@ async def synthesized(words: Sequence[str]) -> Supervisor:
                 await asyncio.shield(process.wait())
         if process.returncode != 0:
             raise NoSupervisorError(_reason(output, errors))
-        return read(made)
+        told = msgspec.json.decode(output, type=_Told)
+        return MadeModel(read(made), tuple(map(str, told.diagnostics)), text)
 
 
 def read(path: Path) -> Supervisor:
@@ -193,11 +189,20 @@ def read(path: Path) -> Supervisor:
         raise NoSupervisorError(f"{path.name}: {error}") from error
 
 
+def finding_text(severity: str, message: str, code: str) -> str:
+    """A finding without its place: lines move when something above them is written, and that is no news."""
+    return f"{severity}: {message} [{code}]"
+
+
 class _Place(msgspec.Struct):
     severity: str
     message: str
+    code: str = ""
     file: str | None = None
     line: int | None = None
+
+    def __str__(self) -> str:
+        return finding_text(self.severity, self.message, self.code)
 
 
 class _Error(msgspec.Struct):

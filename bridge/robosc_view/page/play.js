@@ -1,0 +1,177 @@
+// A model that is played with: its events as buttons, their data, undo and redo, chance, kept runs, and a link.
+
+import { announce } from "./announce.js";
+import { byId, make, mark, quoted, say, show } from "./dom.js";
+import { count } from "./format.js";
+import { isModel, received } from "./received.js";
+
+const IN_LINK = "#model=";
+const LEADS = { __proto__: null, step: "", unknown: "Unknown:", trouble: "Trouble:", changed: "Saved:", wrong: "Not done:" };
+
+/** One event: a button, a field for each part of its data, and why it cannot happen. */
+class PlayEvent {
+  constructor({ event, controllable, fields }, send) {
+    this.event = event;
+    this.fields = fields.map((field) => new Field(event, field));
+    const kind = controllable ? "controllable" : "uncontrollable";
+    this.button = make("button", { type: "submit", class: `happen is-${kind}` },
+      make("span", { class: `mark is-${kind}`, "aria-hidden": "true" }, controllable ? "◆" : "○"), " ", quoted(event));
+    this.why = make("p", { class: "play-why" });
+    this.form = make("form", { class: "play-event", "data-event": event },
+      this.button, ...this.fields.map((field) => field.element), this.why);
+    this.form.addEventListener("submit", (submitted) => {
+      submitted.preventDefault();
+      // The keyboard, too, can only have happen what can.
+      if (this.button.getAttribute("aria-disabled") !== "true") send({ type: "event", line: this.line() });
+    });
+  }
+
+  /** The event as a line of a file of events. */
+  line() {
+    const known = this.fields.map((field) => [field.path, field.json()]).filter(([, json]) => json !== null);
+    return known.length > 0 ? `${this.event} ${nested(known)}` : this.event;
+  }
+
+  paint(why) {
+    // Not "disabled": then it could not be reached, and its reason not be read.
+    mark(this.button, "aria-disabled", why !== undefined);
+    say(this.why, (why ?? []).join("; "));
+    show(this.why, why !== undefined);
+  }
+}
+
+/** A part of the data of an event; nothing in it is unknown. */
+class Field {
+  constructor(event, { path, type, choices, is_boolean: isBoolean }) {
+    this.path = path;
+    this.isBoolean = isBoolean;
+    this.isChoice = choices.length > 0;
+    const name = path.join(".") || "value";
+    const label = `${name} of ${event}`;
+    this.input = this.isChoice
+      ? make("select", { "aria-label": label }, make("option", { value: "" }, "unknown"), ...choices.map((choice) => make("option", { value: choice }, choice)))
+      : make("input", { type: "text", placeholder: "unknown", "aria-label": label, autocomplete: "off", size: 9 });
+    this.element = make("label", { class: "play-field", title: `${name}: ${type}` }, quoted(name), this.input);
+  }
+
+  /** The value as JSON; null: it is unknown. */
+  json() {
+    const text = this.input.value.trim();
+    if (text === "") return null;
+    if (this.isChoice && !this.isBoolean) return JSON.stringify(text);
+    if (["NaN", "Infinity", "-Infinity"].includes(text)) return text;
+    try {
+      return JSON.stringify(JSON.parse(text));
+    } catch {
+      // A word is a text: so in files of events, too.
+      return JSON.stringify(text);
+    }
+  }
+}
+
+/** JSON of the parts of some data, each with its path and its own JSON. */
+function nested(parts) {
+  if (parts.length === 1 && parts[0][0].length === 0) return parts[0][1];
+  const below = Map.groupBy(parts, ([path]) => path[0]);
+  const items = [...below].map(([name, inner]) => `${JSON.stringify(name)}:${nested(inner.map(([path, json]) => [path.slice(1), json]))}`);
+  return `{${items.join(",")}}`;
+}
+
+/**
+ * @param {(message: object) => boolean} send Sends a message; false: there is no connection.
+ * @param {string} token Token that a model of a link needs.
+ * @returns {object} Functions that main.js calls.
+ */
+export function startPlay(send, token) {
+  let events = [];
+  let walks = 0;
+  const tell = (kind, lines) => {
+    const place = byId("play-told");
+    mark(place, "data-kind", kind);
+    const lead = LEADS[kind] ? [make("strong", {}, LEADS[kind]), " "] : [];
+    // New elements, so that the same sentence told twice is seen and read twice.
+    place.replaceChildren(...lines.map((line, i) => make("p", {}, ...(i === 0 ? lead : []), quoted(line))));
+    if (lines.length > 0) announce("play", [LEADS[kind], ...lines].join(" "));
+  };
+  const want = (message) => {
+    if (!send(message)) tell("wrong", ["there is no connection"]);
+  };
+
+  for (const type of ["undo", "redo", "restart"]) byId(`play-${type}`).addEventListener("click", () => want({ type }));
+  for (const form of ["log", "test"]) byId(`play-${form}`).addEventListener("click", () => want({ type: "save", form }));
+  const walk = (untilTrouble) => {
+    const seed = walks;
+    walks += 1;
+    const steps = untilTrouble ? 1000 : Math.min(Math.max(Math.trunc(Number(byId("play-steps").value)) || 1, 1), 5000);
+    want({ type: "walk", steps, seed, until_trouble: untilTrouble });
+  };
+  byId("play-walk").addEventListener("click", () => walk(false));
+  byId("play-trouble").addEventListener("click", () => walk(true));
+  byId("play-link").addEventListener("click", async () => {
+    const address = `${location.origin}/${IN_LINK}${received.definition.play.link}`;
+    history.replaceState(null, "", address);
+    try {
+      await navigator.clipboard.writeText(address);
+      tell("step", ["the link to this model is copied: it holds all of it"]);
+    } catch {
+      tell("step", ["the link to this model is in the address of this page: it holds all of it"]);
+    }
+  });
+  window.addEventListener("keydown", (event) => {
+    if (!isModel() || !(event.ctrlKey || event.metaKey) || event.altKey || event.target.closest("input")) return;
+    const key = event.key.toLowerCase();
+    const type = key === "z" ? (event.shiftKey ? "redo" : "undo") : key === "y" ? "redo" : "";
+    if (type === "") return;
+    event.preventDefault();
+    want({ type });
+  });
+
+  let isLinkOpened = false;
+  return {
+    build() {
+      const { play } = received.definition;
+      show(byId("play"), Boolean(play));
+      show(byId("requests-panel"), !play);
+      if (!play) return;
+      const before = new Map(events.map((item) => [item.event, item]));
+      events = play.events.map((item) => new PlayEvent(item, want));
+      for (const item of events) {
+        // What was entered stays, as far as there is a field for it.
+        const old = before.get(item.event)?.fields ?? [];
+        for (const field of item.fields) {
+          const was = old.find((other) => String(other.path) === String(field.path) && other.isChoice === field.isChoice);
+          if (was) field.input.value = was.input.value;
+        }
+      }
+      const own = new Set(play.events.filter((item) => item.controllable).map((item) => item.event));
+      for (const [place, isOwn] of [["play-own", true], ["play-world", false]]) {
+        const forms = events.filter((item) => own.has(item.event) === isOwn).map((item) => item.form);
+        byId(place).replaceChildren(...(forms.length > 0 ? forms : [make("p", { class: "quiet" }, "Nothing.")]));
+      }
+      show(byId("play-link"), play.link !== null);
+      const packed = location.hash.startsWith(IN_LINK) ? location.hash.slice(IN_LINK.length) : "";
+      if (packed && !isLinkOpened && packed !== play.link) want({ type: "model", packed, token });
+      isLinkOpened = true;
+    },
+    paint() {
+      const { run } = received;
+      if (run === null) return;
+      for (const item of events) item.paint(run.hindered[item.event]);
+      for (const type of ["undo", "redo"]) {
+        const button = byId(`play-${type}`);
+        button.disabled = run[type] === "";
+        mark(button, "title", run[type]);
+      }
+      say(byId("play-count"), `${count(run.steps, "event", "events")}${run.is_marked ? " · marked" : ""}`);
+    },
+    /** What was just done. */
+    told: ({ kind, lines }) => kind !== "" && tell(kind, lines),
+    refused: ({ what, why }) => tell("wrong", [`${what}: ${why}`]),
+    saved({ name, text }) {
+      const link = make("a", { href: URL.createObjectURL(new Blob([text], { type: "text/plain" })), download: name });
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+      tell("step", [`${name} was saved${name.endsWith(".py") ? ": it belongs into the folder of the model" : ""}`]);
+    },
+  };
+}

@@ -1,0 +1,601 @@
+"""A model that is played with: events, undo, walks, kept runs, links; made anew when its files change."""
+
+import argparse
+import asyncio
+import base64
+import contextlib
+import io
+import json
+import os
+import re
+import zlib
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import robosc
+from robosc.cli.arguments import Parser
+from robosc.cli.output import CommandError
+from robosc.event_logs.entries import LogEntry, LoggedRun
+from robosc.pipeline.saved_runs import event_log
+from robosc.pipeline.simulation import Run
+from robosc.supervisor import Supervisor, encode
+from robosc_bridge.daemon.states import OperatorCommand
+from robosc_view import command, watched_model
+from robosc_view.model_changes import model_changes
+from robosc_view.playground import Playground, packed, playable, unpacked
+from robosc_view.replay import Recording, Replay
+from robosc_view.reports import SourceKind
+from robosc_view.requests import parse_request
+from robosc_view.sources import Pause, RefusedError
+from robosc_view.watched_model import MadeModel, NoSupervisorError, WatchedModel, file_digest, read, synthesized
+from support.live import large_model, supervisor_without_synthesis
+from support.models import EXAMPLES
+from support.pages_open import opened, token_of
+from support.view_servers import served
+
+MODEL = EXAMPLES / "line_follower" / "line_follower.rscd"
+FIRST, SECOND = (supervisor_without_synthesis(large_model(count)) for count in (2, 3))
+LIMIT_S = 30.0
+
+
+class Files:
+    """Files whose looks and syntheses are in a test's hands."""
+
+    def __init__(self) -> None:
+        self.content: str | NoSupervisorError = "first"
+        self.made: asyncio.Future[MadeModel] = asyncio.Future()
+        self.cancelled: list[str] = []
+        self.begun: list[str] = []
+        self._looks = asyncio.Semaphore(0)
+        self._asked = asyncio.Event()
+        self.watched = WatchedModel(MadeModel(FIRST), "first", self._digest, self._make, pause=self._pause)
+        self.robot = playable(self.watched.made)
+
+    def source(self) -> Playground:
+        """The run of one more page."""
+        return Playground(self.watched, None, self._of_link)
+
+    async def _of_link(self, text: str) -> MadeModel:
+        self.begun.append(text)
+        return MadeModel(SECOND, (), text)
+
+    async def look(self) -> None:
+        """The source looks, and has done what follows."""
+        for _ in range(2):
+            await self._asked.wait()
+            self._asked.clear()
+            self._looks.release()
+        await self._asked.wait()
+
+    async def _pause(self) -> None:
+        self._asked.set()
+        await self._looks.acquire()
+
+    def _digest(self) -> str:
+        if isinstance(self.content, NoSupervisorError):
+            raise self.content
+        return self.content
+
+    async def _make(self) -> MadeModel:
+        content = str(self.content)
+        self.begun.append(content)
+        self.made = asyncio.Future()
+        try:
+            return await self.made
+        except asyncio.CancelledError:
+            self.cancelled.append(content)
+            raise
+
+
+@contextlib.asynccontextmanager
+async def looking(files: Files) -> AsyncIterator[Any]:
+    async with served(files.source, is_shared=False, robot=files.robot) as server, opened(server.url) as page:
+        yield page
+
+
+def components(update: dict[str, Any]) -> set[str]:
+    return set(update["components"])
+
+
+def test_what_is_shown_first() -> None:
+    async def run() -> None:
+        files = Files()
+        async with looking(files) as page:
+            definition = await page.told("definition")
+            assert (definition["source"], definition["can_command"]) == (str(SourceKind.MODEL), False)
+            update = await page.told("update")
+            assert update["enabled"] and not update["warnings"]
+            assert not page.entries()
+            await files.look()
+            assert files.begun == []
+
+    asyncio.run(run())
+
+
+def test_a_change_is_shown_and_what_is_wrong_is_told() -> None:
+    async def run() -> None:
+        files = Files()
+        async with looking(files) as page:
+            await page.told("definition")
+            before = components(await page.told("update"))
+            files.content = "second"
+            await files.look()
+            files.made.set_result(MadeModel(SECOND))
+            await files.look()
+            await page.told("definition")
+            after = components(await page.told("update"))
+            assert before < after
+            files.content = "third"
+            await files.look()
+            files.made.set_exception(NoSupervisorError("a component is missing"))
+            await files.look()
+            update = await page.until(lambda told: told["type"] == "update" and told["warnings"])
+            assert components(update) == after
+            assert "a component is missing" in str(update["warnings"])
+            files.content = NoSupervisorError("it is gone")
+            await files.look()
+            assert files.begun[-1] == "it is gone"
+            files.content = "third"
+            await files.look()
+            files.made.set_result(MadeModel(FIRST))
+            await files.look()
+            update = await page.until(lambda told: told["type"] == "update" and not told["warnings"])
+            assert components(update) == before
+
+    asyncio.run(run())
+
+
+def test_a_change_ends_the_synthesis_of_the_one_before_and_so_does_the_end() -> None:
+    async def run() -> None:
+        files = Files()
+        async with looking(files) as page:
+            await page.told("update")
+            for content in ("second", "third"):
+                files.content = content
+                await files.look()
+            assert (files.begun, files.cancelled) == (["second", "third"], ["second"])
+        assert files.cancelled == ["second", "third"]
+
+    asyncio.run(run())
+
+
+def test_nothing_is_commanded_or_replayed() -> None:
+    async def run() -> None:
+        source = Files().source()
+        with pytest.raises(RefusedError, match="nothing is executed"):
+            await source.order(OperatorCommand.STOP, "somebody")
+        with pytest.raises(RefusedError, match="only a log"):
+            source.control_replay(Pause())
+
+    asyncio.run(run())
+
+
+def test_what_synth_tells(tmp_path: Path) -> None:
+    async def run() -> None:
+        made = await synthesized(["--", str(MODEL)])
+        assert made.supervisor.model.name == "LineFollower"
+        again = await synthesized([], MODEL.read_text(encoding="utf-8"))
+        assert again.supervisor.added == made.supervisor.added
+        wrong = tmp_path / "wrong.rscd"
+        for text, why in (
+            ("robot R { component C {} component C {} component C {} }", r"wrong.rscd, line 1: .*'C'.* \(2 errors\)"),
+            ("robot R {", "wrong.rscd, line 1: "),
+            (
+                "robot R { component C { outgoing message m with type: none behaviour { initial marked state a { on "
+                "response from m goto b } state b { on response from m goto a } } } requirement never C.b }",
+                "no supervisor exists",
+            ),
+        ):
+            wrong.write_text(text)
+            with pytest.raises(NoSupervisorError, match=why):
+                await synthesized(["--", str(wrong)])
+        wrong.unlink()
+        with pytest.raises(NoSupervisorError, match="there is no file"):
+            await synthesized(["--", str(wrong)])
+
+    asyncio.run(run())
+
+
+def test_nothing_of_the_folder_that_one_works_in_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "argparse.py").write_text("import pathlib; pathlib.Path('was_run').touch(); raise SystemExit")
+    monkeypatch.chdir(tmp_path)
+    assert asyncio.run(synthesized(["--", str(MODEL)])).supervisor.model.name == "LineFollower"
+    assert not (tmp_path / "was_run").exists()
+
+
+def test_one_that_is_not_wanted_any_more_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Reading it never ends, since nobody writes.
+    model = tmp_path / "pipe.rscd"
+    os.mkfifo(model)
+    started = []
+    real = asyncio.create_subprocess_exec
+
+    async def noted(*words: Any, **options: Any) -> asyncio.subprocess.Process:
+        started.append(await real(*words, **options))
+        return started[-1]
+
+    monkeypatch.setattr(watched_model.asyncio, "create_subprocess_exec", noted)  # type: ignore[attr-defined]
+
+    async def run() -> None:
+        task = asyncio.create_task(synthesized(["--", str(model)]))
+        while not started:
+            await asyncio.sleep(0)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await asyncio.wait_for(task, LIMIT_S)
+        assert started[0].returncode is not None
+
+    asyncio.run(run())
+
+
+def test_a_supervisors_file(tmp_path: Path) -> None:
+    file = tmp_path / "made.rsup"
+    with pytest.raises(NoSupervisorError, match=r"made\.rsup"):
+        file_digest(file)
+    with pytest.raises(NoSupervisorError, match=r"made\.rsup"):
+        read(file)
+    file.write_bytes(encode(FIRST))
+    before = file_digest(file)
+    assert read(file) == FIRST
+    file.write_bytes(encode(SECOND))
+    assert file_digest(file) != before
+    file.write_bytes(b"{}")
+    with pytest.raises(NoSupervisorError, match=r"made\.rsup"):
+        read(file)
+
+
+@pytest.mark.parametrize("suffix", [".rscd", ".rsup"])
+def test_the_command_follows_its_file(tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(watched_model, "LOOK_S", 0.01)
+    file = tmp_path / f"robot{suffix}"
+
+    def write(supervisor: Supervisor, count: int) -> None:
+        part = tmp_path / "part"
+        part.write_bytes(encode(supervisor) if suffix == ".rsup" else large_model(count).encode())
+        part.replace(file)
+
+    write(FIRST, 2)
+    parser: argparse.ArgumentParser = Parser(prog="robosc")
+    command.add_parser(parser.add_subparsers())
+    make, is_shared, robot = command._source(parser.parse_args(["view", "--model", str(file)]))
+
+    async def look() -> None:
+        async with served(make, is_shared=is_shared, robot=robot) as server, opened(server.url) as page:
+            before = components(await page.told("update"))
+            write(SECOND, 3)
+            await page.until(lambda told: told["type"] == "update" and components(told) > before)
+            file.write_bytes(b"robot {")
+            await page.until(lambda told: told["type"] == "update" and told["warnings"])
+            write(FIRST, 2)
+            await page.until(
+                lambda told: told["type"] == "update" and components(told) == before and not told["warnings"]
+            )
+
+    asyncio.run(look())
+
+
+GATE = """robot Gate {
+    datatype enum Light from double to { value > 300.0 -> day  default -> night }
+    component Sensor {
+        outgoing message light with identifier: "/light", type: Light
+        outgoing message seen with identifier: "/people", type: integer(0..9)
+        behaviour {
+            variable light: Light = night
+            variable people: integer(0..9)
+            on response from light do light := value
+            on response from seen do people := value
+            initial marked state watching { }
+        }
+    }
+    component Gate {
+        incoming message open with identifier: "/gate/open", type: none
+        incoming message shut with identifier: "/gate/shut", type: integer
+        behaviour {
+            initial marked state closed { on request to open goto opened }
+            state opened { on request to shut goto closed }
+        }
+    }
+    requirement open needs Sensor.light = day
+    requirement shut needs Sensor.people = 0
+    provide shut with Sensor.people + 1
+}"""
+
+
+def made_of(text: str, findings: tuple[str, ...] = ()) -> MadeModel:
+    made = robosc.synthesize(robosc.load(text=text)).supervisor
+    assert made is not None
+    return MadeModel(made, findings, text)
+
+
+class Playing(Files):
+    """A page that plays with the gate."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.watched = WatchedModel(made_of(GATE), "first", self._digest, self._make, pause=self._pause)
+        self.robot = playable(self.watched.made)
+
+
+async def done(page: Any, kind: str, **request: Any) -> dict[str, Any]:
+    """Ask for something, and return the answer about the run."""
+    await page.send(type=kind, **request)
+    told: dict[str, Any] = await page.told("run")
+    return told
+
+
+def test_events_happen_with_their_data_and_are_taken_back() -> None:
+    async def run() -> None:
+        async with looking(Playing()) as page:
+            definition = await page.told("definition")
+            events = {item["event"]: item for item in definition["play"]["events"]}
+            assert [name for name, item in events.items() if item["controllable"]] == ["open.request", "shut.request"]
+            (field,) = events["light.response"]["fields"]
+            assert field == {"path": [], "type": "Light", "choices": ["day", "night"], "is_boolean": False}
+            first = await page.told("run")
+            assert (first["steps"], first["undo"], first["redo"], first["is_marked"]) == (0, "", "", True)
+            assert first["hindered"]["shut.request"] == ["Gate is in closed, not in opened"]
+            told = await done(page, "event", line="open")
+            assert (told["kind"], told["steps"]) == ("wrong", 0)
+            assert "open.request' is not allowed now: requirement open needs Sensor.light = day" in told["lines"][0]
+            # What is not given is unknown, and stays so.
+            told = await done(page, "event", line="light.response")
+            assert (told["kind"], told["steps"]) == ("unknown", 1)
+            assert told["lines"][1] == "value is night by default: an earlier rule is unknown"
+            told = await done(page, "event", line="light.response 512.0")
+            assert (told["kind"], told["lines"]) == ("step", ["light.response (value = day): Sensor.light = day"])
+            assert "open.request" not in told["hindered"]
+            told = await done(page, "event", line="open.request")
+            assert (told["undo"], told["is_marked"]) == ("open.request", False)
+            assert [entry["number"] for entry in page.entries()] == [1, 2, 3, 4]
+            assert [entry["event"] for entry in page.entries()][-2:] == ["light.response", "open.request"]
+            assert page.entries()[-1]["transitions"][0]["component"] == "Gate"
+            told = await done(page, "undo")
+            assert (told["entries"], told["redo"], told["undo"]) == (3, "open.request", "light.response")
+            update = await page.until(lambda message: message["type"] == "update")
+            assert update["components"]["Gate"]["state"] == "closed"
+            assert "Gate" not in update["last"]
+            told = await done(page, "redo")
+            assert (told["entries"], told["redo"]) == (4, "")
+            told = await done(page, "undo")
+            told = await done(page, "event", line="seen 3")
+            # It takes the number of what was taken back.
+            assert (page.entries()[-1]["number"], page.entries()[-1]["event"]) == (4, "seen.response")
+            told = await done(page, "event", line="seen null")
+            assert told["lines"][1] == "Sensor.people keeps its value, since what it was to take is unknown"
+            told = await done(page, "restart")
+            assert (told["entries"], told["steps"], told["redo"]) == (0, 0, "")
+
+    asyncio.run(run())
+
+
+def test_chance_and_trouble() -> None:
+    async def run() -> None:
+        async with looking(Playing()) as page:
+            told = await page.told("run")
+            told = await done(page, "walk", steps=12, seed=3)
+            assert (told["steps"], told["lines"]) == (12, ["12 events by chance, seed 3"])
+            twin = Run(made_of(GATE).supervisor)
+            assert [entry["event"] for entry in page.entries() if entry["kind"] == "event"] == [
+                step.event for step in twin.walk(12, 3)
+            ]
+            told = await done(page, "restart")
+            told = await done(page, "walk", steps=1000, seed=0, until_trouble=True)
+            twin.restart()
+            assert (told["kind"], told["lines"]) == ("trouble", [str(twin.walk_until_trouble(1000, 0))])
+            assert told["steps"] == len(twin)
+            for _ in range(4):
+                told = await done(page, "walk", steps=5000, seed=1)
+            assert (told["kind"], told["steps"]) == ("wrong", 15000 + len(twin))
+            assert "at most 20000 events" in told["lines"][0]
+
+    asyncio.run(run())
+
+
+def test_a_run_is_kept_as_a_log_and_as_a_test() -> None:
+    async def run() -> None:
+        async with looking(Playing()) as page:
+            await page.told("run")
+            await done(page, "event", line="light day")
+            await done(page, "event", line="open")
+            twin = Run(made_of(GATE).supervisor)
+            twin.step("light.response", "day")
+            twin.step("open.request")
+            await page.send(type="save", form="log")
+            told = await page.told("saved")
+            assert (told["name"], told["text"]) == ("gate.jsonl", event_log(twin))
+            await page.send(type="save", form="test")
+            told = await page.told("saved")
+            assert told["name"] == "test_gate.py"
+            assert "MODEL = FOLDER / 'gate.rscd'" in told["text"]
+            assert "'open.request'" in told["text"]
+            compile(told["text"], told["name"], "exec")
+
+    asyncio.run(run())
+
+
+def test_each_page_has_a_run_of_its_own() -> None:
+    async def run() -> None:
+        files = Playing()
+        async with (
+            served(files.source, is_shared=False, robot=files.robot) as server,
+            opened(server.url) as one,
+            opened(server.url) as other,
+        ):
+            await one.told("run")
+            await other.told("run")
+            assert (await done(one, "event", line="light day"))["steps"] == 1
+            assert (await done(other, "undo"))["steps"] == 0
+
+    asyncio.run(run())
+
+
+def test_a_saved_file_says_what_has_changed_and_the_run_happens_again() -> None:
+    async def run() -> None:
+        files = Playing()
+        async with looking(files) as page:
+            await page.told("run")
+            await done(page, "event", line="light day")
+            await done(page, "event", line="open")
+            files.content = "second"
+            await files.look()
+            changed = GATE.replace("needs Sensor.light = day", "needs Sensor.light = day and Sensor.people = 0")
+            changed = changed.replace("requirement shut needs Sensor.people = 0", "requirement shut needs Gate.closed")
+            changed = changed.replace("state opened", "marked state opened")
+            files.made.set_result(made_of(changed, ("warning: shut never happens [never-enabled]",)))
+            await files.look()
+            told = await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
+            assert told["steps"] == 2
+            assert told["lines"][0] == "the model has changed"
+            assert "new finding: warning: shut never happens [never-enabled]" in told["lines"]
+            files.content = "third"
+            await files.look()
+            files.made.set_result(made_of(changed.replace("needs Sensor.light = day and", "needs Gate.opened and")))
+            await files.look()
+            told = await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
+            # What cannot happen any more ends it there.
+            assert told["steps"] == 1
+            assert any(line.startswith("of 2 events 1 happened again: 'open.request' is") for line in told["lines"])
+            assert "no longer found: warning: shut never happens [never-enabled]" in told["lines"]
+            assert any("states, which were" in line for line in told["lines"])
+
+    asyncio.run(run())
+
+
+def test_a_link_holds_the_model() -> None:
+    async def run() -> None:
+        files = Playing()
+        async with (
+            served(files.source, is_shared=False, robot=files.robot) as server,
+            opened(server.url) as page,
+        ):
+            token = token_of(server.url)
+            link = (await page.told("definition"))["play"]["link"]
+            assert unpacked(link) == GATE
+            await page.told("run")
+            # Somebody else's link does not set this machine to work.
+            for shown in (None, "x", 3):
+                await page.send(type="model", packed=packed("robot Other { }"), token=shown)
+                assert "needs the token of this start" in (await page.told("refused"))["why"]
+            assert files.begun == []
+            await page.send(type="model", packed=packed("robot Other { }"), token=token)
+            told = await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
+            assert told["lines"] == ["this is the model of the link"]
+            assert files.begun == ["robot Other { }"]
+            for wrong in ("", "x", "!!!", link[:40], link[:-8]):
+                await page.send(type="model", packed=wrong, token=token)
+                told = await page.until(lambda message: message["type"] in ("run", "refused"))
+                assert "link" in str(told) or "must be a text" in str(told)
+
+    asyncio.run(run())
+    assert packed("x".join(map(str, range(9000)))) is None
+    with pytest.raises(RefusedError, match="too large"):
+        unpacked(base64.urlsafe_b64encode(zlib.compress(b"x" * (1 << 21))).decode())
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        {"type": "event"},
+        {"type": "event", "line": 3},
+        {"type": "event", "line": " "},
+        {"type": "walk", "steps": 0, "seed": 1},
+        {"type": "walk", "steps": 5001, "seed": 1},
+        {"type": "walk", "steps": 5},
+        {"type": "walk", "steps": 5, "seed": True},
+        {"type": "save", "form": "word"},
+        {"type": "save", "form": ["log"]},
+        {"type": "model", "packed": None},
+    ],
+)
+def test_requests_that_make_no_sense_are_refused(request_: dict[str, Any]) -> None:
+    with pytest.raises(RefusedError):
+        parse_request(json.dumps(request_))
+
+
+def test_what_is_shown_live_is_not_led_by_hand() -> None:
+    async def run() -> None:
+        made = made_of(GATE)
+        log = LoggedRun((LogEntry(1, 0.0, "restart", "", False, {}),))
+        recording = Recording(log, made.supervisor)
+        async with served(lambda: Replay(recording), is_shared=False) as server, opened(server.url) as page:
+            await page.send(type="undo")
+            assert "only a model alone is" in (await page.told("refused"))["why"]
+
+    asyncio.run(run())
+
+
+def test_changes_of_the_supervisor_are_told() -> None:
+    carrier = """robot Carrier {
+        component Gate {
+            incoming message open with identifier: "/open", type: none
+            incoming message shut with identifier: "/shut", type: none
+            behaviour {
+                initial marked state closed { on request to open goto opened }
+                state opened { on request to shut goto closed }
+            }
+        }
+        component Lift {
+            incoming message raise with identifier: "/raise", type: none
+            incoming message lower with identifier: "/lower", type: none
+            behaviour {
+                initial marked state down { on request to raise goto up }
+                state up { on request to lower goto down }
+            }
+        }
+        requirement shut needs Lift.down
+        requirement lower needs Gate.closed
+    }"""
+    before = made_of(carrier)
+    after = made_of(carrier.replace("requirement shut needs Lift.down", ""))
+    told = model_changes(before, after)
+    assert "4 states, which were 3" in told
+    assert any(line.startswith("the supervisor adds nothing more to open.request (before: Lift.down") for line in told)
+    assert model_changes(before, before) == ("nothing that the supervisor does has changed",)
+    assert "gone: shut.request" in model_changes(
+        before, made_of(carrier.replace("shut with", "close with").replace("to shut", "to close")
+                        .replace("requirement shut", "requirement close"))
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("how", ["file", "-", "link"])
+def test_the_command_plays_with_a_file_a_text_or_a_link(
+    how: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "gate.rscd").write_text(GATE, encoding="utf-8")
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(GATE.encode())))
+    word = {"file": "gate.rscd", "-": "-", "link": f"http://127.0.0.1:8066/#model={packed(GATE)}"}[how]
+    parser: argparse.ArgumentParser = Parser(prog="robosc")
+    command.add_parser(parser.add_subparsers())
+    arguments = parser.parse_args(["view", word])
+    command._take_played(arguments)
+    make, is_shared, robot = command._source(arguments)
+    assert (is_shared, robot is not None and robot.shape.name) == (False, "Gate")
+
+    async def look() -> None:
+        async with served(make, is_shared=is_shared, robot=robot) as server, opened(server.url) as page:
+            await page.told("run")
+            assert (await done(page, "event", line="light day"))["steps"] == 1
+
+    asyncio.run(look())
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["gate.rscd", "--model", "gate.rscd"], "MODEL is played with alone"),
+        (["gate.rscd", "--ros2"], "MODEL is played with alone"),
+        (["none.rscd"], "there is no file none.rscd"),
+        (["-", "--end-with-input"], "do not go together"),
+        (["http://h/#model=x"], "the link holds no model"),
+        ([], "what is shown?"),
+    ],
+)
+def test_wrong_use(words: list[str], message: str) -> None:
+    parser: argparse.ArgumentParser = Parser(prog="robosc")
+    command.add_parser(parser.add_subparsers())
+    with pytest.raises(CommandError, match=re.escape(message)):
+        command.run(parser.parse_args(["view", *words]))

@@ -14,7 +14,7 @@ _BEGIN_OPERANDS = frozenset({"(", "!", "true", "false", "value"})
 _CONVERSIONS = frozenset({"integer", "double"})
 _BEHIND_OPERANDS = frozenset({"then", "else", "in"})
 _BETWEEN = frozenset({",", ":", "..", "in"})
-"""What parts arguments, slices and quantifiers in brackets."""
+"""Tokens between arguments, the ends of a slice, and the parts of a quantifier in brackets."""
 _BINARY = frozenset({"or", "and", "=", "!=", ">", ">=", "<", "<=", "+", "*", "/", "=>"})
 
 

@@ -65,6 +65,7 @@ def remarks(bundle: Bundle) -> tuple[Diagnostic, ...]:
     checked = check(bundle)
     model = checked.model_or_raise()
     system = to_automata(model, Deployment.CONTROLLER)
+    assert checked.places is not None
     explanation = explain_synthesis(model, checked.places, system, deployment=Deployment.CONTROLLER)
     return tuple(
         Diagnostic(Severity.WARNING, remark.kind, remark.message, remark.location, "") for remark in explanation.remarks

@@ -347,7 +347,7 @@ def test_words_as_names(word: str) -> None:
 
 
 def test_not_takes_no_meaning_from_a_text() -> None:
-    """Texts that the grammar without the operator takes keep their meaning, but for calls of `not`, which is no function."""
+    """Texts that the grammar without the operator takes keep their meaning, but for calls of `not`, no function."""
     read = 0
     for seed in range(300):
         random = Random(seed)

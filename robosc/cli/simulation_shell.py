@@ -2,7 +2,7 @@
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
@@ -34,6 +34,8 @@ help, quit
 """
 
 _MOST = 1_000_000
+_MOST_TOLD = 20
+"""Steps of a walk that are told at once."""
 
 
 class _CommandFault(Exception):
@@ -163,7 +165,7 @@ class Shell:
 
     def _history(self, words: Sequence[str]) -> None:
         _no_words("history", words)
-        self._tell(self._run.history, 0)
+        self._tell(0)
 
     def _restart(self, words: Sequence[str]) -> None:
         _no_words("restart", words)
@@ -174,19 +176,17 @@ class Shell:
         count, seed = _numbers("random", words, (None, self._walks))
         self._walks += 1
         before = len(self._run)
-        if len(self._run.walk(count, seed)) < count:
-            self._tell(self._run.history[before:], before)
-            write_lines(["nothing more can happen"])
-        else:
-            self._tell(self._run.history[before:], before)
-        write_lines([f"seed {seed}", *standing(self._run)])
+        taken = self._run.walk(count, seed)
+        self._tell_walk(before)
+        ended = ["nothing more can happen"] if len(taken) < count else []
+        write_lines([*ended, f"seed {seed}", *standing(self._run)])
 
     def _until_trouble(self, words: Sequence[str]) -> None:
         count, seed = _numbers("until-trouble", words, (DEFAULT_STEPS, self._walks))
         self._walks += 1
         before = len(self._run)
         trouble = self._run.walk_until_trouble(count, seed)
-        self._tell(self._run.history[before:], before)
+        self._tell_walk(before)
         write_lines([str(trouble) if trouble is not None else f"no trouble in {len(self._run) - before} steps"])
         write_lines([f"seed {seed}", *standing(self._run)])
 
@@ -200,9 +200,18 @@ class Shell:
 
     # Output and completion
 
-    def _tell(self, steps: "Iterable[Step]", number: int) -> None:
+    def _tell_walk(self, number: int) -> None:
+        """Tell the steps after so many; of a long walk the last ones."""
+        left_out = len(self._run) - number - _MOST_TOLD
+        if left_out > 0:
+            write_lines([f"      {left_out} events, which 'history' tells"])
+            number += left_out
+        self._tell(number)
+
+    def _tell(self, number: int) -> None:
+        """Tell the steps after so many."""
         before = self._run.history[number - 1].state if number else self._run.initial
-        for count, step in enumerate(steps, start=number + 1):
+        for count, step in enumerate(self._run.history[number:], start=number + 1):
             write_lines(step_lines(count, step, before))
             before = step.state
 

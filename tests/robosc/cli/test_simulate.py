@@ -186,6 +186,7 @@ def test_commands_from_a_file(capsys: pytest.CaptureFixture[str], monkeypatch: p
         state
         history
         random 2 7
+        random 25 7
         until-trouble 50 3
         save run.jsonl
         restart
@@ -208,6 +209,7 @@ def test_commands_from_a_file(capsys: pytest.CaptureFixture[str], monkeypatch: p
         "nothing is left to be taken back",
         "taken again: scan.response",
         "seed 7",
+        "      5 events, which 'history' tells",
         "written to run.jsonl",
         *HELP.splitlines(),
     ):

@@ -283,7 +283,7 @@ def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool,
 def _playground(arguments: argparse.Namespace, scene: Any) -> "tuple[Callable[[], Source], bool, Robot]":
     """Return a function that makes the run of a page, that each page has its own, and the robot."""
     from robosc.cli.simulate import model_of_test
-    from robosc_view.playground import Playground, playable
+    from robosc_view.playground import KeptRuns, Playground, playable
     from robosc_view.watched_model import synthesized
 
     words = ["--deployment", arguments.deployment or "controller", "--engine", arguments.engine, "--allow-livelock"]
@@ -293,8 +293,9 @@ def _playground(arguments: argparse.Namespace, scene: Any) -> "tuple[Callable[[]
     words += [] if arguments.max_nodes is None else ["--max-nodes", str(arguments.max_nodes)]
     watched = _watched(arguments, words)
     file = None if arguments.text is not None else model_of_test(arguments)
+    kept = KeptRuns()
     return (
-        lambda: Playground(watched, file, lambda text: synthesized(words, text), scene),
+        lambda: Playground(watched, kept, file, lambda text: synthesized(words, text), scene),
         False,
         playable(watched.made, scene),
     )

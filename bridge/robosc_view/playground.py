@@ -9,6 +9,7 @@ import base64
 import binascii
 import time
 import zlib
+from collections import OrderedDict
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from robosc_view.messages import TransitionTracker, run_text, saved_text
 from robosc_view.model_changes import model_changes
 from robosc_view.replay import LastTaken
 from robosc_view.reports import EventBatch, Notice, RunReport, SourceKind, Status
-from robosc_view.requests import Back, Form, Happen, LoadModel, RunCommand, Save, Walk
+from robosc_view.requests import Back, Form, Happen, LoadModel, Resume, RunCommand, Save, Walk
 from robosc_view.sources import RefusedError, ReplayCommand, Sink, not_replayed
 from robosc_view.watched_model import MadeModel, NoSupervisorError, WatchedModel
 
@@ -33,6 +34,9 @@ MAXIMUM_WAITING = 50
 
 MAXIMUM_STEPS = 20_000
 """Events of one run: a page is no place for longer ones."""
+
+MAXIMUM_KEPT = 100
+"""Runs that are kept for pages that come back."""
 
 MAXIMUM_TEXT = 1 << 20
 """Characters of a model that a link holds."""
@@ -66,11 +70,30 @@ def unpacked(text: str) -> str:
         raise RefusedError("the link holds no model") from error
 
 
+class KeptRuns:
+    """Runs of pages, for pages that come back: after a lost connection, or loaded again. The oldest are forgotten."""
+
+    def __init__(self) -> None:
+        self._runs: OrderedDict[str, tuple[MadeModel | None, tuple[Step, ...]]] = OrderedDict()
+
+    def keep(self, page: str, own: MadeModel | None, history: tuple[Step, ...]) -> None:
+        """Keep what a page has done, and the model of the link that it plays with, if it is that."""
+        self._runs[page] = own, history
+        self._runs.move_to_end(page)
+        while len(self._runs) > MAXIMUM_KEPT:
+            self._runs.popitem(last=False)
+
+    def of(self, page: str) -> tuple[MadeModel | None, tuple[Step, ...]]:
+        """Return the link's model and the steps that were kept of a page; nothing where none were."""
+        return self._runs.get(page, (None, ()))
+
+
 class Playground:
     """The run of one page.
 
     Args:
         watched: The model.
+        kept: Runs of pages that may come back.
         file: File of the model, for saved tests; None: it has none.
         make: Function that makes a model of a text: of a link that is opened.
         scene: Scene for the map.
@@ -80,12 +103,16 @@ class Playground:
     def __init__(
         self,
         watched: WatchedModel,
+        kept: KeptRuns,
         file: ModelOfTest | None,
         make: Callable[[str], Awaitable[MadeModel]],
         scene: Any = None,
         clock: Callable[[], float] = time.time,
     ) -> None:
         self._watched = watched
+        self._kept = kept
+        # Name of the page; empty: it has not told it.
+        self._page = ""
         self._file = file
         self._make = make
         self._scene = scene
@@ -191,6 +218,8 @@ class Playground:
                 self._show(sink, RunReport("step", (f"{len(taken)} events by chance, seed {seed}", *more)))
             case Save(form=form):
                 sink.answer(saved_text(*await asyncio.to_thread(self._saved, form)))
+            case Resume(page=page):
+                await self._resume(page, sink)
             case LoadModel(packed=text):
                 await self._load(unpacked(text), sink)
 
@@ -207,6 +236,27 @@ class Playground:
         # Seen from the folder of the model, where the test is expected to go.
         model = ModelOfTest(Path(f"{name}.rscd")) if file is None else file
         return f"test_{name}.py", pytest_module(self._run, model, model.path.parent / f"test_{name}.py")
+
+    async def _resume(self, page: str, sink: Sink) -> None:
+        own, history = self._kept.of(page)
+        self._page = page
+        if len(self._run) or not (history or own):
+            return
+        if own is not None:
+            self._own = own
+            self._begin(own)
+            await self._define(sink)
+        told = await asyncio.to_thread(self._again, history)
+        self._show(sink, RunReport("changed" if told else "step", told or ("what this page did before is here again",)))
+
+    def _again(self, history: tuple[Step, ...]) -> tuple[str, ...]:
+        """Take the events of a run again, as far as they can happen; returns what is in their way."""
+        for number, step in enumerate(history):
+            try:
+                self._run.step(step.event, *(() if step.given is NO_DATA else (step.given,)))
+            except RoboscError as error:
+                return (f"of {len(history)} events {number} happened again: {error}",)
+        return ()
 
     async def _load(self, text: str, sink: Sink) -> None:
         try:
@@ -228,12 +278,7 @@ class Playground:
         told = list(await asyncio.to_thread(model_changes, before, after))
         history = self._run.history
         self._begin(after)
-        for number, step in enumerate(history):
-            try:
-                self._run.step(step.event, *(() if step.given is NO_DATA else (step.given,)))
-            except RoboscError as error:
-                told.append(f"of {len(history)} events {number} happened again: {error}")
-                break
+        told += await asyncio.to_thread(self._again, history)
         await self._define(sink)
         self._show(sink, RunReport("changed", ("the model has changed", *told)))
 
@@ -272,6 +317,8 @@ class Playground:
             )
         )
         sink.show_run(run_text(run, len(everything), report))
+        if self._page:
+            self._kept.keep(self._page, self._own, history)
 
 
 def playable(made: MadeModel, scene: Any = None) -> Robot:

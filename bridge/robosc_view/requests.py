@@ -17,6 +17,9 @@ MAXIMUM_LED_BYTES = 16384
 MAXIMUM_WALK = 5000
 """Events of one walk."""
 
+MAXIMUM_PAGE = 64
+"""Characters of the name that a page gives itself."""
+
 _OF_WALKS = (("steps", 1, MAXIMUM_WALK), ("seed", 0, 2**31))
 
 SLOWEST, FASTEST = 0.01, 1000.0
@@ -111,7 +114,18 @@ class LoadModel:
     token: object
 
 
-RunCommand = Happen | Back | Walk | Save | LoadModel
+@dataclass(frozen=True, slots=True)
+class Resume:
+    """Go on with the run that this page had before its connection was lost, or before it was loaded again.
+
+    Attributes:
+        page: Name that the page has given itself.
+    """
+
+    page: str
+
+
+RunCommand = Happen | Back | Walk | Save | LoadModel | Resume
 
 
 @runtime_checkable
@@ -165,6 +179,8 @@ def parse_request(text: str) -> PageRequest:
             return Walk(steps, seed, document.get("until_trouble") is True)
         case "save" if document.get("form") in tuple(Form):
             return Save(Form(document["form"]))
+        case "resume":
+            return Resume(_text(document, "page")[:MAXIMUM_PAGE])
         case "model":
             return LoadModel(_text(document, "packed"), document.get("token"))
     raise RefusedError("there is nothing of that type")

@@ -73,6 +73,9 @@ def test_a_model_is_played_with(browser: Browser, tmp_path: Path) -> None:
         expect(page.locator("#stream-rows .row")).to_have_count(2)
         page.locator("#play-redo").click()
         expect(told).to_have_text("taken again: seen.response")
+        page.reload()
+        expect(told).to_have_text("what this page did before is here again")
+        expect(page.locator("#stream-rows .row")).to_have_count(4)
         page.locator("#play-trouble").click()
         expect(told).to_contain_text("Trouble:")
         for button, name in (("#play-log", "gate.jsonl"), ("#play-test", "test_gate.py")):
@@ -83,6 +86,7 @@ def test_a_model_is_played_with(browser: Browser, tmp_path: Path) -> None:
         assert '"event":"light.response"' in (tmp_path / "gate.jsonl").read_text(encoding="utf-8")
         compile((tmp_path / "test_gate.py").read_text(encoding="utf-8"), "test_gate.py", "exec")
         seen.picture("playground")
+        page.locator(event("light.response")).locator("select").select_option("day")
         # The file is saved: what has changed is told, and what was entered stays.
         file.write_text(GATE.replace("needs Sensor.people = 0", "needs Sensor.people < 3"), encoding="utf-8")
         expect(told).to_contain_text("the model has changed")

@@ -34,6 +34,7 @@ const receive = {
   definition(message) {
     forget();
     received.definition = message;
+    play.defined(message);
     const now = JSON.stringify(message);
     if (wasLost) stream.note("The connection is back. What happened meanwhile is not here.");
     wasLost = false;
@@ -116,6 +117,7 @@ connection = new Connection(`${location.protocol === "https:" ? "wss" : "ws"}://
   },
   onChange() {
     if (connection === null) return;
+    if (!connection.isOpen) play.disconnected();
     if (!connection.isOpen && received.definition !== null) {
       wasLost = true;
       stream.note("The connection is lost.");

@@ -69,6 +69,20 @@ class Field {
   }
 }
 
+const KEPT = "robosc-page";
+
+/** Name of this tab, which a reload keeps. */
+function pageName() {
+  const made = [...crypto.getRandomValues(new Uint8Array(16))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+  try {
+    const name = sessionStorage.getItem(KEPT) ?? made;
+    sessionStorage.setItem(KEPT, name);
+    return name;
+  } catch {
+    return made;
+  }
+}
+
 /** JSON of the parts of some data, each with its path and its own JSON. */
 function nested(parts) {
   if (parts.length === 1 && parts[0][0].length === 0) return parts[0][1];
@@ -127,6 +141,7 @@ export function startPlay(send, token) {
   });
 
   let isLinkOpened = false;
+  let isResumed = false;
   return {
     build() {
       const { play } = received.definition;
@@ -149,9 +164,12 @@ export function startPlay(send, token) {
         byId(place).replaceChildren(...(forms.length > 0 ? forms : [make("p", { class: "quiet" }, "Nothing.")]));
       }
       show(byId("play-link"), play.link !== null);
-      const packed = location.hash.startsWith(IN_LINK) ? location.hash.slice(IN_LINK.length) : "";
-      if (packed && !isLinkOpened && packed !== play.link) want({ type: "model", packed, token });
+      const packed = isLinkOpened ? "" : location.hash.startsWith(IN_LINK) ? location.hash.slice(IN_LINK.length) : "";
       isLinkOpened = true;
+      if (!packed) return;
+      // A page that is loaded again goes on with what it did, and does not open the link again.
+      history.replaceState(null, "", location.pathname);
+      if (packed !== play.link) want({ type: "model", packed, token });
     },
     paint() {
       const { run } = received;
@@ -163,6 +181,15 @@ export function startPlay(send, token) {
         mark(button, "title", run[type]);
       }
       say(byId("play-count"), `${count(run.steps, "event", "events")}${run.is_marked ? " · marked" : ""}`);
+    },
+    /** There is a definition: a page that was here before goes on with what it did. */
+    defined(definition) {
+      if (!definition.play || isResumed) return;
+      isResumed = true;
+      send({ type: "resume", page: pageName() });
+    },
+    disconnected() {
+      isResumed = false;
     },
     /** What was just done. */
     told: ({ kind, lines }) => kind !== "" && tell(kind, lines),

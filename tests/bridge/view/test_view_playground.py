@@ -25,7 +25,7 @@ from robosc.supervisor import Supervisor, encode
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view import command, watched_model
 from robosc_view.model_changes import model_changes
-from robosc_view.playground import Playground, packed, playable, unpacked
+from robosc_view.playground import MAXIMUM_KEPT, KeptRuns, Playground, packed, playable, unpacked
 from robosc_view.replay import Recording, Replay
 from robosc_view.reports import SourceKind
 from robosc_view.requests import parse_request
@@ -52,11 +52,12 @@ class Files:
         self._looks = asyncio.Semaphore(0)
         self._asked = asyncio.Event()
         self.watched = WatchedModel(MadeModel(FIRST), "first", self._digest, self._make, pause=self._pause)
+        self.kept = KeptRuns()
         self.robot = playable(self.watched.made)
 
     def source(self) -> Playground:
         """The run of one more page."""
-        return Playground(self.watched, None, self._of_link)
+        return Playground(self.watched, self.kept, None, self._of_link)
 
     async def _of_link(self, text: str) -> MadeModel:
         self.begun.append(text)
@@ -319,10 +320,10 @@ class Playing(Files):
         self.robot = playable(self.watched.made)
 
 
-async def done(page: Any, kind: str, **request: Any) -> dict[str, Any]:
+async def done(view: Any, kind: str, **request: Any) -> dict[str, Any]:
     """Ask for something, and return the answer about the run."""
-    await page.send(type=kind, **request)
-    told: dict[str, Any] = await page.told("run")
+    await view.send(type=kind, **request)
+    told: dict[str, Any] = await view.told("run")
     return told
 
 
@@ -494,6 +495,40 @@ def test_a_link_holds_the_model() -> None:
     assert packed("x".join(map(str, range(9000)))) is None
     with pytest.raises(RefusedError, match="too large"):
         unpacked(base64.urlsafe_b64encode(zlib.compress(b"x" * (1 << 21))).decode())
+
+
+def test_a_page_that_comes_back_goes_on_with_its_run() -> None:
+    async def run() -> None:
+        files = Playing()
+        async with served(files.source, is_shared=False, robot=files.robot) as server:
+            async with opened(server.url) as page:
+                await page.told("run")
+                # Nothing was kept of it yet.
+                await page.send(type="resume", page="one")
+                await done(page, "event", line="light day")
+                assert (await done(page, "event", line="open"))["steps"] == 2
+            async with opened(server.url) as page, opened(server.url) as other:
+                await page.told("run")
+                told = await done(page, "resume", page="one")
+                assert (told["steps"], told["lines"]) == (2, ["what this page did before is here again"])
+                assert [entry["event"] for entry in page.entries()] == ["light.response", "open.request"]
+                await other.told("run")
+                await other.send(type="resume", page="two")
+                assert (await done(other, "event", line="seen 1"))["steps"] == 1
+                await page.send(type="model", packed=packed("robot Other { }"), token=token_of(server.url))
+                await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
+            async with opened(server.url) as page:
+                first = components(await page.told("update"))
+                await page.send(type="resume", page="one")
+                # The model of the link is kept, too.
+                await page.until(lambda message: message["type"] == "update" and components(message) != first)
+
+    asyncio.run(run())
+    kept = KeptRuns()
+    for number in range(MAXIMUM_KEPT + 1):
+        kept.keep(str(number), MadeModel(FIRST), ())
+    assert kept.of("0") == (None, ())
+    assert kept.of("1") == (MadeModel(FIRST), ())
 
 
 @pytest.mark.parametrize(

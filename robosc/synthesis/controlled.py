@@ -1,9 +1,9 @@
 """Answers to questions about the controlled system, on predicates: no state is ever looked at by itself."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from functools import cached_property
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from robosc.errors import InternalError
 from robosc.expressions import Expression
 from robosc.synthesis.causes import Causes
 from robosc.synthesis.encoding import Encoding
@@ -11,7 +11,7 @@ from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import FixedPoint, Problem, allowed, initial_states, safe_states
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.questions import Answers, EnabledTogether, NeverEnabled, Questions, Restriction, Unprompted
-from robosc.synthesis.runs import ShortestRuns
+from robosc.synthesis.runs import ShortestRuns, SystemRun
 from robosc.synthesis.transitions import Steps
 
 MAXIMUM_TOGETHER = 100
@@ -55,7 +55,7 @@ class ControlledSystem:
             unused=self._unused(questions.restrictions),
             together=self._together(questions.rivals),
             unreached=tuple(self._unreached(questions.locations)),
-            unprompted=tuple(self._unprompted(questions.prompted, questions.prompts)),
+            unprompted=tuple(self._unprompted(questions.prompted, questions.prompts, questions.silent)),
         )
 
     def _possible(self, event: str) -> Any:
@@ -164,25 +164,60 @@ class ControlledSystem:
 
     # Prompts
 
-    def _unprompted(self, events: Sequence[str], prompts: frozenset[str]) -> Iterator[Unprompted]:
+    def _unprompted(
+        self, events: Sequence[str], prompts: frozenset[str], silent: Sequence[str]
+    ) -> Iterator[Unprompted]:
         """Those of some events that can happen again and again while no prompt does.
 
         A loop that was told already tells of the events that are in it.
+
+        Args:
+            events: The events, none of them silent.
+            prompts: The prompts.
+            silent: Events that go before all others wherever they change anything.
         """
+        executed = self._executed(silent)
         inside = [steps for steps in self._problem.steps if steps.event.name not in prompts]
+        runs = self._runs_from(self._start, self._problem.steps, executed)
         told: set[str] = set()
         for event in events:
-            if event in told:
-                continue
             steps = self._steps[event]
-            states = self._again(steps, inside)
-            if states == self._manager.false:
+            states = self._again(steps, inside, executed) if event not in told else self._manager.false
+            run = runs.run_to(states) if states != self._manager.false else None
+            if run is None:
                 continue
-            state, loop = self._loop(steps, inside, states)
+            state, loop = self._loop(steps, inside, executed, states, run)
             told.update(loop)
-            yield Unprompted(event, self._runs.trace_to(state), loop)
+            yield Unprompted(event, runs.trace_to(state), loop)
 
-    def _loop(self, steps: Steps, inside: Sequence[Steps], states: Any) -> tuple[Any, tuple[str, ...]]:
+    def _executed(self, silent: Sequence[str]) -> dict[str, Any]:
+        """Return for each event the states in which an executor may take it: silent events go first."""
+        possible = {name: self._reachable & allowed(steps, self._good) for name, steps in self._steps.items()}
+        first = {name: self._possible(name) & self._steps[name].moving() for name in silent}
+        stable = ~self._encoding.any_of(first.values())
+        return {name: first[name] if name in first else states & stable for name, states in possible.items()}
+
+    def _again(self, steps: Steps, inside: Sequence[Steps], executed: Mapping[str, Any]) -> Any:
+        """Return the states in which an event can happen, and then again and again, by some events alone.
+
+        Source: E. A. Emerson and C.-L. Lei, "Efficient model checking in fragments of the propositional mu-calculus",
+        LICS 1986, pp. 267-278: the largest set from which the event leads to where the set can be reached.
+        """
+        found, narrowed = self._manager.true, executed[steps.event.name]
+        while narrowed != found:
+            found = leading = narrowed
+            wider = self._manager.true
+            while wider != leading:
+                wider = leading
+                for other in inside:
+                    self._monitor.check_stop()
+                    leading = leading | (executed[other.event.name] & other.some(leading))
+            narrowed = found & steps.some(leading)
+        return found
+
+    def _loop(
+        self, steps: Steps, inside: Sequence[Steps], executed: Mapping[str, Any], states: Any, run: SystemRun
+    ) -> tuple[Any, tuple[str, ...]]:
         """Return a state from which an event, and some that follow it, lead back to it; and these events.
 
         Where nothing leads back, a state further on is tried; there is no way back from that one, so it ends.
@@ -190,39 +225,19 @@ class ControlledSystem:
         Args:
             steps: The event.
             inside: The events that may follow it.
+            executed: The states in which each event may be taken.
             states: States that `_again` has found for them.
+            run: A run to one of these.
         """
-        run = self._runs.run_to(states)
-        while True:
-            assert run is not None  # noqa: S101  # From everywhere in these states there is a way to one of them.
-            state = self._encoding.state(run.states[-1])
-            runs = self._runs_from(steps.image(state), inside)
+        further: SystemRun | None = run
+        while further is not None:
+            state = self._encoding.state(further.states[-1])
+            runs = self._runs_from(steps.image(state), inside, executed)
             back = runs.run_to(state)
             if back is not None:
                 return state, (steps.event.name, *back.events)
-            run = runs.run_to(states)
-
-    def _again(self, steps: Steps, inside: Sequence[Steps]) -> Any:
-        """Return the states in which an event can happen, and then again and again, by some events alone.
-
-        Source: E. A. Emerson and C.-L. Lei, "Efficient model checking in fragments of the propositional mu-calculus",
-        LICS 1986, pp. 267-278: the largest set from which the event leads to where the set can be reached.
-        """
-        found, narrowed = self._manager.true, self._possible(steps.event.name)
-        while narrowed != found:
-            found = narrowed
-            narrowed = found & steps.some(self._leading_to(found, inside))
-        return found
-
-    def _leading_to(self, states: Any, events: Sequence[Steps]) -> Any:
-        """Return the states of the controlled system from which some events lead to others, or that are such."""
-        found, wider = self._manager.false, states
-        while wider != found:
-            found = wider
-            for steps in events:
-                self._monitor.check_stop()
-                wider = wider | (self._reachable & allowed(steps, self._good) & steps.some(wider))
-        return found
+            further = runs.run_to(states)
+        raise InternalError("from a state of a loop there is no way on to a state of one")
 
     # Rivals
 
@@ -230,16 +245,16 @@ class ControlledSystem:
         pairs = list(self._pairs(groups))
         if not pairs:
             return ()
-        runs = self._runs
+        possible = {name: self._reachable & allowed(steps, self._good) for name, steps in self._steps.items()}
+        runs = self._runs_from(self._start, self._problem.steps, possible)
         return tuple(EnabledTogether(first, second, runs.trace_to(states)) for first, second, states in pairs)
 
-    @cached_property
-    def _runs(self) -> ShortestRuns:
-        """Runs from the initial states."""
-        return self._runs_from(initial_states(self._encoding) & self._good, self._problem.steps)
+    @property
+    def _start(self) -> Any:
+        """The initial states in which the supervisor lets the system begin."""
+        return initial_states(self._encoding) & self._good
 
-    def _runs_from(self, start: Any, events: Sequence[Steps]) -> ShortestRuns:
-        possible = {name: self._reachable & allowed(steps, self._good) for name, steps in self._steps.items()}
+    def _runs_from(self, start: Any, events: Sequence[Steps], possible: Mapping[str, Any]) -> ShortestRuns:
         return ShortestRuns(self._encoding, self._monitor, events, possible, start)
 
     def _pairs(self, groups: Iterable[Sequence[str]]) -> Iterator[tuple[str, str, Any]]:

@@ -11,10 +11,10 @@
   never): what counts is whether the controlled system would do more without it. All that are reported can go
   together. What never is requested is never restricted.
 - `unreachable-state`: a state that its component never is in, whether or not its behaviour alone has a way there.
-- `unprompted-request`: a service or action that can be requested again and again while nothing happens but requests,
-  their replies and silent steps: no message of the robot, by which somebody or something would ask for it. It is a
-  note, since a patrol is meant to go on for ever. A loop is told once, for the request in it that is declared first.
-  Only for the controller: in a layer it is the existing controller that asks.
+- `unprompted-request`: a service or action that an executor, which takes resets and silent steps first, can request
+  again and again while nothing happens but requests, their replies and silent steps: no message of the robot, by which
+  somebody or something would ask for it. It is a note, since a patrol is meant to go on for ever. A loop is told once,
+  for the request in it that is declared first. Only for the controller: in a layer the existing controller asks.
 - `competing-requests`: two communications of one kind (topics, services and actions have name spaces of their own)
   with one identifier that can be requested in one state, with a shortest run to such a state. Only for the
   controller: in a layer it is the existing controller that chooses.
@@ -69,6 +69,9 @@ def questions_about(model: Model, system: System, deployment: Deployment) -> Que
             for item in model.communications
             if item.kind is CommunicationKind.OUTGOING_MESSAGE
             for event in item.events
+        ),
+        silent=tuple(
+            event.name for event in system.events if is_tau(event.name) or event.name.endswith(f".{EventKind.RESET}")
         ),
     )
 

@@ -65,6 +65,7 @@ class Questions:
         locations: Automata with one of their locations, of which to tell whether they are ever in it.
         prompted: Events of which to tell whether they can happen again and again without a prompt.
         prompts: The events that are prompts.
+        silent: Events that are taken before all others, as an executor does.
     """
 
     events: tuple[str, ...] = ()
@@ -73,6 +74,7 @@ class Questions:
     locations: tuple[tuple[str, str], ...] = ()
     prompted: tuple[str, ...] = ()
     prompts: frozenset[str] = frozenset()
+    silent: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

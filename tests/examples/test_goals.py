@@ -7,11 +7,11 @@ import pytest
 import robosc
 
 GOALS = Path(__file__).parents[2] / "examples" / "goals"
-PATTERNS = sorted(path.stem for path in GOALS.glob("*.rscd") if path.stem != "parts")
+PATTERNS = sorted(path.stem for path in GOALS.glob("*/*.rscd") if path.stem != "parts")
 
 
 def run_of(pattern: str) -> robosc.Run:
-    supervisor = robosc.synthesize(GOALS / f"{pattern}.rscd").supervisor
+    supervisor = robosc.synthesize(GOALS / pattern / f"{pattern}.rscd").supervisor
     assert supervisor is not None
     return robosc.simulate(supervisor)
 
@@ -28,7 +28,7 @@ def is_asked_for(run: robosc.Run) -> bool:
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_a_pattern_has_no_warnings(pattern: str) -> None:
-    found = robosc.synthesize(GOALS / f"{pattern}.rscd").diagnostics
+    found = robosc.synthesize(GOALS / pattern / f"{pattern}.rscd").diagnostics
     assert [item.code for item in found if item.severity is not robosc.Severity.NOTE] == []
     # A patrol alone goes on by itself.
     assert ("unprompted-request" in {item.code for item in found}) == (pattern == "patrol")

@@ -1,6 +1,6 @@
 """Warnings about a model that only synthesis can give: by hand in pairs, and against enumerated states."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ from robosc.certification import OutcomeStatus, make_supervisor
 from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.exploration import explore
 from robosc.model import Places
-from robosc.model.structure import CommunicationKind, Deployment, EventKind, Model
+from robosc.model.structure import CommunicationKind, Deployment, EventKind, Model, is_tau
 from robosc.source import Location
 from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisStatus, findings, questions_about, synthesize
@@ -557,7 +557,9 @@ class Twin:
         added = state_predicates(system, synthesize(system).added)
         graph = explore(system, added, model, limit=LIMIT)
         self.enabled = [set(state.enabled) for state in graph.states]
-        self.transitions = graph.transitions
+        self._leaving: defaultdict[int, list[tuple[int, str, int]]] = defaultdict(list)
+        for item in graph.transitions:
+            self._leaving[item[0]].append(item)
         self._places = {subject: place for place, subject in enumerate(subjects(system))}
 
     def findings(self, places: Places, deployment: Deployment) -> set[tuple[str, Location]]:
@@ -574,7 +576,18 @@ class Twin:
     def repeated(self, places: Places) -> set[Location]:
         """The services and actions whose request is on a circle of the graph without messages of the robot."""
         messages = {item.name for item in self.model.communications if item.kind is CommunicationKind.OUTGOING_MESSAGE}
-        steps = [item for item in self.transitions if item[1].rpartition(".")[0] not in messages]
+        begun, steps, todo = {0}, [], [0]
+        while todo:
+            here = todo.pop()
+            # Resets and silent steps that change something go before everything else.
+            first = [item for item in self._leaving[here] if item[1].endswith(".reset") or is_tau(item[1])]
+            first = [item for item in first if item[2] != here]
+            for item in first or [item for item in self._leaving[here] if not is_tau(item[1])]:
+                if item[2] not in begun:
+                    begun.add(item[2])
+                    todo.append(item[2])
+                if item[1].rpartition(".")[0] not in messages:
+                    steps.append(item)
         graph = igraph.Graph(len(self.enabled), [(source, target) for source, _, target in steps], directed=True)
         circle = graph.connected_components(mode="strong").membership
         on_circles = {event for source, event, target in steps if circle[source] == circle[target]}

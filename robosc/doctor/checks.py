@@ -277,6 +277,10 @@ def _ports(machine: Machine, is_needed: bool) -> Iterator[Finding]:
 
 def _port(machine: Machine, port: str, is_needed: bool) -> Finding:
     if machine.is_usable(port):
+        users = ", ".join(machine.users_of(port))
+        if users:
+            fix = "end what is not the bridge, such as the bring-up of ROS (docs/first-drive.md)"
+            return Finding("serial port", Grade.NOTE, f"{port} is used by {users}", fix)
         return Finding("serial port", Grade.OK, f"{port} can be read and written")
     group = machine.group_of(port)
     grade = _lack(is_needed)

@@ -1,5 +1,6 @@
 """The machine as the examination sees it; tests put another in its place."""
 
+import contextlib
 import getpass
 import grp
 import os
@@ -107,6 +108,17 @@ class Machine:
             return stat.S_ISCHR(Path(path).stat().st_mode)
         except OSError:
             return False
+
+    def users_of(self, device: str) -> tuple[str, ...]:
+        """Return the programs that have a device open, as `NAME (NUMBER)`: those that this user may look at."""
+        place, found = Path(device).resolve(), []
+        for process in sorted(Path("/proc").glob("[0-9]*")):
+            # Processes end meanwhile, and those of others are hidden.
+            with contextlib.suppress(OSError):
+                if any(link.readlink() == place for link in (process / "fd").iterdir()):
+                    name = (process / "comm").read_text("utf-8", "replace").strip()
+                    found.append(f"{name} ({process.name})")
+        return tuple(found)
 
     def group_of(self, device: str) -> str:
         """Return the group that a device belongs to."""

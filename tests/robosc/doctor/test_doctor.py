@@ -47,6 +47,7 @@ class MadeUp(Machine):
             "/usr/share/fonts/a/b.ttf",
         }
         self.allowed = {"/dev/ttyACM0"}
+        self.users: tuple[str, ...] = ()
         self.mine: set[str] = set()
         self.later: set[str] = set()
         self.modules = {"rclpy": "/usr/bin/python3", "rospy": "/usr/bin/python3"}
@@ -79,6 +80,9 @@ class MadeUp(Machine):
 
     def is_device(self, path: str) -> bool:
         return path in self.files
+
+    def users_of(self, device: str) -> tuple[str, ...]:
+        return self.users if device == "/dev/ttyACM0" else ()
 
     def group_of(self, device: str) -> str:
         return "dialout"
@@ -184,6 +188,13 @@ def test_why_a_port_cannot_be_used(machine: MadeUp) -> None:
     assert "chmod" in problems(machine, Purpose.BRIDGE)["serial port"].fix
 
 
+def test_who_holds_a_port_is_told(machine: MadeUp) -> None:
+    machine.users = ("turtlebot3_ros (41)",)
+    found = problems(machine, Purpose.BRIDGE)["serial port"]
+    assert (found.grade, found.message) == (Grade.NOTE, "/dev/ttyACM0 is used by turtlebot3_ros (41)")
+    assert found.fix
+
+
 def test_names_by_udev(machine: MadeUp) -> None:
     machine.files.discard("/dev/robosc-opencr")
     assert problems(machine, Purpose.BRIDGE)["udev names"].fix == ""
@@ -239,6 +250,16 @@ class TestThisMachine:
         assert machine.matching("/no/such/folder", "*") == ()
         assert machine.matching("/dev", "nul[l]") == ("/dev/null",)
         assert all(isinstance(name, str) for name in machine.groups())
+
+    def test_users_of_a_device(self) -> None:
+        ours, its = os.openpty()
+        try:
+            found = Machine().users_of(os.ttyname(its))
+        finally:
+            os.close(its)
+            os.close(ours)
+        assert [name for name in found if name.endswith(f" ({os.getpid()})")]
+        assert Machine().users_of("/dev/robosc-no-such-device") == ()
 
     def test_packages(self) -> None:
         machine = Machine()

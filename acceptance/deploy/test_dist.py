@@ -96,3 +96,6 @@ def test_it_is_installed_without_network(extras: str, tmp_path: Path) -> None:
             assert "can be started" in made.run("robosc-lsp", "--check")
         case "":
             assert made.findings("--for", "server", status=1)["extra server"] == "missing"
+            made.run("robosc", "completion", "bash", "--install")
+            for program in ("robosc-client", "robosc-server", "robosc-bridge"):
+                made.run(program, status=2)

@@ -8,7 +8,7 @@ from robosc.cli.starting import start
 
 def entry() -> NoReturn:
     """Run the command and leave with its exit status."""
-    start("robosc-client", _load)
+    start("robosc-client", _load, "client")
 
 
 def _load() -> Callable[[], int]:

@@ -1,4 +1,7 @@
-"""Start of an installed command: Ctrl-C ends it with one line at any time, even while it is imported or closed."""
+"""Start of an installed command: Ctrl-C ends it with one line at any time, even while it is imported or closed.
+
+So does a package that is not installed, since each command but `robosc` needs an extra.
+"""
 
 import contextlib
 import os
@@ -10,13 +13,16 @@ from typing import NoReturn
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as of a shell."""
 
+_WRONG_USE = 2
 
-def start(program: str, load: Callable[[], Callable[[], int]]) -> NoReturn:
+
+def start(program: str, load: Callable[[], Callable[[], int]], extra: str | None = None) -> NoReturn:
     """Run a command and leave with its exit status.
 
     Args:
         program: Name of the command.
         load: Function that imports the command and returns its `main`.
+        extra: Extra of the distribution that has what the command needs; None: it needs none.
     """
 
     def leave(*_: object) -> NoReturn:
@@ -29,13 +35,20 @@ def start(program: str, load: Callable[[], Callable[[], int]]) -> NoReturn:
     is_heard = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if is_heard:
         signal.signal(signal.SIGINT, leave)
-    main = load()
     try:
+        main = load()
         if is_heard:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         status = main()
     except KeyboardInterrupt:
         leave()
+    except ModuleNotFoundError as error:
+        package = (error.name or str(error)).partition(".")[0]
+        if extra is None or package.startswith("robosc"):
+            raise
+        fix = f"the extra {extra} has it: pip install 'robosc[{extra}]'"
+        sys.stderr.write(f"{program}: the package {package} is not installed; {fix}\n")
+        status = _WRONG_USE
     finally:
         if is_heard:
             signal.signal(signal.SIGINT, leave)

@@ -9,7 +9,7 @@ from robosc.cli.starting import start
 
 def entry() -> NoReturn:
     """Run the command and leave with its exit status."""
-    start("robosc-server", _load)
+    start("robosc-server", _load, "server")
 
 
 def _load() -> Callable[[], int]:

@@ -68,6 +68,36 @@ def test_in_the_background_ctrl_c_is_not_heard() -> None:
     assert (done.returncode, done.stderr) == (2, "robosc: there is no file nothing.rscd\n")
 
 
+MISSING = """
+import sys
+sys.modules[{package!r}] = None
+sys.argv = [{program!r}, *{words!r}]
+from {module} import entry
+entry()
+"""
+
+
+@pytest.mark.parametrize(
+    ("program", "words", "package"),
+    [
+        ("robosc-client", "version --server 127.0.0.1:1", "grpc"),
+        ("robosc-bridge", "drivers", "yaml"),
+        ("robosc-bridge", "stop", "grpc"),
+        ("robosc-bridge", "health --config nothing.yaml", "yaml"),
+        ("robosc-server", "", "pydantic"),
+        ("robosc-server", "health", "grpc"),
+    ],
+)
+def test_a_program_without_its_extra_says_what_it_needs(program: str, words: str, package: str) -> None:
+    module, extra = SCRIPTS[program].partition(":")[0], program.removeprefix("robosc-")
+    code = MISSING.format(package=package, program=program, words=words.split(), module=module)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=240, check=False)
+    told = (
+        f"{program}: the package {package} is not installed; the extra {extra} has it: pip install 'robosc[{extra}]'\n"
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", told)
+
+
 @pytest.mark.parametrize(
     ("program", "words"),
     [("robosc", ""), ("robosc-client", ""), ("robosc-client", "profile"), ("robosc-bridge", "")],

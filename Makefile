@@ -16,7 +16,7 @@ WHEELS := out/wheels
 # Without bytecode on disk, every program that the tests start would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test acceptance smoke soak mutants faults fuzz lint format bindings lock benchmark environment colcon checkers docs pictures images dist extension vscode clean help
+.PHONY: demo test acceptance smoke soak mutants faults mistakes fuzz lint format bindings lock benchmark environment colcon checkers docs pictures images dist extension vscode clean help
 
 help:
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -121,6 +121,11 @@ FAULTS := --number 50 --seed 1
 
 faults: $(TOOLS)/.ready ## put small faults into functions drawn by chance, one at a time, and tell which the tests find
 	PYTHONPATH=$(CURDIR)/$(TOOLS) $(BIN)/python soak/faults.py $(FAULTS)
+
+MISTAKES :=
+
+mistakes: $(READY) ## print how many mistakes in models are told well, by category; MISTAKES=--long shows the others
+	$(BIN)/python tests/support/mistakes.py $(MISTAKES)
 
 DECODERS := lds01 lds02 lds03 mavlink dynamixel registers
 SECONDS := 60

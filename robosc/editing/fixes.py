@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from robosc.errors import Diagnostic
 from robosc.source import Location
 
-_WRITE = re.compile(r"Write '([^']+)'\.")
+_WRITE = re.compile(r"(?:Write |or |write )'([^']+)'")
+_INSTEAD = re.compile(r"Write '(.+?)' instead of '(.+)'\.", re.DOTALL)
+_BEFORE = re.compile(r"Write '([^']+)' before it\b")
 _WORDS = {"&": "and", "|": "or"}
 _PREPOSITIONS = {"request": "to"}
 _RANGE = re.compile(r"(integer\s*\()([^.]+?)(\s*\.\.\s*)([^.]+?)(\s*\))")
@@ -50,8 +52,11 @@ class _Line:
         self._before = line[: self._begin]
 
     def fixes(self, found: Diagnostic) -> Iterator[Fix]:
+        if instead := _INSTEAD.fullmatch(found.fix):
+            yield from self._instead(instead[1], instead[2])
+            return
         match found.code:
-            case "unknown-name" | "unknown-field" | "unknown-ros-type" | "field-type-mismatch":
+            case "unknown-name" | "update-out-of-scope" | "unknown-field" | "unknown-ros-type" | "field-type-mismatch":
                 for name in _WRITE.findall(found.fix):
                     yield self._written(name)
             case "ambiguous-name":
@@ -61,11 +66,23 @@ class _Line:
                 for right in re.findall(r"goes with '(from|to)'", found.message):
                     yield self._written(right)
             case "wrong-result-kind":
+                yield from self._directions(found.fix)
                 yield from self._other_results(found.fix)
+            case "no-initial-state":
+                head = re.search(r"(marked\s+)?state\s+\Z", self._before)
+                if head is not None:
+                    yield self._inserted("initial ", head.start())
+            case "multiple-initial-states":
+                head = re.search(r"initial\s+(?=(marked\s+)?state\s+\Z)", self._before)
+                if head is not None:
+                    yield from self._changed("Remove 'initial'", head.start(), head.end(), "")
             case "type-mismatch":
                 yield from self._types(found.fix)
             case "syntax-error":
                 yield from self._syntax(found.fix)
+            case code if code.startswith("duplicate-"):
+                for name in _WRITE.findall(found.fix):
+                    yield self._written(name)
 
     def _written(self, text: str) -> Fix:
         return Fix(f"Write '{text}'", self._location, text)
@@ -74,6 +91,30 @@ class _Line:
         """Another text for a stretch of the line, which may not be empty."""
         if end > begin:
             yield Fix(title, Location(self._location.file, self._location.line, begin + 1, end - begin), text)
+
+    def _inserted(self, text: str, begin: int) -> Fix:
+        """Text before a place, which may be the end of the line."""
+        place = self._location
+        following = self._line[begin : begin + 1]
+        return Fix(f"Write '{text.strip()}'", Location(place.file, place.line, begin + 1, 1), text + following)
+
+    def _instead(self, meant: str, written: str) -> Iterator[Fix]:
+        """Text for what is written at the place."""
+        # The place may be where the writing first, or only at its end, does not fit.
+        before = next((at for at in range(len(written)) if self._line.startswith(written, self._begin - at)), None)
+        if before is not None and before <= self._begin:
+            begin = self._begin - before
+            end = begin + len(written)
+            # Signs need no blanks around them, words do.
+            left = " " * bool(re.match(r"\w", meant) and re.search(r"\w\Z", self._line[:begin]))
+            right = " " * bool(re.search(r"\w\Z", meant) and re.match(r"\w", self._line[end:]))
+            yield from self._changed(f"Write '{meant}'", begin, end, f"{left}{meant}{right}")
+
+    def _directions(self, fix: str) -> Iterator[Fix]:
+        right = re.match(r"Write '(incoming|outgoing) message'", fix)
+        head = re.search(r"\b(incoming|outgoing)(?=\s+message\s+\Z)", self._before)
+        if right is not None and head is not None:
+            yield from self._changed(f"Write '{right[1]}'", head.start(), head.end(), right[1])
 
     def _other_results(self, fix: str) -> Iterator[Fix]:
         """`on response from x`, of what has no response."""
@@ -109,8 +150,8 @@ class _Line:
             yield from (self._written(f"{direction} {token}") for direction in ("incoming", "outgoing"))
         elif meant := re.fullmatch(r"(?:If '.*' is meant as a name, write|Did you mean) '([^']+)'[.?]", fix):
             yield self._written(meant[1])
-        elif missing := re.match(r"Write '([^']+)' before it, or", fix):
-            yield from self._changed(f"Write '{missing[1]}' before it", self._begin, self._end, f"{missing[1]} {token}")
+        elif missing := _BEFORE.match(fix):
+            yield Fix(f"Write '{missing[1]}' before it", self._location, f"{missing[1]} {token}")
 
 
 __all__ = ["Fix", "fixes"]

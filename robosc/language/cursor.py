@@ -8,19 +8,22 @@ the innermost one.
 """
 
 import difflib
+import re
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.language import syntax
+from robosc.language.advice import fix_syntax
 from robosc.language.limits import MAXIMUM_NAME, MAXIMUM_NESTING, MAXIMUM_SYNTAX_ERRORS
 from robosc.language.tokens import Kind, Places, Tokens
-from robosc.language.words import STARTS, expected_words, fix_syntax, unescape
+from robosc.language.words import RESERVED_WORDS, STARTS, expected_words, unescape
 from robosc.source import Location, SourceFile
 
 _NAME, _WORD, _NUMBER, _STRING, _END = (
     int(kind) for kind in (Kind.NAME, Kind.WORD, Kind.NUMBER, Kind.STRING, Kind.END)
 )
+_UNQUOTED = re.compile(r"[“”‘’]?([\w/~{}.\-]+)[“”‘’]?")
 _MAXIMUM_SHOWN = 40
 _NEAR = 0.75
 """Share that a misspelt word must have in common with the one that was meant."""
@@ -100,12 +103,13 @@ class Cursor:
             words = (*self._possible[1], *words)
         self._possible = (index, words)
 
-    def fault(self, *expected: str, related: tuple[RelatedPlace, ...] = ()) -> Fault:
+    def fault(self, *expected: str, related: tuple[RelatedPlace, ...] = (), fix: str = "") -> Fault:
         """Return the error that the next token is not what was expected; raise it.
 
         Args:
             expected: Words for what would have fitted, such as `a name` or `'{'`.
             related: Other places that explain it.
+            fix: Advice on how to fix it, where more is known than the tokens tell.
         """
         index = self.place
         token = self.texts[index]
@@ -117,7 +121,9 @@ class Cursor:
         message = f"{met} does not fit here; expected {expected_words(expected)}"
         if token == ")":
             message = "this ')' closes nothing"
-        fix = fix_syntax(self.texts[index - 1] if index else "", token, expected)
+        fix = fix or fix_syntax(
+            self.texts[index - 1] if index else "", token, expected, self.texts[index + 1 : index + 4]
+        )
         self.report("syntax-error", message, self.at(index), fix, *related)
         return self.told()
 
@@ -186,9 +192,24 @@ class Cursor:
         """Read a text in quotes."""
         index = self.place
         if self.kinds[index] != _STRING:
-            raise self.fault("a text in quotes")
+            raise self._unquoted(index)
         self.place = index + 1
         return syntax.Text(unescape(self.texts[index]), self.at(index))
+
+    def _unquoted(self, index: int) -> Fault:
+        """Return the error that a text has no quotes, or curly ones."""
+        written = _UNQUOTED.match(self._file.text, self._starts[index])
+        if written is None or self.texts[index] in RESERVED_WORDS:
+            return self.fault("a text in quotes")
+        message = f"'{written[0]}' does not fit here; expected a text in quotes"
+        fix = f"Write '\"{written[1]}\"' instead of '{written[0]}'."
+        self.report("syntax-error", message, self._places.location(*written.span()), fix)
+        return self.told()
+
+    def source(self, begin: int) -> str:
+        """The text from a token to the last one that was read."""
+        last = self.place - 1
+        return self._file.text[self._starts[begin] : self._starts[last] + len(self.texts[last])]
 
     def integer(self) -> int:
         """Read a whole number, perhaps behind a `-`."""
@@ -290,9 +311,11 @@ class Cursor:
         is_at_end = self.kinds[index] == _END and self.texts[self._braces[-1]] == "}"
         if index != self._resumed and not is_at_end:
             related: tuple[RelatedPlace, ...] = ()
+            fix = ""
             if self.kinds[index] == _END or self._begins_item(index):
                 related = (RelatedPlace("this '{' is not closed", self.at(self._braces[-1])),)
-            self.fault(*expected, "'}'", related=related)
+                fix = "Write '}' before it."
+            self.fault(*expected, "'}'", related=related, fix=fix)
             self._recover(index)
         # What an outer list can go on with ends this one.
         index = self.place

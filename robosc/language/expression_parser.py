@@ -4,16 +4,18 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from robosc.language import precedence, syntax
+from robosc.language.advice import is_foreign_operator, type_elsewhere
 from robosc.language.cursor import Cursor, Fault
 from robosc.language.limits import MAXIMUM_NESTING
 from robosc.language.negation import NOT, is_negation
 from robosc.language.tokens import Kind
-from robosc.language.words import unescape
+from robosc.language.words import FOREIGN_TYPES, unescape
 
 _OPERATORS = frozenset().union(*precedence.LEVELS) | {"=>"}
 _BASIC_TYPES = {str(name): name for name in syntax.BasicTypeName}
 _CONVERSIONS = ("integer", "double")
 _QUANTIFIERS = ("any", "all")
+_NEGATIONS_ELSEWHERE = ("Not", "NOT")
 _NAME, _NUMBER, _STRING, _END = int(Kind.NAME), int(Kind.NUMBER), int(Kind.STRING), int(Kind.END)
 
 
@@ -82,6 +84,8 @@ class ExpressionParser(Cursor):
                 group = _Group(index, [], [], [])
                 self.place = index + 1
                 continue
+            if token in _NEGATIONS_ELSEWHERE and is_negation(texts, self.kinds, index, word=token):
+                raise self.fault("an expression", fix=f"Write 'not' instead of '{token}'.")
             tree = self._primary(is_negative=bool(group.signs) and group.signs[-1][0] == "-")
             group.operands.append(self._signed(group, tree) if group.signs else tree)
             while outer and texts[self.place] == ")":
@@ -124,6 +128,8 @@ class ExpressionParser(Cursor):
         return tree
 
     def _unclosed(self, opening: int) -> Fault:
+        if is_foreign_operator(self.texts[self.place]):
+            return self.fault("an operator", "')'")
         self.expect("an operator", "')'")
         self.report("syntax-error", "this '(' is never closed", self.at(opening), "Close it with ')'.")
         return self.told()
@@ -272,12 +278,24 @@ class ExpressionParser(Cursor):
         self.shallower(len(openings))
         return tree
 
+    def _no_foreign_type(self, index: int) -> None:
+        """Raise the fault that a type is written as in another language or in ROS, if that explains what follows."""
+        name, following = self.texts[index], self.texts[index + 1 : index + 4]
+        if following[:1] == ["("] and name in FOREIGN_TYPES:
+            raise self.fault("a type", fix=f"Write '{FOREIGN_TYPES[name]}' instead of '{name}'.")
+        sign = "/" if following[:1] == ["/"] else "::" if following[:2] == [":", ":"] else ""
+        parts = self.texts[index : index + len(sign) + 2 : len(sign) + 1]
+        if (sign and self.kinds[index + len(sign) + 1] == _NAME) or (sign and parts[-1] == "string"):
+            raise self.fault("a type", fix=f"Write '{type_elsewhere(parts)}' instead of '{sign.join(parts)}'.")
+
     def _plain_type(self) -> syntax.BasicType | syntax.NamedType:
         index = self.place
         if self.kinds[index] == _NAME:
-            return syntax.NamedType(self.name())
+            self._no_foreign_type(index)
         basic = _BASIC_TYPES.get(self.texts[index])
         if basic is None:
+            if self.kinds[index] == _NAME:
+                return syntax.NamedType(self.name())
             raise self.fault("a type")
         self.place = index + 1
         if basic is not syntax.BasicTypeName.INTEGER or not self.takes("("):

@@ -14,19 +14,20 @@ _BEGIN_OPERANDS = frozenset({"(", "!", "true", "false", "value"})
 _CONVERSIONS = frozenset({"integer", "double"})
 _BEHIND_OPERANDS = frozenset({"then", "else", "in"})
 _BETWEEN = frozenset({",", ":", "..", "in"})
-"""Tokens between arguments, the ends of a slice, and the parts of a quantifier in brackets."""
+"""Tokens between arguments, bounds of slices and parts of quantifiers."""
 _BINARY = frozenset({"or", "and", "=", "!=", ">", ">=", "<", "<=", "+", "*", "/", "=>"})
 
 
-def is_negation(texts: Sequence[str], kinds: Sequence[int], index: int) -> bool:
+def is_negation(texts: Sequence[str], kinds: Sequence[int], index: int, word: str = NOT) -> bool:
     """Return True if the word `not`, at a token where an operand begins, is the operator.
 
     Args:
         texts: The tokens, as written, with ends behind the last.
         kinds: Their kinds.
         index: The token.
+        word: Word that stands there, if it is the operator.
     """
-    if texts[index] != NOT:
+    if texts[index] != word:
         return False
     following, kind = texts[index + 1], kinds[index + 1]
     if kind == _NAME:

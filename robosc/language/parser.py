@@ -18,7 +18,14 @@ from robosc.language.tokens import Kind, Places, Tokens, obstacle, readable_toke
 from robosc.recursion import allow_depth
 from robosc.source import SourceFile
 
-_NAME, _NUMBER, _END = int(Kind.NAME), int(Kind.NUMBER), int(Kind.END)
+_NAME, _NUMBER, _STRING, _END = (int(kind) for kind in (Kind.NAME, Kind.NUMBER, Kind.STRING, Kind.END))
+_MAXIMUM_VALUES = 20
+"""Values by which the type of a variable without one is guessed."""
+
+_TYPES = frozenset({*map(str, syntax.BasicTypeName), "array"})
+_BEFORE_VALUES = frozenset({":=", "=", "!=", "<", "<=", ">", ">="})
+_NEEDED = "a request is only made where requirements hold, so write 'requirement ... needs ...' in the robot."
+_CHOSEN = "what is received always counts, so go to a state from where a 'transition if ...' chooses."
 _RESULT_KINDS = ("request", "response", "feedback", "error", "cancel")
 _QUALITIES = ("reliable", "best_effort", "sensor", "latched")
 
@@ -150,6 +157,10 @@ class _Parser(ExpressionParser):
         self.take("interface")
         name = self.name()
         self.take("use")
+        if self.texts[self.place + 1] == "/":
+            package, _, type_name = self.texts[self.place : self.place + 3]
+            fix = f"Write '{type_name} from {package}' instead of '{package}/{type_name}'."
+            raise self.fault("a type's name", fix=fix)
         type_ = self.name()
         self.take("from")
         return syntax.Interface(name, type_, self.name())
@@ -266,7 +277,9 @@ class _Parser(ExpressionParser):
             if not self.takes(","):
                 break
         if len(types) < len(keys):
-            raise self.fault()
+            missing = keys[len(types)]
+            comma = "" if self.texts[self.place - 1] == "," else ", "
+            raise self.fault(fix=f"Write '{comma}{missing}: none' before it, or the type that it carries.")
         link = self.name() if self.takes("links") else None
         return _Given(identifier, types, tuple(options), link)
 
@@ -305,9 +318,46 @@ class _Parser(ExpressionParser):
     def _variable(self) -> syntax.Variable:
         self.take("variable")
         name = self.name()
+        is_typed = self.texts[self.place] in _TYPES
+        if self.texts[self.place] != ":" and not is_typed and (meant := self._type_of_variable(name.text)):
+            raise self.fault("':'", fix=f"Write ': {meant}' before it.")
         self.take(":")
         type_ = self.type()
         return syntax.Variable(name, type_, self.initial_value() if self.takes("=") else None)
+
+    def _type_of_variable(self, name: str) -> str:
+        """The type that a variable without one has by the values that it is given and compared with, as far as told."""
+        if self.texts[self.place] == "(" or self.kinds[self.place] == _NAME:
+            return ""
+        values = [self.place + 1] if self.texts[self.place] == "=" else []
+        for index, token in enumerate(self.texts):
+            if token == name and self.texts[index + 1] in _BEFORE_VALUES:
+                values.append(index + 2)
+        types = [found for index in values[:_MAXIMUM_VALUES] if (found := self._type_of_value(index))]
+        # Whole numbers are told as the range that has them all.
+        whole = [int(found) for found in types if found.isdigit()]
+        return f"integer(0..{max(whole)})" if whole and types[0].isdigit() else next(iter(types), "boolean")
+
+    def _type_of_value(self, index: int) -> str:
+        """The type of the value at a token: a whole number stands for itself; empty where nothing tells it."""
+        value, texts = self.texts[index], self.texts
+        if value in ("true", "false"):
+            return "boolean"
+        if self.kinds[index] == _NUMBER:
+            return "double" if "." in value else value[:9]
+        if self.kinds[index] == _STRING:
+            return "string"
+        if value == "value" and texts[index + 1] != ".":
+            # What is received has the type of the message.
+            start = next((at for at in range(index, 0, -1) if texts[at] == "on"), 0)
+            head = ["message", *texts[start + 3 : start + 4]]
+            begin = next((at for at in range(len(texts)) if texts[at : at + 2] == head), len(texts))
+            found = next((at for at in range(begin, len(texts)) if texts[at] == "type"), None)
+            return "" if found is None else texts[found + 2]
+        # Where an enum has the value, it is of that enum.
+        rule = next((at for at in range(len(texts) - 1) if texts[at : at + 2] == ["->", value]), 0)
+        enum = next((at for at in range(rule, 0, -1) if texts[at] == "enum"), None)
+        return "" if enum is None else texts[enum + 1]
 
     def _state(self) -> syntax.State:
         is_initial = self.takes("initial")
@@ -332,11 +382,14 @@ class _Parser(ExpressionParser):
         self.place += 1
         communication = self.name()
         updates: list[syntax.Update] = []
+        self._no_condition(f"Remove the condition: {_NEEDED if kind == 'request' else _CHOSEN}")
         if self.takes("do"):
             updates.append(self._update())
             while self.takes(","):
                 updates.append(self._update())
+        self._no_condition(f"Remove the condition: {_NEEDED if kind == 'request' else _CHOSEN}")
         target = self.name() if self.takes("goto") else None
+        self._no_condition(f"Remove the condition: {_NEEDED if kind == 'request' else _CHOSEN}")
         name = syntax.Name(preposition, self.at(index))
         return syntax.CommunicationTransition(kind, name, communication, tuple(updates), target, self.since(begin))
 
@@ -344,14 +397,56 @@ class _Parser(ExpressionParser):
         begin = self.place
         target = self.access()
         self.require_shallow(target, begin)
-        self.take(":=")
-        return syntax.Update(target, self.expression())
+        index = self.place
+        if self.texts[index] == ":=":
+            self.place += 1
+            return syntax.Update(target, self.expression())
+        if self.texts[index] in ("+", "-", "*", "/") and self.texts[index + 1] == "=":
+            sign = self.texts[index]
+            raise self._assigned(2, f":= {self.source(begin)} {sign}")
+        if self.texts[index] in ("+", "-") and self.texts[index + 1] == self.texts[index]:
+            raise self._assigned(2, f":= {self.source(begin)} {self.texts[index]} 1")
+        if self.texts[index] in ("=", ":"):
+            raise self._assigned(2 if self.texts[index + 1] == "=" else 1, ":=")
+        raise self.fault("':='")
+
+    def _assigned(self, tokens: int, meant: str) -> Fault:
+        """Return the error that an update is written as another language has it."""
+        begin = self.place
+        self.place += tokens
+        written, place = self.source(begin), self.since(begin)
+        message = f"'{written}' does not fit here; expected ':='"
+        self.report("syntax-error", message, place, f"Write '{meant}' instead of '{written}'.")
+        return self.told()
 
     def _tau(self) -> syntax.TauTransition:
         place = self.at(self.take("transition"))
         guard = self.expression() if self.takes("if") else None
+        begin = self.place
         target = self.name() if self.takes("goto") else None
+        if guard is None and target is not None and self.texts[self.place] == "if":
+            raise self._late_condition(begin)
         return syntax.TauTransition(guard, target, place)
+
+    def _no_condition(self, fix: str) -> None:
+        """Report a condition of a transition that takes none, and go on behind it."""
+        begin = self.place
+        if self.texts[begin] == "if":
+            self.place += 1
+            self.expression()
+            message = "only 'transition' has a condition; what is sent and received has none here"
+            self.report("syntax-error", message, self.since(begin), fix)
+
+    def _late_condition(self, begin: int) -> Fault:
+        """Return the error that the condition of a transition stands behind its `goto`."""
+        condition = self.place
+        target = self._file.text[self._starts[begin] : self._starts[condition]].strip()
+        self.place += 1
+        self.expression()
+        message = "the condition of a transition stands before 'goto'"
+        fix = f"Write '{self.source(condition)} {target}' instead of '{self.source(begin)}'."
+        self.report("syntax-error", message, self.since(begin), fix)
+        return self.told()
 
     # Requirements and data
 
@@ -367,6 +462,8 @@ class _Parser(ExpressionParser):
             self.take("needs")
             return syntax.Requirement(names, False, self.expression(), place)
         if self.kinds[self.place] == _NAME:
+            if self.texts[self.place + 1] == ",":
+                raise self.fault("'{'", fix="Write '{' before it.")
             self.possible("'needs'", ahead=1)
         expression = self.expression()
         self.take("disables")
@@ -414,6 +511,8 @@ class _Parser(ExpressionParser):
     def _provided(self) -> syntax.ObjectValue | syntax.Expression:
         begin = self.place
         if self.texts[begin] != "{":
+            if self.kinds[begin] == _NAME and self.texts[begin + 1] == ":":
+                raise self.fault("'{'", fix="Write '{' before it.")
             return self.expression()
         self.place += 1
         self.deeper(begin)

@@ -38,6 +38,9 @@ def _pattern(string: str, open_string: str) -> re.Pattern[str]:
 _TOKEN = _pattern(_STRING, r"[\"'][\s\S]*+")
 _TOKEN_BY_LINE = _pattern(_STRING_OF_A_LINE, r"[\"'][^\n]*+")
 
+_LONGEST = 300
+"""Characters of a text without a quote that are looked at."""
+
 COMMENT = re.compile(f"{_LINE_COMMENT}|{_BLOCK_COMMENT}")
 """One comment of either kind."""
 
@@ -158,6 +161,26 @@ def readable_tokens(text: str) -> Tokens:
     return Tokens(found.texts, kinds, found.starts)
 
 
+_PATH = r"[\w/~{}.\-]+"
+
+
+def _open_string(text: str, quote: str, start: int, places: Places) -> Diagnostic:
+    """Return the error that one of the two quotes around a text is missing."""
+    message, begin, end = "this text is never closed", start, start + 1
+    fix = f"Close it with {quote}."
+    before = re.search(rf":[ \t]*+({_PATH})\Z", text[max(0, start - _LONGEST) : start])
+    behind = re.match(_PATH, text[start + 1 : start + _LONGEST])
+    if before is not None:
+        message, begin = "this text has no opening quote", start - len(before[1])
+        written, meant = f"{before[1]}{quote}", f"{quote}{before[1]}{quote}"
+        fix = f"Write '{meant}' instead of '{written}'."
+    elif behind is not None:
+        end += len(behind[0])
+        written = text[start:end]
+        fix = f"Write '{written}{quote}' instead of '{written}'."
+    return Diagnostic(Severity.ERROR, "unclosed-string", message, places.location(begin, end), fix)
+
+
 def obstacle(file: SourceFile, tokens: Tokens, places: Places) -> Diagnostic | None:
     """Return the error that hides the rest of a text from the grammar.
 
@@ -182,5 +205,10 @@ def obstacle(file: SourceFile, tokens: Tokens, places: Places) -> Diagnostic | N
         if is_open_comment(token):
             return found("unclosed-comment", "this comment is never closed", start, "Close it with '*/'.")
         if is_open_string(token):
-            return found("unclosed-string", "this text is never closed", start, f"Close it with {token[0]}.")
+            # One quote too few turns all behind it inside out: its own line tells where.
+            for other, other_kind, begin in zip(*tokenize_broken(text), strict=True):
+                if other_kind == Kind.OTHER and is_open_string(other):
+                    token, start = other, begin
+                    break
+            return _open_string(text, token[0], start, places)
     return None

@@ -1,6 +1,6 @@
 """Builds and checks the behaviour of a component."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import islice
 
@@ -20,8 +20,9 @@ from robosc.expressions import (
     type_text,
 )
 from robosc.language import syntax
+from robosc.language.words import spelled
 from robosc.model.expression_checker import ExpressionChecker
-from robosc.model.findings import Findings
+from robosc.model.findings import Findings, did_you_mean
 from robosc.model.scope import ComponentNames, Scope
 from robosc.model.structure import (
     Behaviour,
@@ -161,6 +162,12 @@ def _no_object_variable(variable: syntax.Variable, findings: Findings) -> None:
     )
 
 
+_OPPOSITE = {
+    CommunicationKind.INCOMING_MESSAGE: CommunicationKind.OUTGOING_MESSAGE,
+    CommunicationKind.OUTGOING_MESSAGE: CommunicationKind.INCOMING_MESSAGE,
+}
+
+
 class BehaviourBuilder:
     """Builder of one behaviour.
 
@@ -171,6 +178,7 @@ class BehaviourBuilder:
         defaults: Default value of an uninitialised variable, for each enum type.
         findings: Findings to which faults are reported.
         unknown_communication: Function called for a name that no communication has.
+        commanded: Names of the communications that requirements and provide statements name.
     """
 
     def __init__(
@@ -181,14 +189,17 @@ class BehaviourBuilder:
         defaults: Mapping[str, str],
         findings: Findings,
         unknown_communication: Callable[[syntax.Name], None],
+        commanded: Collection[str] = frozenset(),
     ) -> None:
         self._tree = tree
+        self._commanded = commanded
         self._scope = scope
         self._communications = communications
         self._defaults = defaults
         self._findings = findings
         self._unknown_communication = unknown_communication
         self._taus = 0
+        self._told: set[str] = set()
         self._states_by_name = {state.name.text: state for state in tree.states}
 
     def build(self) -> Behaviour:
@@ -197,7 +208,11 @@ class BehaviourBuilder:
         variables = tuple(self._variables())
         transitions = tuple(self._transitions())
         behaviour = Behaviour(variables, states, transitions)
-        self._check_graph(behaviour)
+        # Of a transition with an unknown name nobody knows where it leads.
+        targets = zip(transitions, self._tree.transitions, strict=False)
+        is_whole = all((item.target is None) == (tree.target is None) for item, (_, tree) in targets)
+        if is_whole and len(transitions) == len(self._tree.transitions):
+            self._check_graph(behaviour)
         self._check_determinism()
         return behaviour
 
@@ -210,15 +225,17 @@ class BehaviourBuilder:
             self._findings.error(
                 "no-initial-state",
                 f"the behaviour of '{component}' has no initial state",
-                self._tree.location,
-                "Write 'initial' before one of its states.",
+                self._tree.states[0].name.location if self._tree.states else self._tree.location,
+                "Write 'initial' before this state or the one that it starts in."
+                if self._tree.states
+                else "Write a state, with 'initial' before it.",
             )
         for other in initial[1:]:
             self._findings.error(
                 "multiple-initial-states",
                 f"the behaviour of '{component}' has more than one initial state",
                 other.name.location,
-                "Keep 'initial' before one state only.",
+                "Remove 'initial' before this state or before the other one.",
                 RelatedPlace("the first initial state stands here", initial[0].name.location),
             )
         return tuple(State(state.name.text, state.is_initial, state.is_marked) for state in self._tree.states)
@@ -276,10 +293,16 @@ class BehaviourBuilder:
         if name is None:
             return None
         if name.text not in self._states_by_name:
-            self._findings.unknown("state", name.text, name.location, self._states_by_name)
+            # Of states that nothing is near, one that nothing leads to is likeliest to be meant.
+            led_to = {tree.target.text for _, tree in self._tree.transitions if tree.target is not None}
+            known = sorted(self._states_by_name, key=lambda state: (state in led_to, self._is_initial(state)))
+            self._findings.unknown("state", name.text, name.location, known)
             return None
         self._findings.bindings.bind(name, self._states_by_name[name.text].name.location)
         return name.text
+
+    def _is_initial(self, state: str) -> bool:
+        return self._states_by_name[state].is_initial
 
     def _event(self, tree: syntax.CommunicationTransition) -> tuple[Communication, EventKind] | None:
         communication = self._communications.get(tree.communication.text)
@@ -289,6 +312,9 @@ class BehaviourBuilder:
             return None
         kind = EventKind(tree.kind)
         if kind not in _KINDS[communication.kind]:
+            if self._is_turned(communication):
+                self._turned(communication)
+                return None
             allowed = ", ".join(item for item in EventKind if item in _KINDS[communication.kind])
             self._findings.error(
                 "wrong-result-kind",
@@ -306,6 +332,39 @@ class BehaviourBuilder:
                 f"Write 'on {kind} {preposition} {communication.name}'.",
             )
         return communication, kind
+
+    def _is_turned(self, communication: Communication) -> bool:
+        """Return True if all transitions on a message would be right if it went in the other direction, as it seems to.
+
+        What requirements and provide statements name is sent to the component, and nothing else is.
+        """
+        opposite = _OPPOSITE.get(communication.kind)
+        if (communication.name in self._commanded) != (opposite is CommunicationKind.INCOMING_MESSAGE):
+            return False
+        place = self._findings.bindings.communications.get(communication.name)
+        if opposite is None or place is None or place.file != self._tree.location.file:
+            return False
+        uses = (
+            tree.kind
+            for _, tree in self._tree.transitions
+            if isinstance(tree, syntax.CommunicationTransition) and tree.communication.text == communication.name
+        )
+        return all(EventKind(kind) in _KINDS[opposite] for kind in uses)
+
+    def _turned(self, communication: Communication) -> None:
+        if communication.name in self._told:
+            return
+        self._told.add(communication.name)
+        is_incoming = communication.kind is CommunicationKind.INCOMING_MESSAGE
+        right, used = ("outgoing", "response") if is_incoming else ("incoming", "request")
+        self._findings.error(
+            "wrong-result-kind",
+            f"{_article(communication.kind)} has no {used}, on which the behaviour of "
+            f"'{self._tree.part.tree.name.text}' reacts; did you mean '{right}'?",
+            self._findings.bindings.communications[communication.name],
+            f"Write '{right} message': directions are the component's, so what a sensor sends is outgoing, and what "
+            "moves a motor is incoming.",
+        )
 
     def _updates(
         self, tree: syntax.CommunicationTransition, communication: Communication, kind: EventKind
@@ -352,11 +411,14 @@ class BehaviourBuilder:
         if own is None or len(names) != 1 or not isinstance(name, syntax.Name) or name.text not in own.variables:
             known = sorted(own.variables)[:_MAXIMUM_SHOWN] if own else []
             wanted = name.text if isinstance(name, syntax.Name) and len(names) == 1 else "this"
+            near = did_you_mean(wanted, own.variables) if own else None
             self._findings.error(
                 "update-out-of-scope",
-                f"'{wanted}' is no variable of this behaviour",
+                f"'{wanted}' is no variable of this behaviour" + (f"; did you mean '{near}'?" if near else ""),
                 access.location,
-                "Assign a variable of this behaviour" + (f": {', '.join(known)}." if known else "."),
+                f"Write '{spelled(near)}'."
+                if near
+                else "Assign a variable of this behaviour" + (f": {', '.join(known)}." if known else "."),
             )
             return None
         self._findings.bindings.bind(name, own.places.get(name.text))

@@ -248,6 +248,13 @@ class _RobotChecker:
             for key, (enum, _, tree) in self._types.enums.items()
             if enum.values
         }
+        commanded = {
+            name.text
+            for unit in self.units
+            for item in unit.tree.items
+            if isinstance(item, syntax.Requirement | syntax.Provide)
+            for name in (item.communications if isinstance(item, syntax.Requirement) else (item.communication,))
+        }
         found: dict[str, Behaviour] = {}
         for part in self.parts:
             self.places.components[part.name] = part.place
@@ -255,7 +262,8 @@ class _RobotChecker:
             if tree is None:
                 continue
             unknown = self._unknown_communication(part, communications)
-            builder = BehaviourBuilder(tree, scopes.inside(part), communications, defaults, self.findings, unknown)
+            scope = scopes.inside(part)
+            builder = BehaviourBuilder(tree, scope, communications, defaults, self.findings, unknown, commanded)
             found[part.name] = builder.build()
             self._place_behaviour(tree)
         return found

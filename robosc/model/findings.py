@@ -15,6 +15,9 @@ _MAXIMUM_COMPARISONS = 20_000
 _MAXIMUM_COMPARED = 64
 """Characters of a name that is compared."""
 
+_MAXIMUM_CHOICES = 6
+"""Names that are all told where none is near."""
+
 _WORD = re.compile("[A-Za-z_][A-Za-z_0-9]*+")
 
 
@@ -92,8 +95,16 @@ class Findings:
         """
         if name in self._broken_words:
             return
+        known = list(known)
         near = self._near(name, [*known, *words])
         written = near if near is None or near in words else spelled(near)
+        if (
+            not near
+            and not fix
+            and 1 <= len(choices := [item for item in known if item.isidentifier()]) <= _MAXIMUM_CHOICES
+        ):
+            listed = " or ".join(f"'{spelled(item)}'" for item in choices)
+            fix = f"Write {listed}, or define the {what} '{name}'."
         self.error(
             "unknown-name",
             f"unknown {what} '{name}'" + (f"; did you mean '{near}'?" if near else ""),

@@ -16,7 +16,8 @@ from robosc.expressions import (
 )
 from robosc.language import syntax
 from robosc.language.limits import MAXIMUM_NESTING
-from robosc.model.findings import Findings
+from robosc.language.words import FOREIGN_TYPES
+from robosc.model.findings import Findings, did_you_mean
 from robosc.model.structure import ObjectDefinition, Property
 from robosc.model.units import Unit, unique
 from robosc.source import Location
@@ -28,18 +29,14 @@ _BASIC: dict[syntax.BasicTypeName, Type] = {
     syntax.BasicTypeName.NONE: NoneType(),
 }
 
-_FOREIGN_TYPES = {
-    "bool": "boolean",
-    "char": "string",
-    "float": "double",
-    "float32": "double",
-    "float64": "double",
-    "int": "integer",
-    **{f"{sign}int{width}": "integer" for sign in ("", "u") for width in (8, 16, 32, 64)},
-    "str": "string",
-    "void": "none",
-}
-"""Names of the basic types in other languages and in ROS."""
+
+def _misspelt_default(tree: syntax.EnumDefinition) -> syntax.Name | None:
+    """The name before `->` of a rule that was meant as the default one."""
+    for rule in tree.rules:
+        match rule.condition:
+            case syntax.Access(root=syntax.Name() as name, steps=()) if did_you_mean(name.text, ("default",)):
+                return name
+    return None
 
 
 class Types:
@@ -101,7 +98,7 @@ class Types:
         """The type that a name means in a unit, or None after reporting an unknown name."""
         definition = unit.types.get(name.text)
         if definition is None:
-            meant = _FOREIGN_TYPES.get(name.text)
+            meant = FOREIGN_TYPES.get(name.text)
             fix = f"Write '{meant}'." if meant else ""
             words = [*syntax.BasicTypeName]
             self._findings.unknown("data type", name.text, name.location, unit.types, fix, words)
@@ -200,6 +197,9 @@ class Types:
         self.sources[key] = NoneType() if source is None or isinstance(source, EnumType) else source
 
     def _report_defaults(self, tree: syntax.EnumDefinition, defaults: list[syntax.EnumRule]) -> None:
+        if not defaults and (meant := _misspelt_default(tree)) is not None:
+            self._findings.unknown("name", meant.text, meant.location, (), words=("default",))
+            return
         if not defaults:
             self._findings.error(
                 "enum-default",

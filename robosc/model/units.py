@@ -1,7 +1,8 @@
 """Files as units of definitions, and where each component of a robot comes from (language A.4)."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from itertools import count
 
 from robosc.errors import RelatedPlace
 from robosc.language import Parsed, parse, syntax
@@ -88,9 +89,14 @@ def unique(names: list[syntax.Name], code: str, what: str, findings: Findings) -
                 code,
                 f"the {what} '{name.text}' is defined twice{same}",
                 name.location,
-                f"Rename or remove one of the two {what}s.",
+                f"Rename or remove one of the two {what}s: write '{_another(name.text, first)}', for instance.",
                 RelatedPlace(f"'{earlier.text}' is defined here first", earlier.location),
             )
+
+
+def _another(name: str, taken: Collection[str]) -> str:
+    """A name like one that is taken."""
+    return next(found for number in count(2) if (found := f"{name}_{number}").casefold() not in taken)
 
 
 class Libraries:

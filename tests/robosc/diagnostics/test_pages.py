@@ -64,6 +64,7 @@ def remarks(bundle: Bundle) -> tuple[Diagnostic, ...]:
     """Return the warnings of an explanation as findings."""
     checked = check(bundle)
     model = checked.model_or_raise()
+    assert checked.places is not None
     system = to_automata(model, Deployment.CONTROLLER)
     assert checked.places is not None
     explanation = explain_synthesis(model, checked.places, system, deployment=Deployment.CONTROLLER)

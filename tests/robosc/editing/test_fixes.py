@@ -55,7 +55,7 @@ def titles_and_texts(text: str) -> dict[str, str]:
         ("behaviour", "behavoiur", "Write 'behaviour'"),
         ("integer(0..3)", "integer(3..0)", "Write 'integer(0..3)'"),
         ("C.n = 2", "C.n.x = 2", "Remove '.x'"),
-        ("goto b", "goto bb", None),
+        ("goto b", "goto bb", "Write 'b'"),
         ("on request to go goto b", "on response from go goto b", "Write 'on request'"),
         ("on response from m", "on feedback from m", "Write 'on response'"),
         ("on response from m", "on response to m", "Write 'from'"),

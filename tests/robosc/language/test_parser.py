@@ -225,7 +225,7 @@ def test_parentheses_of_arrays_are_matched(text: str, column: int, words: str) -
         ("robot R { requirement r needs a && b }", "Write 'and' for '&&'."),
         ("robot R { requirement r needs a || b }", "Write 'or' for '||'."),
         ("robot R { requirement r needs a == b }", "Write '=' once: it compares."),
-        ("robot R { requirement r needs not a }", "Write '!' for 'not'."),
+        ("robot R { requirement r needs Not a }", "Write 'not' instead of 'Not'."),
         ("robot R { component Caméra { } }", "Names are made of the letters A to Z, digits and '_' only."),
         ("robot R { component C { } ; }", "Remove the ';': nothing ends with one."),
         ("robot R { requirement r needs state = a }", "If 'state' is meant as a name, write '^state'."),

@@ -87,7 +87,7 @@ RULES: list[tuple[str, str, str, str]] = [
     (
         "no-initial-state",
         "error",
-        robot(component("marked state a { }").replace("behaviour", "§behaviour")),
+        robot(component("marked state §a { }")),
         robot(component(STATES)),
     ),
     (
@@ -117,8 +117,20 @@ RULES: list[tuple[str, str, str, str]] = [
     (
         "wrong-result-kind",
         "error",
-        robot(component("§on response from go " + STATES)),
+        robot(component("§on response from go on request to go " + STATES)),
         robot(component("on request to go " + STATES)),
+    ),
+    (
+        "wrong-result-kind",
+        "error",
+        robot(component("on response from go " + STATES).replace("message go", "message §go")),
+        robot(component("on response from seen " + STATES)),
+    ),
+    (
+        "wrong-result-kind",
+        "error",
+        robot(component("§on response from go " + STATES), "requirement go needs C.a"),
+        robot(component("on request to go " + STATES), "requirement go needs C.a"),
     ),
     (
         "wrong-preposition",

@@ -1,0 +1,144 @@
+"""Mistakes that people make are told in their place, with a fix that leads to a good model."""
+
+import re
+from collections import Counter
+from functools import cache
+
+import pytest
+
+from robosc.language.advice import fix_syntax
+from support.mistakes import GOOD, SLIPS, Mistake, Verdict, every_mistake, first_error, judge, obeyed
+
+WANTED = 0.95
+"""Share of all mistakes that is told well."""
+WANTED_OF_EACH = 0.9
+OF_TREES = "Behaviour trees"
+"""Habit for which the language often has no word: nothing a machine could obey would make a good model of it."""
+WANTED_OF_TREES = 0.6
+
+
+@cache
+def judged() -> tuple[tuple[Mistake, Verdict], ...]:
+    return tuple((mistake, judge(mistake)) for mistake in every_mistake())
+
+
+def share(mistakes: list[tuple[Mistake, Verdict]]) -> float:
+    return sum(verdict.is_good for _, verdict in mistakes) / len(mistakes)
+
+
+CATEGORIES = tuple(dict.fromkeys(mistake.category for mistake in every_mistake()))
+
+
+def test_the_models_that_mistakes_are_made_in_are_good() -> None:
+    assert len(GOOD) > 5
+    for path in GOOD:
+        assert first_error(path.read_text("utf-8")) is None, path
+
+
+def test_there_are_enough_mistakes_and_always_the_same() -> None:
+    counts = Counter(mistake.category for mistake, _ in judged())
+    assert counts.total() >= 200
+    assert min(counts.values()) >= 10
+    assert set(SLIPS) < set(counts)
+    assert every_mistake() == tuple(mistake for mistake, _ in judged())
+    assert every_mistake(2) != every_mistake(1)
+
+
+def test_the_share_of_all() -> None:
+    assert share(list(judged())) >= WANTED, "make mistakes MISTAKES=--long"
+
+
+@pytest.mark.parametrize("category", CATEGORIES)
+def test_the_share_of_each_category(category: str) -> None:
+    found = [item for item in judged() if item[0].category == category]
+    assert share(found) >= (WANTED_OF_TREES if category == OF_TREES else WANTED_OF_EACH), category
+
+
+def test_other_slips_than_those_that_were_looked_at() -> None:
+    found = [(mistake, judge(mistake)) for mistake in every_mistake(seed=2026)]
+    assert share(found) >= WANTED
+
+
+def test_every_message_is_one_that_somebody_can_work_with() -> None:
+    for mistake, verdict in judged():
+        assert verdict.found is not None, mistake
+        assert verdict.found.location is not None
+        assert re.fullmatch(r"[A-Z][^\n]*[.?]", verdict.found.fix), verdict.found.fix
+
+
+ROBOT = """robot R {
+    interface t use Twist from geometry_msgs
+    datatype object V { x: double }
+    datatype enum E from boolean to { value -> on_ default -> off }
+    component Button {
+        outgoing message pressed with identifier: "/pressed", type: E
+        behaviour {
+            variable down: E
+            on response from pressed do down := value
+            initial marked state idle { transition if down = on_ goto busy }
+            marked state busy { transition if down = off goto idle }
+        }
+    }
+    component Motor {
+        incoming message drive with identifier: "/drive", type: V links t
+        behaviour { initial marked state still { on request to drive } }
+    }
+    requirement drive needs Button.busy
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "told"),
+    [
+        (":= value", "= value", "Write ':=' instead of '='."),
+        (":= value", "== value", "Write ':=' instead of '=='."),
+        ("outgoing message", "incoming message", "Write 'outgoing message': directions are the component's"),
+        ("incoming message", "outgoing message", "Write 'incoming message': directions are the component's"),
+        ("initial marked state idle", "marked state idle", "Write 'initial' before this state"),
+        ("marked state busy", "initial marked state busy", "Remove 'initial' before this state"),
+        ('"/pressed"', "/pressed", "Write '\"/pressed\"' instead of '/pressed'."),
+        ('"/pressed"', '"/pressed', "Write '\"/pressed\"' instead of '\"/pressed'."),
+        ('"/pressed"', '/pressed"', "Write '\"/pressed\"' instead of '/pressed\"'."),
+        ('"/pressed"', "“/pressed”", "Write '\"/pressed\"' instead of '“/pressed”'."),
+        ("down: E\n", "down\n", "Write ': E' before it."),
+        ("down: E\n", "down = off\n", "Write ': E' before it."),
+        ("if down = on_ goto busy", "goto busy if down = on_", "Write 'if down = on_ goto busy' instead of"),
+        ("transition if down = on_", "transition when down = on_", "Did you mean 'if'?"),
+        ("goto idle", "goto ilde", "Write 'idle'."),
+        ("do down := value", "do dwon := value", "Write 'down'."),
+        ("requirement drive", "rule drive", "Did you mean 'requirement'?"),
+        ("datatype object", "struct", "Did you mean 'datatype object'?"),
+        ("datatype enum", "enum", "Write 'datatype' before it."),
+        ("outgoing message", "publisher", "Did you mean 'outgoing message'?"),
+        ("use Twist from geometry_msgs", "use geometry_msgs/Twist", "Write 'Twist from geometry_msgs' instead of"),
+        ("on request to drive }", "on request to drive if true }", "Remove the condition: a request is only made"),
+        ("x: double", "x: std::float", "Write 'double' instead of 'std::float'."),
+        ("default -> off", "defualt -> off", "Write 'default'."),
+        ("}\n    component Motor", "\n    component Motor", "Write '}' before it."),
+        ("component Motor {", "component Motor", "Write '{' before it."),
+    ],
+)
+def test_what_is_told_is_obeyed(right: str, wrong: str, told: str) -> None:
+    text = ROBOT.replace(right, wrong, 1)
+    assert text != ROBOT
+    found = first_error(text)
+    assert found is not None
+    assert found.fix.startswith(told)
+    for _ in range(3):
+        if found is None:
+            break
+        text = obeyed(text, found) or ""
+        found = first_error(text)
+    assert found is None, found
+
+
+def test_a_direction_that_is_used_rightly_too_is_not_turned() -> None:
+    text = ROBOT.replace("on request to drive }", "on request to drive on response from drive }")
+    found = first_error(text)
+    assert found is not None
+    assert found.fix == "Use request."
+
+
+def test_what_nothing_is_known_of_is_told_so() -> None:
+    assert fix_syntax("a", "zzz", ("a name", "'on'")).startswith("Write one of the expected words here")

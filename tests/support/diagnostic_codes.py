@@ -16,14 +16,14 @@ _IS_A_CODE = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 NO_CODES = frozenset(
     {
         *("utf-8", "utf-8-sig", "robosc-supervisor", "explain-synthesis"),
-        *("ssh-ed25519", "check-log", "triangle-up"),
+        *("ssh-ed25519", "check-log", "triangle-up", "until-trouble", "site-functions", "bash-completion"),
         *(info.name for info in available_targets()),
     }
 )
-"""Texts of the source that look like codes and are none: commands, their remarks, kinds of keys and marks, targets."""
+"""Texts of the source that look like codes and are none: commands, their remarks, kinds of keys and marks, folders, targets."""
 
-# The pages themselves, and the models that a new robot begins with.
-_ELSEWHERE = ("diagnostics", "starter")
+# The pages themselves, the models that a new robot begins with, and names of programs and packages.
+_ELSEWHERE = ("diagnostics", "starter", "doctor")
 
 REPORTERS = {"error": 0, "warning": 0, "note": 0, "_warning": 0, "Diagnostic": 1, "Remark": 0, "_shown": 0}
 """Functions that take a code, and at which position."""

@@ -8,8 +8,9 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,10 @@ from robosc_api.security import ServerSecurity
 from robosc_server.application import running_server
 from robosc_server.operations.settings import Settings
 from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
+from support.held_time import HeldLoop
 from support.waiting import PATIENCE_S
+
+_PAUSE_S = 0.005
 
 
 @contextmanager
@@ -70,7 +74,7 @@ def _served(chosen: Settings, workers: Any, loop: asyncio.AbstractEventLoop) -> 
     stop = asyncio.Event()
 
     async def run() -> None:
-        async with running_server(chosen, workers) as name:
+        async with _time_at_the_end(loop, stop), running_server(chosen, workers) as name:
             address.append(name)
             ready.set()
             await stop.wait()
@@ -98,6 +102,30 @@ def _served(chosen: Settings, workers: Any, loop: asyncio.AbstractEventLoop) -> 
         assert not thread.is_alive()
     if failure:
         raise failure[0]
+
+
+@asynccontextmanager
+async def _time_at_the_end(loop: asyncio.AbstractEventLoop, stop: asyncio.Event) -> AsyncIterator[None]:
+    """Have time pass on a loop that holds it, from the moment that its server is to stop.
+
+    A server waits then for what its callers may have seen the end of already.
+    """
+    has_ended = False
+
+    async def passes(held: HeldLoop) -> None:
+        await stop.wait()
+        while not has_ended:
+            await held.passed(_PAUSE_S)
+            await asyncio.to_thread(time.sleep, _PAUSE_S)
+
+    passing = asyncio.create_task(passes(loop)) if isinstance(loop, HeldLoop) else None
+    try:
+        yield
+    finally:
+        has_ended = True
+        stop.set()
+        if passing is not None:
+            await passing
 
 
 @contextmanager

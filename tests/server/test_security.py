@@ -31,6 +31,7 @@ from robosc_server.main import main
 from robosc_server.tasks.task import Outcome, Result, Task, TaskLimits
 from robosc_server.workers import OnCpuTime, OnReport, ignore_cpu_time
 from support.certificates import Authority
+from support.held_time import HeldLoop
 from support.job_workers import task_message
 from support.service import bundle_of, secured, served, server_process
 from support.waiting import PATIENCE_S
@@ -281,7 +282,8 @@ class TestQuotas:
         token, tokens = token_in(tmp_path, Scope.SYNTHESIZE, quota=Quota(per_minute=2))
         other, other_tokens = token_in(tmp_path, Scope.SYNTHESIZE, name="other")
         tokens.write_text(tokens.read_text() + other_tokens.read_text())
-        with serving(ServerSecurity(tokens=tokens)) as address:
+        # Time stands still, so that nothing of the quota comes back.
+        with serving(ServerSecurity(tokens=tokens), loop=HeldLoop()) as address:
             with Client(address, Credentials(token_file=token), retries=ONCE) as client:
                 for text in ("a", "b"):
                     client.check(bundle_of(text))

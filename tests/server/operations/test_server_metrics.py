@@ -12,7 +12,8 @@ from robosc_api.security import SecurityError
 from robosc_server.operations.instrumented_workers import InstrumentedWorkers
 from robosc_server.operations.metrics import Metrics, MetricsEndpoint, metric_names
 from robosc_server.tasks.task import Failure, Outcome, Reason, Result, Task, TaskKind, TaskLimits
-from support.waiting import PATIENCE_S, limited
+from support.held_time import HeldLoop, on_held_time
+from support.waiting import PATIENCE_S, limited, until
 
 
 def samples(text: str) -> dict[tuple[str, frozenset[tuple[str, str]]], float]:
@@ -109,22 +110,26 @@ def test_a_head_without_end_is_dropped() -> None:
     asked(Metrics("1"), test)
 
 
-def test_who_keeps_connections_open_leaves_others_none_for_a_while_and_then_is_dropped(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("robosc_server.operations.metrics._HEAD_SECONDS", 0.2)
+def test_who_keeps_connections_open_leaves_others_none_for_a_while_and_then_is_dropped() -> None:
+    async def dropped(reader: asyncio.StreamReader) -> None:
+        with pytest.raises(ConnectionError):
+            assert await reader.read() == b""
+            raise ConnectionError
 
-    async def test(address: str) -> None:
-        host, _, port = address.rpartition(":")
-        silent = [await asyncio.open_connection(host, int(port)) for _ in range(40)]
-        for reader, writer in silent:
-            with pytest.raises(ConnectionError):
-                assert await reader.read() == b""
-                raise ConnectionError
-            writer.close()
-        assert b"200 OK" in await sent(address, b"GET /metrics HTTP/1.1\r\n\r\n")
+    async def test(loop: HeldLoop) -> None:
+        async with MetricsEndpoint(Metrics("1"), "127.0.0.1:0") as endpoint:
+            host, _, port = endpoint.address.rpartition(":")
+            silent = [await asyncio.open_connection(host, int(port)) for _ in range(40)]
+            ends = [asyncio.create_task(dropped(reader)) for reader, _ in silent]
+            # Those that there is no room for.
+            await until(lambda: sum(end.done() for end in ends) == 24)
+            await loop.passed(5.0)
+            await asyncio.gather(*ends)
+            for _, writer in silent:
+                writer.close()
+            assert b"200 OK" in await sent(endpoint.address, b"GET /metrics HTTP/1.1\r\n\r\n")
 
-    asked(Metrics("1"), test)
+    on_held_time(test)
 
 
 def test_where_other_machines_reach_it_only_if_it_is_told() -> None:

@@ -1,7 +1,6 @@
 """`robosc-server check-config`, `example-config` and `token`."""
 
 import contextlib
-import datetime
 import errno
 import json
 import os
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cryptography import x509
 from sqlalchemy import create_engine, text
 
 from robosc_api.security import Quota, Scope, make_token
@@ -105,8 +105,8 @@ def test_certificates(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Non
     old, old_key = authority.sign("old", days=-1)
     checked = Checked(capsys, words[0], str(old), words[2], str(old_key))
     assert checked.status == 1
-    yesterday = datetime.datetime.now(datetime.UTC) - datetime.timedelta(days=1)
-    assert f"{old}: expired at {yesterday:%Y-%m-%d}" in checked.of("certificates")[0][1]
+    ended = x509.load_pem_x509_certificate(old.read_bytes()).not_valid_after_utc
+    assert f"{old}: expired at {ended:%Y-%m-%d}" in checked.of("certificates")[0][1]
     checked = Checked(capsys, *words[:3], str(soon_key))
     assert "cannot be used" in checked.of("certificates")[0][1]
     (tmp_path / "empty").touch()

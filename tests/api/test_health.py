@@ -13,6 +13,7 @@ from robosc_bridge.health_check import main as bridge_health
 from robosc_server.health_check import main as server_health
 from support.certificates import Authority
 from support.health_servers import answering
+from support.scripted_service import kept_port
 
 Status = health_pb2.HealthCheckResponse
 IN_THE_CLEAR = ServerSecurity()
@@ -41,7 +42,8 @@ def test_answers_are_told_apart() -> None:
     with answering(Status.NOT_SERVING) as address:
         ill = ask_health(address, timeout_s=10)
     assert (ill.is_alive, ill.is_serving, ill.message) == (True, False, "NOT_SERVING")
-    nobody = ask_health(address, timeout_s=10)
+    with kept_port() as port:
+        nobody = ask_health(f"127.0.0.1:{port}", timeout_s=10)
     assert (nobody.is_alive, nobody.is_serving) == (False, False) and nobody.message.startswith("UNAVAILABLE")
 
 
@@ -59,7 +61,8 @@ def test_an_expired_certificate_is_not_well_but_ends_no_program(tmp_path: Path) 
     with answering(Status.SERVING, ServerSecurity(certificate=certificate, key=key)) as address:
         condition = ask_health(address, timeout_s=10, certificate=certificate)
     assert (condition.is_alive, condition.is_serving) == (True, False) and "expired" in condition.message.lower()
-    assert not ask_health(address, timeout_s=10, certificate=certificate).is_alive
+    with kept_port() as port:
+        assert not ask_health(f"127.0.0.1:{port}", timeout_s=10, certificate=certificate).is_alive
 
 
 def test_whoever_wants_a_certificate_is_shown_its_own(tmp_path: Path) -> None:
@@ -98,7 +101,8 @@ def test_a_file_that_is_no_certificate_is_one_clear_error(secure: ServerSecurity
     with answering(Status.SERVING, secure) as address:
         condition = ask_alive(address, timeout_s=10, certificate=file)
     assert (condition.is_alive, condition.is_serving) == (True, False) and "server.pem" in condition.message
-    assert not ask_alive(address, timeout_s=10, certificate=file).is_alive
+    with kept_port() as port:
+        assert not ask_alive(f"127.0.0.1:{port}", timeout_s=10, certificate=file).is_alive
 
 
 @pytest.mark.parametrize(("status", "code", "alive"), [(Status.SERVING, 0, 0), (Status.NOT_SERVING, 1, 0)])
@@ -125,7 +129,9 @@ def test_the_commands_say_it_by_their_status(
             file.write_text(file.read_text().replace(str(secure.certificate), str(spoiled)))
             assert health(["--config", str(file)]) == 2
             assert health(["--config", str(file), "--alive"]) == 0
-    assert server_health(["--config", str(server), "--alive"]) == 1
+    with kept_port() as nobodys:
+        server.write_text(server.read_text().replace(f"port = {port}", f"port = {nobodys}"))
+        assert server_health(["--config", str(server), "--alive"]) == 1
     capsys.readouterr()
 
 

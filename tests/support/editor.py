@@ -77,7 +77,7 @@ class Editor:
 
     Args:
         folder: Folder with the files.
-        options: Options of the server's command line.
+        options: Options of the server's command line; a synthesis may take any time unless they say otherwise.
         encodings: Encodings in which it can count columns, in its order.
     """
 
@@ -88,7 +88,9 @@ class Editor:
         self.faults: list[str] = []
         self.lenses_refreshed = 0
         self.watched: list[lsp.Registration] = []
-        self._options = options
+        # A synthesis leaves the processor to everybody else, and so may take long where others have much to do.
+        is_said = "--synthesis-seconds" in options
+        self._options = options if is_said else (*options, "--synthesis-seconds", "100000")
         self._encodings = [lsp.PositionEncodingKind(item) for item in encodings]
         self._versions: dict[str, int] = {}
         self._runner = asyncio.Runner()

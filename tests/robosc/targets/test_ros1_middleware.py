@@ -2,9 +2,7 @@
 
 import socket
 import sys
-import threading
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -45,16 +43,41 @@ def test_names_on_the_wire(connections: Any, prefix: str, identifier: str, name:
     assert connections.wire_name(prefix, identifier) == name
 
 
-def test_what_waits_in_a_queue_is_awaited(connections: Any) -> None:
+class Time:
+    """The time, which passes only while somebody sleeps.
+
+    Args:
+        then: Function that is called when the moment `at_s` has come.
+        at_s: Seconds from the beginning.
+    """
+
+    def __init__(self, then: Callable[[], object] = lambda: None, at_s: float = 0.0) -> None:
+        self.now_s = 0.0
+        self._then, self._at_s = then, at_s
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+    def sleep(self, seconds: float) -> None:
+        self.now_s += seconds
+        if self.now_s >= self._at_s:
+            self._then()
+
+
+def test_what_waits_in_a_queue_is_awaited(connections: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     connection = SimpleNamespace(_queue=[b"zero"], socket=None)
-    threading.Timer(0.2, connection._queue.clear).start()
-    began_s = time.monotonic()
+    time = Time(connection._queue.clear, 0.2)
+    monkeypatch.setattr(connections, "time", time)
     connections.wait_until_delivered([publisher(SimpleNamespace(_queue=[], socket=None)), publisher(connection)])
     assert not connection._queue
-    assert time.monotonic() - began_s >= 0.2
+    assert 0.2 <= time.now_s < connections.DELIVERY_S
 
 
-def test_what_the_other_computer_has_not_confirmed_is_awaited_but_not_for_long(connections: Any) -> None:
+def test_what_the_other_computer_has_not_confirmed_is_awaited_but_not_for_long(
+    connections: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    time = Time()
+    monkeypatch.setattr(connections, "time", time)
     with socket.create_server(("127.0.0.1", 0)) as server, socket.create_connection(server.getsockname()) as sender:
         receiver, _ = server.accept()
         with receiver:
@@ -64,9 +87,8 @@ def test_what_the_other_computer_has_not_confirmed_is_awaited_but_not_for_long(c
                     sender.send(bytes(65536))
             connection = SimpleNamespace(_queue=[], socket=sender)
             assert connections._unsent(connection)
-            began_s = time.monotonic()
             connections.wait_until_delivered([publisher(connection)])
-            assert time.monotonic() - began_s >= connections.DELIVERY_S
+            assert connections.DELIVERY_S <= time.now_s < 2 * connections.DELIVERY_S
 
     assert not connections._unsent(SimpleNamespace(_queue=[], socket=sender))
     assert not connections._unsent(SimpleNamespace(_queue=[], socket=None))

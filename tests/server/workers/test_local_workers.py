@@ -116,7 +116,12 @@ class TestDeaths:
             ("garbage", "the worker process sent an invalid answer"),
         ],
     )
-    def test_a_process_that_dies_ends_its_task_alone(self, running: Running, text: str, message: str) -> None:
+    def test_a_process_that_dies_ends_its_task_alone(
+        self, running: Running, monkeypatch: pytest.MonkeyPatch, text: str, message: str
+    ) -> None:
+        # Whatever else this machine has no memory for.
+        for name in ("oom_kills", "_kills_before"):
+            monkeypatch.setattr(f"robosc_server.workers.process.{name}", lambda: 0)
         other, pid = running.begun("stop\necho unharmed")
         assert eventually(lambda: is_stopped(pid))
         failure = running.failure(text)
@@ -262,8 +267,8 @@ class TestNothingIsLeft:
 
     def test_nothing_is_left_after_many_tasks(self, running: Running) -> None:
         def is_at_rest() -> bool:
-            # Also of the last one, whose descriptors are closed when it is gone.
-            return len(running.local.pids) == 2 and not running.local._pool._terminations
+            # Also of the last one, whose descriptors are closed when it is gone: only then those that wait are counted.
+            return not running.local._pool._terminations and len(running.local.pids) == 2
 
         running.run("echo")
         assert eventually(is_at_rest)
@@ -271,7 +276,8 @@ class TestNothingIsLeft:
         for text in ("echo", "exit 1", "die 11", "garbage", "raise") * 4:
             running.run(text)
         assert eventually(is_at_rest)
-        assert eventually(lambda: open_descriptors() == before)
+        # What earlier tests have left may have been closed meanwhile.
+        assert eventually(lambda: open_descriptors() <= before)
 
     def test_workers_end_also_where_a_burial_ends_that_very_moment(self) -> None:
         async def run() -> None:

@@ -42,13 +42,22 @@ def skip_without_postgresql() -> None:
             pytest.skip(f"there is no user {_USER}, and PostgreSQL does not run as root")
 
 
-def _lasting_port() -> int:
-    """A free port that the system gives to nobody who asks for any: it is still free when the server comes back."""
+def _lasting_port() -> socket.socket:
+    """A socket that keeps a free port, so that it is still free when the server begins, and when it comes back.
+
+    The system gives the port to nobody who asks for any, and a server of another suite finds that it is taken.
+    """
     ports = range(20_000, 30_000)
     for port in random.SystemRandom().sample(ports, len(ports)):
-        with socket.socket() as listener, contextlib.suppress(OSError):
-            listener.bind(("127.0.0.1", port))
-            return port
+        keeper = socket.socket()
+        try:
+            keeper.bind(("127.0.0.1", port))
+        except OSError:
+            keeper.close()
+            continue
+        # The server may listen there, since this one does not.
+        keeper.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        return keeper
     raise AssertionError("no port is free")
 
 
@@ -63,7 +72,8 @@ class Postgresql:
         self._folder = folder
         self._process: subprocess.Popen[bytes] | None = None
         self._numbers = itertools.count()
-        self._port = _lasting_port()
+        self._keeper = _lasting_port()
+        self._port = self._keeper.getsockname()[1]
         self._as: list[str] = []
         if os.getuid() == 0:
             user = pwd.getpwnam(_USER)
@@ -127,7 +137,8 @@ class Postgresql:
         self._signal_all(signal.SIGCONT)
 
     def end(self) -> None:
-        """End it, whatever it does."""
+        """End it, whatever it does, and give up its port."""
+        self._keeper.close()
         if self._process is not None:
             self.thaw()
             self._end(signal.SIGQUIT)

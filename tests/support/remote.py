@@ -106,6 +106,9 @@ SNAPSHOT = Snapshot(
 )
 
 
+AHEAD_S = 3600.0
+
+
 def scan(first_m: float) -> Scan:
     now_s = time.monotonic()
     raw = RawScan((0.0,), (first_m,), (1.0,))
@@ -137,6 +140,7 @@ class FakeDaemon:
         self.handle: Callable[[FromProgram], None] = lambda item: None
         self.turns = True
         self._number = 0
+        self._turned = 0
         self._inbox: queue.SimpleQueue[Order | FromProgram | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._run)
 
@@ -152,7 +156,8 @@ class FakeDaemon:
     def show(self, **changes: Any) -> Snapshot:
         """Another snapshot."""
         self._number += 1
-        snapshot = replace(SNAPSHOT, **{"number": self._number, "time_s": time.time(), **changes})
+        # It does not grow old, however long a test takes.
+        snapshot = replace(SNAPSHOT, **{"number": self._number, "time_s": time.time() + AHEAD_S, **changes})
         self.feed.show(snapshot)
         return snapshot
 
@@ -166,8 +171,8 @@ class FakeDaemon:
         return [order.command for order in self.orders]
 
     def program(self) -> Program:
-        """The first that was attached."""
-        return wait_until(lambda: self.told[0].program if self.told else None)
+        """The first that was attached, after the turn in which that was told: a snapshot was shown at its end."""
+        return wait_until(lambda: self.told[0].program if self._turned else None)
 
     def of(self, kind: type[Any]) -> list[Any]:
         """Return the reported items of a kind."""
@@ -195,6 +200,7 @@ class FakeDaemon:
                 self.told.append(item)
                 self.handle(item)
             self.show()
+            self._turned = len(self.told)
 
 
 @contextmanager

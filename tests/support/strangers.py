@@ -33,9 +33,9 @@ class Stranger:
         # The thread that answers sends, too: a frame must not get into the middle of another one.
         self._sending = threading.Lock()
         self.line = socket.create_connection((host, int(port)), source_address=(source, 0))
-        self._send(_PREFACE)
         told = b"".join(struct.pack(">HI", number, value) for number, value in (settings or {}).items())
-        self.send(SETTINGS, 0, 0, told)
+        # At once: a server may end a connection that has begun and says nothing.
+        self._send(_PREFACE + _frame(SETTINGS, 0, 0, told))
         self.is_open = True
         self.frames: list[tuple[int, int, bytes]] = []
         self._thread = threading.Thread(target=self._answer)
@@ -43,7 +43,7 @@ class Stranger:
 
     def send(self, kind: int, flags: int, stream: int, content: bytes) -> None:
         """A frame; nobody takes it where the server has ended the connection."""
-        self._send(struct.pack(">I", len(content))[1:] + struct.pack(">BBI", kind, flags, stream) + content)
+        self._send(_frame(kind, flags, stream, content))
 
     def call(
         self, stream: int, path: str, metadata: Mapping[str, str] | None = None, flags: int = END_OF_HEADERS
@@ -96,6 +96,10 @@ class Stranger:
                     if kind in (PING, SETTINGS) and not flags & ACKNOWLEDGED:
                         self.send(kind, ACKNOWLEDGED, 0, content if kind == PING else b"")
         self.is_open = False
+
+
+def _frame(kind: int, flags: int, stream: int, content: bytes) -> bytes:
+    return struct.pack(">I", len(content))[1:] + struct.pack(">BBI", kind, flags, stream) + content
 
 
 @contextmanager

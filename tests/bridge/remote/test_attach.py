@@ -366,13 +366,14 @@ class TestHostilePrograms:
     ) -> None:
         assert endpoint_module.PING_S + endpoint_module.PING_LIMIT_S <= 8.0
         monkeypatch.setattr(endpoint_module, "PING_S", 0.05)
-        # One that is slow is taken for gone as well as one that hangs.
+        # One that is slow is taken for gone as well as one that hangs, and comes again.
         monkeypatch.setattr(endpoint_module, "PING_LIMIT_S", 0.5)
         text = (
-            "import sys; from support.remote import *\n"
-            "with connected(sys.argv[1]) as stub:\n"
-            "    program = Attachment(stub, name='far away')\n"
-            "    program.receive(); program.receive()\n"
+            "import contextlib, sys; from support.remote import *\n"
+            "while True:\n"
+            "    with contextlib.suppress(grpc.RpcError), connected(sys.argv[1]) as stub:\n"
+            "        program = Attachment(stub, name='far away')\n"
+            "        program.receive(); program.receive()\n"
         )
         with served(daemon) as endpoint:
             environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
@@ -458,7 +459,9 @@ class TestHostilePrograms:
         wait_until(lambda: len(daemon.of(programs.MessageReceived)) == 12)
         program.end()
 
-    def test_the_end_of_the_bridge_is_told(self, daemon: FakeDaemon) -> None:
+    def test_the_end_of_the_bridge_is_told(self, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch) -> None:
+        # However long a busy machine takes for it.
+        monkeypatch.setattr(endpoint_module, "_GRACE_S", PATIENCE_S)
         with served(daemon) as endpoint, connected(endpoint.address) as stub:
             program = attached(stub)
             endpoint.stop()

@@ -20,7 +20,9 @@ from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.main import main as robosc_bridge
 from robosc_bridge.remote import RemoteSettings
+from robosc_bridge.remote import endpoint as endpoint_module
 from robosc_bridge.safety import Reason
+from robosc_bridge.terminal import client
 from robosc_bridge.terminal.commands import NAMES, main
 from robosc_bridge.terminal.formatting import Lines, event_line, status_lines
 from support.certificates import Authority
@@ -28,6 +30,13 @@ from support.remote import READING, FakeDaemon, connected, served
 from support.waiting import PATIENCE_S, wait_until
 
 NOWHERE = "127.0.0.1:1"
+
+
+@pytest.fixture(autouse=True)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine may take longer for an answer than a bridge may."""
+    for name in ("STOP_LIMIT_S", "STATUS_LIMIT_S", "COMMAND_LIMIT_S"):
+        monkeypatch.setattr(client, name, PATIENCE_S)
 
 
 @pytest.fixture
@@ -241,7 +250,9 @@ class TestWatch:
             assert found["scan"]["ranges_m"][:2] == [1.5, "NaN"]
             assert found["lost_events"] == "0"
 
-    def test_the_end_of_the_bridge_is_told(self, daemon: FakeDaemon) -> None:
+    def test_the_end_of_the_bridge_is_told(self, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch) -> None:
+        # However long a busy machine takes for it.
+        monkeypatch.setattr(endpoint_module, "_GRACE_S", PATIENCE_S)
         with served(daemon) as endpoint, watching("--address", endpoint.address) as process:
             assert process.stdout is not None
             process.stdout.readline()

@@ -14,6 +14,7 @@ import pytest
 from robosc_experiments import processes
 from robosc_experiments.processes import Program, finish, interruptible
 from robosc_experiments.scenario import ScenarioError
+from support.background import has_ended
 from support.waiting import wait_until
 
 LIMIT_S = 30.0
@@ -24,14 +25,6 @@ def script(folder: Path, text: str, name: str = "program.py") -> tuple[str, ...]
     file = folder / name
     file.write_text(textwrap.dedent(text), encoding="utf-8")
     return (str(file),)
-
-
-def is_alive(number: int) -> bool:
-    try:
-        state = Path(f"/proc/{number}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[0]
-    except FileNotFoundError:
-        return False
-    return state != "Z"
 
 
 def test_a_program_answers_and_ends_politely(tmp_path: Path) -> None:
@@ -82,8 +75,8 @@ def test_what_a_program_has_started_ends_with_it(tmp_path: Path) -> None:
     """
     with Program("parent", script(tmp_path, text), tmp_path) as program:
         child = int(program.wait_for(r"^child (\d+)$")[1])
-        assert is_alive(child)
-    wait_until(lambda: not is_alive(child))
+        assert not has_ended(child)
+    wait_until(lambda: has_ended(child))
 
 
 def test_a_program_that_is_not_there_is_told(tmp_path: Path) -> None:
@@ -119,10 +112,10 @@ def test_a_program_ends_politely_when_who_runs_it_is_killed(tmp_path: Path) -> N
     try:
         assert outer.stdout is not None
         robot = int(outer.stdout.readline())
-        assert is_alive(robot)
+        assert not has_ended(robot)
         outer.kill()
         outer.wait()
-        wait_until(lambda: not is_alive(robot))
+        wait_until(lambda: has_ended(robot))
         assert (tmp_path / "robot.log").read_text() == "ready\nat rest\n"
     finally:
         outer.kill()
@@ -179,7 +172,7 @@ def test_a_signal_stops_programs_and_a_second_one_changes_nothing(number: signal
         outer.send_signal(number)
         (tmp_path / "end").touch()
         assert outer.communicate(timeout=LIMIT_S)[0] == "interrupted 0\n"
-        assert not is_alive(child)
+        assert has_ended(child)
     finally:
         outer.kill()
         outer.wait()
@@ -199,7 +192,7 @@ def test_a_signal_while_a_program_is_started_leaves_nothing(tmp_path: Path, monk
     with pytest.raises(KeyboardInterrupt), interruptible(), program:
         pytest.fail("it goes on")
     assert len(started) == 1
-    assert not is_alive(started[0])
+    assert has_ended(started[0])
 
 
 def test_a_first_signal_while_a_deaf_program_is_stopped_leaves_nothing(

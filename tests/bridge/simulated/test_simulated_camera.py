@@ -166,7 +166,7 @@ def test_what_is_there_already_is_left_alone(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="too long"):
         SimulatedTurtleBot3(camera_link=tmp_path / ("x" * 120), clock=ManualClock())
     assert path.read_text() == "mine"
-    assert open_descriptors() == before
+    assert open_descriptors() <= before
 
 
 def test_it_is_told_what_to_do() -> None:

@@ -322,7 +322,7 @@ def test_no_descriptor_is_left(pty: PtyEnd, tmp_path: Path) -> None:
         for path, baud in (("/dev/no-such-port", 9600), ("/dev/null", 9600), (str(tmp_path), 9600), (pty.path, 2**40)):
             with pytest.raises(LineError):
                 SerialLine(path, baud)
-    assert open_descriptors() == before
+    assert open_descriptors() <= before
 
 
 def test_a_file_number_above_1024_does_not_matter() -> None:

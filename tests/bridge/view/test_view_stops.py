@@ -14,6 +14,7 @@ from robosc_view import remote_bridge
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
 from support.pages_open import LIMIT_S, OpenPage, opened
 from support.view_servers import remotely_viewed
+from support.waiting import wait_until
 
 MOST_THREADS = 12
 
@@ -82,6 +83,8 @@ async def _copied(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) ->
 
 @pytest.fixture
 def robot() -> LiveRobot:
+    # Those of an earlier test end when their connections have.
+    wait_until(lambda: not asking())
     return LiveRobot(supervisor_without_synthesis(large_model(3)))
 
 

@@ -488,7 +488,7 @@ class TestEndpoint:
         endpoint = serve(daemon.operations, RemoteSettings("127.0.0.1:0"))
         endpoint.stop()
         endpoint.stop()
-        assert not [thread for thread in threading.enumerate() if thread.name == "remote endpoint"]
+        wait_until(lambda: not any(thread.name == "remote endpoint" for thread in threading.enumerate()))
         again = serve(daemon.operations, RemoteSettings(endpoint.address))
         assert again.address == endpoint.address
         again.stop()

@@ -110,7 +110,9 @@ def test_faults_on_the_way(time: Timebase) -> None:
         assert sum(one != other for one, other in zip(damaged, b"cba", strict=True)) == 1
         line.faults.corrupt_share, line.faults.drop_share = 0.0, 1.0
         near.send(b"lost")
-        wait_until(lambda: device.heard == [b"abc", b"lost"])
+        # An answer is lost after the question was heard, and before it lives again.
+        wait_until(lambda: device.lives == 4)
+        assert device.heard == [b"abc", b"lost"]
         line.faults.drop_share = 0.0
         near.send(b"de")
         assert near.recv(100) == b"ed"

@@ -26,7 +26,7 @@ from robosc_view.server import BURST
 from support.held_time import HeldLoop
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
 from support.pages_open import LIMIT_S, opened
-from support.waiting import eventually
+from support.waiting import eventually, wait_until
 
 PLACES = 3
 BEGIN_S = 1000.0
@@ -208,4 +208,5 @@ def test_the_server_ends_beside_those_who_take_nothing(robot: LiveRobot, monkeyp
     with viewed(robot) as endpoint, slow(endpoint):
         fill(endpoint, robot, 1, time.sleep)
         endpoint.stop()
-        assert not endpoint.is_alive
+        # A busy machine may take longer for it than whoever stops it waits.
+        wait_until(lambda: not endpoint.is_alive)

@@ -18,7 +18,7 @@ from robosc.certification.certify import certify
 from robosc.controller_properties import check_controller, controller_findings
 from robosc.errors import Diagnostic, NodeLimitError, sorted_diagnostics
 from robosc.model import check
-from robosc.model.layers import layer_findings
+from robosc.model.layers import layer_findings, without_controller_findings
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle
@@ -111,16 +111,16 @@ def prepare(bundle: Bundle, deployment: Deployment) -> SynthesisProblem | Synthe
     if checked.model is None or checked.places is None:
         reason = "" if checked.has_errors else "a library has no robot to make a supervisor for"
         return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, checked.diagnostics, reason=reason)
+    diagnostics = checked.diagnostics
     if deployment is Deployment.LAYER:
+        diagnostics = without_controller_findings(diagnostics)
         ambiguous = layer_findings(checked.model, checked.places)
         if ambiguous:
-            return SynthesisOutcome(
-                OutcomeStatus.MODEL_ERRORS, None, sorted_diagnostics((*checked.diagnostics, *ambiguous))
-            )
+            return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, sorted_diagnostics((*diagnostics, *ambiguous)))
     system = ExecutableSystem(checked.model, deployment)
     # A model that synthesis cannot handle is refused here.
     _ = system.automata
-    return SynthesisProblem(checked.model, checked.places, system, checked.diagnostics)
+    return SynthesisProblem(checked.model, checked.places, system, diagnostics)
 
 
 def make_supervisor(

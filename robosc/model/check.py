@@ -4,7 +4,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from robosc.errors import Diagnostic, InternalError, LanguageError, RelatedPlace, Severity, sorted_diagnostics
+from robosc.interfaces.catalogue import Catalogue
 from robosc.language import Parsed, parse, syntax
+from robosc.model.array_lengths import ArrayLengths
 from robosc.model.behaviour import (
     BehaviourBuilder,
     BehaviourTree,
@@ -28,6 +30,7 @@ from robosc.model.own_requests import OwnRequests
 from robosc.model.places import Places
 from robosc.model.restrictions import Restrictions
 from robosc.model.scopes import Scopes
+from robosc.model.sent_messages import SentMessages
 from robosc.model.structure import (
     Behaviour,
     Communication,
@@ -36,6 +39,7 @@ from robosc.model.structure import (
     EnumDefinition,
     EnumRule,
     Model,
+    Provide,
     Requirement,
 )
 from robosc.model.synthesis_variables import check_synthesis_variables, mark_synthesis_variables
@@ -183,7 +187,9 @@ class _RobotChecker:
             if tree is not None:
                 check_synthesis_variables(tree, behaviour, communications, self._types, self.findings)
                 partial_updates(tree, behaviour, self.findings)
-        InterfaceChecker(self._bundle, self._types, self.findings).check(trees, communications, self._unit)
+        fitting = InterfaceChecker(self._bundle, self._types, self.findings).check(trees, communications, self._unit)
+        self._check_data(trees, communications, provides, fitting)
+        self._check_indices(trees, communications, behaviour_trees, fitting)
         self._check_requests(communications, marked, requirements)
         self._check_empty(communications)
         self.places.objects.update(self._types.object_places)
@@ -276,6 +282,40 @@ class _RobotChecker:
 
     def _unknown_communication(self, part: Part, communications: Mapping[str, Communication]) -> "_Unknown":
         return _Unknown(part, self._unit, communications, self.findings)
+
+    def _check_data(
+        self,
+        trees: Iterable[CommunicationTree],
+        communications: Mapping[str, Communication],
+        provides: Iterable[Provide],
+        fitting: Mapping[str, Catalogue],
+    ) -> None:
+        """Check what requests send against the interfaces that they fit."""
+        placed = tuple(zip(provides, self.places.provides, strict=True))
+        sent = SentMessages(fitting, placed, self._types, self.findings)
+        for item in trees:
+            communication = communications.get(item.tree.name.text)
+            if communication is not None:
+                sent.check(communication, item.tree, item.location)
+
+    def _check_indices(
+        self,
+        trees: Iterable[CommunicationTree],
+        communications: Mapping[str, Communication],
+        behaviours: Mapping[str, BehaviourTree | None],
+        fitting: Mapping[str, Catalogue],
+    ) -> None:
+        """Check indices of received arrays against the lengths that interfaces give."""
+        lengths = ArrayLengths(self._types, self.findings)
+        for item in trees:
+            name = item.tree.name.text
+            if name in fitting:
+                lengths.check_communication(communications[name], item.tree, fitting[name])
+        for behaviour in behaviours.values():
+            for _, transition in behaviour.transitions if behaviour else ():
+                if isinstance(transition, syntax.CommunicationTransition) and transition.communication.text in fitting:
+                    name = transition.communication.text
+                    lengths.check_transition(transition, communications[name], fitting[name])
 
     def _check_requests(
         self,

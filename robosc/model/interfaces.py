@@ -15,17 +15,19 @@ from robosc.language.words import spelled
 from robosc.model.communications import CommunicationTree
 from robosc.model.findings import Findings, did_you_mean
 from robosc.model.message_fields import Fault, FieldChecker, Language, Message
-from robosc.model.structure import Communication, CommunicationKind
+from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.model.types import Types
 from robosc.model.units import Unit
 from robosc.source import Bundle, Location
 
-_KINDS = {
+KINDS = {
     CommunicationKind.INCOMING_MESSAGE: "msg",
     CommunicationKind.OUTGOING_MESSAGE: "msg",
     CommunicationKind.SERVICE: "srv",
     CommunicationKind.ACTION: "action",
 }
+"""Kind of interface of each kind of communication."""
+
 _WORDS = {"msg": "message", "srv": "service", "action": "action"}
 _ARTICLES = {"msg": "a message", "srv": "a service", "action": "an action"}
 
@@ -65,7 +67,7 @@ class _Linked:
     @property
     def kind(self) -> str:
         """Folder of the interface in its package."""
-        return _KINDS[self.communication.kind]
+        return KINDS[self.communication.kind]
 
     @property
     def package(self) -> str:
@@ -239,6 +241,16 @@ def _linked(
     link = item.tree.link
     interface = None if link is None else item.part.unit.interfaces.get(link.text)
     return None if communication is None or interface is None else (communication, item.tree, interface)
+
+
+def parts_by_event(item: Communication, catalogue: Catalogue) -> dict[EventKind, tuple[Type, Part]]:
+    """The type of the data of each event of a communication, and the part of its interface that the data comes as."""
+    if item.interface is None:
+        return {}
+    definition = catalogue.definition(KINDS[item.kind], item.interface.package, item.interface.type) or ()
+    types = {EventKind.REQUEST: item.request, EventKind.RESPONSE: item.response, EventKind.FEEDBACK: item.feedback}
+    given = [(kind, type_) for kind, type_ in types.items() if type_ is not None]
+    return {kind: (type_, part) for (kind, type_), part in zip(given, definition, strict=False)}
 
 
 def headers_of(part: Part, catalogue: Catalogue, *, is_action: bool) -> tuple[tuple[str, ...], ...]:

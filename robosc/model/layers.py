@@ -1,8 +1,18 @@
 """Statements that a model must make to become a supervision layer (language B.13)."""
 
+from collections.abc import Iterable
+
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.model.places import Places
 from robosc.model.structure import Communication, CommunicationKind, Model
+
+_CONTROLLER_CODES = frozenset({"empty-frame", "not-stamped"})
+"""Codes of findings about what a controller sends: a layer passes on what comes to it."""
+
+
+def without_controller_findings(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """The findings about a model that mean something for a layer."""
+    return tuple(item for item in diagnostics if item.code not in _CONTROLLER_CODES)
 
 
 def confusable(model: Model) -> tuple[tuple[Communication, Communication], ...]:

@@ -116,7 +116,7 @@ def bundle_of_case(case: str) -> Bundle:
 
 
 def _findings(diagnostics: Iterable[Diagnostic]) -> list[str]:
-    # Which packages have definitions is a matter of the machine, not of the model.
+    # What is installed on this machine is no meaning of a model.
     return sorted(_finding(item) for item in diagnostics if item.code != "definition-not-found")
 
 

@@ -20,7 +20,7 @@ NO_CODES = frozenset(
         *(info.name for info in available_targets()),
     }
 )
-"""Texts of the source that look like codes and are none: commands, their remarks, kinds of keys and marks, folders, targets."""
+"""Texts of the source that look like codes and are none: commands, options, kinds of keys, marks, folders, targets."""
 
 # The pages themselves, the models that a new robot begins with, and names of programs and packages.
 _ELSEWHERE = ("diagnostics", "starter", "doctor")

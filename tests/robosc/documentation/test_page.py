@@ -162,7 +162,7 @@ def test_a_page_does_not_depend_on_the_folder(tmp_path: Path) -> None:
     copy = tmp_path / "other" / "name.rscd"
     copy.parent.mkdir()
     copy.write_text(source.read_text(encoding="utf-8"), encoding="utf-8")
-    one, other = (check(load_bundle(path, interface_paths=(EXAMPLES,))) for path in (source, copy))
+    one, other = (check(load_bundle(file, (), (EXAMPLES,))) for file in (source, copy))
     assert one.diagnostics
     assert page(one.model_or_raise(), one.diagnostics) == page(other.model_or_raise(), other.diagnostics)
 

@@ -311,8 +311,8 @@ MISFITS = {
         "message m: sensor_msgs/msg/LaserScan has no field 'rages'; it has header, angle_min,",
     ),
     "a basic type for a message of many fields": (
-        "interface i use Range from sensor_msgs component C { outgoing message m with type: double links i }",
-        "the message sensor_msgs/msg/Range has the fields header, radiation_type,",
+        "interface i use BasicTypes from test_msgs component C { outgoing message m with type: double links i }",
+        "the message test_msgs/msg/BasicTypes has the fields bool_value, byte_value,",
     ),
     "a service type that is not installed": (
         "interface i use Fly from no_such_srvs component C { service s with request: none, response: none links i }",

@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -30,7 +30,7 @@ from robosc import __version__
 from robosc.editing.completion import Candidate, complete
 from robosc.editing.definitions import Definition, DefinitionKind
 from robosc.editing.findings import no_supervisor
-from robosc.editing.fixes import fixes
+from robosc.editing.fixes import Fix, fixes
 from robosc.editing.hover import holder_of, hover_text
 from robosc.editing.outline import folds, parts
 from robosc.errors import Diagnostic, LanguageError, RelatedPlace, Severity
@@ -459,8 +459,8 @@ class Server(LanguageServer):
                 break
             is_tried = is_first = True
             for fix in fixes(item, analysis.text.line_of(item.location)):
-                edit = lsp.TextEdit(analysis.text.range_of(fix.location), fix.text)
-                if not self._is_fixed(analysis, item, edit):
+                changes = self._changes(analysis, item, fix)
+                if not self._is_fixed(analysis, item, changes):
                     continue
                 actions.append(
                     lsp.CodeAction(
@@ -468,15 +468,26 @@ class Server(LanguageServer):
                         kind=lsp.CodeActionKind.QuickFix,
                         diagnostics=[shown],
                         is_preferred=is_first,
-                        edit=lsp.WorkspaceEdit(changes={uri: [edit]}),
+                        edit=lsp.WorkspaceEdit(changes=changes),
                     )
                 )
                 is_first = False
         return actions
 
-    def _is_fixed(self, analysis: Analysis, found: Diagnostic, edit: lsp.TextEdit) -> bool:
-        """Return True if an edit removes a finding and does not increase the number of findings."""
-        after = self.project.with_edits({analysis.uri: [edit]}).analysis(analysis.uri)
+    def _changes(self, analysis: Analysis, found: Diagnostic, fix: Fix) -> dict[str, Sequence[lsp.TextEdit]]:
+        """Return the edits of a fix: another name of a property is written wherever the property is named."""
+        place = analysis.text.range_of(fix.location)
+        if found.code == "unknown-field":
+            try:
+                renamed = self.renamed(analysis.uri, place.start, fix.text)
+            except JsonRpcInvalidParams:
+                return {}
+            return {} if renamed is None or renamed.changes is None else dict(renamed.changes)
+        return {analysis.uri: [lsp.TextEdit(place, fix.text)]}
+
+    def _is_fixed(self, analysis: Analysis, found: Diagnostic, changes: Mapping[str, Iterable[lsp.TextEdit]]) -> bool:
+        """Return True if some edits remove a finding and do not increase the number of findings."""
+        after = self.project.with_edits(changes).analysis(analysis.uri) if changes else None
         if after is None:
             return False
         # Syntax errors hide other errors: compare only syntax errors, unless there are none.

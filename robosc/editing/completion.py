@@ -12,6 +12,7 @@ from robosc.language.negation import NOT
 from robosc.language.tokens import tokenize
 from robosc.language.words import RESERVED_WORDS, spelled
 from robosc.model.check import Inspected
+from robosc.model.message_fields import model_type
 from robosc.model.scope import ComponentNames, Scope
 from robosc.model.structure import EVENT_KINDS, Communication, CommunicationKind, EventKind
 from robosc.source import SourceFile
@@ -163,6 +164,8 @@ class _Names:
             yield from self._interfaces(last)
         elif "a type" in expected:
             yield from self._types()
+        elif place.open[-1:] and place.open[-1][:2] == ("datatype", "object"):
+            yield from self._fields(name_of(place.open[-1][-1]))
         elif self._is_communication_wanted():
             yield from self._restrictable()
             if last == "requirement":
@@ -234,6 +237,18 @@ class _Names:
             for name, tree in unit.types.items():
                 is_object = type(tree).__name__ == "ObjectDefinition"
                 yield Candidate(spelled(name), DefinitionKind.OBJECT if is_object else DefinitionKind.ENUM)
+
+    def _fields(self, name: str) -> Iterator[Candidate]:
+        """Yield the fields of messages that further properties of an object type can stand for."""
+        if not self._inspected.units:
+            return
+        fields = self._inspected.fields.get(self._inspected.units[0].type_name(name), {})
+        written = _written_properties(self._place.before)
+        for item in fields.values():
+            if item.name not in written:
+                type_ = model_type(item)
+                text = f"{spelled(item.name)}: {type_}" if type_ else f"{spelled(item.name)}:"
+                yield Candidate(text, DefinitionKind.PROPERTY, item.type_text)
 
     def _imported(self, last: str) -> Iterator[Candidate]:
         libraries = self._surroundings().libraries

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from robosc.errors import Diagnostic, InternalError, LanguageError, RelatedPlace, Severity, sorted_diagnostics
+from robosc.interfaces import Field
 from robosc.interfaces.catalogue import Catalogue
 from robosc.language import Parsed, parse, syntax
 from robosc.model.array_lengths import ArrayLengths
@@ -96,6 +97,8 @@ class Inspected:
         scopes: Meanings of names in each place of it; None where there is no tree.
         units: The files that were read, the main one first.
         communications: Those of the robot whose types are sound, by name.
+        fields: Fields of messages that properties of object types can stand for, by model name of the type and name
+            of the field.
     """
 
     checked: Checked
@@ -104,6 +107,7 @@ class Inspected:
     scopes: Scopes | None = None
     units: tuple[Unit, ...] = ()
     communications: Mapping[str, Communication] = field(default_factory=dict)
+    fields: Mapping[str, Mapping[str, Field]] = field(default_factory=dict)
 
 
 def check(bundle: Bundle) -> Checked:
@@ -126,7 +130,9 @@ def inspect(bundle: Bundle) -> Inspected:
         # Suppress follow-on errors: missing syntax causes faults that are none.
         checker.model()
         checked = Checked(None, parsed.diagnostics, bindings=checker.findings.bindings)
-    return Inspected(checked, parsed, checker.parts, checker.scopes, checker.units, checker.communications)
+    return Inspected(
+        checked, parsed, checker.parts, checker.scopes, checker.units, checker.communications, checker.fields
+    )
 
 
 def _checked(checker: "_RobotChecker", tree: syntax.File) -> Checked:
@@ -154,6 +160,7 @@ class _RobotChecker:
         self.places = Places(tree.name.location)
         self.scopes: Scopes | None = None
         self.communications: Mapping[str, Communication] = {}
+        self.fields: Mapping[str, Mapping[str, Field]] = {}
 
     @property
     def units(self) -> tuple[Unit, ...]:
@@ -187,7 +194,9 @@ class _RobotChecker:
             if tree is not None:
                 check_synthesis_variables(tree, behaviour, communications, self._types, self.findings)
                 partial_updates(tree, behaviour, self.findings)
-        fitting = InterfaceChecker(self._bundle, self._types, self.findings).check(trees, communications, self._unit)
+        interfaces = InterfaceChecker(self._bundle, self._types, self.findings)
+        fitting = interfaces.check(trees, communications, self._unit)
+        self.fields = interfaces.fields
         self._check_data(trees, communications, provides, fitting)
         self._check_indices(trees, communications, behaviour_trees, fitting)
         self._check_requests(communications, marked, requirements)

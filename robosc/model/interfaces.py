@@ -8,13 +8,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from robosc.expressions import Type
-from robosc.interfaces import DISTRIBUTIONS, INTERFACE_KINDS, Part
+from robosc.interfaces import DISTRIBUTIONS, INTERFACE_KINDS, Field, Part
 from robosc.interfaces.catalogue import Catalogue, FoundInterfaces
 from robosc.language import syntax
 from robosc.language.words import spelled
 from robosc.model.communications import CommunicationTree
 from robosc.model.findings import Findings, did_you_mean
-from robosc.model.message_fields import Fault, FieldChecker, Language, Message
+from robosc.model.message_fields import Fault, FieldChecker, Language, Message, fields_of_objects
 from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.model.types import Types
 from robosc.model.units import Unit
@@ -101,6 +101,9 @@ class InterfaceChecker:
         bundle: Texts with the definitions that were found; what is missing comes with RoboSC, if it has it.
         types: Types of the model.
         findings: Findings to which faults are reported.
+
+    Attributes:
+        fields: Fields that properties of object types can stand for, by model name of the type and name of the field.
     """
 
     def __init__(self, bundle: Bundle, types: Types, findings: Findings) -> None:
@@ -110,6 +113,7 @@ class InterfaceChecker:
         self._types = types
         self._findings = findings
         self._noted: set[str] = set()
+        self.fields: dict[str, dict[str, Field]] = {}
 
     def check(
         self, trees: Iterable[CommunicationTree], communications: Mapping[str, Communication], unit: Unit
@@ -142,6 +146,9 @@ class InterfaceChecker:
                 found = _outcome(item, catalogue, language, self._types)
                 if found is not None and (key not in outcomes or len(found.faults) < len(outcomes[key].faults)):
                     outcomes[key] = found
+        for outcome in tuple(outcomes.values())[:1]:
+            for data, part in parts_by_event(item.communication, outcome.catalogue).values():
+                fields_of_objects(data, part, outcome.catalogue, self._types, self.fields)
         if not outcomes:
             self._note_missing(item.package, f"{item.package}/{item.type}", item.interface.package.location)
             return None

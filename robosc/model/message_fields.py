@@ -38,7 +38,12 @@ _PYTHON_FIELDS: dict[type[Type], frozenset[str]] = {
     DoubleType: frozenset({"float32", "float64"}),
     IntegerType: _INTEGERS | {"char"},
 }
-_BASIC_NAMES = {"bool": "boolean", "string": "string", "wstring": "string", "float32": "double", "float64": "double"}
+_TYPE_NAMES = {
+    "boolean": frozenset({"bool"}),
+    "string": frozenset({"string", "wstring"}),
+    "double": frozenset({"float32", "float64"}),
+}
+"""Fields of primitive types that are no whole numbers, by the type in the model."""
 
 
 class Language(StrEnum):
@@ -185,12 +190,10 @@ class FieldChecker:
         )
 
     def _wanted(self, field: Field) -> str:
-        """The type in the model that a field needs; empty for what only an object type can be."""
-        for element in ("boolean", "integer", "double", "string"):
-            kind = {"boolean": BooleanType, "integer": IntegerType, "double": DoubleType, "string": StringType}[element]
-            if not field.is_message and self._fits(field.type, kind()):
-                return f"array({element})" if field.array else element
-        return ""
+        """The type in the model that a field needs; empty where it is none, or an object."""
+        found = model_type(field)
+        is_byte = field.type == "byte" and not self._fits("byte", IntegerType())
+        return "" if is_byte else found
 
     def _advice(self, field: Field) -> str:
         if not field.is_message:
@@ -199,6 +202,38 @@ class FieldChecker:
         names = "" if fields is None else f", such as {_listed(fields.fields)}"
         kind = "an array of an object type" if field.array else "an object type"
         return f"Make {kind} with the fields of {field.type} that are meant{names}."
+
+
+def model_type(field: Field) -> str:
+    """The type in the model that stands for a field of a primitive type; empty for a message."""
+    if field.is_message:
+        return ""
+    element = next((str(name) for name, fields in _TYPE_NAMES.items() if field.type in fields), "integer")
+    return f"array({element})" if field.array else element
+
+
+def fields_of_objects(
+    type_: Type, part: Part, catalogue: Catalogue, types: Types, found: dict[str, dict[str, Field]]
+) -> None:
+    """Collect the fields that properties of object types can stand for.
+
+    Args:
+        type_: Type of data.
+        part: Message that the data comes as.
+        catalogue: The interfaces.
+        types: Types of the model.
+        found: Filled with the fields by model name of the object type and name of the field.
+    """
+    source = types.sources[type_.name] if isinstance(type_, EnumType) else type_
+    source = source.element if isinstance(source, ArrayType) else source
+    if not isinstance(source, ObjectType):
+        return
+    found.setdefault(source.name, {}).update(part.fields)
+    for item in types.objects[source.name].properties:
+        field = part.fields.get(item.name)
+        nested = None if field is None else catalogue.message(field.type)
+        if nested is not None:
+            fields_of_objects(item.type, nested, catalogue, types, found)
 
 
 def basic_field(part: Part) -> Field | None:

@@ -625,6 +625,34 @@ def test_types_of_an_installed_ament_index_are_offered(tmp_path: Path, monkeypat
         assert complete(editor, "r.rscd", "Wheel from |")[:1] == ["robot_msgs"]
 
 
+def test_a_misspelt_field_is_put_right_wherever_it_is_named(editor: Editor) -> None:
+    right = """robot R {
+    interface i use BatteryState from sensor_msgs
+    datatype object Battery { percentage: double }
+    datatype enum Level from Battery to { value.percentage < 0.2 -> low default -> high }
+    component C { outgoing message m with type: Level links i }
+}
+"""
+    editor.open("battery.rscd", right.replace("percentage", "percentag"))
+    place = editor.at("battery.rscd", "percen|tag: double")
+    where = lsp.Range(place.position, place.position)
+    (action,) = editor.run(
+        editor.client.text_document_code_action_async(
+            lsp.CodeActionParams(place.text_document, where, lsp.CodeActionContext([]))
+        )
+    )
+    assert action.title == "Write 'percentage'"
+    ((_, edits),) = action.edit.changes.items()
+    assert with_edits(editor.texts["battery.rscd"], edits) == right
+
+
+def test_types_that_come_with_robosc_are_offered(editor: Editor) -> None:
+    editor.open("r.rscd", "robot R {\n    interface w use MoveB from \n}\n")
+    assert "MoveBase" in complete(editor, "r.rscd", "use MoveB| from")
+    editor.replace("r.rscd", "robot R {\n    interface w use MoveBase from \n}\n")
+    assert complete(editor, "r.rscd", "MoveBase from |")[:1] == ["move_base_msgs"]
+
+
 def test_types_in_named_folders_are_offered_also_new_ones(tmp_path: Path) -> None:
     messages = tmp_path / "mine" / "own_msgs" / "msg"
     messages.mkdir(parents=True)

@@ -228,8 +228,20 @@ def test_the_parser_refuses_with_status_2(capsys: pytest.CaptureFixture[str], ar
         ("python", 'outgoing message a with identifier: "/x", type: boolean, depth: 3', "conflicting-topic"),
         ("ros2", 'incoming message a with identifier: "/1x", type: double', "invalid-identifier"),
         ("ros2", 'incoming message a with identifier: "", type: double', "invalid-identifier"),
+        ("ros2", "} interface i use BateryState from sensor_msgs component D {", "unknown-ros-type"),
+        ("ros1-cpp", "} interface i use BateryState from sensor_msgs component D {", "unknown-ros-type"),
+        ("ros2", "outgoing message a with type: O links i } datatype object O { percentag: double }"
+         " interface i use BatteryState from sensor_msgs component D {", "unknown-field"),
+        ("ros2", "outgoing message a with type: O links i } datatype object O { K: array(double) }"
+         " interface i use CameraInfo from sensor_msgs component D {", "ros1-only"),
+        ("ros1", "outgoing message a with type: O links i } datatype object O { k: array(double) }"
+         " interface i use CameraInfo from sensor_msgs component D {", "ros2-only"),
+        ("ros1", "outgoing message a with type: O links i } datatype object O { present: boolean percentage: integer }"
+         " interface i use BatteryState from sensor_msgs component D {", "field-type-mismatch"),
+        ("ros2", 'incoming message a with type: none, stamped: "x" links i }'
+         " interface i use Twist from geometry_msgs component D {", "no-header"),
     ],
-)
+)  # fmt: skip
 def test_what_is_only_a_warning_of_the_check_stops_a_target_at_its_place(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, target: str, messages: str, code: str
 ) -> None:
@@ -247,10 +259,21 @@ def test_what_is_only_a_warning_of_the_check_stops_a_target_at_its_place(
     assert not (tmp_path / "out").exists()
 
 
-def test_what_ros_cannot_name_others_can(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("body", "target"),
+    [
+        ('component C { incoming message a with identifier: "", type: double }', "python"),
+        ("interface i use BateryState from sensor_msgs component C { }", "python"),
+        ("interface i use Header from std_msgs datatype object H { seq: integer } "
+         "component C { outgoing message m with type: H links i }", "ros1"),
+        ("interface i use BatteryState from sensor_msgs datatype object H { power_supply_status: boolean } "
+         "component C { outgoing message m with type: H links i }", "ros2-cpp"),
+    ],
+)  # fmt: skip
+def test_what_ros_cannot_do_others_can(tmp_path: Path, body: str, target: str) -> None:
     path = tmp_path / "model.rscd"
-    path.write_text('robot R { component C { incoming message a with identifier: "", type: double } }')
-    assert main(["generate", str(path), "--target", "python", "-o", str(tmp_path / "out")]) == 0
+    path.write_text(f"robot R {{ {body} }}")
+    assert main(["generate", str(path), "--target", target, "-o", str(tmp_path / "out")]) == 0
 
 
 @pytest.mark.parametrize(

@@ -211,3 +211,26 @@ def test_behind_not_stands_an_operand() -> None:
 def test_behind_what_is_called_not_stands_an_operator_too() -> None:
     found = offered(NEGATED.replace("NAME", "not").replace("?", ""))
     assert {"Door", "true", "not", "and", "or"} <= found.keys()
+
+
+FIELDS = """robot R {
+    interface i use Odometry from nav_msgs
+    datatype object Odometry { child_frame_id: string pose: Pose | }
+    datatype object Pose { covariance: array(double) %s }
+    component C { outgoing message m with type: Odometry links i }
+}"""
+
+
+def test_fields_of_a_message_are_offered_in_its_object_type() -> None:
+    assert list(offered(FIELDS % "")) == ["header:", "twist:"]
+    inside = offered(FIELDS.replace("|", "") % "|")
+    assert list(inside) == ["pose:"]
+    assert inside["pose:"].detail == "geometry_msgs/Pose"
+    battery = """robot R {
+        interface i use BatteryState from sensor_msgs
+        datatype object Battery { per| }
+        component C { outgoing message m with type: Battery links i }
+    }"""
+    found = offered(battery)
+    assert {"percentage: double", "present: boolean", "cell_voltage: array(double)", "header:"} <= found.keys()
+    assert "percentage: double" not in offered(battery.replace("Battery links i", "none links i"))

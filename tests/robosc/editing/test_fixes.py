@@ -26,6 +26,14 @@ ROBOT = """robot R {
 """
 
 
+BATTERY = """robot R {
+    interface i use BatteryState from sensor_msgs
+    datatype object Battery { percentage: double cell_voltage: array(double) }
+    component C { outgoing message m with type: Battery links i }
+}
+"""
+
+
 def titles_and_texts(text: str) -> dict[str, str]:
     """Return the title of each fix for a text's first finding, and the text with it."""
     found = inspect(Bundle(SourceFile("r.rscd", text))).checked.diagnostics
@@ -88,3 +96,17 @@ def test_a_word_that_is_missing_is_written() -> None:
 def test_bars_are_a_word() -> None:
     found = titles_and_texts("robot R { requirement A||B disables c }")
     assert found == {"Write 'or'": "robot R { requirement A or B disables c }"}
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("BatteryState", "BateryState"),
+        ("percentage", "percentag"),
+        ("double cell", "integer(0..100) cell"),
+        ("array(double)", "double"),
+        ("array(double)", "array(boolean)"),
+    ],
+)
+def test_types_and_fields_of_ros_are_put_right(right: str, wrong: str) -> None:
+    assert BATTERY in titles_and_texts(BATTERY.replace(right, wrong)).values()

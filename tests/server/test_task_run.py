@@ -518,3 +518,30 @@ class TestDescription:
             "waiting_tasks_per_caller": 8,
             "retention_seconds": 86400.0,
         }
+
+
+def test_definitions_of_ros_types_travel_with_a_bundle_and_common_ones_are_there() -> None:
+    text = """robot R {
+        interface own use Level from own_msgs
+        interface gone use Gone from own_msgs
+        interface battery use BatteryState from sensor_msgs
+        datatype object Level { levl: double }
+        datatype object Battery { percentag: double }
+        component C {
+            outgoing message level with type: Level links own
+            outgoing message charge with type: Battery links battery
+        }
+    }"""
+    main = pb.SourceFile(name="robot.rscd", text=text)
+    definitions = [
+        pb.SourceFile(name="own_msgs/msg/Level.msg", text="float64 level"),
+        pb.SourceFile(name="own_msgs/types.txt", text="msg/Level\n"),
+    ]
+    for interfaces, searched, expected in (
+        (definitions, ["."], ["unknown-ros-type", "unknown-field", "unknown-field"]),
+        ([], ["."], ["definition-not-found", "unknown-field"]),
+        ([], [], ["unknown-field"]),
+    ):
+        bundle = pb.Bundle(main=main, interfaces=interfaces, searched=searched)
+        (answer,) = answers(TaskKind.CHECK, pb.CheckRequest(bundle=bundle))
+        assert [item.code for item in answer.diagnostics] == expected

@@ -25,8 +25,15 @@ _NAME, _WORD, _NUMBER, _STRING, _END = (
 )
 _UNQUOTED = re.compile(r"[“”‘’]?([\w/~{}.\-]+)[“”‘’]?")
 _MAXIMUM_SHOWN = 40
+_MAXIMUM_FIX = 300
 _NEAR = 0.75
 """Share that a misspelt word must have in common with the one that was meant."""
+
+
+def shown(token: str) -> str:
+    """A piece of the text as a message quotes it: in one line, and not too long."""
+    line = " ".join(token.split())
+    return f"'{line}'" if len(line) <= _MAXIMUM_SHOWN else f"'{line[:_MAXIMUM_SHOWN]}...'"
 
 
 class Fault(Exception):
@@ -94,6 +101,9 @@ class Cursor:
 
     def report(self, code: str, message: str, location: Location, fix: str, *related: RelatedPlace) -> None:
         """An error that does not keep the parser from reading on."""
+        if len(fix) > _MAXIMUM_FIX or "\n" in fix:
+            # What stands there is more than anyone would read in a message.
+            fix = "Write one of the expected words here, or look for a bracket or comma missing before."
         self.diagnostics.append(Diagnostic(Severity.ERROR, code, message, location, fix, related))
 
     def possible(self, *words: str, ahead: int = 0) -> None:
@@ -116,8 +126,7 @@ class Cursor:
         if self._possible[0] == index:
             expected = (*self._possible[1], *expected)
         self.expect(*expected)
-        shown = token if len(token) <= _MAXIMUM_SHOWN else f"{token[:_MAXIMUM_SHOWN]}..."
-        met = f"'{shown}'" if token else "the end of the file"
+        met = shown(token) if token else "the end of the file"
         message = f"{met} does not fit here; expected {expected_words(expected)}"
         if token == ")":
             message = "this ')' closes nothing"
@@ -201,7 +210,7 @@ class Cursor:
         written = _UNQUOTED.match(self._file.text, self._starts[index])
         if written is None or self.texts[index] in RESERVED_WORDS:
             return self.fault("a text in quotes")
-        message = f"'{written[0]}' does not fit here; expected a text in quotes"
+        message = f"{shown(written[0])} does not fit here; expected a text in quotes"
         fix = f"Write '\"{written[1]}\"' instead of '{written[0]}'."
         self.report("syntax-error", message, self._places.location(*written.span()), fix)
         return self.told()
@@ -373,4 +382,4 @@ class Cursor:
         self.place = self._resumed = index
 
 
-__all__ = ["Cursor", "Extent", "Fault", "TooManyFaults"]
+__all__ = ["Cursor", "Extent", "Fault", "TooManyFaults", "shown"]

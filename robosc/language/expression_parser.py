@@ -290,7 +290,7 @@ class ExpressionParser(Cursor):
 
     def _plain_type(self) -> syntax.BasicType | syntax.NamedType:
         index = self.place
-        if self.kinds[index] == _NAME:
+        if self.kinds[index] == _NAME and self.texts[index + 1] in ("(", "/", ":"):
             self._no_foreign_type(index)
         basic = _BASIC_TYPES.get(self.texts[index])
         if basic is None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from robosc.errors import Diagnostic, RelatedPlace, sorted_diagnostics
 from robosc.language import syntax
-from robosc.language.cursor import Extent, Fault, TooManyFaults
+from robosc.language.cursor import Extent, Fault, TooManyFaults, shown
 from robosc.language.expression_parser import ExpressionParser
 from robosc.language.limits import FRAMES_PER_LEVEL, MAXIMUM_NESTING
 from robosc.language.tokens import Kind, Places, Tokens, obstacle, readable_tokens, tokenize
@@ -382,14 +382,14 @@ class _Parser(ExpressionParser):
         self.place += 1
         communication = self.name()
         updates: list[syntax.Update] = []
-        self._no_condition(f"Remove the condition: {_NEEDED if kind == 'request' else _CHOSEN}")
+        self._no_condition(kind)
         if self.takes("do"):
             updates.append(self._update())
             while self.takes(","):
                 updates.append(self._update())
-        self._no_condition(f"Remove the condition: {_NEEDED if kind == 'request' else _CHOSEN}")
+        self._no_condition(kind)
         target = self.name() if self.takes("goto") else None
-        self._no_condition(f"Remove the condition: {_NEEDED if kind == 'request' else _CHOSEN}")
+        self._no_condition(kind)
         name = syntax.Name(preposition, self.at(index))
         return syntax.CommunicationTransition(kind, name, communication, tuple(updates), target, self.since(begin))
 
@@ -415,7 +415,7 @@ class _Parser(ExpressionParser):
         begin = self.place
         self.place += tokens
         written, place = self.source(begin), self.since(begin)
-        message = f"'{written}' does not fit here; expected ':='"
+        message = f"{shown(written)} does not fit here; expected ':='"
         self.report("syntax-error", message, place, f"Write '{meant}' instead of '{written}'.")
         return self.told()
 
@@ -428,13 +428,14 @@ class _Parser(ExpressionParser):
             raise self._late_condition(begin)
         return syntax.TauTransition(guard, target, place)
 
-    def _no_condition(self, fix: str) -> None:
+    def _no_condition(self, kind: str) -> None:
         """Report a condition of a transition that takes none, and go on behind it."""
         begin = self.place
         if self.texts[begin] == "if":
             self.place += 1
             self.expression()
             message = "only 'transition' has a condition; what is sent and received has none here"
+            fix = f"Remove the condition: {_NEEDED if kind == 'request' else _CHOSEN}"
             self.report("syntax-error", message, self.since(begin), fix)
 
     def _late_condition(self, begin: int) -> Fault:

@@ -1,6 +1,7 @@
 """Builds and checks the behaviour of a component."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from itertools import islice
 
@@ -22,7 +23,7 @@ from robosc.expressions import (
 from robosc.language import syntax
 from robosc.language.words import spelled
 from robosc.model.expression_checker import ExpressionChecker
-from robosc.model.findings import Findings, did_you_mean
+from robosc.model.findings import MAXIMUM_CHOICES, Findings
 from robosc.model.scope import ComponentNames, Scope
 from robosc.model.structure import (
     Behaviour,
@@ -168,6 +169,36 @@ _OPPOSITE = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Uses:
+    """Uses of communications in a robot, as written.
+
+    Attributes:
+        commanded: Names of those that requirements and provide statements name.
+        reactions: Kinds of the events that behaviours react to, of each that they name.
+    """
+
+    commanded: Collection[str]
+    reactions: Mapping[str, Set[str]]
+
+
+def uses_of(trees: Iterable[BehaviourTree], items: Iterable[syntax.Item]) -> Uses:
+    """The uses of communications in some behaviours, and in the items of some files."""
+    commanded: set[str] = set()
+    for item in items:
+        match item:
+            case syntax.Requirement(communications=names):
+                commanded.update(name.text for name in names)
+            case syntax.Provide(communication=name):
+                commanded.add(name.text)
+    reactions = defaultdict[str, set[str]](set)
+    for tree in trees:
+        for _, transition in tree.transitions:
+            if isinstance(transition, syntax.CommunicationTransition):
+                reactions[transition.communication.text].add(transition.kind)
+    return Uses(commanded, reactions)
+
+
 class BehaviourBuilder:
     """Builder of one behaviour.
 
@@ -178,7 +209,7 @@ class BehaviourBuilder:
         defaults: Default value of an uninitialised variable, for each enum type.
         findings: Findings to which faults are reported.
         unknown_communication: Function called for a name that no communication has.
-        commanded: Names of the communications that requirements and provide statements name.
+        uses: Uses of the communications in the robot.
     """
 
     def __init__(
@@ -189,17 +220,17 @@ class BehaviourBuilder:
         defaults: Mapping[str, str],
         findings: Findings,
         unknown_communication: Callable[[syntax.Name], None],
-        commanded: Collection[str] = frozenset(),
+        uses: Uses,
     ) -> None:
         self._tree = tree
-        self._commanded = commanded
+        self._uses = uses
         self._scope = scope
         self._communications = communications
         self._defaults = defaults
         self._findings = findings
         self._unknown_communication = unknown_communication
         self._taus = 0
-        self._told: set[str] = set()
+        self._turned: set[str] = set()
         self._states_by_name = {state.name.text: state for state in tree.states}
 
     def build(self) -> Behaviour:
@@ -293,16 +324,18 @@ class BehaviourBuilder:
         if name is None:
             return None
         if name.text not in self._states_by_name:
-            # Of states that nothing is near, one that nothing leads to is likeliest to be meant.
-            led_to = {tree.target.text for _, tree in self._tree.transitions if tree.target is not None}
-            known = sorted(self._states_by_name, key=lambda state: (state in led_to, self._is_initial(state)))
-            self._findings.unknown("state", name.text, name.location, known)
+            self._findings.unknown("state", name.text, name.location, self._likeliest_states())
             return None
         self._findings.bindings.bind(name, self._states_by_name[name.text].name.location)
         return name.text
 
-    def _is_initial(self, state: str) -> bool:
-        return self._states_by_name[state].is_initial
+    def _likeliest_states(self) -> Iterable[str]:
+        """The states; if they are few, one that nothing leads to first: it is likeliest to be meant by what is none."""
+        if len(self._states_by_name) > MAXIMUM_CHOICES:
+            return self._states_by_name
+        led_to = {tree.target.text for _, tree in self._tree.transitions if tree.target is not None}
+        led_to |= {name for name, state in self._states_by_name.items() if state.is_initial}
+        return sorted(self._states_by_name, key=lambda name: name in led_to)
 
     def _event(self, tree: syntax.CommunicationTransition) -> tuple[Communication, EventKind] | None:
         communication = self._communications.get(tree.communication.text)
@@ -312,8 +345,8 @@ class BehaviourBuilder:
             return None
         kind = EventKind(tree.kind)
         if kind not in _KINDS[communication.kind]:
-            if self._is_turned(communication):
-                self._turned(communication)
+            if communication.name in self._turned or self._is_turned(communication):
+                self._report_turned(communication)
                 return None
             allowed = ", ".join(item for item in EventKind if item in _KINDS[communication.kind])
             self._findings.error(
@@ -339,22 +372,19 @@ class BehaviourBuilder:
         What requirements and provide statements name is sent to the component, and nothing else is.
         """
         opposite = _OPPOSITE.get(communication.kind)
-        if (communication.name in self._commanded) != (opposite is CommunicationKind.INCOMING_MESSAGE):
-            return False
         place = self._findings.bindings.communications.get(communication.name)
-        if opposite is None or place is None or place.file != self._tree.location.file:
+        if opposite is None or communication.component != self._tree.part.name or self._tree.part.is_imported:
             return False
-        uses = (
-            tree.kind
-            for _, tree in self._tree.transitions
-            if isinstance(tree, syntax.CommunicationTransition) and tree.communication.text == communication.name
-        )
-        return all(EventKind(kind) in _KINDS[opposite] for kind in uses)
+        is_commanded = communication.name in self._uses.commanded
+        kinds = self._uses.reactions[communication.name]
+        is_incoming = opposite is CommunicationKind.INCOMING_MESSAGE
+        return place is not None and is_commanded == is_incoming and kinds <= {*_KINDS[opposite]}
 
-    def _turned(self, communication: Communication) -> None:
-        if communication.name in self._told:
+    def _report_turned(self, communication: Communication) -> None:
+        """Report the direction of a message once."""
+        if communication.name in self._turned:
             return
-        self._told.add(communication.name)
+        self._turned.add(communication.name)
         is_incoming = communication.kind is CommunicationKind.INCOMING_MESSAGE
         right, used = ("outgoing", "response") if is_incoming else ("incoming", "request")
         self._findings.error(
@@ -411,7 +441,7 @@ class BehaviourBuilder:
         if own is None or len(names) != 1 or not isinstance(name, syntax.Name) or name.text not in own.variables:
             known = sorted(own.variables)[:_MAXIMUM_SHOWN] if own else []
             wanted = name.text if isinstance(name, syntax.Name) and len(names) == 1 else "this"
-            near = did_you_mean(wanted, own.variables) if own else None
+            near = self._findings.near(wanted, own.variables) if own else None
             self._findings.error(
                 "update-out-of-scope",
                 f"'{wanted}' is no variable of this behaviour" + (f"; did you mean '{near}'?" if near else ""),

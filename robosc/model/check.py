@@ -14,6 +14,7 @@ from robosc.model.behaviour import (
     behaviour_tree,
     component_names,
     partial_updates,
+    uses_of,
 )
 from robosc.model.bindings import Bindings
 from robosc.model.communications import (
@@ -263,13 +264,7 @@ class _RobotChecker:
             for key, (enum, _, tree) in self._types.enums.items()
             if enum.values
         }
-        commanded = {
-            name.text
-            for unit in self.units
-            for item in unit.tree.items
-            if isinstance(item, syntax.Requirement | syntax.Provide)
-            for name in (item.communications if isinstance(item, syntax.Requirement) else (item.communication,))
-        }
+        uses = uses_of(filter(None, trees.values()), (item for unit in self.units for item in unit.tree.items))
         found: dict[str, Behaviour] = {}
         for part in self.parts:
             self.places.components[part.name] = part.place
@@ -278,7 +273,7 @@ class _RobotChecker:
                 continue
             unknown = self._unknown_communication(part, communications)
             scope = scopes.inside(part)
-            builder = BehaviourBuilder(tree, scope, communications, defaults, self.findings, unknown, commanded)
+            builder = BehaviourBuilder(tree, scope, communications, defaults, self.findings, unknown, uses)
             found[part.name] = builder.build()
             self._place_behaviour(tree)
         return found

@@ -15,7 +15,7 @@ _MAXIMUM_COMPARISONS = 20_000
 _MAXIMUM_COMPARED = 64
 """Characters of a name that is compared."""
 
-_MAXIMUM_CHOICES = 6
+MAXIMUM_CHOICES = 6
 """Names that are all told where none is near."""
 
 _WORD = re.compile("[A-Za-z_][A-Za-z_0-9]*+")
@@ -96,14 +96,11 @@ class Findings:
         if name in self._broken_words:
             return
         known = list(known)
-        near = self._near(name, [*known, *words])
+        near = self.near(name, [*known, *words])
         written = near if near is None or near in words else spelled(near)
-        if (
-            not near
-            and not fix
-            and 1 <= len(choices := [item for item in known if item.isidentifier()]) <= _MAXIMUM_CHOICES
-        ):
-            listed = " or ".join(f"'{spelled(item)}'" for item in choices)
+        is_shown = 1 <= len(known) <= MAXIMUM_CHOICES and all(item.isidentifier() for item in known)
+        if is_shown and not near and not fix:
+            listed = " or ".join(f"'{spelled(item)}'" for item in known)
             fix = f"Write {listed}, or define the {what} '{name}'."
         self.error(
             "unknown-name",
@@ -125,7 +122,7 @@ class Findings:
         if not self.explain(name):
             self.unknown("communication", name, location, known)
 
-    def _near(self, name: str, known: Iterable[str]) -> str | None:
+    def near(self, name: str, known: Iterable[str]) -> str | None:
         """The nearest known name, until so many names have been compared that more would take noticeable time."""
         if self._comparisons <= 0:
             return None

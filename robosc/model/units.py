@@ -81,6 +81,7 @@ def make_unit(tree: syntax.File, findings: Findings) -> Unit:
 def unique(names: list[syntax.Name], code: str, what: str, findings: Findings) -> None:
     """Report every name that was given before, ignoring case."""
     first: dict[str, syntax.Name] = {}
+    taken = {name.text.casefold() for name in names}
     for name in names:
         earlier = first.setdefault(name.text.casefold(), name)
         if earlier is not name:
@@ -89,7 +90,7 @@ def unique(names: list[syntax.Name], code: str, what: str, findings: Findings) -
                 code,
                 f"the {what} '{name.text}' is defined twice{same}",
                 name.location,
-                f"Rename or remove one of the two {what}s: write '{_another(name.text, first)}', for instance.",
+                f"Rename or remove one of the two {what}s: write '{_another(name.text, taken)}', for instance.",
                 RelatedPlace(f"'{earlier.text}' is defined here first", earlier.location),
             )
 

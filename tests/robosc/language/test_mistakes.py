@@ -142,3 +142,37 @@ def test_a_direction_that_is_used_rightly_too_is_not_turned() -> None:
 
 def test_what_nothing_is_known_of_is_told_so() -> None:
     assert fix_syntax("a", "zzz", ("a name", "'on'")).startswith("Write one of the expected words here")
+
+
+def test_what_another_component_reacts_to_has_its_direction() -> None:
+    """Only where all that react to it are wrong the declaration is."""
+    other = "component Other { behaviour { initial marked state s { on request to pressed } } }"
+    text = ROBOT.replace("    component Motor", f"    {other}\n    component Motor", 1)
+    found = first_error(text)
+    assert found is not None
+    assert found.fix == "Use response."
+    found = first_error(text.replace("outgoing message pressed", "incoming message pressed"))
+    assert found is not None
+    assert found.fix == "Use request."
+
+
+def test_a_fix_is_never_longer_than_a_line() -> None:
+    condition = "down = on_ and " * 100 + "\n down = off"
+    for part in (f"goto busy if {condition}", f"goto busy if down =\n on_ {condition[:20]} down = off"):
+        found = first_error(ROBOT.replace("if down = on_ goto busy", part, 1))
+        assert found is not None
+        assert "\n" not in found.fix
+        assert len(found.fix) <= 300
+    found = first_error(ROBOT.replace('"/pressed"', "/" + "x" * 5000, 1))
+    assert found is not None
+    assert len(found.message) < 200
+
+
+@pytest.mark.parametrize(("name", "meant"), [("pressed", "pressed_3"), ("Pressed", "Pressed_3"), ("drive", "drive_2")])
+def test_another_name_is_one_that_is_free(name: str, meant: str) -> None:
+    more = f"incoming message {name} with type: none outgoing message PRESSED_2 with type: none"
+    found = first_error(
+        ROBOT.replace("        behaviour { initial", f"        {more}\n        behaviour {{ initial", 1)
+    )
+    assert found is not None
+    assert f"write '{meant}'" in found.fix

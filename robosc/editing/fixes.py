@@ -121,7 +121,7 @@ class _Line:
         given = re.match(r"(on\s+)\w+(\s+)\w+\b(.*)", self._covered)
         if given is None:
             return
-        for kind in re.findall(r"\w+", fix.removeprefix("Use ")):
+        for kind in re.findall(r"\b(?:request|response|feedback|error|cancel)\b", fix):
             right = f"{kind}{given[2]}{_PREPOSITIONS.get(kind, 'from')}"
             yield Fix(f"Write 'on {kind}'", self._location, f"{given[1]}{right}{given[3]}")
 

@@ -207,8 +207,24 @@ class _Parser(ExpressionParser):
         condition = None if self.texts[self.place] == "default" else self.expression()
         if condition is None:
             self.place += 1
+        elif (
+            self.texts[self.place - 2] == "=>"
+            and self.kinds[self.place - 1] == _NAME
+            and self.texts[self.place] != "->"
+        ):
+            self._thick_arrow(self.place - 2)
+            self.place -= 1
+            return syntax.EnumRule(condition, self.name())
         self.take("->")
         return syntax.EnumRule(condition, self.name())
+
+    def _thick_arrow(self, index: int) -> None:
+        """Report a `=>` for `->`, which was read as a part of the condition before it."""
+        place = self.at(index)
+        self.diagnostics = [
+            item for item in self.diagnostics if (item.code, item.location) != ("ambiguous-implication", place)
+        ]
+        self.report("syntax-error", "'=>' does not fit here; expected '->'", place, "Write '->' instead of '=>'.")
 
     # Components
 

@@ -353,7 +353,7 @@ class BehaviourBuilder:
                 "wrong-result-kind",
                 f"{_article(communication.kind)} has no {kind}; it has {allowed}",
                 tree.location,
-                f"Use {allowed}.",
+                f"Use {allowed}{self._other_direction(communication)}.",
             )
             return None
         preposition = _PREPOSITIONS.get(kind)
@@ -371,14 +371,22 @@ class BehaviourBuilder:
 
         What requirements and provide statements name is sent to the component, and nothing else is.
         """
-        opposite = _OPPOSITE.get(communication.kind)
-        place = self._findings.bindings.communications.get(communication.name)
+        opposite = self._suiting(communication)
         if opposite is None or communication.component != self._tree.part.name or self._tree.part.is_imported:
             return False
         is_commanded = communication.name in self._uses.commanded
-        kinds = self._uses.reactions[communication.name]
-        is_incoming = opposite is CommunicationKind.INCOMING_MESSAGE
-        return place is not None and is_commanded == is_incoming and kinds <= {*_KINDS[opposite]}
+        return is_commanded == (opposite is CommunicationKind.INCOMING_MESSAGE)
+
+    def _suiting(self, communication: Communication) -> CommunicationKind | None:
+        """The other direction of a message, if all reactions to it would be right then."""
+        opposite = _OPPOSITE.get(communication.kind)
+        reactions = self._uses.reactions[communication.name]
+        return opposite if opposite is not None and reactions <= {*_KINDS[opposite]} else None
+
+    def _other_direction(self, communication: Communication) -> str:
+        """Return the advice to declare a message in the other direction, if that is possible."""
+        opposite = self._suiting(communication)
+        return "" if opposite is None else f", or make it {_article(opposite)}: directions are the component's"
 
     def _report_turned(self, communication: Communication) -> None:
         """Report the direction of a message once."""

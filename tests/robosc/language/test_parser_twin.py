@@ -75,6 +75,9 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
     ):
         # Of a condition behind its `goto`, a ROS type with its package and a `NOT`, all is told.
         return stops is not None and stops > here
+    if fault.fix == "Write '->' instead of '=>'.":
+        # Only what follows tells that it ends a condition.
+        return stops is not None and stops > here
     if fault.fix == "Write '{' before it." and fault.message.endswith("expected '{'"):
         # The sign behind the name tells that it is the first of several, or the name of a property.
         return stops is not None and stops >= here

@@ -19,8 +19,14 @@ from robosc.recursion import allow_depth
 from robosc.source import SourceFile
 
 _NAME, _NUMBER, _STRING, _END = (int(kind) for kind in (Kind.NAME, Kind.NUMBER, Kind.STRING, Kind.END))
-_MAXIMUM_VALUES = 20
+_MAXIMUM_VALUES = 5
 """Values by which the type of a variable without one is guessed."""
+
+_MAXIMUM_READ = 10_000
+"""Tokens of a text in which such values and their types are looked for."""
+
+_MAXIMUM_BACK = 200
+"""Tokens of a transition before a value."""
 
 _TYPES = frozenset({*map(str, syntax.BasicTypeName), "array"})
 _BEFORE_VALUES = frozenset({":=", "=", "!=", "<", "<=", ">", ">="})
@@ -346,7 +352,7 @@ class _Parser(ExpressionParser):
         if self.texts[self.place] == "(" or self.kinds[self.place] == _NAME:
             return ""
         values = [self.place + 1] if self.texts[self.place] == "=" else []
-        for index, token in enumerate(self.texts):
+        for index, token in enumerate(self.texts[:_MAXIMUM_READ]):
             if token == name and self.texts[index + 1] in _BEFORE_VALUES:
                 values.append(index + 2)
         types = [found for index in values[:_MAXIMUM_VALUES] if (found := self._type_of_value(index))]
@@ -356,7 +362,8 @@ class _Parser(ExpressionParser):
 
     def _type_of_value(self, index: int) -> str:
         """The type of the value at a token: a whole number stands for itself; empty where nothing tells it."""
-        value, texts = self.texts[index], self.texts
+        texts = self.texts
+        value, read = texts[index], range(min(len(texts) - 2, _MAXIMUM_READ))
         if value in ("true", "false"):
             return "boolean"
         if self.kinds[index] == _NUMBER:
@@ -365,13 +372,13 @@ class _Parser(ExpressionParser):
             return "string"
         if value == "value" and texts[index + 1] != ".":
             # What is received has the type of the message.
-            start = next((at for at in range(index, 0, -1) if texts[at] == "on"), 0)
+            start = next((at for at in range(index, max(0, index - _MAXIMUM_BACK), -1) if texts[at] == "on"), 0)
             head = ["message", *texts[start + 3 : start + 4]]
-            begin = next((at for at in range(len(texts)) if texts[at : at + 2] == head), len(texts))
-            found = next((at for at in range(begin, len(texts)) if texts[at] == "type"), None)
+            begin = next((at for at in read if texts[at : at + 2] == head), len(read))
+            found = next((at for at in read[begin:] if texts[at] == "type"), None)
             return "" if found is None else texts[found + 2]
         # Where an enum has the value, it is of that enum.
-        rule = next((at for at in range(len(texts) - 1) if texts[at : at + 2] == ["->", value]), 0)
+        rule = next((at for at in read if texts[at : at + 2] == ["->", value]), 0)
         enum = next((at for at in range(rule, 0, -1) if texts[at] == "enum"), None)
         return "" if enum is None else texts[enum + 1]
 

@@ -178,3 +178,12 @@ def test_another_name_is_one_that_is_free(name: str, meant: str) -> None:
     )
     assert found is not None
     assert f"write '{meant}'" in found.fix
+
+
+def test_the_type_of_a_variable_is_looked_for_in_the_begin_of_a_text() -> None:
+    """So many variables without a type cost no more than the text is long."""
+    begin = "robot R { component C { behaviour { variable first do_ initial marked state s { } } } }"
+    many = "variable x variable y = value variable z = blue on response from m do x := value, z := blue " * 5000
+    found = first_error(begin.replace("do_", many))
+    assert found is not None
+    assert found.fix == "Write ': boolean' before it."

@@ -126,7 +126,9 @@ class _Line:
             yield Fix(f"Write 'on {kind}'", self._location, f"{given[1]}{right}{given[3]}")
 
     def _types(self, fix: str) -> Iterator[Fix]:
-        if fix == "Write the smaller bound first.":
+        if value := re.fullmatch(r"Write '([^']+)'(?:\.|, or .*)", fix):
+            yield self._written(value[1])
+        elif fix == "Write the smaller bound first.":
             bounds = _RANGE.fullmatch(self._covered)
             if bounds is not None:
                 opening, first, points, second, closing = bounds.groups()
@@ -144,6 +146,14 @@ class _Line:
             left = " " * self._before[-1:].isidentifier()
             right = " " * bool(re.match(r"\w", self._line[end : end + 1]))
             yield from self._changed(f"Write '{_WORDS[token]}'", self._begin, end, f"{left}{_WORDS[token]}{right}")
+        elif closed := re.fullmatch(r"Close it with '\)'(?:, before '(.+)')?\.", fix):
+            following = closed[1] and re.compile(rf"\s*(?<!\w){re.escape(closed[1])}").search(self._line, self._end)
+            end = following.start() if following else len(self._line.rstrip())
+            yield self._inserted(")", end)
+        elif needless := re.match(r"Remove '(\w+)' before it", fix):
+            word = re.search(rf"\s*\b{needless[1]}\s*\Z", self._before)
+            if word is not None:
+                yield from self._changed(f"Remove '{needless[1]}'", word.start(), self._begin, " ")
         elif fix.startswith(("Remove ", "Write '=' once")):
             yield from self._changed(f"Remove '{token}'", self._begin, self._end, "")
         elif fix.startswith("Write 'incoming message' or"):

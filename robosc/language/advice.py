@@ -115,6 +115,8 @@ def fix_syntax(before: str, token: str, expected: Sequence[str], following: Sequ
     return (
         _of_signs(before, token, expected, following[0])
         or _of_words(token, expected, following)
+        or _of_operators(before, token, expected)
+        or _of_missing_words(before, token, expected, following[0])
         or _of_brackets(token, expected)
         or _of_what_is_missing(token, expected)
     )
@@ -137,12 +139,26 @@ def _of_signs(before: str, token: str, expected: Sequence[str], following: str) 
             return "Remove the '='."
         case ">" if before == "<":
             return "Write '!=' instead of '<>'."
+        case "<" if before == "=":
+            return "Write '<=' instead of '=<'."
+        case "," | "-" | ":" if {*expected} == {"'..'"}:
+            return f"Write '..' instead of '{token}'."
+        case ":=" if "'='" in expected:
+            return "Write '=' instead of ':='."
+        case "[" if "'('" in expected:
+            return "Write '(' instead of '['."
+        case "]" if "')'" in expected:
+            return "Write ')' instead of ']'."
+        case "," if "'goto'" in expected:
+            return "Remove the ','."
         case "=" if "':'" in expected:
             return "Write ':' instead of '='."
         case ":" if following == ":" and "an operator" in expected:
             return "Write '.' instead of '::'."
         case ":" if "'{'" in expected:
             return "Write '{' instead of ':'."
+        case ":" if missing := next((key for key in _KEYS if f"'{key}'" in expected), None):
+            return f"Write '{missing}' before it."
         case ":":
             return "Remove the ':'."
         case "->" if "'goto'" in expected:
@@ -192,15 +208,85 @@ def _of_words(token: str, expected: Sequence[str], following: Sequence[str]) -> 
     return ""
 
 
+def _of_operators(before: str, token: str, expected: Sequence[str]) -> str:
+    """Advice about two operators in a row, or one with nothing behind it."""
+    if before not in ("and", "or", "not") or "an expression" not in expected:
+        return ""
+    if token in ("and", "or"):
+        return f"Remove it: '{before}' stands before it."
+    if token in RESERVED_WORDS or token == "}":
+        return f"Remove '{before}' before it, or write what is missing there."
+    return ""
+
+
+def _of_missing_words(before: str, token: str, expected: Sequence[str], following: str) -> str:
+    """Advice about a word or sign that is missing before what would go on behind it."""
+    is_name = token.removeprefix("^").isidentifier() and (token[0] == "^" or token not in RESERVED_WORDS)
+    begins_operand = is_name or token in _BEGIN_OPERANDS or token[:1].isdigit()
+    begins_item = "an operator" not in expected
+    missing = next(
+        (
+            word
+            for word, is_missing in (
+                ("component", begins_item and is_name and following in ("{", "from")),
+                ("requirement", begins_item and (begins_operand or token in ("{", "always", "never"))),
+                ("if", begins_operand and not (is_name and following in _BEHIND_TARGETS)),
+                ("do", is_name and following in (":=", "=")),
+                (_PREPOSITIONS.get(before, "from"), is_name and "'to'" in expected and "'from'" in expected),
+                ("goto", is_name),
+                ("state", is_name),
+                (",", following == ":"),
+                ("links", is_name),
+                ("on", token in _PREPOSITIONS),
+                ("transition", token in ("if", "goto")),
+                ("needs", begins_operand),
+                ("to", token == "{"),
+                ("(", token[:1].isdigit()),
+            )
+            if is_missing and f"'{word}'" in expected
+        ),
+        None,
+    )
+    if missing is not None:
+        return f"Write '{missing}' before it."
+    if begins_operand and "an operator" in expected:
+        return "Write 'and' before it, or the operator that is meant."
+    return ""
+
+
+_PREPOSITIONS = {"request": "to", "response": "from", "feedback": "from", "error": "from", "cancel": "to"}
+_KEYS = ("type", "request", "response", "feedback")
+_BEHIND_TARGETS = frozenset({"", "}", "on", "transition", "state", "initial", "marked", "variable", "goto"})
+"""Tokens behind the state that a transition leads to."""
+
+_BEGIN_OPERANDS = frozenset({"!", "(", "true", "false", "value"})
+
+
 def _of_brackets(token: str, expected: Sequence[str]) -> str:
     """Advice about a bracket that is missing, or one too many."""
-    if "'}'" in expected and (not token or token in STARTS or {*expected} in _ENDS_OF_LISTS):
+    if "'}'" in expected and (not token or {*expected} in _ENDS_OF_LISTS):
         return "Write '}' before it."
+    if "'}'" in expected and token in _HOMES:
+        return misplaced(token)
     if "'{'" in expected and (token == "}" or token in STARTS):
         return "Write '{' before it."
     if token == "}" and "the end of the file" in expected:
         return "Remove it: there is one '}' too many, here or before."
     return ""
+
+
+_HOMES = {
+    **dict.fromkeys(("component", "datatype", "interface", "requirement", "provide"), "the robot or library"),
+    **dict.fromkeys(("incoming", "outgoing", "service", "action", "behaviour"), "a component"),
+    **dict.fromkeys(("variable", "initial", "marked", "state"), "a behaviour"),
+    **dict.fromkeys(("on", "transition"), "a state or behaviour"),
+}
+"""The lists that items stand in, by their first words."""
+
+
+def misplaced(word: str) -> str:
+    """Advice about an item that stands in a list of others."""
+    return f"Move it: '{word}' stands in {_HOMES.get(word, 'another list')}, not in what is open here."
 
 
 _ENDS_OF_LISTS = ({"','", "'}'"}, {"an operator", "','", "'}'"})
@@ -215,4 +301,4 @@ def _of_what_is_missing(token: str, expected: Sequence[str]) -> str:
     return "Write one of the expected words here, or look for a bracket or comma missing before."
 
 
-__all__ = ["fix_syntax", "is_foreign_operator", "type_elsewhere"]
+__all__ = ["fix_syntax", "is_foreign_operator", "misplaced", "type_elsewhere"]

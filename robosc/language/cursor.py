@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.language import syntax
-from robosc.language.advice import fix_syntax
+from robosc.language.advice import fix_syntax, misplaced
 from robosc.language.limits import MAXIMUM_NAME, MAXIMUM_NESTING, MAXIMUM_SYNTAX_ERRORS
 from robosc.language.tokens import Kind, Places, Tokens
 from robosc.language.words import RESERVED_WORDS, STARTS, expected_words, unescape
@@ -323,7 +323,8 @@ class Cursor:
             fix = ""
             if self.kinds[index] == _END or self._begins_item(index):
                 related = (RelatedPlace("this '{' is not closed", self.at(self._braces[-1])),)
-                fix = "Write '}' before it."
+                is_missing = self.texts.count("{") > self.texts.count("}")
+                fix = "Write '}' before it." if is_missing else misplaced(self.texts[index])
             self.fault(*expected, "'}'", related=related, fix=fix)
             self._recover(index)
         # What an outer list can go on with ends this one.

@@ -131,8 +131,14 @@ class ExpressionParser(Cursor):
         if is_foreign_operator(self.texts[self.place]):
             return self.fault("an operator", "')'")
         self.expect("an operator", "')'")
-        self.report("syntax-error", "this '(' is never closed", self.at(opening), "Close it with ')'.")
+        self.report("syntax-error", "this '(' is never closed", self.at(opening), self._closing(opening))
         return self.told()
+
+    def _closing(self, opening: int) -> str:
+        """Advice on where to close a parenthesis: before the next token, if that is in the same line."""
+        token = self.texts[self.place]
+        is_here = bool(token) and self.at(self.place).line == self.at(opening).line
+        return f"Close it with ')', before '{token}'." if is_here else "Close it with ')'."
 
     def _primary(self, *, is_negative: bool = False) -> syntax.Expression:
         index = self.place
@@ -271,7 +277,7 @@ class ExpressionParser(Cursor):
             if self.texts[self.place] != ")":
                 message = "the '(' of this array is never closed"
                 self.expect("')'")
-                self.report("syntax-error", message, self.at(opening), "Close it with ')'.")
+                self.report("syntax-error", message, self.at(opening), self._closing(opening))
                 raise self.told()
             self.place += 1
             tree = syntax.ArrayType(tree, self.since(opening))

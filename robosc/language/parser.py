@@ -174,6 +174,8 @@ class _Parser(ExpressionParser):
     def _constant(self) -> syntax.Constant:
         self.take("constant")
         name = self.name()
+        if self.texts[self.place] == "=" and (meant := self._type_of_value(self.place + 1)):
+            raise self.fault("':'", fix=f"Write ': {'integer' if meant.isdigit() else meant}' before it.")
         self.take(":")
         type_ = self.type()
         self.take("=")
@@ -300,6 +302,8 @@ class _Parser(ExpressionParser):
                 break
         if len(types) < len(keys):
             missing = keys[len(types)]
+            if self.texts[self.place] == missing:
+                raise self.fault(fix="Write ',' before it.")
             comma = "" if self.texts[self.place - 1] == "," else ", "
             raise self.fault(fix=f"Write '{comma}{missing}: none' before it, or the type that it carries.")
         link = self.name() if self.takes("links") else None

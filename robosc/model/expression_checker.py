@@ -35,7 +35,8 @@ from robosc.expressions import (
     type_text,
 )
 from robosc.language import syntax
-from robosc.model.findings import Findings
+from robosc.language.words import spelled
+from robosc.model.findings import MAXIMUM_CHOICES, Findings
 from robosc.model.ranges import Range, Ranges, narrowed
 from robosc.model.scope import ComponentNames, Scope
 from robosc.model.typed import (
@@ -110,6 +111,8 @@ class ExpressionChecker:
         """As `value`, with the type; `because` is where the wanted type is declared."""
         typed = self.infer(tree, wanted)
         if typed is not None and not fits(typed.type, wanted):
+            if self._quoted(tree, wanted):
+                return None
             self._mismatch(tree, typed.type, f"{type_text(wanted)} is needed here", because)
             return None
         return typed
@@ -160,6 +163,15 @@ class ExpressionChecker:
             *((because,) if because else ()),
         )
 
+    def _quoted(self, tree: syntax.Expression, wanted: Type) -> bool:
+        """Return True after reporting a value of an enum that is written as a text."""
+        match tree, wanted:
+            case syntax.Literal(value=str() as text), EnumType(name=name, values=values) if text in values:
+                fix = f"Write '{spelled(text)}'."
+                self._findings.error("type-mismatch", f"a value of {name} has no quotes", tree.location, fix)
+                return True
+        return False
+
     # Operators
 
     def _unary(self, tree: syntax.Unary) -> Typed | None:
@@ -189,6 +201,10 @@ class ExpressionChecker:
         if left is None or right is None:
             return None
         logical = tree.operator in _LOGIC
+        if tree.operator == "=>" and is_numeric(left.type) and is_numeric(right.type):
+            message, fix = "'=>' takes booleans; did you mean '>='?", "Write '>=' instead of '=>'."
+            self._findings.error("type-mismatch", message, tree.location, fix)
+            return None
         for side, typed in ((tree.left, left), (tree.right, right)):
             suits = isinstance(typed.type, BooleanType) if logical else is_numeric(typed.type)
             if not suits:
@@ -216,6 +232,8 @@ class ExpressionChecker:
         both_numbers = is_numeric(left.type) and is_numeric(right.type)
         comparable = not isinstance(left.type, ObjectType | ArrayType | NoneType)
         if not comparable or not (both_numbers or same_kind(left.type, right.type)):
+            if self._quoted(tree.left, right.type) or self._quoted(tree.right, left.type):
+                return None
             self._findings.error(
                 "type-mismatch",
                 f"'{tree.operator}' compares {_article(type_text(left.type))} with {_article(type_text(right.type))}",
@@ -433,6 +451,9 @@ class ExpressionChecker:
                 "Define it in this file, or rename one of the two.",
             )
         elif name not in self._scope.absent:
+            if isinstance(wanted, EnumType) and not tree.steps and len(wanted.values) <= MAXIMUM_CHOICES:
+                self._findings.unknown(f"value of '{wanted.name}'", name, tree.root.location, wanted.values)
+                return None
             known = self._scope.known_names()
             self._findings.unknown("name", name, tree.root.location, known, words=_WORDS)
         return None

@@ -30,12 +30,16 @@ _BASIC: dict[syntax.BasicTypeName, Type] = {
 }
 
 
+_DEFAULTS_ELSEWHERE = frozenset({"else", "otherwise", "other", "others", "_"})
+
+
 def _misspelt_default(tree: syntax.EnumDefinition) -> syntax.Name | None:
     """The name before `->` of a rule that was meant as the default one."""
     for rule in tree.rules:
         match rule.condition:
-            case syntax.Access(root=syntax.Name() as name, steps=()) if did_you_mean(name.text, ("default",)):
-                return name
+            case syntax.Access(root=syntax.Name() as name, steps=()):
+                if name.text in _DEFAULTS_ELSEWHERE or did_you_mean(name.text, ("default",)):
+                    return name
     return None
 
 
@@ -198,7 +202,7 @@ class Types:
 
     def _report_defaults(self, tree: syntax.EnumDefinition, defaults: list[syntax.EnumRule]) -> None:
         if not defaults and (meant := _misspelt_default(tree)) is not None:
-            self._findings.unknown("name", meant.text, meant.location, (), words=("default",))
+            self._findings.unknown("name", meant.text, meant.location, (), "Write 'default'.", ("default",))
             return
         if not defaults:
             self._findings.error(

@@ -170,6 +170,17 @@ def _without(*tokens: str, where: Callable[[_Text, int], bool] = lambda text, in
     return slip
 
 
+def _unclosed(text: _Text, dice: Random) -> tuple[str, int, int] | None:
+    """A parenthesis is opened and not closed: both ends are the place."""
+    index = dice.choice(text.indices(")"))
+    depth, opening = 1, index
+    while depth:
+        opening -= 1
+        depth += (text.texts[opening] == ")") - (text.texts[opening] == "(")
+    changed, _, end = text.removed(index)
+    return changed, text.starts[opening], end
+
+
 def _with(pattern: str, new: str | Callable[[re.Match[str]], str], *, is_missing: bool = False) -> _Slip:
     """A stretch of the text that fits a pattern is written in another way, or something in it is missing."""
 
@@ -266,6 +277,16 @@ SLIPS: dict[str, tuple[_Slip, ...]] = {
     "missing closing brace": (_without("}"),) * 2,
     "missing opening brace": (_without("{", where=lambda text, index: text.texts[index - 1] != "with"),),
     "word of another language": tuple(_instead((word,), others) for word, others in _WORDS.items()),
+    "missing word": tuple(
+        _without(word)
+        for word in "goto do needs with links state message on to from use component requirement and or if type".split()
+    ),
+    "missing comma or bracket": (
+        _without(",", where=lambda text, index: text.texts[index + 2] == ":"),
+        _without(",", where=lambda text, index: text.texts[index + 2] == ":"),
+        _unclosed,
+        _with(r"(?<=[\w)])\)(?= )", "))"),
+    ),
     "misspelt word": (_typo(lambda text, index: text.kinds[index] == Kind.WORD),) * 2,
     "misspelt name": (_typo(_is_used_name),) * 3,
     "missing colon": (_without(":"),) * 2,

@@ -12,9 +12,13 @@ from support.mistakes import GOOD, SLIPS, Mistake, Verdict, every_mistake, first
 WANTED = 0.95
 """Share of all mistakes that is told well."""
 WANTED_OF_EACH = 0.9
-OF_TREES = "Behaviour trees"
-"""Habit for which the language often has no word: nothing a machine could obey would make a good model of it."""
-WANTED_OF_TREES = 0.6
+WANTED_OF_SOME = {
+    # The language often has no word: nothing that a machine could obey would make a good model of it.
+    "Behaviour trees": 0.6,
+    # Of nested parentheses over several lines nobody knows which one lacks its end.
+    "missing comma or bracket": 0.75,
+}
+"""Share of each category in which a person has to think."""
 
 
 @cache
@@ -51,7 +55,7 @@ def test_the_share_of_all() -> None:
 @pytest.mark.parametrize("category", CATEGORIES)
 def test_the_share_of_each_category(category: str) -> None:
     found = [item for item in judged() if item[0].category == category]
-    assert share(found) >= (WANTED_OF_TREES if category == OF_TREES else WANTED_OF_EACH), category
+    assert share(found) >= WANTED_OF_SOME.get(category, WANTED_OF_EACH), category
 
 
 def test_other_slips_than_those_that_were_looked_at() -> None:
@@ -181,7 +185,7 @@ def test_another_name_is_one_that_is_free(name: str, meant: str) -> None:
 
 
 def test_the_type_of_a_variable_is_looked_for_in_the_begin_of_a_text() -> None:
-    """So many variables without a type cost no more than the text is long."""
+    """Many variables without a type cost no more time than the text is long."""
     begin = "robot R { component C { behaviour { variable first do_ initial marked state s { } } } }"
     many = "variable x variable y = value variable z = blue on response from m do x := value, z := blue " * 5000
     found = first_error(begin.replace("do_", many))

@@ -52,8 +52,10 @@ from robosc.model.typed import (
     literal_type,
     same_kind,
 )
+from robosc.source import Location
 
 _BOOLEAN = BooleanType()
+_OPPOSITES = {"=": "!=", "!=": "=", "<": ">=", ">=": "<", ">": "<=", "<=": ">"}
 _LOGIC = {"or": "or", "and": "and", "=>": "implies"}
 _ORDER = frozenset({"<", "<=", ">", ">="})
 _WORDS = ("true", "false", "value", "default")
@@ -195,6 +197,8 @@ class ExpressionChecker:
         return Typed(Unary("-", operand.expression), operand.type)
 
     def _binary(self, tree: syntax.Binary) -> Typed | None:
+        if self._negates_operand(tree):
+            return None
         if tree.operator in ("=", "!="):
             return self._equality(tree)
         left, right = self.infer(tree.left), self.infer(tree.right)
@@ -218,6 +222,29 @@ class ExpressionChecker:
         if tree.operator != "/" and isinstance(left.type, IntegerType) and isinstance(right.type, IntegerType):
             return Typed(result, arithmetic(tree.operator, left.type, right.type))
         return Typed(result, DoubleType())
+
+    def _negates_operand(self, tree: syntax.Binary) -> bool:
+        """Return True after reporting `!a = b` or `not a < b` of what is no boolean: `!` takes `a` alone."""
+        opposite = _OPPOSITES.get(tree.operator)
+        match tree.left:
+            case syntax.Unary(operator="!", operand=syntax.Access(root=syntax.Name() as root, steps=steps) as operand):
+                names = [root, *(step for step in steps if isinstance(step, syntax.Name))]
+            case _:
+                return False
+        begin, end = tree.left.location, tree.location
+        if opposite is None or len(names) <= len(steps) or begin.line != end.line:
+            return False
+        typed = self.infer(operand)
+        if typed is None or isinstance(typed.type, BooleanType):
+            return typed is None
+        written = ".".join(spelled(name.text) for name in names)
+        self._findings.error(
+            "type-mismatch",
+            f"'!' and 'not' take '{written}' alone, which is {_article(_plain_text(typed.type))} and no boolean",
+            Location(begin.file, begin.line, begin.column, end.column + end.length - begin.column),
+            f"Write '{written} {opposite}', or put what is negated in parentheses.",
+        )
+        return True
 
     def _equality(self, tree: syntax.Binary) -> Typed | None:
         """One type on both sides; the side with a type of its own decides what a bare enum value means."""

@@ -129,7 +129,7 @@ def test_what_is_called_not_keeps_its_name(text: str, meaning: str) -> None:
         "AG §A.n",
         "§not",
         "AG not §U",
-        "not §A.n = 3",
+        "§not A.n = 3",
         "AG A.G §&& A.X",
         "EF enabled(§mode.request)",
         "EF enabled(mode§)",

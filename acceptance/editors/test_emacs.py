@@ -17,7 +17,7 @@ from support.waiting import eventually
 
 MODE = ROOT / "editors" / "emacs" / "robosc-mode.el"
 
-WORDS_ELSEWHERE = frozenset({"always", "constant", "else", "never", "then"})
+WORDS_ELSEWHERE = frozenset({"always", "constant", "else", "never", "not", "then"})
 """Words that are names where they mean nothing: what begins an item or parts an expression is shown as a word."""
 
 

@@ -27,9 +27,9 @@
    '("action" "always" "and" "array" "behaviour" "boolean" "cancel" "component" "constant"
      "datatype" "default" "disables" "do" "double" "else" "enum" "error" "false" "feedback"
      "from" "goto" "if" "import" "incoming" "initial" "integer" "interface" "library" "links"
-     "marked" "message" "needs" "never" "none" "not" "object" "on" "or" "outgoing" "provide" "request"
-     "requirement" "response" "robot" "service" "state" "string" "then" "to" "transition" "true"
-     "use" "value" "variable" "with")
+     "marked" "message" "needs" "never" "none" "not" "object" "on" "or" "outgoing" "provide"
+     "request" "requirement" "response" "robot" "service" "state" "string" "then" "to"
+     "transition" "true" "use" "value" "variable" "with")
    'symbols)
   "Words of the language.")
 

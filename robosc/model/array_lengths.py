@@ -26,6 +26,8 @@ class ArrayLengths:
         self._types = types
         self._findings = findings
         self._told: set[tuple[Location, str]] = set()
+        # The message is kept, so that its identity stays its own.
+        self._checked: dict[tuple[str, int], Part] = {}
 
     def check_communication(self, item: Communication, tree: syntax.Communication, catalogue: Catalogue) -> None:
         """Check the enums that are made from the data of a communication, and the condition in its list.
@@ -53,7 +55,10 @@ class ArrayLengths:
 
     def _check_type(self, type_: Type, part: Part, catalogue: Catalogue) -> None:
         """Check the rules of the enums that are made from received data of a type."""
-        source = type_
+        if not isinstance(type_, EnumType | ObjectType) or (type_.name, id(part)) in self._checked:
+            return
+        self._checked[type_.name, id(part)] = part
+        source: Type = type_
         if isinstance(type_, EnumType):
             source = self._types.sources[type_.name]
             _, _, tree = self._types.enums[type_.name]

@@ -123,7 +123,7 @@ class Findings:
             self.unknown("communication", name, location, known)
 
     def near(self, name: str, known: Iterable[str]) -> str | None:
-        """The nearest known name, until so many names have been compared that more would take noticeable time."""
+        """The nearest known name; None once so many names have been compared that more would take noticeable time."""
         if self._comparisons <= 0:
             return None
         names = set(known)

@@ -13,8 +13,8 @@ from robosc.interfaces.catalogue import Catalogue, FoundInterfaces
 from robosc.language import syntax
 from robosc.language.words import spelled
 from robosc.model.communications import CommunicationTree
-from robosc.model.findings import Findings, did_you_mean
-from robosc.model.message_fields import Fault, FieldChecker, Language, Message, fields_of_objects
+from robosc.model.findings import Findings
+from robosc.model.message_fields import Comparison, Fault, FieldChecker, Language, Message, fields_of_objects
 from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.model.types import Types
 from robosc.model.units import Unit
@@ -110,9 +110,15 @@ class InterfaceChecker:
         found = FoundInterfaces({file.name: file.text for file in bundle.interfaces})
         self._are_searched = bool(bundle.searched)
         self._catalogues = tuple(Catalogue(distribution, found) for distribution in DISTRIBUTIONS)
+        self._checkers = {
+            (catalogue.distribution, language): FieldChecker(catalogue, language, types)
+            for catalogue in self._catalogues
+            for language in Language
+        }
         self._types = types
         self._findings = findings
         self._noted: set[str] = set()
+        self._told: set[Fault] = set()
         self.fields: dict[str, dict[str, Field]] = {}
 
     def check(
@@ -140,12 +146,11 @@ class InterfaceChecker:
     def _checked(self, item: _Linked) -> Catalogue | None:
         """Report what does not fit; the first catalogue in which something fits."""
         outcomes: dict[tuple[int, Language], _Outcome] = {}
-        for catalogue in self._catalogues:
-            for language in Language:
-                key = (catalogue.distribution.version, language)
-                found = _outcome(item, catalogue, language, self._types)
-                if found is not None and (key not in outcomes or len(found.faults) < len(outcomes[key].faults)):
-                    outcomes[key] = found
+        for (distribution, language), checker in self._checkers.items():
+            key = (distribution.version, language)
+            found = _outcome(item, checker)
+            if found is not None and (key not in outcomes or len(found.faults) < len(outcomes[key].faults)):
+                outcomes[key] = found
         for outcome in tuple(outcomes.values())[:1]:
             for data, part in parts_by_event(item.communication, outcome.catalogue).values():
                 fields_of_objects(data, part, outcome.catalogue, self._types, self.fields)
@@ -157,9 +162,7 @@ class InterfaceChecker:
             # Told are the faults of the version that comes nearest.
             told = [outcome for (_, language), outcome in outcomes.items() if language is Language.PYTHON]
             for fault in min(told, key=lambda outcome: len(outcome.faults)).faults:
-                # Data that has no meaning is an error; what only ROS could not do is one for packages of ROS.
-                report = self._findings.error if fault.code == "ambiguous-field" else self._findings.warning
-                report(fault.code, fault.message + fault.hint, fault.location, fault.fix, *fault.related)
+                self._tell(fault)
             return None
         for type_, location in fitting.unknown.items():
             self._note_missing(type_.partition("/")[0], type_, location)
@@ -169,6 +172,19 @@ class InterfaceChecker:
         )
         self._report_limits(ros1, ros2)
         return fitting.catalogue
+
+    def _tell(self, fault: Fault) -> None:
+        """Report a fault that all nodes have, once."""
+        if fault in self._told:
+            return
+        self._told.add(fault)
+        near = self._findings.near(fault.name, fault.known) if fault.name else None
+        hint, fix = (
+            (fault.hint, fault.fix) if near is None else (f"; did you mean '{near}'?", f"Write '{spelled(near)}'.")
+        )
+        # Data that has no meaning is an error; what only ROS could not do is one for packages of ROS.
+        report = self._findings.error if fault.code == "ambiguous-field" else self._findings.warning
+        report(fault.code, fault.message + hint, fault.location, fix, *fault.related)
 
     def _note_missing(self, package: str, type_: str, location: Location) -> None:
         if any(catalogue.knows(package) for catalogue in self._catalogues):
@@ -215,30 +231,28 @@ class InterfaceChecker:
         if any(catalogue.has(kind, package, type_) for catalogue in self._catalogues for kind in INTERFACE_KINDS):
             return
         if knowing:
-            fault = _unknown_type(interface, knowing[0], INTERFACE_KINDS)
-            self._findings.warning(fault.code, fault.message + fault.hint, fault.location, fault.fix)
+            self._tell(_unknown_type(interface, knowing[0], INTERFACE_KINDS))
         else:
             self._note_missing(package, f"{package}/{type_}", interface.package.location)
 
 
-def _outcome(item: _Linked, catalogue: Catalogue, language: Language, types: Types) -> _Outcome | None:
+def _outcome(item: _Linked, checker: FieldChecker) -> _Outcome | None:
     """Compare a communication as nodes of one kind do at their start; None where the interface is not known."""
+    catalogue = checker.catalogue
     definition = catalogue.definition(item.kind, item.package, item.type)
     if definition is None:
         kinds = [kind for kind in INTERFACE_KINDS if catalogue.has(kind, item.package, item.type)]
         if item.kind in kinds or not (kinds or catalogue.knows(item.package)):
             return None
         return _Outcome(catalogue, (_unknown_type(item.interface, catalogue, (item.kind,)),), {})
-    unknown: dict[str, Location] = {}
-    checker = FieldChecker(catalogue, language, types, unknown)
     name = catalogue.described(item.kind, item.package, item.type)
-    found: list[Fault] = []
+    found = Comparison()
     for part, (type_, location) in zip(definition, item.parts(), strict=False):
         if type_ is not None:
-            found += checker.faults(type_, Message(name, part), location)
+            found.include(checker.compare(type_, Message(name, part), location))
     if item.communication.frame is not None:
-        found += _header_faults(item, definition[0], name, catalogue)
-    return _Outcome(catalogue, tuple(dict.fromkeys(found)), unknown)
+        found.add(*_header_faults(item, definition[0], name, catalogue))
+    return _Outcome(catalogue, tuple(dict.fromkeys(found.faults)), found.unknown)
 
 
 def _linked(
@@ -298,8 +312,6 @@ def _unknown_type(interface: syntax.Interface, catalogue: Catalogue, kinds: Sequ
     if other is not None:
         fix = f"Link it to {_ARTICLES[other]}, or use a type that is {_ARTICLES[kinds[0]]}."
         return Fault("unknown-ros-type", text, f"; it is {_ARTICLES[other]}", place, fix)
-    near = did_you_mean(type_, [name for kind in kinds for name in catalogue.types(kind, package)])
-    if near is not None:
-        return Fault("unknown-ros-type", text, f"; did you mean '{near}'?", place, f"Write '{spelled(near)}'.")
     fix = f"Use a type that {package} has, or name the folder with a version that has it with -I."
-    return Fault("unknown-ros-type", text, "", place, fix)
+    known = tuple(name for kind in kinds for name in catalogue.types(kind, package))
+    return Fault("unknown-ros-type", text, "", place, fix, (), type_, known)

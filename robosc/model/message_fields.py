@@ -4,8 +4,9 @@
 C++ nodes do.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from enum import StrEnum
 
 from robosc.errors import RelatedPlace
@@ -23,13 +24,14 @@ from robosc.expressions import (
 )
 from robosc.interfaces import TIMES, Field, Part
 from robosc.interfaces.catalogue import Catalogue
-from robosc.language.words import spelled
-from robosc.model.findings import did_you_mean
 from robosc.model.types import Types
 from robosc.source import Location
 
 _MAXIMUM_SHOWN = 6
 """Fields that one finding lists."""
+
+MAXIMUM_FAULTS = 100
+"""Differences of one type that are told; more are told once these are fixed."""
 
 _INTEGERS = frozenset(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))
 _PYTHON_FIELDS: dict[type[Type], frozenset[str]] = {
@@ -64,6 +66,9 @@ class Fault:
         location: Place in the model.
         fix: Sentence on how to fix it.
         related: Other places that explain it.
+        name: Name that nothing has; empty if the fault is another one. The hint and the fix are for where no known name
+            is near.
+        known: Known names.
     """
 
     code: str
@@ -72,6 +77,8 @@ class Fault:
     location: Location
     fix: str
     related: tuple[RelatedPlace, ...] = ()
+    name: str = ""
+    known: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,24 +94,46 @@ class Message:
     part: Part
 
 
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Differences between a type and a message.
+
+    Attributes:
+        faults: The first of them, at most `MAXIMUM_FAULTS`.
+        unknown: Messages whose definition is not known, each with a place where it matters.
+    """
+
+    faults: list[Fault] = dataclass_field(default_factory=list)
+    unknown: dict[str, Location] = dataclass_field(default_factory=dict)
+
+    def add(self, *faults: Fault) -> None:
+        """Add faults, as far as there may be more."""
+        self.faults.extend(faults[: MAXIMUM_FAULTS - len(self.faults)])
+
+    def include(self, other: "Comparison") -> None:
+        """Add all that another comparison has found."""
+        self.add(*other.faults)
+        self.unknown.update(other.unknown)
+
+
 class FieldChecker:
-    """Checker of data types against messages.
+    """Checker of data types against messages; of each pair, no matter how often it is asked for, once.
 
     Args:
         catalogue: The interfaces.
         language: Language of the node.
         types: Types of the model.
-        unknown: Filled with the messages whose definition is not known, each with a place where it matters.
     """
 
-    def __init__(self, catalogue: Catalogue, language: Language, types: Types, unknown: dict[str, Location]) -> None:
-        self._catalogue = catalogue
+    def __init__(self, catalogue: Catalogue, language: Language, types: Types) -> None:
+        self.catalogue = catalogue
         self._language = language
         self._types = types
-        self._unknown = unknown
+        # The message is kept, so that its identity stays its own.
+        self._known: dict[tuple[str, int], tuple[Part, Comparison]] = {}
 
-    def faults(self, type_: Type, message: Message, location: Location) -> Iterator[Fault]:
-        """Yield what keeps data of a type from crossing as a message.
+    def compare(self, type_: Type, message: Message, location: Location) -> Comparison:
+        """Compare data of a type with the message as which it crosses.
 
         Args:
             type_: Type of the data.
@@ -113,29 +142,46 @@ class FieldChecker:
         """
         basic = self._source(type_)
         if isinstance(basic, ObjectType):
-            yield from self._object(basic, message, location)
-        elif not isinstance(basic, NoneType):
+            return self._object(basic, message, location)
+        found = Comparison()
+        if not isinstance(basic, NoneType):
             field = basic_field(message.part)
             if field is None:
-                yield _ambiguous(type_text(basic), message, location)
+                found.add(_ambiguous(type_text(basic), message, location))
             else:
-                yield from self._field(field, basic, message.name, location, location)
+                self._field(field, basic, message.name, (location, location), found)
+        return found
 
     def _source(self, type_: Type) -> Type:
         return self._types.sources[type_.name] if isinstance(type_, EnumType) else type_
 
-    def _object(self, type_: ObjectType, message: Message, used: Location) -> Iterator[Fault]:
-        for item in self._types.objects[type_.name].properties:
-            place = self._types.property_places[type_.name, item.name]
-            field = message.part.fields.get(item.name)
-            if field is None:
-                yield _unknown_field(item.name, message, place, used)
-            else:
-                written = self._types.property_type_places[type_.name, item.name]
-                yield from self._field(field, item.type, message.name, written, used)
+    def _object(self, type_: ObjectType, message: Message, used: Location) -> Comparison:
+        key = (type_.name, id(message.part))
+        if key not in self._known:
+            found = Comparison()
+            for item in self._types.objects[type_.name].properties:
+                place = self._types.property_places[type_.name, item.name]
+                field = message.part.fields.get(item.name)
+                if field is None:
+                    found.add(_unknown_field(item.name, message, place, used))
+                else:
+                    written = self._types.property_type_places[type_.name, item.name]
+                    self._field(field, item.type, message.name, (written, used), found)
+            self._known[key] = (message.part, found)
+        return self._known[key][1]
 
-    def _field(self, field: Field, type_: Type, owner: str, place: Location, used: Location) -> Iterator[Fault]:
-        """Yield what keeps a property from standing for a field."""
+    def _field(
+        self, field: Field, type_: Type, owner: str, places: tuple[Location, Location], found: Comparison
+    ) -> None:
+        """Compare a property with the field that it stands for.
+
+        Args:
+            field: The field.
+            type_: Type of the property.
+            owner: The message, in words.
+            places: Place of the type, and place from which it crosses.
+            found: Comparison to which differences are added.
+        """
         source = self._source(type_)
         is_array = isinstance(source, ArrayType)
         inner = self._source(source.element) if isinstance(source, ArrayType) else source
@@ -146,27 +192,27 @@ class FieldChecker:
             or isinstance(inner, ArrayType)
             or isinstance(inner, ObjectType) is not field.is_message
         ):
-            yield self._misfit(field, source, owner, place, used)
+            found.add(self._misfit(field, source, owner, *places))
         elif isinstance(inner, ObjectType):
-            yield from self._nested(field, inner, place)
+            self._nested(field, inner, places[0], found)
         elif not self._fits(field.type, inner):
-            yield self._misfit(field, source, owner, place, used)
+            found.add(self._misfit(field, source, owner, *places))
 
-    def _nested(self, field: Field, type_: ObjectType, place: Location) -> Iterator[Fault]:
-        part = self._catalogue.message(field.type)
+    def _nested(self, field: Field, type_: ObjectType, place: Location, found: Comparison) -> None:
+        part = self.catalogue.message(field.type)
         if part is None:
-            self._unknown.setdefault(field.type, place)
+            found.unknown.setdefault(field.type, place)
             return
-        package, _, name = self._catalogue.resolved(field.type).partition("/")
-        message = Message(self._catalogue.described("msg", package, name) if name else field.type, part)
-        if field.type in TIMES and self._language is Language.CPP and self._catalogue.distribution.version == 1:
+        package, _, name = self.catalogue.resolved(field.type).partition("/")
+        message = Message(self.catalogue.described("msg", package, name) if name else field.type, part)
+        if field.type in TIMES and self._language is Language.CPP and self.catalogue.distribution.version == 1:
             # The classes of roscpp call them otherwise than those of rospy.
-            fields = {f"{name.removesuffix('s')}": found for name, found in part.fields.items()}
+            fields = {name.removesuffix("s"): inner for name, inner in part.fields.items()}
             message = Message(message.name, Part(fields, {}))
-        yield from self._object(type_, message, place)
+        found.include(self._object(type_, message, place))
 
     def _fits(self, field_type: str, type_: Type) -> bool:
-        is_ros1 = self._catalogue.distribution.version == 1
+        is_ros1 = self.catalogue.distribution.version == 1
         if field_type in _PYTHON_FIELDS[type(type_)]:
             return self._language is Language.PYTHON or field_type != "wstring"
         if isinstance(type_, IntegerType) and field_type == "byte":
@@ -198,7 +244,7 @@ class FieldChecker:
     def _advice(self, field: Field) -> str:
         if not field.is_message:
             return "Remove the property: no type of the model is read from such a field."
-        fields = self._catalogue.message(field.type)
+        fields = self.catalogue.message(field.type)
         names = "" if fields is None else f", such as {_listed(fields.fields)}"
         kind = "an array of an object type" if field.array else "an object type"
         return f"Make {kind} with the fields of {field.type} that are meant{names}."
@@ -215,7 +261,7 @@ def model_type(field: Field) -> str:
 def fields_of_objects(
     type_: Type, part: Part, catalogue: Catalogue, types: Types, found: dict[str, dict[str, Field]]
 ) -> None:
-    """Collect the fields that properties of object types can stand for.
+    """Collect the fields that properties of object types can stand for; each type is looked at once.
 
     Args:
         type_: Type of data.
@@ -226,9 +272,9 @@ def fields_of_objects(
     """
     source = types.sources[type_.name] if isinstance(type_, EnumType) else type_
     source = source.element if isinstance(source, ArrayType) else source
-    if not isinstance(source, ObjectType):
+    if not isinstance(source, ObjectType) or source.name in found:
         return
-    found.setdefault(source.name, {}).update(part.fields)
+    found[source.name] = part.fields
     for item in types.objects[source.name].properties:
         field = part.fields.get(item.name)
         nested = None if field is None else catalogue.message(field.type)
@@ -270,8 +316,6 @@ def _unknown_field(name: str, message: Message, place: Location, used: Location)
     if name in constants:
         hint = f"; it is a constant, {constants[name]}"
         return Fault("unknown-field", text, hint, place, "Remove the property, and write the value instead.", related)
-    near = did_you_mean(name, fields)
-    if near is not None:
-        return Fault("unknown-field", text, f"; did you mean '{near}'?", place, f"Write '{spelled(near)}'.", related)
     hint = f"; it has {_listed(fields)}" if fields else "; it has none"
-    return Fault("unknown-field", text, hint, place, "Remove the property, or give it the name of a field.", related)
+    fix = "Remove the property, or give it the name of a field."
+    return Fault("unknown-field", text, hint, place, fix, related, name, tuple(fields))

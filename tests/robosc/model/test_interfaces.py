@@ -13,8 +13,9 @@ from robosc.interfaces import DISTRIBUTIONS, Field, Part
 from robosc.interfaces.catalogue import Catalogue, FoundInterfaces
 from robosc.language import load_bundle
 from robosc.language.interfaces import find_interfaces, interface_folders
-from robosc.model import check
+from robosc.model import check, message_fields
 from robosc.model.interfaces import headers_of as known_headers
+from robosc.model.message_fields import Fault
 from robosc.source import Bundle, SourceFile
 from robosc.targets.ros.errors import ROS2_ERRORS
 from robosc.targets.ros.runtime.messages import SetupError, check_shape, headers_of
@@ -376,3 +377,30 @@ def test_headers_that_nodes_stamp_are_those_that_the_check_knows() -> None:
         except SetupError:
             count = 0
         assert len(known_headers(definition[0], catalogue, is_action=True)) == count
+
+
+def test_a_type_is_compared_with_a_message_once_however_often_it_crosses(monkeypatch: pytest.MonkeyPatch) -> None:
+    count = 0
+    told = message_fields._unknown_field
+
+    def counted(*arguments: Any) -> Fault:
+        nonlocal count
+        count += 1
+        return told(*arguments)
+
+    monkeypatch.setattr(message_fields, "_unknown_field", counted)
+    number = 20
+    properties = " ".join(f"nothing{index}: double" for index in range(number))
+    messages = " ".join(f"outgoing message m{index} with type: O links i" for index in range(number))
+    text = (
+        f"robot R {{ interface i use BatteryState from sensor_msgs datatype object O {{ {properties} }} "
+        f"component C {{ {messages} }} }}"
+    )
+    assert len(checked(text).diagnostics) == number
+    assert count == number * len(DISTRIBUTIONS) * len(message_fields.Language)
+
+
+def test_of_very_many_faults_the_first_are_told() -> None:
+    properties = " ".join(f"nothing{index}: double" for index in range(message_fields.MAXIMUM_FAULTS + 5))
+    text = MODEL.format("BatteryState", "sensor_msgs", properties, "")
+    assert len(checked(text).diagnostics) == message_fields.MAXIMUM_FAULTS

@@ -89,7 +89,11 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
         return stops is not None and stops > here
     tokens = tokenize(text)
     at = tokens.starts.index(offset(text, *here))
-    if stops is None or stops < here:
+    if stops is not None and stops < here:
+        # A conditional with a fault behind its `then` is none there, so that the `not` before it is a name.
+        stop = tokens.starts.index(offset(text, *stops))
+        return tokens.texts[stop - 1 : stop + 1] == ["not", "if"]
+    if stops is None:
         return False
     token, following = tokens.texts[at : at + 2]
     if token in OPTIONS:

@@ -17,6 +17,9 @@ from robosc.synthesis.transitions import Steps
 MAXIMUM_TOGETHER = 100
 """Pairs of rivals that are told: a hundred requests on one identifier make thousands, which would tell nothing new."""
 
+MAXIMUM_EFFORT = 300_000
+"""Nodes of the searches for loops together, counted once for each event: a third of a second with the faster engine."""
+
 
 class ControlledSystem:
     """The system under its supervisor.
@@ -42,6 +45,7 @@ class ControlledSystem:
         self._steps = {steps.event.name: steps for steps in problem.steps}
         self._causes = Causes(encoding, monitor, problem, good, reachable)
         self._known: dict[str, Any] = {}
+        self._effort = 0
 
     def answers(self, questions: Questions) -> Answers:
         """The answers to some questions.
@@ -169,7 +173,7 @@ class ControlledSystem:
     ) -> Iterator[Unprompted]:
         """Those of some events that can happen again and again while no prompt does.
 
-        A loop that was told already tells of the events that are in it.
+        A loop that was told already tells of the events that are in it. Beyond `MAXIMUM_EFFORT` none is told any more.
 
         Args:
             events: The events, none of them silent.
@@ -209,6 +213,9 @@ class ControlledSystem:
             wider = self._manager.true
             while wider != leading:
                 wider = leading
+                self._effort += leading.dag_size * len(inside)
+                if self._effort > MAXIMUM_EFFORT:
+                    return self._manager.false
                 for other in inside:
                     self._monitor.check_stop()
                     leading = leading | (executed[other.event.name] & other.some(leading))

@@ -194,7 +194,7 @@ def test_show_automata(editor: VsCode, model: Path) -> None:
     assert editor.command("showAutomata", model) is True
     frame = editor.live_view()
     frame.locator("#robot", has_text="LineFollower").wait_for()
-    frame.locator("#link-word", has_text="initial state").wait_for()
+    frame.locator("#link-word", has_text="by hand").wait_for()
     editor.page.screenshot(path=SCREENSHOTS / "vscode-automata.png")
     (view,) = editor.views()
     # It follows what is saved, and the same panel comes to the front.

@@ -40,7 +40,7 @@ def collected(folders: Iterable[Path]) -> dict[str, str]:
             for file in sorted((home / kind).glob(f"*.{kind}")):  # type: ignore[operator]  # a path
                 found[f"{package}/{kind}/{file.stem}"] = compact(file.read_text(encoding="utf-8"), package)
     actions = {name.replace("/action/", "/msg/") for name in found if "/action/" in name}
-    # What is generated from an action in ROS 1 is no interface that a model names.
+    # Messages generated from an action in ROS 1 are no interfaces that a model names.
     return {name: text for name, text in found.items() if _DERIVED.sub("", name) not in actions - {name}}
 
 

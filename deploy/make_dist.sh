@@ -20,7 +20,7 @@ trap 'rm -f "$lock"' EXIT
 "$PYTHON" deploy/lock_images.py $EXTRAS >"$lock"
 
 "$PYTHON" -m pip wheel $quiet --no-deps --no-build-isolation --no-index --wheel-dir "$directory" .
-# What has no wheel is built by the locked tools of the environment.
+# Packages without a wheel are built by the locked tools of the environment.
 if [ "$MACHINE" = "$(uname -m)" ]; then
     "$PYTHON" -m pip wheel $quiet --no-deps --no-build-isolation --require-hashes --wheel-dir "$directory/wheels" -r "$lock"
 else

@@ -65,7 +65,7 @@ def test_the_commands_are_understood(command: str) -> None:
     parser = make_parser(wanted_plugins(arguments, _NAMES)) if program == "robosc" else client_parser()
     parsed = parser.parse_args(arguments)
     for place in (getattr(parsed, "model", None), *getattr(parsed, "paths", ())):
-        # Whoever reads has made a robot called Patrol, or writes MODEL in place of it.
+        # A reader has made a robot called Patrol, or writes MODEL in place of it.
         assert place is None or str(place).startswith(("patrol", "MODEL")) or (ROOT / place).exists()
 
 

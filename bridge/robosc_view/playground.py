@@ -291,7 +291,7 @@ class Playground:
     def _show(self, sink: Sink, report: RunReport) -> None:
         run = self._run
         history = run.history
-        # What is the same as it was when it was told before is not told again.
+        # A trouble that is as it was when it was told before is not told again.
         same = 0
         while same < min(len(history), len(self._entries)) and self._told[same] is history[same]:
             same += 1

@@ -107,7 +107,7 @@ class WatchedModel:
                     making = None
         finally:
             if making is not None:
-                # Whoever watches next is to make it again.
+                # The next watcher has to make it again.
                 self._seen = ""
             await _ended(making)
 

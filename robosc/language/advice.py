@@ -88,7 +88,7 @@ def _near_word(token: str, expected: Iterable[str]) -> str | None:
     if said := _said_elsewhere(token, words):
         return said
     near = difflib.get_close_matches(token[:_MAXIMUM_MEANT], words, n=1, cutoff=0.75)
-    # Of a short word two letters that changed places are half.
+    # Two letters that changed places are half of a short word.
     turned = [word for word in words if len(word) < 5 and sorted(word) == sorted(token)]
     return next(iter([*near, *turned]), None)
 

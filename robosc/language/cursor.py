@@ -102,7 +102,7 @@ class Cursor:
     def report(self, code: str, message: str, location: Location, fix: str, *related: RelatedPlace) -> None:
         """An error that does not keep the parser from reading on."""
         if len(fix) > _MAXIMUM_FIX or "\n" in fix:
-            # What stands there is more than anyone would read in a message.
+            # The text there is longer than anyone would read in a message.
             fix = "Write one of the expected words here, or look for a bracket or comma missing before."
         self.diagnostics.append(Diagnostic(Severity.ERROR, code, message, location, fix, related))
 

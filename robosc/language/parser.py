@@ -375,7 +375,7 @@ class _Parser(ExpressionParser):
         if self.kinds[index] == _STRING:
             return "string"
         if value == "value" and texts[index + 1] != ".":
-            # What is received has the type of the message.
+            # Received data has the type of the message.
             start = next((at for at in range(index, max(0, index - _MAXIMUM_BACK), -1) if texts[at] == "on"), 0)
             head = ["message", *texts[start + 3 : start + 4]]
             begin = next((at for at in read if texts[at : at + 2] == head), len(read))

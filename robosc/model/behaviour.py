@@ -239,7 +239,7 @@ class BehaviourBuilder:
         variables = tuple(self._variables())
         transitions = tuple(self._transitions())
         behaviour = Behaviour(variables, states, transitions)
-        # Of a transition with an unknown name nobody knows where it leads.
+        # A transition with an unknown name may lead anywhere.
         targets = zip(transitions, self._tree.transitions, strict=False)
         is_whole = all((item.target is None) == (tree.target is None) for item, (_, tree) in targets)
         if is_whole and len(transitions) == len(self._tree.transitions):

@@ -59,7 +59,7 @@ def test_ctrl_c_is_one_line_at_any_moment(program: str, words: str, moments: tup
         done = started(program, *words.split(), moment=moment)
         lines = done.stderr.splitlines()
         assert (done.returncode, lines[-1]) == (130, f"{program}: interrupted"), moment
-        # What the command itself has told comes before the end.
+        # The command's own words come before the end.
         assert len(lines) <= (2 if moment == "exit" else 1), done.stderr
 
 

@@ -116,7 +116,7 @@ def bundle_of_case(case: str) -> Bundle:
 
 
 def _findings(diagnostics: Iterable[Diagnostic]) -> list[str]:
-    # What is installed on this machine is no meaning of a model.
+    # The packages of this machine are no meaning of a model.
     return sorted(_finding(item) for item in diagnostics if item.code != "definition-not-found")
 
 

@@ -193,7 +193,7 @@ def _with(pattern: str, new: str | Callable[[re.Match[str]], str], *, is_missing
         begin, end = match.span()
         changed = text.text[:begin] + written + text.text[end:]
         if is_missing:
-            # What is forgotten is between the words around it.
+            # The forgotten text is between the words around it.
             before = re.search(r"\S*\s*\Z", text.text[:begin])
             behind = re.match(r"\s*\S*", text.text[end:])
             assert before and behind
@@ -354,7 +354,7 @@ def drawn(seed: int = 1) -> Iterator[Mistake]:
             if len(seen) >= max(WANTED, 2 * len(slips)) * 3 // 4:
                 break
             made = slips[number % len(slips)](dice.choice(texts), dice)
-            # What is no mistake after all, such as another name for the robot, is none.
+            # A change that is no mistake after all, such as another name for the robot, does not count.
             if made is not None and made[0] not in seen and first_error(made[0]) is not None:
                 seen.add(made[0])
                 yield Mistake(category, *made)

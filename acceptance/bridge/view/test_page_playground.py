@@ -53,7 +53,7 @@ def test_a_model_is_played_with(browser: Browser, tmp_path: Path) -> None:
         expect(opening.locator("button")).to_have_attribute("aria-disabled", "true")
         expect(opening.locator(".play-why")).to_contain_text("requirement open needs Sensor.light = day")
         expect(page.locator("#requests-panel")).to_be_hidden()
-        # What cannot happen does not, however it is pressed.
+        # An event that cannot happen does not, however its button is pressed.
         opening.locator("button").click(force=True)
         expect(page.locator("#play-count")).to_have_text("0 events · marked")
         page.locator(event("light.response")).locator("select").select_option("day")
@@ -63,7 +63,7 @@ def test_a_model_is_played_with(browser: Browser, tmp_path: Path) -> None:
         opening.locator("button").click()
         expect(page.locator('[data-component="Gate"] .card-state')).to_have_text("opened")
         expect(page.locator("#stream-rows .row")).to_have_count(2)
-        # Of an object one part is entered, and the other stays unknown.
+        # One part of an object is entered, and the other stays unknown.
         page.locator(event("seen.response")).locator("input").first.fill("2")
         page.locator(event("seen.response")).locator("button").click()
         expect(told).to_contain_text("Sensor.name keeps its value, since what it was to take is unknown")

@@ -34,7 +34,7 @@ def in_python(field: Field, package: str) -> str:
 
 def test_the_classes_of_an_installed_ros_1_have_the_fields_that_the_definitions_say() -> None:
     noetic = next(item for item in DISTRIBUTIONS if item.version == 1)
-    # Of an action, ROS 1 has messages alone.
+    # ROS 1 has messages alone for an action.
     names = [name for name in noetic.definitions if "/action/" not in name]
     result = subprocess.run(
         [PYTHON, "-c", PRINT_FIELDS],

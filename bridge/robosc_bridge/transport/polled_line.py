@@ -61,6 +61,6 @@ class PolledLine(ABC):
             os.close(self._waker)
 
     def _check_open(self) -> None:
-        # Of a closed line, the numbers of its files may be somebody else's.
+        # The numbers of a closed line's files may be somebody else's.
         if not self._is_open:
             raise LineLostError(self.path, "the line is closed")

@@ -234,7 +234,7 @@ def test_what_nobody_read_is_gone_when_the_port_is_opened() -> None:
         line = robot.scanner_line
         for _ in range(400):
             robot.advance(0.005)
-            # What the kernel is still carrying there when the port is opened would come afterwards.
+            # Bytes that the kernel still carries when the port is opened would come afterwards.
             wait_until(lambda: line._end.unread() == line.sent)
         assert line.lost_bytes > 0
         with Host(robot.scanner_path, 230_400) as host:

@@ -39,7 +39,7 @@ def test_the_end_of_the_bridge_is_told(daemon: FakeDaemon, monkeypatch: pytest.M
     with served(daemon) as endpoint:
         terminal = Terminal(endpoint.address)
         try:
-            # What it shows says that it has called, not that the bridge has heard it.
+            # Its display says that it has called, not that the bridge has heard it.
             daemon.program()
             endpoint.stop()
             assert terminal.process.wait(PATIENCE_S) == 2

@@ -58,7 +58,7 @@ def test_a_sender_hears_what_comes_back(peer: socket.socket) -> None:
 
 
 def test_nobody_at_the_other_end_of_udp_is_no_loss() -> None:
-    # Of the ports that the system hands out to nobody.
+    # One of the ports that the system hands out to nobody.
     line = NetworkLine("udpout:127.0.0.1:1")
     for _ in range(5):
         line.write(b"hello")

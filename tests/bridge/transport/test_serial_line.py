@@ -133,7 +133,7 @@ def test_discarded_input_does_not_come(pty: PtyEnd, line: SerialLine) -> None:
     assert _everything(line, 3) == b"old"
     pty.taken = 3
     pty.send(b"older")
-    # What the kernel is still carrying here has not come yet.
+    # Bytes that the kernel still carries have not come yet.
     pty.settle()
     line.discard_input()
     pty.send(b"new")

@@ -146,7 +146,7 @@ from robosc_view.graphs import Node, layout, _WithoutMatplotlib
 layout([Node("a", True, True)], [])
 assert "igraph" in sys.modules
 print("matplotlib" in sys.modules, any(isinstance(item, _WithoutMatplotlib) for item in sys.meta_path))
-# Who draws pictures in another thread meanwhile gets what it asks for.
+# A thread that draws pictures meanwhile gets what it asks for.
 sys.meta_path.insert(0, _WithoutMatplotlib())
 thread = threading.Thread(target=lambda: __import__("matplotlib"))
 thread.start()

@@ -341,7 +341,7 @@ def test_events_happen_with_their_data_and_are_taken_back() -> None:
             told = await done(page, "event", line="open")
             assert (told["kind"], told["steps"]) == ("wrong", 0)
             assert "open.request' is not allowed now: requirement open needs Sensor.light = day" in told["lines"][0]
-            # What is not given is unknown, and stays so.
+            # Data that is not given is unknown, and stays so.
             told = await done(page, "event", line="light.response")
             assert (told["kind"], told["steps"]) == ("unknown", 1)
             assert told["lines"][1] == "value is night by default: an earlier rule is unknown"
@@ -456,7 +456,7 @@ def test_a_saved_file_says_what_has_changed_and_the_run_happens_again() -> None:
             files.made.set_result(made_of(changed.replace("needs Sensor.light = day and", "needs Gate.opened and")))
             await files.look()
             told = await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
-            # What cannot happen any more ends it there.
+            # An event that cannot happen any more ends it there.
             assert told["steps"] == 1
             assert any(line.startswith("of 2 events 1 happened again: 'open.request' is") for line in told["lines"])
             assert "no longer found: warning: shut never happens [never-enabled]" in told["lines"]

@@ -143,7 +143,7 @@ def test_what_is_missing_comes_with_a_fix(
     assert found.grade is Grade.MISSING
     assert found.message and found.fix
     assert not is_ready(examine(machine, [purpose]))
-    # What another purpose needs is no more than a note.
+    # A need of another purpose is no more than a note.
     if purpose is not Purpose.SYNTH:
         assert is_ready(examine(machine))
         assert problems(machine)[part].grade is Grade.NOTE

@@ -15,7 +15,7 @@ WANTED_OF_EACH = 0.9
 WANTED_OF_SOME = {
     # The language often has no word: nothing that a machine could obey would make a good model of it.
     "Behaviour trees": 0.6,
-    # Of nested parentheses over several lines nobody knows which one lacks its end.
+    # Nested parentheses over several lines do not tell which one lacks its end.
     "missing comma or bracket": 0.75,
 }
 """Share of each category in which a person has to think."""

@@ -257,7 +257,7 @@ def test_silent_steps_come_first() -> None:
     run = robosc.simulate(supervisor_of(text))
     taken = run.walk(50, 2)
     pairs = [(step.event, after.event) for step, after in itertools.pairwise(taken) if step.event.startswith("ask.")]
-    # Of several silent steps resets are the first.
+    # Resets are the first of several silent steps.
     assert {("ask.request", "S.tau_1"), ("ask.response", "ask.reset"), ("ask.error", "ask.reset")} <= set(pairs)
     assert len(set(pairs)) == 4
 

@@ -276,7 +276,7 @@ class TestNothingIsLeft:
         for text in ("echo", "exit 1", "die 11", "garbage", "raise") * 4:
             running.run(text)
         assert eventually(is_at_rest)
-        # What earlier tests have left may have been closed meanwhile.
+        # Leftovers of earlier tests may have been closed meanwhile.
         assert eventually(lambda: open_descriptors() <= before)
 
     def test_workers_end_also_where_a_burial_ends_that_very_moment(self) -> None:

@@ -143,7 +143,12 @@ class SdkPort(PortHandler):  # type: ignore[misc]
         return data
 
     def clearPort(self) -> None:
+        """Discard all that the line has sent, also what the kernel has not yet carried to this end."""
+        wait_until(self._is_clear)
+
+    def _is_clear(self) -> bool:
         self.readPort(self.ser.in_waiting)
+        return self._read == self._line.sent
 
     def isPacketTimeout(self) -> bool:
         is_over = self._line.has_answered(self._written) and self._read == self._line.sent

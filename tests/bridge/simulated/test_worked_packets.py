@@ -7,6 +7,7 @@ import pytest
 
 from robosc.execution.runtime.clock import ManualClock
 from robosc_simulated import SimulatedTurtleBot3
+from support.waiting import wait_until
 from support.wire import Host
 
 OK_200 = "ff ff fd 00 c8 04 00 55 00 19 2d"
@@ -69,6 +70,8 @@ def test_opencr_answers_a_recalibration_when_it_is_done(board: tuple[SimulatedTu
     robot, host = board
     host.send("ff ff fd 00 c8 06 00 03 3b 00 01 17 a5")
     host.send("ff ff fd 00 c8 03 00 01 3b fa")
+    # The five seconds begin when the board hears the first of the two.
+    wait_until(lambda: robot.base_line.received == 13 + 10)
     assert host.hears_nothing()
     robot.advance(4.9)
     assert host.hears_nothing()

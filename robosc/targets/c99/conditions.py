@@ -1,14 +1,12 @@
 """Generated functions that tell whether a controllable event is allowed now, and which requirements hold."""
 
-from robosc.expressions import conjuncts
 from robosc.supervisor import DecisionNode
 from robosc.targets.c99.expressions import number_code
-from robosc.targets.c99.text import comment
+from robosc.targets.c99.statements import statement_lines, unused
 from robosc.targets.c99.unit import Reading, Unit
-from robosc.targets.code.conditions import Conditions, node_words
-from robosc.targets.code.expressions import Code, Kind, Sort, call, operation, place
-from robosc.targets.code.text import indent
-from robosc.targets.model_text import requirement_text
+from robosc.targets.code.conditions import Condition, Conditions
+from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, Kind, Sort, call, operation, variable
+from robosc.targets.code.statements import Assign, Block, Comment, Return, Statement, when
 
 _SIGNATURE = "const state_t *s"
 
@@ -21,58 +19,47 @@ class CConditions(Conditions):
     """
 
     def __init__(self, unit: Unit) -> None:
-        self._reading = Reading(unit)
         self._unit = unit
         self._layout = unit.layout
-        super().__init__(unit.layout.supervisor, unit.system, self._reading)
+        super().__init__(unit.layout.supervisor, unit.system, Reading(unit))
 
     def allow_function(self, event: str) -> list[str]:
         """The function that tells whether an event is allowed: plants, ranges, requirements, then the supervisor."""
-        lines = [f"static bool {self._layout.function('allows', event)}({_SIGNATURE})", "{", "    (void)s;"]
+        body = unused("s")
         for words, code in self.enabling(event):
-            lines += indent([*(comment(words) if words else []), *self._reading.unless(code, "return false;")])
-        return [*lines, "    return true;", "}"]
+            body += [Comment(words), when(self._scope.negated(code), Return(FALSE_CODE))]
+        head = f"static bool {self._layout.function('allows', event)}({_SIGNATURE})"
+        return self._unit.definition(head, [*body, Return(TRUE_CODE)])
 
     def requirements_function(self, communication: str) -> list[str]:
         """The function that tells for each requirement on a request whether it holds."""
-        body = []
-        for number, requirement in enumerate(self._layout.model.requirements_on(communication)):
-            body += comment(requirement_text(requirement))
-            body.append(f"holds[{number}] = {self._unit.text(self._reading.truth(requirement.condition))};")
-        return self._filling("requirements", communication, body)
+        return self._filling("requirements", communication, self.requirements(communication))
 
     def conjuncts_function(self, communication: str) -> list[str]:
         """The function that tells for each top-level conjunct of the requirements whether it holds."""
-        parts = [
-            part
-            for requirement in self._layout.model.requirements_on(communication)
-            for part in conjuncts(requirement.condition)
-        ]
-        body = [f"holds[{number}] = {self._unit.text(self._reading.truth(part))};" for number, part in enumerate(parts)]
-        return self._filling("conjuncts", communication, body)
+        return self._filling("conjuncts", communication, self.conjuncts(communication))
 
-    def _filling(self, purpose: str, communication: str, body: list[str]) -> list[str]:
+    def _filling(self, purpose: str, communication: str, items: list[Condition]) -> list[str]:
+        body: list[Statement] = unused("s", "holds")
+        for number, (words, code) in enumerate(items):
+            body += [Comment(words), Assign(variable(f"holds[{number}]"), code)]
         head = f"static void {self._layout.function(purpose, communication)}({_SIGNATURE}, bool *holds)"
-        return [head, "{", "    (void)s;", "    (void)holds;", *indent(body), "}"]
+        return self._unit.definition(head, body)
 
     def _node_call(self, number: int) -> Code:
         return call(f"node_{number + 1}", Code(Kind.PLACE, "s"))
 
-    def _node_function(self, number: int, node: DecisionNode, branches: tuple[Code, ...]) -> list[str]:
-        lines = [*comment(node_words(node)), f"static bool node_{number + 1}({_SIGNATURE})", "{", "    (void)s;"]
+    def _node_function(self, number: int, words: str, body: Block) -> list[str]:
+        head = f"static bool node_{number + 1}({_SIGNATURE})"
         with self._unit.uses_apart() as self._unit.uses[f"node_{number + 1}"]:
-            for end, branch in list(zip(node.starts[1:], branches, strict=False)):
-                test = self._unit.text(self._is_before(node, end))
-                lines += indent([f"if ({test}) {{", f"    return {self._unit.text(branch)};", "}"])
-            return [*lines, f"    return {self._unit.text(branches[-1])};", "}"]
+            return [*statement_lines([Comment(words)]), *self._unit.definition(head, [*unused("s"), *body])]
 
-    def _is_before(self, node: DecisionNode, end: int) -> Code:
-        """Return the code that tests whether the subject's value stands before place `end` of its domain."""
+    def _node_test(self, node: DecisionNode, start: int, end: int) -> Code:
         domain = self._formulas.domains[node.automaton, node.variable]
         if node.variable is None:
             # Locations are numbered in the order of their domain.
-            return operation("below", Code(Kind.PLACE, self._reading.location(node.automaton)), number_code(end))
-        subject = place(*self._reading.variable(node.automaton, node.variable))
+            return operation("below", self._scope.location_place(node.automaton), number_code(end))
+        subject = self._scope.variable_place(node.automaton, node.variable)
         if isinstance(domain[0], bool):
             return self._scope.negated(subject)
         return operation("below", subject, number_code(int(domain[end]) if subject.sort is Sort.INTEGER else end))

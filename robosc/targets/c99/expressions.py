@@ -4,9 +4,9 @@ What stands for unknown (language B.4): -1 for a boolean and an enum, INT64_MIN 
 for a text. Integers are worked out in 64 bits, so that a result beyond 32 bits is noticed before it overflows.
 """
 
-from abc import abstractmethod
+from dataclasses import replace
 
-from robosc.expressions import MINIMUM_INTEGER, IntegerType, Type
+from robosc.expressions import MINIMUM_INTEGER
 from robosc.targets.c99.text import string_literal
 from robosc.targets.code.expression_writer import OPPOSITE, ExpressionWriter
 from robosc.targets.code.expressions import (
@@ -19,9 +19,9 @@ from robosc.targets.code.expressions import (
     Sort,
     Unknown,
     call,
+    double,
     literal,
     operation,
-    place,
 )
 
 # Whatever is no atom stands in parentheses; only conditions that guard an access are joined without.
@@ -31,6 +31,9 @@ _OTHER, _GUARD, ATOM = range(3)
 def _infix(operator: str) -> Shape:
     return Shape(f"{{}} {operator} {{}}", _OTHER, (ATOM, ATOM))
 
+
+_CASTS = ("void", "double", "int64_t", "int32_t", "uint8_t", "uint16_t", "uint32_t")
+"""Types that a value is converted to."""
 
 C = Language(
     {
@@ -48,8 +51,19 @@ C = Language(
         "if": Shape("{} ? {} : {}", _OTHER, (ATOM,) * 3),
         "if there": Shape("{} ? {} : {}", _OTHER, (ATOM, ATOM, _OTHER)),
         "has element": Shape("{} != NULL && {} > {}", _GUARD, (ATOM,) * 3),
-        "int64": Shape("(int64_t){}", _OTHER, (ATOM,)),
-        "double": Shape("(double){}", _OTHER, (ATOM,)),
+        **{name: Shape(f"({name}){{}}", _OTHER, (ATOM,)) for name in _CASTS},
+        "between": Shape("{1} >= {0} && {1} <= {2}", _GUARD, (_OTHER, ATOM, _OTHER)),
+        "is given": Shape("{} != NULL", _GUARD, (ATOM,)),
+        "is set": Shape("({} != 0)", ATOM, (ATOM,)),
+        "not all": Shape("!({})", _GUARD, (_OTHER,)),
+        "truth": Shape("({}) != 0", _OTHER, (_OTHER,)),
+        "unknown boolean": Shape("{} < 0", _GUARD, (ATOM,)),
+        "unknown enum": Shape("{} < 0", _GUARD, (ATOM,)),
+        "unknown integer": Shape("{} == INT64_MIN", _GUARD, (ATOM,)),
+        "unknown double": Shape("!isfinite({})", _GUARD, (_OTHER,)),
+        "unknown text": Shape("{} == NULL", _GUARD, (ATOM,)),
+        "item": Shape("{}[{}]", ATOM, (ATOM, _OTHER)),
+        "increment": Shape("{}++", _OTHER, (ATOM,)),
     },
     sign=_OTHER,
     atom=ATOM,
@@ -97,14 +111,10 @@ def unknown_as(sort: Sort) -> Unknown:
     return Unknown.NAN if sort is Sort.DOUBLE else Unknown.VALUE
 
 
-def low_text(number: int) -> str:
-    """A 32-bit number as C, the least one too."""
-    return str(number) if number > MINIMUM_INTEGER else "(-2147483647 - 1)"
-
-
 def number_code(number: int) -> Code:
-    """A 32-bit number without the suffix of 64 bits, as an argument of a function."""
-    return literal(low_text(number), Sort.INTEGER, number)
+    """A 32-bit number without the suffix of 64 bits."""
+    is_least = number == MINIMUM_INTEGER
+    return literal("(-2147483647 - 1)" if is_least else str(number), Sort.INTEGER, number, number < 0 and not is_least)
 
 
 def _tested(code: Code) -> tuple[Code, str, bool] | None:
@@ -114,7 +124,7 @@ def _tested(code: Code) -> tuple[Code, str, bool] | None:
             return code, "true", True
         case Code(kind=Kind.OPERATION, word="not", operands=(Code(kind=Kind.PLACE) as place_,)):
             return place_, "true", False
-        case Code(kind=Kind.OPERATION, word="=" | "!=" as word, operands=(left, Code(kind=Kind.LITERAL) as right)):
+        case Code(kind=Kind.OPERATION, word="=" | "!=" as word, operands=(left, right)) if right.is_literal:
             return (left, right.word, word == "=") if right.sort in (Sort.INTEGER, Sort.ENUM) else None
     return None
 
@@ -131,30 +141,27 @@ def _is_decided(operator: str, operands: tuple[Code, ...]) -> bool:
 class CWriter(ExpressionWriter):
     """Writer of expressions in C; what they read is left open."""
 
-    @abstractmethod
-    def variable(self, component: str, name: str) -> tuple[str, Type]:
-        """Text and type of a variable."""
-
     def _constant_code(self, constant: bool | int | float | str) -> Code:
         match constant:
             case bool():
                 return TRUE_CODE if constant else FALSE_CODE
             case int() if constant < 0:
                 text = str(constant) if constant > MINIMUM_INTEGER else "-2147483647 - 1"
-                return literal(text, Sort.INTEGER, constant)
+                return literal(text, Sort.INTEGER, constant, is_signed=True)
             case int():
                 return literal(f"INT64_C({constant})", Sort.INTEGER, constant)
             case float():
-                return literal(repr(constant), Sort.DOUBLE)
+                return double(constant)
             case str():
                 return literal(string_literal(constant), Sort.TEXT)
 
     def variable_code(self, component: str, variable: str) -> Code:
         """The code that reads a variable."""
-        text, type_ = self.variable(component, variable)
-        if isinstance(type_, IntegerType):  # Small members would be added as `int`, which may have 16 bits.
-            return operation("int64", place(text, type_)).typed(type_)
-        return place(text, type_)
+        found = self.variable_place(component, variable)
+        if found.sort is not Sort.INTEGER:
+            return found
+        # Small members would be added as `int`, which may have 16 bits.
+        return replace(found, kind=Kind.OPERATION, word="int64_t", operands=(found,))
 
     def _kleene_call(self, function: str, *arguments: Code, sort: Sort = Sort.BOOLEAN) -> Code:
         name = f"{_FUNCTIONS.get(function, function)}_{_TYPES[arguments[-1].sort][1]}"

@@ -24,9 +24,9 @@ from robosc.supervisor import Supervisor
 from robosc.targets.c99.layer import request_declarations
 from robosc.targets.c99.layout import Layout, data_that_comes, event_data, width
 from robosc.targets.c99.provide import request_field, request_struct
-from robosc.targets.c99.step import unknown_name
-from robosc.targets.c99.text import comment, safe
-from robosc.targets.c99.unit import Unit, declared, plain_type
+from robosc.targets.c99.received import unknown_name
+from robosc.targets.c99.text import comment, declared, pointer_to, safe
+from robosc.targets.c99.unit import Unit, plain_type
 from robosc.targets.code.text import indent
 from robosc.targets.model_text import requirement_texts
 
@@ -260,8 +260,7 @@ def _received_types(layout: Layout) -> list[str]:
         if isinstance(type_, ArrayType):
             visit(type_.element)
             raw = layout.raw(type_.element)
-            items = f"{raw}const *items;" if raw.endswith("*") else f"const {raw} *items;"
-            body = [items, "size_t length;"]
+            body = [f"{pointer_to(raw, 'items')};", "size_t length;"]
             words = "An array; `items` is NULL where none came."
         else:
             body = []

@@ -4,7 +4,7 @@ from robosc.model.structure import CommunicationKind
 from robosc.targets.c99.example import CANCEL, main_text
 from robosc.targets.c99.layer import request_parameters
 from robosc.targets.c99.layout import Layout
-from robosc.targets.c99.step import unknown_name
+from robosc.targets.c99.received import unknown_name
 from robosc.targets.c99.unit import Unit
 from robosc.targets.code.text import indent
 

@@ -4,22 +4,13 @@ from robosc.errors import InternalError
 from robosc.expressions.text import expression_text
 from robosc.model.received import received_paths
 from robosc.model.structure import Communication, CommunicationKind, EventKind
-from robosc.targets.c99.header import reply_head
 from robosc.targets.c99.layer import call_head, cancel_head, goal_head, request_head, request_parameters
-from robosc.targets.c99.layout import Layout, event_data, possible_messages, request_data, told_apart
-from robosc.targets.c99.received import Reader
-from robosc.targets.c99.step import unknown_name
-from robosc.targets.c99.text import comment
-from robosc.targets.c99.unit import Lvalue, Reading, Unit
-from robosc.targets.code.text import indent
-
-_LOOK = "look_at_clock(r, now_us);"
-
-
-def happen_call(layout: Layout, event: str) -> str:
-    """The statement that lets an event of the environment happen with the data that came."""
-    data = ["data"] if event_data(layout.model, event) is not None else []
-    return f"(void){layout.function('happens', event)}({', '.join(['r', *data, 'false'])});"
+from robosc.targets.c99.layout import Layout, possible_messages, request_data, told_apart
+from robosc.targets.c99.received import NO_NOTES, Reader
+from robosc.targets.c99.statements import unused
+from robosc.targets.c99.unit import Reading, Unit
+from robosc.targets.code.expressions import call, variable
+from robosc.targets.code.statements import Assign, Comment, Return, Statement
 
 
 def request_functions(unit: Unit) -> list[list[str]]:
@@ -51,29 +42,21 @@ def _match_function(unit: Unit, item: Communication) -> list[str]:
     if item.when is None:
         raise InternalError(f"{item.name} has no condition")
     parameters = [f"{layout.prefix}_t *r", *([] if data is None else [layout.parameter(data, "data")]), "bool *is_this"]
-    lines = ["notes_t notes = {false, false};"]
-    reading = Reading(unit, None)
+    body: list[Statement] = [NO_NOTES]
+    scope = Reading(unit)
     if data is not None:
-        is_pointer = layout.is_by_pointer(data)
-        reader = Reader(unit, data, Lvalue("data", is_pointer), "&notes")
+        reader = Reader(unit, data, "&notes")
         for path in received_paths(item.when):
             reader.read(path)
-        if is_pointer:
-            lines += ["if (data == NULL) {", f"    data = &{unknown_name(layout.raw(data))};", "}"]
-        else:
-            lines.append("(void)data;")
-        lines += reader.take_lines()
-        lines += [f"(void){name};" for name in reader.names]
-        reading = Reading(unit, None, reader.read, data)
-    return [
-        f"static int {layout.function('matches', item.name)}({', '.join(parameters)})",
-        "{",
-        *indent(lines),
-        *indent(comment(f"when: {expression_text(item.when)}")),
-        f"    *is_this = {unit.text(reading.truth(item.when))};",
-        f"    return judge_notes(r, {layout.events[item.event(EventKind.REQUEST)]}, &notes);",
-        "}",
+        body += [*(reader.default() or unused("data")), *reader.take_used()]
+        scope = reader.scope
+    name = variable(layout.events[item.event(EventKind.REQUEST)])
+    body += [
+        Comment(f"when: {expression_text(item.when)}"),
+        Assign(variable("*is_this"), scope.truth(item.when)),
+        Return(call("judge_notes", variable("r"), name, variable("&notes"))),
     ]
+    return unit.definition(f"static int {layout.function('matches', item.name)}({', '.join(parameters)})", body)
 
 
 def _recognition(layout: Layout, identifier: str, places: dict[str, int]) -> list[list[str]]:
@@ -116,47 +99,3 @@ def _request_function(layout: Layout, identifier: str, places: dict[str, int]) -
         call = f"{layout.function('recognizes', identifier)}({', '.join(['r', *names, '&request'])})"
         lines += ["    int request = 0;", "    if (why == LET_THROUGH) {", f"        why = {call};", "    }"]
     return [*lines, f"    let_message_through(r, {topic}, {request}, why, &what);", "}"]
-
-
-def reply_functions(layout: Layout) -> list[list[str]]:
-    """The functions through which answers of the robot come; they are handed on to the caller."""
-    result = []
-    for place, item in enumerate(layout.of_kind(CommunicationKind.SERVICE)):
-        event = item.event(EventKind.RESPONSE)
-        body = [
-            "bool is_well = true;",
-            "bool is_awaited = false;",
-            _LOOK,
-            f"is_awaited = r->calls[{place}].is_awaited && r->calls[{place}].id == id;",
-            f"if (close_call(r, {place}, id)) {{",
-            f"    {happen_call(layout, event)}",
-            "    is_well = end_batch(r);",
-            "}",
-            f"answer_caller(r, {place}, is_awaited, message);",
-            "guard(r, is_well);",
-            "finish(r);",
-        ]
-        result.append([reply_head(layout, event), "{", *indent(body), "}"])
-    for place, item in enumerate(layout.of_kind(CommunicationKind.ACTION)):
-        for kind in (EventKind.FEEDBACK, EventKind.RESPONSE):
-            event = item.event(kind)
-            ends = f"end_for_caller(r, {place}, {layout.upper}_END_SUCCEEDED, message);"
-            is_end = kind is EventKind.RESPONSE
-            body = [
-                "bool is_well = true;",
-                _LOOK,
-                f"if (has_goal(r, {place}, id)) {{",
-                *([f"    close_goal(r, {place});"] if is_end else []),
-                f"    if (r->goals[{place}].is_running) {{",
-                f"        {happen_call(layout, event)}",
-                "        is_well = end_batch(r);",
-                "    } else {",
-                f"        unexpected(r, (int){layout.events[event]});",
-                "    }",
-                f"    {ends if is_end else f'pass_feedback(r, {place}, message);'}",
-                "}",
-                "guard(r, is_well);",
-                "finish(r);",
-            ]
-            result.append([reply_head(layout, event), "{", *indent(body), "}"])
-    return result

@@ -22,6 +22,7 @@ from robosc.expressions import (
 from robosc.model.structure import Communication, CommunicationKind, Deployment, EventKind, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.c99.naming import CNamer, prefix_for
+from robosc.targets.c99.text import declared
 
 # Names of the engine itself after the prefix.
 _ENGINE_NAMES = """
@@ -169,7 +170,7 @@ class Layout:
         raw = self.raw(type_)
         if self.is_by_pointer(type_):
             return f"const {raw} *{name}"
-        return f"{raw}{'' if raw.endswith('*') else ' '}{name}"
+        return declared(raw, name)
 
     def source(self, type_: Type) -> Type:
         """Return the type as which received data of a type comes: an enum's source, else the type itself."""

@@ -2,22 +2,18 @@
 
 from dataclasses import dataclass, field
 
-from robosc.expressions import (
-    BooleanType,
-    DoubleType,
-    EnumType,
-    IntegerType,
-    ObjectType,
-    Type,
-)
+from robosc.expressions import BooleanType, DoubleType, EnumType, IntegerType, ObjectType, Type
 from robosc.model.structure import Communication, ObjectValue, ProvidedValue
-from robosc.targets.c99.expressions import ATOM
 from robosc.targets.c99.naming import CNamer
-from robosc.targets.c99.text import comment
-from robosc.targets.c99.unit import Reading, Unit, declared, plain_type
-from robosc.targets.code.expressions import TRUE_CODE, Sort
+from robosc.targets.c99.statements import unused
+from robosc.targets.c99.text import declared
+from robosc.targets.c99.unit import Reading, Unit, plain_type
+from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, operation, variable
+from robosc.targets.code.provide import first_provided
+from robosc.targets.code.statements import Assign, Block, Let, Return, when
 from robosc.targets.code.text import indent
-from robosc.targets.model_text import provide_text
+
+_GIVEN = Return(TRUE_CODE)
 
 
 @dataclass
@@ -79,92 +75,62 @@ def request_struct(found: Field) -> list[str]:
 
 def provide_function(unit: Unit, item: Communication) -> list[str]:
     """The function that gives a request's data, of the first statement whose condition is true; false if unknown."""
-    reading = Reading(unit)
-    name, prefix = unit.layout.function("provides", item.name), unit.layout.prefix
-    head = f"static bool {name}(const state_t *s, {prefix}_request_t *request)"
-    lines = [head, "{", "    (void)s;", "    (void)request;"]
-    root = request_field(unit, item)
-    for statement in unit.layout.model.provides_for(item.name):
-        condition = TRUE_CODE if statement.condition is None else reading.truth(statement.condition)
-        lines += indent(comment(provide_text(statement)))
-        result = _result(unit, item, root, statement.value)
-        if condition == TRUE_CODE:
-            return [*lines, *indent(result), "}"]
-        lines += [f"    if ({unit.text(condition)}) {{", *indent(result, 2), "    }"]
-    return [*lines, "    return true;", "}"]
+    name, statements = unit.layout.function("provides", item.name), unit.layout.model.provides_for(item.name)
+    head = f"static bool {name}(const state_t *s, {unit.layout.prefix}_request_t *request)"
+    root, place = request_field(unit, item), f"request->data.{unit.layout.request_members[item.name]}"
+    chosen = first_provided(statements, Reading(unit), lambda value: _result(unit, root, value, place), _GIVEN)
+    return unit.definition(head, [*unused("s", "request"), *chosen])
 
 
-def _result(unit: Unit, item: Communication, root: Field | None, provided: ProvidedValue) -> list[str]:
+def _result(unit: Unit, root: Field | None, provided: ProvidedValue, place: str) -> Block:
     """Statements that store the data; where a part may be unknown, all parts are tested before."""
-    tests: list[str] = []
-    stores: list[str] = []
-    lines: list[str] = []
+    held: list[Let] = []
+    stores: list[Assign] = []
     if root is not None:
-        _store(unit, root, provided, f"request->data.{unit.layout.request_members[item.name]}", (lines, tests, stores))
-    if tests:
-        lines += [f"if ({' || '.join(tests)}) {{", "    return false;", "}"]
-    return [*lines, *stores, "return true;"]
+        _store(unit, root, provided, place, held, stores)
+    tests = [operation(f"unknown {item.value.sort.value}", item.place) for item in held]
+    refusal = [when(operation("or", *tests), Return(FALSE_CODE))] if tests else []
+    return [*held, *refusal, *stores, _GIVEN]
 
 
 def _store(
-    unit: Unit, found: Field, provided: ProvidedValue, place: str, into: tuple[list[str], list[str], list[str]]
+    unit: Unit, found: Field, provided: ProvidedValue, place: str, held: list[Let], stores: list[Assign]
 ) -> None:
-    lines, tests, stores = into
     if isinstance(provided, ObjectValue):
         for name, inner in provided.properties:
             member, part = found.parts[name]
-            if isinstance(part.type, ObjectType):
-                _store(unit, part, inner, f"{place}.{member}", into)
-            else:
-                _store(unit, part, inner, place, into)
+            _store(unit, part, inner, f"{place}.{member}" if isinstance(part.type, ObjectType) else place, held, stores)
         return
-    reading = Reading(unit)
-    code = reading.value(provided)
+    code = Reading(unit).value(provided)
     if isinstance(found.type, DoubleType):
-        code = reading.as_double(code)
-    text = unit.text(code)
+        code = Reading(unit).as_double(code)
     if not code.is_known:
-        text = f"data_{len(tests) + 1}"
-        lines.append(unit.local(code, text))
-        tests.append(
-            {
-                Sort.DOUBLE: f"!isfinite({text})",
-                Sort.TEXT: f"{text} == NULL",
-                Sort.INTEGER: f"{text} == INT64_MIN",
-            }.get(code.sort, f"{text} < 0")
-        )
-    stores.append(f"{place}.{found.flag} = true;")
-    stores.append(
-        f"{place}.{found.value} = {_stored(unit, found.type, text, unit.text(code, ATOM) if code.is_known else text)};"
-    )
+        held.append(Let(code.held_in(f"data_{len(held) + 1}"), code))
+        code = held[-1].place
+    stores.append(Assign(variable(f"{place}.{found.flag}"), TRUE_CODE))
+    stores.append(Assign(variable(f"{place}.{found.value}"), _stored(unit, found.type, code)))
 
 
-def _stored(unit: Unit, type_: Type, text: str, atom: str) -> str:
+def _stored(unit: Unit, type_: Type, code: Code) -> Code:
     match type_:
         case BooleanType():
-            return f"({text}) != 0"
+            return operation("truth", code)
         case IntegerType():
-            return f"(int32_t){atom}"
+            return operation("int32_t", code)
         case EnumType(name=name):
             values = ", ".join(f'"{item}"' for item in unit.layout.model.enum(name).values)
-            return f"((const char *const[]){{{values}}})[{text}]"
+            return operation("item", variable(f"((const char *const[]){{{values}}})"), code)
         case _:
-            return text
+            return code
 
 
 def default_function(unit: Unit, item: Communication) -> list[str]:
     """The function that tells whether a request's data is all default."""
-    prefix = unit.layout.prefix
-    lines = [
-        f"static bool {unit.layout.function('is_default', item.name)}(const {prefix}_request_t *request)",
-        "{",
-        "    (void)request;",
-    ]
-    root = request_field(unit, item)
-    if root is not None:
-        for test in _non_default(root, f"request->data.{unit.layout.request_members[item.name]}"):
-            lines += indent([f"if ({test}) {{", "    return false;", "}"])
-    return [*lines, "    return true;", "}"]
+    name, root = unit.layout.function("is_default", item.name), request_field(unit, item)
+    place = f"request->data.{unit.layout.request_members[item.name]}"
+    tests = [] if root is None else _non_default(root, place)
+    body = [*unused("request"), *(when(variable(test), Return(FALSE_CODE)) for test in tests), _GIVEN]
+    return unit.definition(f"static bool {name}(const {unit.layout.prefix}_request_t *request)", body)
 
 
 def _non_default(found: Field, place: str) -> list[str]:

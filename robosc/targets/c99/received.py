@@ -1,83 +1,84 @@
 """Generated code that reads received data into local variables, and makes enums of it."""
 
-from dataclasses import dataclass, field
-
-from robosc.expressions import (
-    ArrayType,
-    EnumType,
-    IntegerType,
-    ObjectType,
-    Type,
-)
-from robosc.expressions.text import expression_text
+from robosc.expressions import ArrayType, EnumType, IntegerType, ObjectType, Type
 from robosc.model.received import Path
 from robosc.model.structure import EnumDefinition
-from robosc.targets.c99.expressions import c_type
 from robosc.targets.c99.naming import CNamer
-from robosc.targets.c99.text import comment
-from robosc.targets.c99.unit import Lvalue, Reading, Unit, declared
-from robosc.targets.code.expression_writer import may_compute
-from robosc.targets.code.expressions import TRUE_CODE, Code
+from robosc.targets.c99.statements import unused
+from robosc.targets.c99.unit import Lvalue, Reading, Unit
+from robosc.targets.code.expressions import TRUE_CODE, Code, Sort, call, literal, operation, variable
+from robosc.targets.code.received import ReceivedReader
+from robosc.targets.code.statements import Assign, Do, If, Let, Return, Statement, when
 from robosc.targets.code.text import indent
-from robosc.targets.paths import path_type
+
+NAMES = frozenset({"data", "notes", "s", "old", "skipped", "r"})
+"""Names that functions use on their own."""
+
+NO_NOTES = Let(variable("notes"), literal("{false, false}", Sort.TEXT), "notes_t")
+"""The declaration of what is noted about received data."""
+
+_DATA, _NULL = variable("data"), literal("NULL", Sort.TEXT)
 
 
-@dataclass
-class Reader:
-    """Writer of declarations that read paths of one received datum; each path is read once.
+class Reader(ReceivedReader):
+    """Builds declarations that read paths of one received datum.
 
-    Attributes:
+    Args:
         unit: The file.
         root: Type of the datum.
-        lvalue: Place of the datum.
         notes: Text of the address of what is noted.
     """
 
-    unit: Unit
-    root: Type
-    lvalue: Lvalue
-    notes: str
-    names: dict[str, None] = field(default_factory=dict)
-    _lines: list[str] = field(default_factory=list)
-    _codes: dict[Path, Code] = field(default_factory=dict)
-    _namer: CNamer = field(default_factory=lambda: CNamer(frozenset({"data", "notes", "s", "old", "skipped", "r"})))
+    def __init__(self, unit: Unit, root: Type, notes: str) -> None:
+        super().__init__(unit.layout.model, root, CNamer(NAMES))
+        self._unit, self._notes = unit, notes
+        self._is_pointer = unit.layout.is_by_pointer(root)
+        self._place = Lvalue("data", self._is_pointer)
 
-    def read(self, path: Path) -> Code:
-        """The code of a path."""
-        if path not in self._codes:
-            self._codes[path] = self._read(path)
-        return self._codes[path]
+    @property
+    def scope(self) -> Reading:
+        """Writer of conditions on the datum."""
+        return Reading(self._unit, received=self.read, root=self._root)
 
-    def type_at(self, path: Path) -> Type:
-        """The type of a path."""
-        return path_type(self.unit.layout.model, self.root, path)
+    def default(self) -> list[Statement]:
+        """The statements that give a datum in which everything is unknown where none came."""
+        if not self._is_pointer:
+            return []
+        nothing = variable(f"&{unknown_name(self._unit.layout.raw(self._root))}")
+        return [when(operation("=", _DATA, _NULL), Assign(_DATA, nothing))]
 
-    def take_lines(self) -> list[str]:
-        """The declarations since the last call."""
-        lines, self._lines = self._lines, []
-        return lines
+    def take_used(self) -> list[Statement]:
+        """The declarations since the last call, none of which a compiler calls unused."""
+        found = self.take()
+        return [*found, *unused(*(item.place.word for item in found if isinstance(item, Let)))]
 
-    def _read(self, path: Path) -> Code:
-        code, type_ = self.unit.part(self.lvalue, self.root, path, self.notes), self.type_at(path)
-        name = self._namer.name("_".join(["value", *map(str, path)]))
-        self.names[name] = None
-        is_array = isinstance(type_, ArrayType)
-        held = f"const {self.unit.layout.raw(type_)} *" if is_array else c_type(code.sort)
-        # The text itself is constant already; of everything else the local variable is.
-        constant = "" if is_array or held.endswith("*") else "const "
-        self._lines.append(f"{constant}{declared(held, name)} = {self.unit.text(code)};")
-        if is_array:
-            notable = note_function(self.unit, type_)
-            if notable:
-                self.unit.used.add(notable)
-                self._lines.append(f"{notable}({name}, {self.notes});")
-        return code.held_in(name)
+    def _read(self, path: Path, type_: Type) -> Code:
+        value = self._unit.part(self._place, self._root, path, self._notes)
+        code = value.held_in(self.local(path))
+        if not isinstance(type_, ArrayType):
+            self._statements.append(Let(code, value))
+            return code
+        self._statements.append(Let(code, value, f"const {self._unit.layout.raw(type_)} *"))
+        if notable := note_function(self._unit, type_):
+            self._statements.append(Do(call(notable, code, variable(self._notes))))
+        return code
+
+    def _result(self, value: Code) -> Return:
+        return Return(value)
+
+    def _undecided(self, enum: EnumDefinition, test: Code) -> If:
+        members = (variable(f"notes->{name}") for name in ("is_unknown", "is_enum_unknown"))
+        is_noted = operation("and", operation("is given", variable("notes")), operation("not all", test))
+        return when(is_noted, *(Assign(member, TRUE_CODE) for member in members))
 
 
-def note_function(unit: Unit, type_: Type) -> str | None:
+def unknown_name(raw: str) -> str:
+    """The constant of an object type in which everything is unknown."""
+    return f"{raw.removesuffix('_t')}_unknown"
+
+
+def note_function(unit: Unit, type_: ArrayType) -> str | None:
     """The function that notes what is unknown in an array's elements, or None if nothing can be noted."""
-    if not isinstance(type_, ArrayType):
-        return None
     with unit.uses_apart() as uses:
         body = _notes_on(unit, Lvalue("array->items[k]"), type_.element)
     if not body:
@@ -123,36 +124,5 @@ def converter_head(unit: Unit, enum: EnumDefinition) -> str:
 def converter(unit: Unit, enum: EnumDefinition) -> list[str]:
     """The function that makes an enum out of received data, as a readable chain of conditions."""
     with unit.uses_apart() as unit.uses[unit.layout.converters[enum.name]]:
-        return [converter_head(unit, enum), "{", *indent(_conversion(unit, enum)), "}"]
-
-
-def _conversion(unit: Unit, enum: EnumDefinition) -> list[str]:
-    lvalue = Lvalue("data", unit.layout.is_by_pointer(enum.source))
-    reader = Reader(unit, enum.source, lvalue, "notes")
-    reading = Reading(unit, None, reader.read, enum.source)
-    values = unit.layout.values
-    body = ["(void)data;", "(void)notes;"]
-    all_false = TRUE_CODE
-    for rule in enum.rules:
-        fires = reading.truth(rule.condition)
-        all_false = reading.both(all_false, reading.falsity(rule.condition))
-        # What only a later rule needs is not read before that rule's turn.
-        body += _declared_and_used(reader)
-        body += comment(f"{expression_text(rule.condition)} -> {rule.value}")
-        body += [f"if ({unit.text(fires)}) {{", f"    return {values[enum.name, rule.value]};", "}"]
-    body += comment(f"default -> {enum.default}")
-    if may_compute(rule.condition for rule in enum.rules):
-        body += [
-            f"if (notes != NULL && !({unit.text(all_false)})) {{",
-            "    notes->is_unknown = true;",
-            "    notes->is_enum_unknown = true;",
-            "}",
-        ]
-    return [*body, f"return {values[enum.name, enum.default]};"]
-
-
-def _declared_and_used(reader: Reader) -> list[str]:
-    """The declarations, none of which a compiler may call unused."""
-    lines = reader.take_lines()
-    names, reader.names = list(reader.names), {}
-    return [*lines, *(f"(void){name};" for name in names)]
+        body = [*unused("data", "notes"), *Reader(unit, enum.source, "notes").conversion(enum)]
+        return unit.definition(converter_head(unit, enum), body)

@@ -1,26 +1,35 @@
 """The generated C file: tables, the functions of the model, the engine, and the functions through which data comes."""
 
+from collections.abc import Iterable, Sequence
+from functools import partial
+
 from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import communication_plant_name
 from robosc.expressions import ArrayType, BooleanType, DoubleType, EnumType, IntegerType, NoneType, ObjectType, Type
 from robosc.model.received import converted_paths
 from robosc.model.structure import CommunicationKind, EventKind, is_tau
 from robosc.targets.c99.conditions import CConditions
-from robosc.targets.c99.expressions import low_text
+from robosc.targets.c99.expressions import number_code
 from robosc.targets.c99.header import batch, batch_parameters, counts, head, receive_head, reply_head, runtime_text
 from robosc.targets.c99.helpers import HELPER_CALLS, HELPERS
-from robosc.targets.c99.layer_source import happen_call, reply_functions, request_functions
+from robosc.targets.c99.layer_source import request_functions
 from robosc.targets.c99.layout import Layout, data_that_comes, event_data
 from robosc.targets.c99.provide import default_function, provide_function
-from robosc.targets.c99.received import converter, converter_head
-from robosc.targets.c99.step import Stepper, unknown_name
-from robosc.targets.c99.text import string_literal
-from robosc.targets.c99.unit import Unit
+from robosc.targets.c99.received import converter, converter_head, unknown_name
+from robosc.targets.c99.statements import statement_lines, unused
+from robosc.targets.c99.step import Stepper
+from robosc.targets.c99.text import comment, string_literal
+from robosc.targets.c99.unit import Reading, Unit
+from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, double, variable
+from robosc.targets.code.steps import initial_state
 from robosc.targets.code.text import indent
 
 _ENGINE = tuple(f"{part}.c" for part in "log releases goals steps policies decisions rest time replies life".split())
 _LAYER_ENGINE = tuple(f"{part}.c" for part in "log releases goals steps rest callers time replies layer life".split())
 """The parts of the engines, each after those that it calls."""
+
+
+_NUMBERED = (CommunicationKind.SERVICE, CommunicationKind.ACTION, CommunicationKind.OUTGOING_MESSAGE)
 
 
 def source_file(unit: Unit) -> str:
@@ -40,7 +49,7 @@ def source_file(unit: Unit) -> str:
     engine = [runtime_text(layout, part).rstrip().splitlines() for part in parts]
     asked = request_functions(unit) if layout.is_layer else []
     ends = [*engine, *happens, *asked, *_entries(layout), *_names(layout)]
-    rest = [*allows, *steps, *provided, *held, *_dispatchers(layout), *ends]
+    rest = [*allows, *steps, *provided, *held, *_dispatchers(unit), *ends]
     converters = {layout.converters[enum.name]: converter(unit, enum) for enum in layout.model.enums}
     functions = {
         **HELPERS,
@@ -148,216 +157,126 @@ def _unknown_value(layout: Layout, type_: Type) -> str:
 
 
 def _tables(layout: Layout, numbers: dict[str, int]) -> list[str]:
-    lines: list[str] = []
-    prefix = layout.prefix
+    communication, event = (f"{layout.prefix}_{kind}_t" for kind in ("communication", "event"))
     infos = {info.name: info for info in layout.description.communications}
-    services = [item.name for item in layout.of_kind(CommunicationKind.SERVICE)]
-    actions = [item.name for item in layout.of_kind(CommunicationKind.ACTION)]
+    services, actions, sensors = ([item.name for item in layout.of_kind(kind)] for kind in _NUMBERED)
     topics = list(layout.topics)
-    if layout.requests:
-        lines += [
-            "",
-            "/* Requests in source order; -1 where something does not apply. */",
-            "static const struct {",
-            f"    {prefix}_communication_t communication;",
-            f"    {prefix}_event_t event;",
-            "    int topic;",
-            "    int service;",
-            "    int action;",
-            "    int conjuncts;",
-            *(["    const char *identifier;"] if layout.is_layer else []),
-            "} REQUESTS[] = {",
-        ]
-        for item in layout.requests:
-            topic = topics.index(item.identifier) if item.kind is CommunicationKind.INCOMING_MESSAGE else -1
-            service = services.index(item.name) if item.name in services else -1
-            action = actions.index(item.name) if item.name in actions else -1
-            event = layout.events[item.event(EventKind.REQUEST)]
-            conjuncts = infos[item.name].conjunct_count
-            parts = [layout.communications[item.name], event, str(topic), str(service), str(action), str(conjuncts)]
-            parts += [string_literal(item.identifier)] if layout.is_layer else []
-            lines.append(f"    {{{', '.join(parts)}}},")
-        lines.append("};")
-    if services:
-        member = [f"    {prefix}_communication_t communication;"] if layout.is_layer else []
-        lines += ["", "static const struct {", *member, f"    {prefix}_event_t error;", "} SERVICES[] = {"]
-        for name in services:
-            parts = [layout.communications[name]] if layout.is_layer else []
-            lines.append(f"    {{{', '.join([*parts, layout.events[f'{name}.error']])}}},")
-        lines.append("};")
-    if actions:
-        lines += [
-            "",
-            "static const struct {",
-            f"    {prefix}_communication_t communication;",
-            f"    {prefix}_event_t cancel;",
-            f"    {prefix}_event_t error;",
-            "    int requirements;",
-            "} ACTIONS[] = {",
-        ]
-        for name in actions:
-            parts = [layout.communications[name], *(layout.events[f"{name}.{kind}"] for kind in ("cancel", "error"))]
-            lines.append(f"    {{{', '.join(parts)}, {infos[name].requirement_count}}},")
-        lines.append("};")
-    if numbers["SILENT"]:
-        lines += ["", "/* Resets, then taus, in source order. */", f"static const {prefix}_event_t SILENT[] = {{"]
-        lines += [f"    {layout.events[event]}," for event in (*layout.description.resets, *layout.description.taus)]
-        lines.append("};")
-    sensors = layout.of_kind(CommunicationKind.OUTGOING_MESSAGE)
-    if sensors:
-        lines += ["", f"static const {prefix}_communication_t SENSORS[] = {{"]
-        lines += [f"    {layout.communications[item.name]}," for item in sensors] + ["};"]
-    return lines
+    requests = []
+    for item in layout.requests:
+        topic = topics.index(item.identifier) if item.kind is CommunicationKind.INCOMING_MESSAGE else -1
+        places = (names.index(item.name) if item.name in names else -1 for names in (services, actions))
+        numbers_of = (str(number) for number in (topic, *places, infos[item.name].conjunct_count))
+        identifier = [string_literal(item.identifier)] if layout.is_layer else []
+        name = layout.events[item.event(EventKind.REQUEST)]
+        requests.append([layout.communications[item.name], name, *numbers_of, *identifier])
+    members = [f"{communication} communication", f"{event} event", "int topic", "int service", "int action"]
+    members += ["int conjuncts", *(["const char *identifier"] if layout.is_layer else [])]
+    words = "Requests in source order; -1 where something does not apply."
+    lines = _table(members, "REQUESTS", requests, words)
+    in_layer = [f"{communication} communication"] if layout.is_layer else []
+    errors = [
+        [*([layout.communications[name]] if in_layer else []), layout.events[f"{name}.error"]] for name in services
+    ]
+    lines += _table([*in_layer, f"{event} error"], "SERVICES", errors)
+    members = [f"{communication} communication", f"{event} cancel", f"{event} error", "int requirements"]
+    ends = [
+        [layout.communications[name], layout.events[f"{name}.cancel"], layout.events[f"{name}.error"],
+         str(infos[name].requirement_count)] for name in actions
+    ]  # fmt: skip
+    lines += _table(members, "ACTIONS", ends)
+    silent = [layout.events[name] for name in (*layout.description.resets, *layout.description.taus)]
+    lines += _table(event, "SILENT", silent if numbers["SILENT"] else [], "Resets, then taus, in source order.")
+    return lines + _table(communication, "SENSORS", [layout.communications[name] for name in sensors])
 
 
-def _switch(head_: str, subject: str, cases: list[tuple[str, str]], default: str, unused: list[str]) -> list[str]:
-    lines = [head_, "{", *indent([f"(void){name};" for name in unused])]
-    if cases:
-        lines.append(f"    switch ({subject}) {{")
-        for label, statement in cases:
-            lines += [f"    case {label}:", *indent(statement.splitlines(), 2)]
-        lines += ["    default:", "        break;", "    }"]
-    return [*lines, *([f"    {default}"] if default else []), "}"]
+def _table(type_: str | list[str], name: str, rows: Sequence[str | list[str]], words: str = "") -> list[str]:
+    """A constant array of a type, or of structs with some members; none where it has no rows."""
+    if not rows:
+        return []
+    head_ = [f"static const {type_} {name}[] = {{"]
+    if not isinstance(type_, str):
+        head_ = ["static const struct {", *(f"    {member};" for member in type_), f"}} {name}[] = {{"]
+    entries = (row if isinstance(row, str) else f"{{{', '.join(row)}}}" for row in rows)
+    return ["", *(comment(words) if words else []), *head_, *(f"    {entry}," for entry in entries), "};"]
 
 
-def _dispatchers(layout: Layout) -> list[list[str]]:
+def _switch(head_: str, parameters: str, subject: str, cases: Iterable[tuple[object, str]], default: str) -> list[str]:
+    """The function that chooses a statement by a subject: the default where there is none for it."""
+    lines = [line for label, statement in cases for line in (f"case {label}:", *indent(statement.splitlines()))]
+    if lines:
+        lines = [f"switch ({subject}) {{", *lines, "default:", "    break;", "}"]
+    ends = [default] if default else []
+    return [head_, "{", *indent([*statement_lines(unused(*parameters.split())), *lines, *ends]), "}"]
+
+
+def _dispatchers(unit: Unit) -> list[list[str]]:
     """Return the functions through which the engine asks the model."""
-    prefix, function, events = layout.prefix, layout.function, layout.events
-    result = [_initial(layout), _same(layout), _model_settings(layout)]
+    layout = unit.layout
+    function, events = layout.function, layout.events
+    state, event, data = "const state_t *s", f"{layout.prefix}_event_t event", f"{layout.prefix}_request_t *data"
     allowed = [(events[event], f"return {function('allows', event)}(s);") for event in layout.executable.issued]
-    result.append(
-        _switch(
-            f"static bool is_allowed(const state_t *s, {prefix}_event_t event)",
-            "event",
-            allowed,
-            "return false;",
-            ["s", "event"],
-        )
-    )
+    head_ = f"static bool is_allowed({state}, {event})"
+    start = initial_state(layout.executable, Reading(unit), partial(_initial, layout))
+    initial = unit.definition("static void set_initial(state_t *s)", [*unused("s"), *start])
+    result = [initial, _same(layout), _model_settings(layout)]
+    result.append(_switch(head_, "s event", "event", allowed, "return false;"))
     if layout.requests or layout.description.taus:
         taken = [
             (events[event.name], f"return {function('takes', event.name)}(s);")
             for event in layout.executable.events.values()
             if (event.is_issued and not _never_taken(layout, event.name)) or event.kind is EventKind.ERROR
         ]
-        result.append(
-            _switch(
-                f"static int take_event(state_t *s, {prefix}_event_t event)",
-                "event",
-                taken,
-                "return REFUSED;",
-                ["s", "event"],
-            )
-        )
-    if layout.requests and not layout.is_layer:
-        data = [
-            (str(place), f"return {function('provides', item.name)}(s, data);")
-            for place, item in enumerate(layout.requests)
-        ]
-        result.append(
-            _switch(
-                f"static bool get_data(const state_t *s, int request, {prefix}_request_t *data)",
-                "request",
-                data,
-                "return false;",
-                ["s", "request", "data"],
-            )
-        )
-    if layout.topics:
-        messages = [
-            (place, item)
-            for place, item in enumerate(layout.requests)
-            if item.kind is CommunicationKind.INCOMING_MESSAGE
-        ]
-        defaults = [(str(place), f"return {function('is_default', item.name)}(data);") for place, item in messages]
-        if not layout.is_layer:
-            result.append(
-                _switch(
-                    f"static bool is_data_default(int request, const {prefix}_request_t *data)",
-                    "request",
-                    defaults,
-                    "return true;",
-                    ["request", "data"],
-                )
-            )
-        held = [(str(place), f"{function('conjuncts', item.name)}(s, holds);\nbreak;") for place, item in messages]
-        result.append(
-            _switch(
-                "static void get_conjuncts(const state_t *s, int request, bool *holds)",
-                "request",
-                held,
-                "",
-                ["s", "request", "holds"],
-            )
-        )
-    actions = layout.of_kind(CommunicationKind.ACTION)
-    if actions:
-        required = [
-            (str(place), f"{function('requirements', item.name)}(s, holds);\nbreak;")
-            for place, item in enumerate(actions)
-        ]
-        result.append(
-            _switch(
-                "static void get_requirements(const state_t *s, int action, bool *holds)",
-                "action",
-                required,
-                "",
-                ["s", "action", "holds"],
-            )
-        )
+        head_ = f"static int take_event(state_t *s, {event})"
+        result.append(_switch(head_, "s event", "event", taken, "return REFUSED;"))
+    requests = list(enumerate(layout.requests))
+    if requests and not layout.is_layer:
+        given = [(place, f"return {function('provides', item.name)}(s, data);") for place, item in requests]
+        head_ = f"static bool get_data({state}, int request, {data})"
+        result.append(_switch(head_, "s request data", "request", given, "return false;"))
+    messages = [(place, item) for place, item in requests if item.kind is CommunicationKind.INCOMING_MESSAGE]
+    if messages and not layout.is_layer:
+        defaults = [(place, f"return {function('is_default', item.name)}(data);") for place, item in messages]
+        head_ = f"static bool is_data_default(int request, const {data})"
+        result.append(_switch(head_, "request data", "request", defaults, "return true;"))
+    held = [(place, f"{function('conjuncts', item.name)}(s, holds);\nbreak;") for place, item in messages]
+    actions = list(enumerate(layout.of_kind(CommunicationKind.ACTION)))
+    required = [(place, f"{function('requirements', item.name)}(s, holds);\nbreak;") for place, item in actions]
+    for name, subject, cases in (("conjuncts", "request", held), ("requirements", "action", required)):
+        if cases:
+            head_ = f"static void get_{name}({state}, int {subject}, bool *holds)"
+            result.append(_switch(head_, f"s {subject} holds", subject, cases, ""))
     return result
 
 
-def _initial(layout: Layout) -> list[str]:
-    lines = ["static void set_initial(state_t *s)", "{", "    (void)s;"]
-    for component, behaviour in layout.executable.behaviours:
-        lines.append(f"    s->{layout.locations[component]} = {layout.location_names[component, behaviour.initial]};")
-        for variable in behaviour.variables:
-            name, type_ = layout.variables[component, variable.name]
-            lines.append(f"    s->{name} = {_literal(layout, type_, variable.initial)};")
-    for item in layout.model.communications:
-        if item.kind in CALLED_KINDS:
-            plant = communication_plant_name(item)
-            lines.append(f"    s->{layout.locations[plant]} = {layout.location_names[plant, 'idle']};")
-    return [*lines, "}"]
-
-
-def _literal(layout: Layout, type_: Type, value: bool | int | float | str) -> str:
+def _initial(layout: Layout, type_: Type, value: bool | int | float | str) -> Code:
     match type_:
         case BooleanType():
-            return "true" if value else "false"
+            return TRUE_CODE if value else FALSE_CODE
         case IntegerType():
-            return low_text(int(value))
+            return number_code(int(value))
         case DoubleType():
-            return repr(float(value))
+            return double(float(value))
         case EnumType(name=name):
-            return layout.values[name, str(value)]
+            return variable(layout.values[name, str(value)])
         case _:
-            return string_literal(str(value))
+            return variable(string_literal(str(value)))
 
 
 def _same(layout: Layout) -> list[str]:
     tests = []
     for component, behaviour in layout.executable.behaviours:
         tests.append(f"a->{layout.locations[component]} == b->{layout.locations[component]}")
-        for variable in behaviour.variables:
-            name, type_ = layout.variables[component, variable.name]
+        for item in behaviour.variables:
+            name, type_ = layout.variables[component, item.name]
             is_plain = isinstance(type_, BooleanType | IntegerType | DoubleType | EnumType)
             tests.append(f"a->{name} == b->{name}" if is_plain else f"strcmp(a->{name}, b->{name}) == 0")
-    for item in layout.model.communications:
-        if item.kind in CALLED_KINDS:
-            name = layout.locations[communication_plant_name(item)]
-            tests.append(f"a->{name} == b->{name}")
-    lines = ["static bool is_same_state(const state_t *a, const state_t *b)", "{", "    (void)a;", "    (void)b;"]
-    if not tests:
-        return [*lines, "    return true;", "}"]
-    return [
-        *lines,
-        f"    return {tests[0]}",
-        *(f"        && {test}" for test in tests[1:-1]),
-        f"        && {tests[-1]};" if len(tests) > 1 else "        ;",
-        "}",
-    ]
+    plants = [communication_plant_name(item) for item in layout.model.communications if item.kind in CALLED_KINDS]
+    tests += [f"a->{layout.locations[plant]} == b->{layout.locations[plant]}" for plant in plants]
+    first, *others = tests or ["true"]
+    ends = [f"    && {test}" for test in others] or (["    "] if tests else [])
+    lines = [*statement_lines(unused("a", "b")), f"return {first}", *ends]
+    lines[-1] += ";"
+    return ["static bool is_same_state(const state_t *a, const state_t *b)", "{", *indent(lines), "}"]
 
 
 def _model_settings(layout: Layout) -> list[str]:
@@ -371,7 +290,7 @@ def _model_settings(layout: Layout) -> list[str]:
     return [*lines, "}"]
 
 
-_LOOK = "    look_at_clock(r, now_us);"
+_LOOK = "look_at_clock(r, now_us);"
 
 
 def _entries(layout: Layout) -> list[list[str]]:
@@ -380,76 +299,67 @@ def _entries(layout: Layout) -> list[list[str]]:
     sensors = [item.name for item in layout.of_kind(CommunicationKind.OUTGOING_MESSAGE)]
     for identifier in layout.received_topics:
         parameters = batch_parameters(layout, identifier)
-        body = ["    if (!r->is_started) {", "        return;", "    }", _LOOK]
+        ignored = statement_lines(unused(*parameters.values()))
+        body = ["if (!r->is_started) {", "    return;", "}", _LOOK]
         for item in batch(layout, identifier):
             event = item.event(EventKind.RESPONSE)
             data = event_data(layout.model, event)
             arguments = ["r", *([parameters[layout.raw(data)]] if data is not None else []), "true"]
             call = f"{layout.function('happens', event)}({', '.join(arguments)})"
-            body += indent([f"if ({call}) {{", f"    see(r, {sensors.index(item.name)});", "}"])
-        unused = [f"    (void){name};" for name in parameters.values()]
-        body.append("    guard(r, end_batch(r));")
+            body += [f"if ({call}) {{", f"    see(r, {sensors.index(item.name)});", "}"]
+        body.append("guard(r, end_batch(r));")
         if layout.is_layer:
             source = layout.received_topics[identifier]
-            body += ["    finish(r);", f"    told(r, r->callbacks.pass_on(r->callbacks.context, {source}, message));"]
-        result.append([receive_head(layout, identifier), "{", *unused, *body, "}"])
-    return result + (reply_functions(layout) if layout.is_layer else _replies(layout))
+            body += ["finish(r);", f"told(r, r->callbacks.pass_on(r->callbacks.context, {source}, message));"]
+        result.append([receive_head(layout, identifier), "{", *indent([*ignored, *body]), "}"])
+    return result + _replies(layout)
 
 
 def _replies(layout: Layout) -> list[list[str]]:
-    """The functions of a controller through which answers come."""
+    """The functions through which answers come; a layer hands them on to the caller."""
     result = []
-    services = [item.name for item in layout.of_kind(CommunicationKind.SERVICE)]
-    actions = [item.name for item in layout.of_kind(CommunicationKind.ACTION)]
-    for name in services:
-        event = f"{name}.response"
-        body = [
-            f"if (close_call(r, {services.index(name)}, id)) {{",
-            f"    {happen_call(layout, event)}",
-            "    guard(r, end_batch(r));",
-            "}",
-        ]
-        result.append([reply_head(layout, event), "{", _LOOK, *indent(body), "}"])
-    for name in actions:
-        place = actions.index(name)
-        for event in (f"{name}.feedback", f"{name}.response"):
-            is_end = event.endswith(".response")
+
+    def add(event: str, start: list[str], body: list[str], end: list[str]) -> None:
+        before = ["bool is_well = true;", *start[:1], _LOOK, *start[1:]] if layout.is_layer else [_LOOK]
+        after = [*end, "guard(r, is_well);", "finish(r);"] if layout.is_layer else []
+        result.append([reply_head(layout, event), "{", *indent([*before, *body, *after]), "}"])
+
+    def taken(event: str) -> list[str]:
+        data = ["data"] if event_data(layout.model, event) is not None else []
+        happens = f"(void){layout.function('happens', event)}({', '.join(['r', *data, 'false'])});"
+        return [happens, "is_well = end_batch(r);" if layout.is_layer else "guard(r, end_batch(r));"]
+
+    for place, item in enumerate(layout.of_kind(CommunicationKind.SERVICE)):
+        event = item.event(EventKind.RESPONSE)
+        awaited = f"is_awaited = r->calls[{place}].is_awaited && r->calls[{place}].id == id;"
+        body = [f"if (close_call(r, {place}, id)) {{", *indent(taken(event)), "}"]
+        answer = [f"answer_caller(r, {place}, is_awaited, message);"]
+        add(event, ["bool is_awaited = false;", awaited], body, answer)
+    for place, item in enumerate(layout.of_kind(CommunicationKind.ACTION)):
+        for kind in (EventKind.FEEDBACK, EventKind.RESPONSE):
+            event, is_end = item.event(kind), kind is EventKind.RESPONSE
+            told = f"end_for_caller(r, {place}, {layout.upper}_END_SUCCEEDED, message);"
             body = [
-                f"if (has_goal(r, {place}, id)) {{",
-                *([f"    close_goal(r, {place});"] if is_end else []),
-                f"    if (r->goals[{place}].is_running) {{",
-                f"        {happen_call(layout, event)}",
-                "        guard(r, end_batch(r));",
-                "    } else {",
-                f"        unexpected(r, (int){layout.events[event]});",
-                "    }",
+                *([f"close_goal(r, {place});"] if is_end else []),
+                f"if (r->goals[{place}].is_running) {{",
+                *indent(taken(event)),
+                "} else {",
+                f"    unexpected(r, (int){layout.events[event]});",
                 "}",
+                *([told if is_end else f"pass_feedback(r, {place}, message);"] if layout.is_layer else []),
             ]
-            result.append([reply_head(layout, event), "{", _LOOK, *indent(body), "}"])
+            add(event, [], [f"if (has_goal(r, {place}, id)) {{", *indent(body), "}"], [])
     return result
 
 
 def _names(layout: Layout) -> list[list[str]]:
     result = []
-    for kind, names in (
-        ("event", list(layout.events)),
-        ("communication", list(layout.communications)),
-        ("topic", list(layout.topics)),
-        *([("source", list(layout.received_topics))] if layout.is_layer else []),
-    ):
-        head_ = f"const char *{layout.prefix}_{kind}_name(int {kind})"
-        if not names:
-            result.append([head_, "{", f"    (void){kind};", "    return NULL;", "}"])
-            continue
-        result.append(
-            [
-                head_,
-                "{",
-                "    static const char *const names[] = {",
-                *(f"        {string_literal(name)}," for name in names),
-                "    };",
-                f"    return ({kind} >= 0 && {kind} < {len(names)}) ? names[{kind}] : NULL;",
-                "}",
-            ]
-        )
+    named = {"event": layout.events, "communication": layout.communications, "topic": layout.topics}
+    for kind, names in (named | ({"source": layout.received_topics} if layout.is_layer else {})).items():
+        body = [f"(void){kind};", "return NULL;"]
+        if names:
+            entries = (f"    {string_literal(name)}," for name in names)
+            value = f"({kind} >= 0 && {kind} < {len(names)}) ? names[{kind}] : NULL"
+            body = ["static const char *const names[] = {", *entries, "};", f"return {value};"]
+        result.append([f"const char *{layout.prefix}_{kind}_name(int {kind})", "{", *indent(body), "}"])
     return result

@@ -5,28 +5,32 @@ All updates of a step read the state before it: a copy, of which a compiler keep
 
 from collections.abc import Sequence
 
-from robosc.expressions import (
-    MAXIMUM_INTEGER,
-    MINIMUM_INTEGER,
-    ArrayType,
-    BooleanType,
-    DoubleType,
-    EnumType,
-    IntegerType,
-    Type,
-)
-from robosc.expressions.text import expression_text
+from robosc.expressions import ArrayType, BooleanType, DoubleType, EnumType, IntegerType, Type
 from robosc.model.received import Path, converted_paths
-from robosc.model.structure import Update, Variable, is_tau
-from robosc.targets.c99.expressions import ATOM, c_type, low_text
+from robosc.model.structure import is_tau
+from robosc.targets.c99.expressions import c_type, number_code
 from robosc.targets.c99.layout import event_data, width
 from robosc.targets.c99.naming import CNamer
-from robosc.targets.c99.received import Reader
-from robosc.targets.c99.text import comment
-from robosc.targets.c99.unit import Lvalue, Reading, Unit, declared
-from robosc.targets.code.expressions import Code, Sort
-from robosc.targets.code.steps import Branch, StepWriter
-from robosc.targets.code.text import indent
+from robosc.targets.c99.received import NAMES, NO_NOTES, Reader
+from robosc.targets.c99.statements import unused
+from robosc.targets.c99.text import declared
+from robosc.targets.c99.unit import Lvalue, Reading, Unit
+from robosc.targets.code.expressions import (
+    FALSE_CODE,
+    TRUE_CODE,
+    Code,
+    Sort,
+    bounds_of,
+    call,
+    literal,
+    operation,
+    variable,
+    words_of,
+)
+from robosc.targets.code.statements import Assign, Block, Do, If, Let, Return, Statement, codes, when
+from robosc.targets.code.steps import StepWriter
+
+_OLD, _SKIPPED, _NOTHING = variable("old"), variable("skipped"), literal("0", Sort.INTEGER)
 
 
 class Stepper(StepWriter):
@@ -37,167 +41,93 @@ class Stepper(StepWriter):
         event: The event.
     """
 
+    refused = literal("REFUSED", Sort.INTEGER)
+
     def __init__(self, unit: Unit, event: str) -> None:
         self.unit = unit
         self.event = event
         self.data = None if is_tau(event) else event_data(unit.layout.model, event)
         self.paths = converted_paths(unit.layout.model, event) if self.data is not None else ()
-        self._namer = CNamer(frozenset({"data", "notes", "s", "old", "skipped", "r"}))
         self._received: dict[Path, Code] = {}
-        self._may_skip = False
-        self._reading = Reading(unit, "old.", self._read, self.data)
-        super().__init__(unit.layout.executable.events[event], self._reading)
-
-    @property
-    def parameters(self) -> list[str]:
-        """Parameters of the step function after the state: one value for each path."""
-        self._name_received()
-        return [
-            f"const {self.unit.layout.raw(self._reading.received_type(path))} *{code.word}"
-            if isinstance(self._reading.received_type(path), ArrayType)
-            else declared(c_type(code.sort), code.word)
-            for path, code in self._received.items()
-        ]
+        before = Reading(unit, Lvalue(_OLD.word), self._received.__getitem__, self.data)
+        super().__init__(unit.layout.executable.events[event], before, before, Reading(unit), CNamer(NAMES))
 
     def step_function(self) -> list[str]:
         """The function that takes the event: how many updates were skipped, or REFUSED."""
-        parameters = self.parameters
-        with self.unit.uses_apart() as used:
-            body = [*self._refusals(), *self._plant(), *self._components()]
-        self.unit.used |= used
-        reads_old = any(word == "&old" or word.startswith("old.") for word in used)
-        head = ", ".join(["state_t *s", *parameters])
-        unused = [code.word for code in self._received.values()]
-        return [
-            f"static int {self.unit.layout.function('takes', self.event)}({head})",
-            "{",
-            *(["    const state_t old = *s;"] if reads_old else []),
-            *(["    int skipped = 0;"] if self._may_skip else []),
-            "    (void)s;",
-            *(f"    (void){name};" for name in unused),
-            *indent(body),
-            f"    return {'skipped' if self._may_skip else '0'};",
-            "}",
-        ]
+        parameters = ["state_t *s", *(self._parameter(path) for path in self.paths)]
+        body: list[Statement] = [*self._refusals(), *self._plant(), *self._components()]
+        start: list[Statement] = []
+        if _OLD.word in words_of(codes(body)):
+            start.append(Let(_OLD, variable("*s"), "const state_t"))
+        if self.may_skip:
+            start.append(Let(_SKIPPED, _NOTHING, "int"))
+        start += unused("s", *(code.word for code in self._received.values()))
+        head = f"static int {self.unit.layout.function('takes', self.event)}({', '.join(parameters)})"
+        return self.unit.definition(head, [*start, *body, Return(_SKIPPED if self.may_skip else _NOTHING)])
 
     def happen_function(self) -> list[str]:
         """The function that converts what came with an event of the environment and takes it."""
-        layout = self.unit.layout
-        parameter = [] if self.data is None else [layout.parameter(self.data, "data")]
-        head = ", ".join([f"{layout.prefix}_t *r", *parameter, "bool may_keep"])
-        lines = [f"static bool {layout.function('happens', self.event)}({head})", "{", "    (void)may_keep;"]
-        arguments = ["&r->state"]
+        layout, name = self.unit.layout, self.unit.layout.events[self.event]
+        parameters = [f"{layout.prefix}_t *r"]
+        arguments = [variable("&r->state")]
+        body = unused("may_keep")
         if self.data is not None:
-            lines.append("    (void)data;")
+            parameters.append(layout.parameter(self.data, "data"))
+            body += unused("data")
             if self.paths:
-                is_pointer = layout.is_by_pointer(self.data)
-                reader = Reader(self.unit, self.data, Lvalue("data", is_pointer), "&notes")
-                arguments += [reader.read(path).word for path in self.paths]
-                lines.append("    notes_t notes = {false, false};")
-                if is_pointer:
-                    lines += indent(["if (data == NULL) {", f"    data = &{unknown_name(layout.raw(self.data))};", "}"])
-                lines += indent(reader.take_lines())
-                enumerator = layout.events[self.event]
-                lines += indent(
-                    [
-                        f"if (notes.is_unknown && !notes_count(r, {enumerator}, &notes, may_keep)) {{",
-                        "    return false;",
-                        "}",
-                    ]
-                )
-        function = layout.function("takes", self.event)
-        return [
-            *lines,
-            f"    happened(r, {layout.events[self.event]}, {function}({', '.join(arguments)}));",
-            "    return true;",
-            "}",
-        ]
+                reader = Reader(self.unit, self.data, "&notes")
+                arguments += [reader.read(path) for path in self.paths]
+                counted = variable(f"notes.is_unknown && !notes_count(r, {name}, &notes, may_keep)")
+                body += [NO_NOTES, *reader.default(), *reader.take(), when(counted, Return(FALSE_CODE))]
+        taken = call(layout.function("takes", self.event), *arguments)
+        body += [Do(call("happened", variable("r"), variable(name), taken)), Return(TRUE_CODE)]
+        head = f"static bool {layout.function('happens', self.event)}({', '.join([*parameters, 'bool may_keep'])})"
+        return self.unit.definition(head, body)
 
-    def _name_received(self) -> None:
-        for path in self.paths:
-            if path not in self._received:
-                name = self._namer.name("_".join(["value", *map(str, path)]))
-                # The declared code of the reader has the same bounds: it is made of the same path.
-                code = Reader(self.unit, self._root, Lvalue("data", True), "NULL").read(path)
-                self._received[path] = code.held_in(name)
-
-    @property
-    def _root(self) -> Type:
+    def _parameter(self, path: Path) -> str:
+        """The parameter of the step function that takes the value of a path."""
         assert self.data is not None  # noqa: S101  # There are paths only where data comes.
-        return self.data
+        # The declared code of the reader has the same bounds: it is made of the same path.
+        code = Reader(self.unit, self.data, "NULL").read(path)
+        code = self._received[path] = code.held_in(self._namer.name("_".join(["value", *map(str, path)])))
+        type_ = self._values.received_type(path)
+        is_array = isinstance(type_, ArrayType)
+        return declared(f"const {self.unit.layout.raw(type_)} *" if is_array else c_type(code.sort), code.word)
 
-    def _read(self, path: Path) -> Code:
-        return self._received[path]
+    def _write(self, place: Code, value: Code, may_stay: bool) -> list[Statement]:
+        return [Assign(place, value)]
 
-    def _refuse_outside(self, automaton: str, locations: tuple[str, ...]) -> list[str]:
-        return self._reading.unless(self._reading.in_one_of(automaton, locations), "return REFUSED;")
+    def _choice(self, branches: Sequence[tuple[Code, Block]], is_whole: bool) -> Block:
+        # They all look at the state before, so that none of them needs an else.
+        return [item for test, body in branches for item in (body if test == TRUE_CODE else [If([(test, body)])])]
 
-    def _refuse_unless(self, words: str, condition: Code) -> list[str]:
-        return [*comment(words), *self._reading.unless(condition, "return REFUSED;")]
+    def _assigned(self, type_: Type, value: Code) -> Code:
+        return self._values.as_double(value) if isinstance(type_, DoubleType) else value
 
-    def _move(self, automaton: str, sources: tuple[str, ...], target: str) -> list[str]:
-        layout = self.unit.layout
-        return [f"s->{layout.locations[automaton]} = {layout.location_names[automaton, target]};"]
+    def _stored(self, type_: Type, value: Code) -> Code:
+        match type_:
+            case IntegerType():
+                return operation("int32_t", value)
+            case EnumType(values=values):
+                return operation(width(len(values)), value)
+            case BooleanType() if not value.is_known:
+                return operation("is set", value)
+            case _:
+                return value
 
-    def _choice(self, component: str, branches: Sequence[Branch], states: int) -> list[str]:
-        lines: list[str] = []
-        for inside, body in branches:
-            if len(inside) == states:
-                lines += body
-            else:
-                test = self._reading.in_one_of(component, inside)
-                lines += [f"if ({self.unit.text(test)}) {{", *indent(body), "}"]
-        return lines
+    def _is_at_hand(self, type_: Type, value: Code) -> bool:
+        return value.is_within(*bounds_of(type_)) if isinstance(type_, IntegerType) else value.is_known
 
-    def _update(self, component: str, variable: Variable, update: Update) -> list[str]:
-        place = f"s->{self.unit.layout.variables[component, variable.name][0]}"
-        code = self._reading.value(update.expression)
-        words = comment(f"{component}: do {variable.name} := {expression_text(update.expression)}")
-        if isinstance(variable.type, DoubleType):
-            code = self._reading.as_double(code)
-        fits = self._fits(variable.type, code)
-        cast = stored_cast(variable.type)
-        if fits is None:
-            return [*words, f"{place} = {cast}{self.unit.text(code, ATOM if cast else 0)};"]
-        self._may_skip = True
-        new = self._namer.name(f"new_{variable.name}")
-        return [
-            *words,
-            self.unit.local(code, new),
-            f"if ({fits.replace('@', new)}) {{",
-            f"    {place} = {cast}{f'({new} != 0)' if isinstance(variable.type, BooleanType) else new};",
-            "} else {",
-            "    skipped++;",
-            "}",
-        ]
-
-    @staticmethod
-    def _fits(type_: Type, code: Code) -> str | None:
-        """The test of a value `@` that may be skipped, or None for one that never is."""
-        if isinstance(type_, IntegerType):
-            low = MINIMUM_INTEGER if type_.low is None else type_.low
-            high = MAXIMUM_INTEGER if type_.high is None else type_.high
-            if code.is_within(low, high):
-                return None
-            return f"@ >= {low_text(low)} && @ <= {low_text(high)}"
-        if code.is_known:
-            return None
-        if code.sort is Sort.DOUBLE:
-            return "isfinite(@)"
-        return "@ != NULL" if code.sort is Sort.TEXT else "@ >= 0"
+    def _unless_skipped(self, name: str, type_: Type, held: Code, written: Block) -> Block:
+        self.may_skip = True
+        return [If([(_fits(type_, held), written)], [Do(operation("increment", _SKIPPED))])]
 
 
-def stored_cast(type_: Type) -> str:
-    """The conversion to the member that holds a variable."""
-    match type_:
-        case IntegerType():
-            return "(int32_t)"
-        case EnumType(values=values):
-            return f"({width(len(values))})"
-        case _:
-            return ""
-
-
-def unknown_name(raw: str) -> str:
-    """The constant of an object type in which everything is unknown."""
-    return f"{raw.removesuffix('_t')}_unknown"
+def _fits(type_: Type, held: Code) -> Code:
+    """Return the code that tests whether the value of an update may be assigned."""
+    if isinstance(type_, IntegerType):
+        low, high = bounds_of(type_)
+        return operation("between", number_code(low), held, number_code(high))
+    if held.sort is Sort.DOUBLE:
+        return call("isfinite", held)
+    return operation("is given", held) if held.sort is Sort.TEXT else operation(">=", held, _NOTHING)

@@ -31,3 +31,13 @@ def string_literal(text: str) -> str:
         char = chr(byte)
         parts.append(char if " " <= char <= "~" and char not in '"\\?' else f"\\{byte:03o}")
     return f'"{"".join(parts)}"'
+
+
+def declared(c_type: str, name: str) -> str:
+    """A declaration of one name."""
+    return f"{c_type}{name}" if c_type.endswith("*") else f"{c_type} {name}"
+
+
+def pointer_to(raw: str, name: str) -> str:
+    """The declaration of a pointer to constant data."""
+    return f"{raw}const *{name}" if raw.endswith("*") else f"const {raw} *{name}"

@@ -26,8 +26,10 @@ from robosc.expressions import (
 from robosc.model.received import Path
 from robosc.model.structure import Model
 from robosc.supervisor import Supervisor
-from robosc.targets.c99.expressions import C, CWriter, c_type, number_code, unknown_as, unknown_text
+from robosc.targets.c99.expressions import CWriter, c_type, code_text, number_code, unknown_as, unknown_text
 from robosc.targets.c99.layout import Layout, make_layout
+from robosc.targets.c99.statements import statement_lines, unused
+from robosc.targets.c99.text import declared, pointer_to
 from robosc.targets.code.expression_writer import read_nothing
 from robosc.targets.code.expressions import (
     FALSE_CODE,
@@ -41,7 +43,11 @@ from robosc.targets.code.expressions import (
     operation,
     place,
     sort_of,
+    variable,
+    words_of,
 )
+from robosc.targets.code.statements import Block, codes
+from robosc.targets.code.text import indent
 from robosc.targets.paths import path_type
 
 
@@ -88,10 +94,15 @@ class Unit:
     uses: dict[str, set[str]] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
 
-    def text(self, code: Code, level: int = 0) -> str:
-        """The text of an expression for a place that asks for a binding strength; what it uses is noted."""
-        self.used.update(piece.word for piece in code.pieces() if piece.kind in (Kind.PLACE, Kind.CALL))
-        return C.within(code, level)
+    def text(self, code: Code) -> str:
+        """The text of an expression; what it uses is noted."""
+        self.used |= words_of([code])
+        return code_text(code)
+
+    def definition(self, head: str, block: Block) -> list[str]:
+        """The function with a head and statements; what they use is noted."""
+        self.used |= words_of(codes(block))
+        return [head, "{", *indent(statement_lines(block)), "}"]
 
     @contextmanager
     def uses_apart(self) -> Iterator[set[str]]:
@@ -110,21 +121,16 @@ class Unit:
             self.uses[name] = uses
         return self.functions[template][0]
 
-    def local(self, code: Code, name: str) -> str:
-        """The declaration of a local variable that holds the value of an expression; a text is constant already."""
-        constant = "" if code.sort is Sort.TEXT else "const "
-        return f"{constant}{declared(c_type(code.sort), name)} = {self.text(code)};"
-
     def conversion(self, lvalue: Lvalue, type_: Type, notes: str) -> Code:
         """The value of a type that is made of received data; what must be noted goes to `notes`."""
-        read, noted = Code(Kind.PLACE, str(lvalue)), Code(Kind.PLACE, notes)
+        read, noted = variable(str(lvalue)), variable(notes)
         match type_:
             case IntegerType(low=int(low), high=int(high)):
                 code = call("clamped", read, number_code(low), number_code(high), noted)
             case IntegerType():
                 code = call("whole", read)
             case EnumType(name=name):
-                argument = Code(Kind.PLACE, lvalue.address) if self.layout.is_by_pointer(type_) else read
+                argument = variable(lvalue.address) if self.layout.is_by_pointer(type_) else read
                 return call(self.layout.converters[name], argument, noted).typed(type_)
             case ArrayType():
                 return place(lvalue.address, type_)
@@ -173,30 +179,20 @@ def plain_type(type_: Type) -> str:
             return "const char *"
 
 
-def declared(c_type: str, name: str) -> str:
-    """A declaration of one name."""
-    return f"{c_type}{name}" if c_type.endswith("*") else f"{c_type} {name}"
-
-
-def pointer_to(raw: str, name: str) -> str:
-    """The declaration of a pointer to constant data."""
-    return f"{raw}const *{name}" if raw.endswith("*") else f"const {raw} *{name}"
-
-
 @dataclass(frozen=True)
 class Reading(CWriter):
     """Writer of expressions at one place of the generated code.
 
     Attributes:
         unit: The file.
-        base: Text before a member of the state, or None where there is no state.
+        base: Place of the state.
         received: Code of received data by path; of an array, its address.
         root: Type of the received data, or None where there is none.
         elements: Place and type of what the quantifiers around look at, the innermost first.
     """
 
     unit: Unit
-    base: str | None = "s->"
+    base: Lvalue = Lvalue("s", True)
     received: Callable[[Path], Code] = read_nothing
     root: Type | None = None
     elements: tuple[tuple[Lvalue, Type], ...] = ()
@@ -206,10 +202,21 @@ class Reading(CWriter):
         """The model."""
         return self.unit.layout.model
 
-    def variable(self, component: str, name: str) -> tuple[str, Type]:
-        """Text and type of a variable."""
-        attribute, type_ = self.unit.layout.variables[component, name]
-        return f"{self.base}{attribute}", type_
+    def variable_place(self, component: str, variable: str) -> Code:
+        """The place of a variable."""
+        attribute, type_ = self.unit.layout.variables[component, variable]
+        return self._member(attribute).typed(type_)
+
+    def location_place(self, automaton: str) -> Code:
+        """The place of an automaton's location."""
+        return self._member(self.unit.layout.locations[automaton])
+
+    def location_code(self, automaton: str, location: str) -> Code:
+        """The code of a location."""
+        return literal(self.unit.layout.location_names[automaton, location], Sort.ENUM)
+
+    def _member(self, name: str) -> Code:
+        return Code(Kind.PLACE, str(self.base.member(name)), (variable(self.base.name),))
 
     def _enum_code(self, enum: str, value: str) -> Code:
         return literal(self.unit.layout.values[enum, value], Sort.ENUM)
@@ -218,16 +225,7 @@ class Reading(CWriter):
         """Return the code that tests whether an automaton is in a location, or is not."""
         if automaton not in self.unit.layout.locations:
             return TRUE_CODE if is_in else FALSE_CODE  # A message's plant has one location.
-        name = literal(self.unit.layout.location_names[automaton, state], Sort.ENUM)
-        return operation("=" if is_in else "!=", Code(Kind.PLACE, self.location(automaton)), name)
-
-    def unless(self, code: Code, statement: str) -> list[str]:
-        """A statement that is executed where a known condition does not hold."""
-        return [f"if ({self.unit.text(self.negated(code))}) {{", f"    {statement}", "}"]
-
-    def location(self, automaton: str) -> str:
-        """Text of an automaton's location."""
-        return f"{self.base}{self.unit.layout.locations[automaton]}"
+        return super().state_code(automaton, state, is_in)
 
     def _element_code(self, level: int, path: tuple[PathStep, ...]) -> Code:
         lvalue, type_ = self.elements[level]
@@ -290,34 +288,35 @@ class Reading(CWriter):
         array, type_ = self._array(expression.part)
         count, index, uses = self._loop(expression.part)
         raw = self.unit.layout.raw
-        parameters, arguments = [f"const {raw(type_)} *array"], [array]
+        parameters, arguments = {"array": f"const {raw(type_)} *array"}, [array]
         found = leaves(expression.condition)
         if any(isinstance(leaf, VariableRead | StateTest) for leaf in found):
-            parameters.append("const state_t *s")
-            arguments.append(Code(Kind.PLACE, "s" if self.base == "s->" else "&old"))
+            parameters["s"] = "const state_t *s"
+            arguments.append(Code(Kind.PLACE, self.base.address, (variable(self.base.name),)))
         codes: dict[Path, Code] = {}
         for path in dict.fromkeys(leaf.path for leaf in found if isinstance(leaf, Received)):
             outer, name = self.received(path), f"value_{len(codes) + 1}"
             is_array = isinstance(self.received_type(path), ArrayType)
             held = f"const {raw(self.received_type(path))} *" if is_array else c_type(outer.sort)
-            parameters.append(declared(held, name))
+            parameters[name] = declared(held, name)
             arguments.append(outer)
             codes[path] = outer.held_in(name)
         elements: list[tuple[Lvalue, Type]] = [(Lvalue("item", True), type_.element)]
         for number, (lvalue, outer_type) in enumerate(self.elements):
-            parameters.append(pointer_to(raw(outer_type), f"outer_{number + 1}"))
-            arguments.append(Code(Kind.PLACE, lvalue.address))
-            elements.append((Lvalue(f"outer_{number + 1}", True), outer_type))
-        inner = Reading(self.unit, "s->", codes.__getitem__, self.root, tuple(elements))
+            name = f"outer_{number + 1}"
+            parameters[name] = pointer_to(raw(outer_type), name)
+            arguments.append(variable(lvalue.address))
+            elements.append((Lvalue(name, True), outer_type))
+        inner = Reading(self.unit, received=codes.__getitem__, root=self.root, elements=tuple(elements))
         with self.unit.uses_apart() as used:
             condition = self.unit.text(inner.value(expression.condition))
         ends = int(expression.word == "any")
         lines = [
-            f"static int @({', '.join(parameters)})",
+            f"static int @({', '.join(parameters.values())})",
             "{",
             f"    const size_t count = (array == NULL || array->items == NULL) ? 0 : {count};",
             f"    int result = count == 0 ? KLEENE_UNKNOWN : {1 - ends};",
-            *(f"    (void){item.rpartition(' ')[2].lstrip('*')};" for item in parameters[1:]),
+            *indent(statement_lines(unused(*[*parameters][1:]))),
             "    for (size_t k = 0; k < count; k++) {",
             f"        {pointer_to(raw(type_.element), 'item')} = &array->items[{index}];",
             f"        const int holds = {condition};",

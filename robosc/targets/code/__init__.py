@@ -1,1 +1,1 @@
-"""Parts that generators of code share: texts, names, expressions. A target imports these, and no other target."""
+"""Parts that generators of code share: texts, names, expressions, statements. A target imports no other target."""

@@ -5,11 +5,14 @@ from abc import ABC, abstractmethod
 from robosc.automata import System
 from robosc.automata.executable import ExecutableEvent
 from robosc.conditions.rendering import Formulas, in_words, size_in_words
+from robosc.expressions import conjuncts
 from robosc.supervisor import DecisionDiagram, DecisionNode, Supervisor
 from robosc.supervisor.diagram import diagram_domains
 from robosc.targets.acceptance import accepting_conditions, enabling_conditions
 from robosc.targets.code.expression_writer import ExpressionWriter
 from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code
+from robosc.targets.code.statements import Block, Return, when
+from robosc.targets.model_text import requirement_text
 
 Condition = tuple[str, Code]
 """Words that explain a condition, and its code."""
@@ -45,8 +48,12 @@ class Conditions(ABC):
         """A call of the function of a node."""
 
     @abstractmethod
-    def _node_function(self, number: int, node: DecisionNode, branches: tuple[Code, ...]) -> list[str]:
-        """The function of a node; its last branch needs no test, since a subject always has a value of its domain."""
+    def _node_test(self, node: DecisionNode, start: int, end: int) -> Code:
+        """Return the code that tests for values `start` to `end` - 1 of a domain, those before being excluded."""
+
+    @abstractmethod
+    def _node_function(self, number: int, words: str, body: Block) -> list[str]:
+        """The function of a node."""
 
     def enabling(self, event: str) -> list[Condition]:
         """Return the conditions for an event to be allowed: plants, ranges, requirements, then the supervisor's."""
@@ -57,6 +64,16 @@ class Conditions(ABC):
             words, code = self._diagram(diagram)
             found.append((f"added by the supervisor: {words}", code))
         return [item for item in found if item[1] != TRUE_CODE]
+
+    def requirements(self, communication: str) -> list[Condition]:
+        """Return the requirements on a communication."""
+        found = self._supervisor.model.requirements_on(communication)
+        return [(requirement_text(item), self._scope.truth(item.condition)) for item in found]
+
+    def conjuncts(self, communication: str) -> list[Condition]:
+        """Return the top-level conjuncts of the requirements on a communication; they need no words."""
+        found = self._supervisor.model.requirements_on(communication)
+        return [("", self._scope.truth(part)) for item in found for part in conjuncts(item.condition)]
 
     def _diagram(self, diagram: DecisionDiagram) -> Condition:
         """A formula where it is short, else functions that share nodes."""
@@ -75,10 +92,10 @@ class Conditions(ABC):
         number = self._numbers.setdefault(key, len(self._numbers))
         code = self._node_call(number)
         if is_new:
-            self.nodes[code.word] = self._node_function(number, node, branches)
+            spans = zip(node.starts, node.starts[1:], branches, strict=False)
+            tests = [when(self._node_test(node, start, end), Return(branch)) for start, end, branch in spans]
+            subject = node.automaton if node.variable is None else f"{node.automaton}.{node.variable}"
+            # The last branch needs no test, since a subject always has a value of its domain.
+            body: Block = [*tests, Return(branches[-1])]
+            self.nodes[code.word] = self._node_function(number, f"Node of the decision diagrams: {subject}.", body)
         return code
-
-
-def node_words(node: DecisionNode) -> str:
-    """A node of a decision diagram in words."""
-    return f"Node of the decision diagrams: {node.automaton}{'' if node.variable is None else f'.{node.variable}'}."

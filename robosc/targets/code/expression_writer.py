@@ -99,12 +99,24 @@ class ExpressionWriter(ABC):
         """The code of an enum's value."""
 
     @abstractmethod
-    def variable_code(self, component: str, variable: str) -> Code:
-        """The code that reads a variable."""
+    def variable_place(self, component: str, variable: str) -> Code:
+        """The place of a variable."""
 
     @abstractmethod
+    def location_place(self, automaton: str) -> Code:
+        """The place of an automaton's location."""
+
+    @abstractmethod
+    def location_code(self, automaton: str, location: str) -> Code:
+        """The code of a location."""
+
+    def variable_code(self, component: str, variable: str) -> Code:
+        """The code that reads a variable."""
+        return self.variable_place(component, variable)
+
     def state_code(self, automaton: str, state: str, is_in: bool = True) -> Code:
         """Return the code that tests whether an automaton is in a location, or is not."""
+        return operation("=" if is_in else "!=", self.location_place(automaton), self.location_code(automaton, state))
 
     @abstractmethod
     def _element_code(self, level: int, path: Path) -> Code:
@@ -302,12 +314,12 @@ class ExpressionWriter(ABC):
             case _:
                 return self.truth(condition)
 
-    def in_one_of(self, automaton: str, locations: tuple[str, ...]) -> Code:
-        """Return the code that tests whether an automaton is in one of some locations."""
+    def in_one_of(self, automaton: str, locations: tuple[str, ...], is_in: bool = True) -> Code:
+        """Return the code that tests whether an automaton is in one of some locations, or is in none."""
         result = FALSE_CODE
         for location in locations:
             result = self.either(result, self.state_code(automaton, location))
-        return result
+        return result if is_in else self.negated(result)
 
     # Values
 

@@ -4,19 +4,12 @@ A generator builds them, asks them what they read, and prints them at the end: a
 operation in one programming language and puts parentheses where its operators need them.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from math import copysign
 
-from robosc.expressions import (
-    MAXIMUM_INTEGER,
-    MINIMUM_INTEGER,
-    BooleanType,
-    DoubleType,
-    EnumType,
-    IntegerType,
-    Type,
-)
+from robosc.expressions import MAXIMUM_INTEGER, MINIMUM_INTEGER, BooleanType, DoubleType, EnumType, IntegerType, Type
 
 
 class Sort(Enum):
@@ -42,6 +35,7 @@ class Kind(Enum):
 
     PLACE = "place"
     LITERAL = "literal"
+    SIGNED = "literal with a sign"
     CALL = "call"
     OPERATION = "operation"
 
@@ -53,7 +47,7 @@ class Code:
     Attributes:
         kind: Kind of the outermost piece.
         word: Text of a place or a literal, name of a function or an operation.
-        operands: Arguments of a function or operands of an operation.
+        operands: Arguments of a function or operands of an operation; of a place what it is a part of, if anything.
         sort: Sort of the value that it yields.
         unknown: Way in which it can be unknown.
         low: Least value of an integer.
@@ -72,6 +66,11 @@ class Code:
     def is_known(self) -> bool:
         """True if it can never be unknown."""
         return self.unknown is Unknown.NEVER
+
+    @property
+    def is_literal(self) -> bool:
+        """True if it is a constant."""
+        return self.kind in (Kind.LITERAL, Kind.SIGNED)
 
     def is_within(self, low: int, high: int) -> bool:
         """Return True if it is known and an integer in a range, whatever happens."""
@@ -123,15 +122,30 @@ def place(text: str, type_: Type, unknown: Unknown = Unknown.NEVER) -> Code:
     return Code(Kind.PLACE, text).typed(type_, unknown)
 
 
-def literal(text: str, sort: Sort, value: int | None = None) -> Code:
+def words_of(codes: Iterable[Code]) -> set[str]:
+    """The places that expressions read, and the functions that they call."""
+    return {piece.word for code in codes for piece in code.pieces() if piece.kind in (Kind.PLACE, Kind.CALL)}
+
+
+def variable(name: str, sort: Sort = Sort.BOOLEAN) -> Code:
+    """The code of a local variable of the generator's own."""
+    return Code(Kind.PLACE, name, sort=sort)
+
+
+def literal(text: str, sort: Sort, value: int | None = None, is_signed: bool = False) -> Code:
     """The code of a constant; of an integer with its value."""
     low, high = (MINIMUM_INTEGER, MAXIMUM_INTEGER) if value is None else (value, value)
-    return Code(Kind.LITERAL, text, (), sort, low=low, high=high)
+    return Code(Kind.SIGNED if is_signed else Kind.LITERAL, text, (), sort, low=low, high=high)
 
 
 def integer(value: int) -> Code:
     """An integer in plain digits."""
-    return literal(str(value), Sort.INTEGER, value)
+    return literal(str(value), Sort.INTEGER, value, value < 0)
+
+
+def double(value: float) -> Code:
+    """A double in the fewest digits that tell it apart."""
+    return literal(repr(value), Sort.DOUBLE, is_signed=copysign(1, value) < 0)
 
 
 def call(function: str, *arguments: Code, sort: Sort = Sort.BOOLEAN, unknown: Unknown = Unknown.NEVER) -> Code:
@@ -147,7 +161,7 @@ def operation(operator: str, *operands: Code, sort: Sort = Sort.BOOLEAN, unknown
 TRUE_CODE = operation("true")
 FALSE_CODE = operation("false")
 
-CHAINS = ("and", "or")
+CHAINS = ("and", "or", "list")
 """Operations that join any number of operands."""
 
 
@@ -199,4 +213,4 @@ class Language:
     def _level(self, code: Code) -> int:
         if code.kind is Kind.OPERATION:
             return self.shapes[code.word].level
-        return self.sign if code.kind is Kind.LITERAL and code.word.startswith("-") else self.atom
+        return self.sign if code.kind is Kind.SIGNED else self.atom

@@ -8,9 +8,8 @@ it is not allowed.
 
 from collections.abc import Mapping, Sequence
 
-from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code
-from robosc.targets.code.text import indent
-from robosc.targets.python.expressions import code_text
+from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, Sort, integer, literal, operation, variable
+from robosc.targets.code.statements import Assign, Statement, when
 from robosc.targets.python.text import comment
 
 ASKED_TOGETHER = 8
@@ -38,22 +37,22 @@ def stale_bits(allows: Sequence[str], read: Mapping[str, set[str]]) -> dict[str,
     return bits
 
 
-def noted_change(place: str, bits: dict[str, int]) -> list[str]:
-    """Statements that follow from another value of an attribute, given as `self.attribute`."""
-    stale = bits.get(place, 0)
-    return ["self.changes += 1", *([f"self._stale |= {stale:#x}"] if stale else [])]
+def noted_change(place: Code, bits: Mapping[str, int]) -> list[Statement]:
+    """Statements that follow from another value of an attribute."""
+    stale = bits.get(place.word, 0)
+    marked = [Assign(variable("self._stale"), literal(f"{stale:#x}", Sort.INTEGER), "|")] if stale else []
+    return [Assign(variable("self.changes"), integer(1), "+"), *marked]
 
 
-def noted_write(attribute: str, code: Code, bits: dict[str, int]) -> list[str]:
-    """Statements that write an attribute; `code` is a local variable or a constant.
+def noted_write(place: Code, value: Code, bits: Mapping[str, int]) -> list[Statement]:
+    """Statements that write an attribute; its value is a local variable or a constant.
 
     It is written also if nothing changes: of equal numbers, too, the new one counts, such as -0.0 after 0.0.
     """
-    if code in (TRUE_CODE, FALSE_CODE):
-        differs = f"not {attribute}" if code == TRUE_CODE else attribute
-    else:
-        differs = f"{attribute} != {code_text(code)}"
-    return [f"if {differs}:", *indent(noted_change(attribute, bits)), f"{attribute} = {code_text(code)}"]
+    differs = operation("!=", place, value)
+    if value in (TRUE_CODE, FALSE_CODE):
+        differs = operation("not", place) if value == TRUE_CODE else place
+    return [when(differs, *noted_change(place, bits)), Assign(place, value)]
 
 
 def asked_lines(requests: Sequence[str], silent: Sequence[str], allows: Sequence[str]) -> list[str]:

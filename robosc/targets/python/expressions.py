@@ -16,16 +16,17 @@ from robosc.targets.code.expressions import (
     FALSE_CODE,
     TRUE_CODE,
     Code,
-    Kind,
     Language,
     Shape,
     Sort,
     Unknown,
     call,
+    double,
     integer,
     literal,
     operation,
     place,
+    variable,
 )
 from robosc.targets.paths import path_type
 
@@ -67,12 +68,21 @@ PYTHON = Language(
         "*": _arithmetic("*", Precedence.PRODUCT),
         "/": _arithmetic("/", Precedence.PRODUCT),
         "=": _comparison("=="),
-        **{operator: _comparison(operator) for operator in ("!=", "<", "<=", ">", ">=", "in")},
+        **{operator: _comparison(operator) for operator in ("!=", "<", "<=", ">", ">=", "in", "not in", "is")},
         "between": Shape("{} <= {} <= {}", Precedence.COMPARISON, (Precedence.SUM,) * 3),
+        "is None": Shape("{} is None", Precedence.COMPARISON, (Precedence.SUM,)),
         "is true": Shape("{} is True", Precedence.COMPARISON, (Precedence.SUM,)),
         "is false": Shape("{} is False", Precedence.COMPARISON, (Precedence.SUM,)),
         "if": Shape("({1} if {0} else {2})", Precedence.ATOM, (Precedence.LAMBDA,) * 3),
+        "if not NaN": Shape("{0} if {0} == {0} else {1}", Precedence.LAMBDA, (Precedence.SUM, Precedence.OR)),
+        "not all": Shape("not ({})", Precedence.NOT, (Precedence.LAMBDA,)),
         "lambda": Shape("lambda {}: {}", Precedence.LAMBDA, (Precedence.LAMBDA,) * 2),
+        "list": Shape(", ", Precedence.LAMBDA, (Precedence.LAMBDA,)),
+        "tuple": Shape("({},)", Precedence.ATOM, (Precedence.LAMBDA,)),
+        "pair": Shape("({}, {})", Precedence.ATOM, (Precedence.LAMBDA,) * 2),
+        "array": Shape("[{}]", Precedence.ATOM, (Precedence.LAMBDA,)),
+        "object": Shape("{{{}}}", Precedence.ATOM, (Precedence.LAMBDA,)),
+        "entry": Shape("{}: {}", Precedence.LAMBDA, (Precedence.LAMBDA,) * 2),
     },
     sign=Precedence.SIGN,
     atom=Precedence.ATOM,
@@ -80,6 +90,12 @@ PYTHON = Language(
 
 code_text = PYTHON.text
 """The text of an expression."""
+
+
+def constant(value: object) -> Code:
+    """The code of a constant as `ascii` shows it; a number has none of what `integer` and `double` know about it."""
+    return literal(ascii(value), Sort.ENUM)
+
 
 _FUNCTIONS = {
     "not": "not_",
@@ -136,30 +152,30 @@ class Scope(ExpressionWriter):
             case int():
                 return integer(constant)
             case float():
-                return literal(repr(constant), Sort.DOUBLE)
+                return double(constant)
             case str():
                 return literal(ascii(constant), Sort.TEXT)
 
     def _enum_code(self, enum: str, value: str) -> Code:
-        return literal(repr(value), Sort.ENUM)
+        return constant(value)
 
-    def variable_code(self, component: str, variable: str) -> Code:
-        """The code that reads a variable."""
+    def variable_place(self, component: str, variable: str) -> Code:
+        """The place of a variable."""
         return place(*self.variable(component, variable))
 
-    def location_code(self, automaton: str) -> Code:
-        """The code that reads an automaton's location."""
-        return Code(Kind.PLACE, self.location(automaton), sort=Sort.ENUM)
+    def location_place(self, automaton: str) -> Code:
+        """The place of an automaton's location."""
+        return variable(self.location(automaton), Sort.ENUM)
 
-    def state_code(self, automaton: str, state: str, is_in: bool = True) -> Code:
-        """Return the code that tests whether an automaton is in a location, or is not."""
-        return operation("=" if is_in else "!=", self.location_code(automaton), literal(repr(state), Sort.ENUM))
+    def location_code(self, automaton: str, location: str) -> Code:
+        """The code of a location."""
+        return constant(location)
 
-    def in_one_of(self, automaton: str, locations: tuple[str, ...]) -> Code:
-        """Return the code that tests whether an automaton is in one of some locations."""
+    def in_one_of(self, automaton: str, locations: tuple[str, ...], is_in: bool = True) -> Code:
+        """Return the code that tests whether an automaton is in one of some locations, or is in none."""
         if len(locations) == 1:
-            return self.state_code(automaton, locations[0])
-        return operation("in", self.location_code(automaton), literal(repr(locations), Sort.ENUM))
+            return self.state_code(automaton, locations[0], is_in)
+        return operation("in" if is_in else "not in", self.location_place(automaton), constant(locations))
 
     def _stays_in_range(self, code: Code, low: int, high: int) -> Code:
         if code.is_known:
@@ -171,7 +187,7 @@ class Scope(ExpressionWriter):
         code = place(name, type_, Unknown.VALUE)
         for step in path:
             function = "read_element" if isinstance(step, int) else "read_property"
-            code = self._helper(function, code, literal(repr(step), Sort.TEXT))
+            code = self._helper(function, code, constant(step))
         return code.typed(path_type(self.model, type_, path), Unknown.VALUE)
 
     def _elements(self, part: ArrayPart) -> tuple[Code, Type]:

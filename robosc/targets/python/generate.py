@@ -6,9 +6,11 @@ from robosc.automata.plants import communication_plant_name
 from robosc.errors import InternalError, UnsupportedModelError
 from robosc.execution.interpreter import describe
 from robosc.execution.runtime.protocol import Description, batches, requesting
-from robosc.expressions import DoubleType
+from robosc.expressions import DoubleType, Type
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
+from robosc.targets.code.expressions import Code
+from robosc.targets.code.steps import initial_state
 from robosc.targets.code.text import indent, printable
 from robosc.targets.model_text import requirement_texts
 from robosc.targets.python.bundle import bundle, section_title
@@ -19,8 +21,10 @@ from robosc.targets.python.changes import (
     restart_lines,
     stale_bits,
 )
+from robosc.targets.python.expressions import constant
 from robosc.targets.python.provide import provide_method
 from robosc.targets.python.received import converter
+from robosc.targets.python.statements import statement_lines
 from robosc.targets.python.step import read_method, receive_method, step_method
 from robosc.targets.python.when import matches_method
 from robosc.targets.python.writer import Writer, make_writer
@@ -202,20 +206,13 @@ def _constructor(writer: Writer, description: Description) -> list[str]:
 
 
 def _restart(writer: Writer, requests: int, silent: int) -> list[str]:
-    lines = ["def restart(self):", '    """Back to the initial state."""', *indent(restart_lines(requests, silent))]
-    for component, behaviour in writer.layout.executable.behaviours:
-        lines.append(f"    self.{writer.layout.locations[component]} = {behaviour.initial!r}")
-        for variable in behaviour.variables:
-            attribute, _ = writer.layout.variables[component, variable.name]
-            initial = float(variable.initial) if isinstance(variable.type, DoubleType) else variable.initial
-            lines.append(f"    self.{attribute} = {initial!a}")
-    lines += [f"    self.{attribute} = 'idle'" for attribute in _plant_attributes(writer)]
-    return lines
+    start = initial_state(writer.layout.executable, writer.scope, _initial)
+    head = ["def restart(self):", '    """Back to the initial state."""']
+    return [*head, *indent([*restart_lines(requests, silent), *statement_lines(start)])]
 
 
-def _plant_attributes(writer: Writer) -> list[str]:
-    components = {component for component, _ in writer.layout.executable.behaviours}
-    return [attribute for automaton, attribute in writer.layout.locations.items() if automaton not in components]
+def _initial(type_: Type, value: bool | int | float | str) -> Code:
+    return constant(float(value) if isinstance(type_, DoubleType) else value)
 
 
 def _state(writer: Writer) -> list[str]:
@@ -252,42 +249,40 @@ def _location(writer: Writer) -> list[str]:
 
 _PROTOCOL_METHODS = [
     text.splitlines()
-    for text in (
-        '''\
+    for text in '''\
 def enabled(self, event):
     """Return True if a controllable event is allowed now."""
-    return self._allow[event]()''',
-        '''\
+    return self._allow[event]()
+
 def read(self, event, data):
     """Convert what came with an uncontrollable event; changes nothing."""
-    return self._read[event](data)''',
-        '''\
+    return self._read[event](data)
+
 def step(self, event, reading=None):
     """Take an event: the skipped updates, or None if it cannot happen now."""
     if event not in self._read:
         return self._step[event]()
     if reading is None:
         reading = self.read(event, None)
-    return self._step[event](*reading.values)''',
-        '''\
+    return self._step[event](*reading.values)
+
 def receive(self, identifier, data):
     """Take all events of what came: where updates were skipped; None if anything is unknown."""
-    return self._receive[identifier](data)''',
-        '''\
+    return self._receive[identifier](data)
+
 def provide(self, communication):
     """Data for a request in the current state: (is known, data)."""
-    return self._provide[communication]()''',
-        '''\
+    return self._provide[communication]()
+
 def matches(self, communication, data):
     """Tell whether a message that a supervision layer received is an incoming message, by its condition `when`."""
-    return self._matches[communication](data) if communication in self._matches else MATCHES''',
-        '''\
+    return self._matches[communication](data) if communication in self._matches else MATCHES
+
 def requirements(self, communication):
     """For each requirement on a request: whether it holds now."""
-    return self._requirements[communication]()''',
-        '''\
+    return self._requirements[communication]()
+
 def conjuncts(self, communication):
     """For each top-level conjunct of those requirements: whether it holds now."""
-    return self._conjuncts[communication]()''',
-    )
+    return self._conjuncts[communication]()'''.split("\n\n")
 ]

@@ -5,12 +5,7 @@ from dataclasses import dataclass
 from robosc.automata.executable import CALLED_KINDS, ExecutableSystem
 from robosc.automata.plants import communication_plant_name
 from robosc.expressions import Type
-from robosc.model.structure import (
-    EVENT_KINDS,
-    CommunicationKind,
-    EventKind,
-    Model,
-)
+from robosc.model.structure import EVENT_KINDS, CommunicationKind, EventKind, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.python.naming import PythonNamer
 

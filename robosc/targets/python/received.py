@@ -1,29 +1,31 @@
 """Generated code that reads received data: properties, array elements, conversions to enums and ranges."""
 
-from dataclasses import dataclass, field
+from functools import reduce
 
 from robosc.errors import InternalError
-from robosc.expressions import (
-    ArrayType,
-    BooleanType,
-    DoubleType,
-    EnumType,
-    IntegerType,
-    ObjectType,
-    StringType,
-    Type,
-)
-from robosc.expressions.text import expression_text
+from robosc.expressions import ArrayType, BooleanType, DoubleType, EnumType, IntegerType, ObjectType, StringType, Type
 from robosc.model.received import Path
 from robosc.model.structure import EnumDefinition
-from robosc.targets.code.expression_writer import may_compute
-from robosc.targets.code.expressions import TRUE_CODE, Code, Sort, Unknown, place
+from robosc.targets.code.expressions import (
+    FALSE_CODE,
+    TRUE_CODE,
+    Code,
+    Sort,
+    Unknown,
+    call,
+    integer,
+    operation,
+    place,
+    variable,
+)
+from robosc.targets.code.received import ReceivedReader
+from robosc.targets.code.statements import Assign, If, Let, Return, when
 from robosc.targets.code.text import indent
-from robosc.targets.paths import path_text, path_type
-from robosc.targets.python.expressions import Scope, code_text
+from robosc.targets.paths import path_text
+from robosc.targets.python.expressions import Scope, constant
 from robosc.targets.python.layout import Layout
 from robosc.targets.python.naming import PythonNamer
-from robosc.targets.python.text import comment
+from robosc.targets.python.statements import statement_lines
 
 _PLAIN: dict[type, str] = {
     DoubleType: "read_double",
@@ -32,6 +34,9 @@ _PLAIN: dict[type, str] = {
     StringType: "read_string",
 }
 """Functions of `values` that convert an element about which there is nothing to note."""
+
+_DATA, _NOTES = variable("data"), variable("notes")
+_ABSENT = (constant(None), constant(()), FALSE_CODE)
 
 
 def received_unknown(type_: Type, path: Path) -> Unknown:
@@ -50,202 +55,165 @@ def reader_namer() -> PythonNamer:
     return PythonNamer(("data", "path", "self", "skipped", "found"))
 
 
-@dataclass(slots=True)
-class Reader:
-    """Writes statements that read paths of one received datum into local variables.
+class Reader(ReceivedReader):
+    """Builds statements that read paths of one received datum into local variables.
+
+    Args:
+        layout: Names of the converters.
+        root: Type of the datum.
+        used: Functions of the runtime modules that the statements call.
+        namer: Names the locals.
 
     Attributes:
-        layout: Names of the converters.
-        root_type: Type of the datum.
-        used: Functions of the runtime modules that the statements call.
-        words: Texts of tuples that say what was unknown, so far.
-        enum_flags: Locals that tell whether an enum fell to its default past an unknown rule, so far.
-        namer: Names the locals; readers whose statements stand in one method share it.
+        words: Tuples that say what was unknown, so far.
+        flags: Conditions that an enum fell to its default past an unknown rule, so far.
     """
 
-    layout: Layout
-    root_type: Type
-    used: set[str]
-    words: list[str] = field(default_factory=list)
-    enum_flags: list[str] = field(default_factory=list)
-    namer: PythonNamer = field(default_factory=reader_namer)
-    _lines: list[str] = field(default_factory=list)
-    _sources: dict[Path, str] = field(default_factory=dict)
-    _codes: dict[Path, Code] = field(default_factory=dict)
-
-    def read(self, path: Path) -> Code:
-        """The code of a path; its statements are written on first use."""
-        if path not in self._codes:
-            self._codes[path] = self._read(path, path_type(self.layout.model, self.root_type, path))
-        return self._codes[path]
+    def __init__(self, layout: Layout, root: Type, used: set[str], namer: PythonNamer | None = None) -> None:
+        super().__init__(layout.model, root, namer or reader_namer())
+        self.layout = layout
+        self.used = used
+        self.words: list[Code] = []
+        self.flags: list[Code] = []
+        self._sources: dict[Path, Code] = {}
 
     @property
     def scope(self) -> Scope:
-        """The scope of conditions on the datum."""
-        return Scope(self.used.add, self.layout.model, received=self.read, root=self.root_type)
+        """Writer of conditions on the datum."""
+        return Scope(self.used.add, self._model, received=self.read, root=self._root)
 
-    def type_at(self, path: Path) -> Type:
-        """The type of a path."""
-        return path_type(self.layout.model, self.root_type, path)
-
-    def seen(self, path: Path) -> str:
-        """Text of a path's value as the event log shows it: as it came, None where nothing fitting came."""
+    def seen(self, path: Path) -> Code:
+        """A path's value as the event log shows it: as it came, None where nothing fitting came."""
         code = self.read(path)
         if code.unknown is not Unknown.NAN:
-            return code.word
+            return code
         if code.sort is Sort.INTEGER:
-            return self._call("known", code.word)
+            return self._call("known", code)
         # A NaN that came is shown as one.
-        return f"{code.word} if {code.word} == {code.word} else {self._call('read_double', self._access(path))}"
-
-    def take_lines(self) -> list[str]:
-        """The statements since the last call."""
-        lines, self._lines = self._lines, []
-        return lines
+        return operation("if not NaN", code, self._call("read_double", self._access(path)))
 
     @property
-    def all_words(self) -> str:
-        """Text of a tuple with everything that was unknown."""
-        return " + ".join(self.words) or "()"
+    def noted(self) -> tuple[Code, Code]:
+        """A tuple with everything that was unknown, and whether any enum fell to its default past an unknown rule."""
+        return _joined(self.words), operation("or", *self.flags) if self.flags else FALSE_CODE
 
-    @property
-    def all_flags(self) -> str:
-        """Text of whether any enum fell to its default past an unknown rule."""
-        return " or ".join(self.enum_flags) or "False"
-
-    def _local(self, path: Path, suffix: str = "") -> str:
-        return self.namer.name("_".join(["value", *map(str, path)]) + suffix)
-
-    def _call(self, function: str, *arguments: str) -> str:
+    def _call(self, function: str, *arguments: Code) -> Code:
         self.used.add(function)
-        return f"{function}({', '.join(arguments)})"
+        return call(function, *arguments)
 
-    def _source(self, path: Path) -> str:
+    def _source(self, path: Path) -> Code:
         """Local of the raw datum at a path that leads on."""
         if not path:
-            return "data"
+            return _DATA
         if path not in self._sources:
-            name = self._local(path, "_raw")
-            self._lines.append(f"{name} = {self._access(path)}")
-            self._sources[path] = name
+            source = variable(self.local(path, "_raw"))
+            self._statements.append(Let(source, self._access(path)))
+            self._sources[path] = source
         return self._sources[path]
 
-    def _access(self, path: Path) -> str:
-        """Text of the raw datum at a path."""
-        if not path:
-            return "data"
-        return self._call("received_part", self._source(path[:-1]), repr(path[-1]))
+    def _access(self, path: Path) -> Code:
+        """The raw datum at a path."""
+        return self._call("received_part", self._source(path[:-1]), constant(path[-1])) if path else _DATA
 
     def _read(self, path: Path, type_: Type) -> Code:
         match type_:
             case DoubleType() if path and isinstance(path[-1], int):
-                text = self._call("number_at", self._source(path[:-1]), repr(path[-1]))
-                return self._assign(path, type_, text, Unknown.NAN)
+                value = self._call("number_at", self._source(path[:-1]), constant(path[-1]))
             case DoubleType():
-                return self._assign(path, type_, self._call("number", self._access(path)), Unknown.NAN)
+                value = self._call("number", self._access(path))
             case IntegerType(low=int(low), high=int(high)):
-                received = self._local(path, "_received")
-                self._lines.append(f"{received} = {self._call('whole', self._access(path))}")
-                self.words.append(self._call("moved", repr(path_text(path)), received, repr(low), repr(high)))
-                text = self._call("clamped", received, repr(low), repr(high))
-                return self._assign(path, type_, text, Unknown.NAN)
+                received, bounds = variable(self.local(path, "_received")), (integer(low), integer(high))
+                self._statements.append(Let(received, self._call("whole", self._access(path))))
+                self.words.append(self._call("moved", constant(path_text(path)), received, *bounds))
+                value = self._call("clamped", received, *bounds)
             case IntegerType():
-                return self._assign(path, type_, self._call("integer", self._access(path)), Unknown.NAN)
-            case BooleanType():
-                return self._assign(path, type_, self._call("read_boolean", self._access(path)), Unknown.VALUE)
-            case StringType():
-                return self._assign(path, type_, self._call("read_string", self._access(path)), Unknown.VALUE)
+                value = self._call("integer", self._access(path))
+            case BooleanType() | StringType():
+                value = self._call(_PLAIN[type(type_)], self._access(path))
             case EnumType(name=enum):
                 return self._read_enum(path, type_, enum)
             case ArrayType(element=element):
                 return self._read_array(path, type_, element)
-        raise InternalError(f"{path_text(path)} is no single value")
+            case _:
+                raise InternalError(f"{path_text(path)} is no single value")
+        return self._assign(path, type_, value)
 
     def _read_array(self, path: Path, type_: Type, element: Type) -> Code:
         plain = _PLAIN.get(type(element))
-        if isinstance(element, IntegerType) and element.is_bounded:
-            plain = None
-        if plain is not None:
+        if plain is not None and not (isinstance(element, IntegerType) and element.is_bounded):
             self.used.add(plain)
-            text = self._call("plain_elements", self._access(path), plain)
-            return self._assign(path, type_, text, Unknown.VALUE)
-        notes = self._local(path, "_notes")
-        self._lines.append(f"{notes} = []")
-        convert = f"lambda item, path, notes: {self._element(element, 'item', 'path', 1)}"
-        code = self._assign(
-            path,
-            type_,
-            self._call("elements", self._access(path), repr(path_text(path)), notes, convert),
-            Unknown.VALUE,
-        )
+            return self._assign(path, type_, self._call("plain_elements", self._access(path), variable(plain)))
+        notes = variable(self.local(path, "_notes"))
+        self._statements.append(Let(notes, operation("array", operation("list"))))
+        converted = operation("lambda", _arguments(""), self._element(element, variable("item"), variable("path"), 1))
+        value = self._call("elements", self._access(path), constant(path_text(path)), notes, converted)
+        code = self._assign(path, type_, value)
         self.words.append(self._call("words_of", notes))
-        self.enum_flags.append(self._call("flag_of", notes))
+        self.flags.append(self._call("flag_of", notes))
         return code
 
-    def _element(self, type_: Type, raw: str, path: str, depth: int) -> str:
-        """Text that converts one element of an array, given the texts of it and of its path in words."""
+    def _element(self, type_: Type, raw: Code, path: Code, depth: int) -> Code:
+        """The conversion of one element of an array, given it and its path in words."""
         match type_:
             case IntegerType(low=int(low), high=int(high)):
-                return self._call("noted_integer", raw, path, "notes", repr(low), repr(high))
+                return self._call("noted_integer", raw, path, _NOTES, integer(low), integer(high))
             case EnumType(name=enum):
-                return self._call("noted_enum", f"{self.layout.converters[enum]}({raw}, {path})", "notes")
+                return self._call("noted_enum", call(self.layout.converters[enum], raw, path), _NOTES)
             case ObjectType(name=name):
-                parts = [
-                    f"{item.name!r}: "
-                    + self._element(
-                        item.type,
-                        self._call("received_part", raw, repr(item.name)),
-                        f"{path} + {f'.{item.name}'!r}",
-                        depth,
+                entries: list[Code] = []
+                for item in self._model.object(name).properties:
+                    part = self._call("received_part", raw, constant(item.name))
+                    words = operation("+", path, constant(f".{item.name}"))
+                    entries.append(
+                        operation("entry", constant(item.name), self._element(item.type, part, words, depth))
                     )
-                    for item in self.layout.model.object(name).properties
-                ]
-                return f"{{{', '.join(parts)}}}"
+                return operation("object", operation("list", *entries))
             case ArrayType(element=element):
-                inner = self._element(element, f"item{depth}", f"path{depth}", depth + 1)
-                convert = f"lambda item{depth}, path{depth}, notes: {inner}"
-                return self._call("elements", raw, path, "notes", convert)
+                inner = self._element(element, variable(f"item{depth}"), variable(f"path{depth}"), depth + 1)
+                converted = operation("lambda", _arguments(depth), inner)
+                return self._call("elements", raw, path, _NOTES, converted)
             case _:
                 plain = _PLAIN.get(type(type_))
-                return "None" if plain is None else self._call(plain, raw)
+                return constant(None) if plain is None else self._call(plain, raw)
 
     def _read_enum(self, path: Path, type_: Type, enum: str) -> Code:
-        name, words, flag = self._local(path), self._local(path, "_words"), self._local(path, "_unknown")
-        call = f"{self.layout.converters[enum]}({self._access(path)}, {path_text(path)!r})"
-        self._lines.append(f"{name}, {words}, {flag} = {call}")
+        value, words, flag = (variable(self.local(path, suffix)) for suffix in ("", "_words", "_unknown"))
+        converted = call(self.layout.converters[enum], self._access(path), constant(path_text(path)))
+        self._statements.append(Assign(operation("list", value, words, flag), converted))
         self.words.append(words)
-        self.enum_flags.append(flag)
-        return place(name, type_, received_unknown(type_, path))
+        self.flags.append(flag)
+        return value.typed(type_, received_unknown(type_, path))
 
-    def _assign(self, path: Path, type_: Type, text: str, unknown: Unknown) -> Code:
-        name = self._local(path)
-        self._lines.append(f"{name} = {text}")
-        return place(name, type_, unknown)
+    def _assign(self, path: Path, type_: Type, value: Code) -> Code:
+        code = place(self.local(path), type_, received_unknown(type_, path))
+        self._statements.append(Let(code, value))
+        return code
+
+    def _result(self, value: Code) -> Return:
+        return Return(operation("list", value, *self.noted))
+
+    def _undecided(self, enum: EnumDefinition, test: Code) -> If:
+        words = operation("+", variable("path"), constant(f" is {enum.default} by default: an earlier rule is unknown"))
+        noted = _joined([*self.words, operation("tuple", words)])
+        return when(operation("not all", test), Return(operation("list", constant(enum.default), noted, TRUE_CODE)))
+
+
+def _joined(words: list[Code]) -> Code:
+    """The sum of tuples."""
+    return reduce(lambda left, right: operation("+", left, right), words) if words else constant(())
+
+
+def _arguments(depth: int | str) -> Code:
+    """The parameters of a function that converts an element."""
+    return operation("list", variable(f"item{depth}"), variable(f"path{depth}"), _NOTES)
 
 
 def converter(layout: Layout, enum: EnumDefinition, used: set[str]) -> list[str]:
     """The function that makes an enum out of received data, as a readable chain of conditions."""
-    reader = Reader(layout, enum.source, used)
-    scope = reader.scope
     used.add("ABSENT")
-    body = ["if data is ABSENT:", "    return None, (), False"]
-    all_false = TRUE_CODE
-    for rule in enum.rules:
-        fires = scope.truth(rule.condition)
-        all_false = scope.both(all_false, scope.falsity(rule.condition))
-        # What only a later rule needs is not read before that rule's turn.
-        body += reader.take_lines()
-        body += comment(f"{expression_text(rule.condition)} -> {rule.value}")
-        body += [f"if {code_text(fires)}:", f"    return {rule.value!r}, {reader.all_words}, {reader.all_flags}"]
-    body += comment(f"default -> {enum.default}")
-    if may_compute(rule.condition for rule in enum.rules):
-        words = f"path + {f' is {enum.default} by default: an earlier rule is unknown'!r}"
-        earlier = [*reader.words, f"({words},)"]
-        body.append(f"if not ({code_text(all_false)}):")
-        body.append(f"    return {enum.default!r}, {' + '.join(earlier)}, True")
-    body.append(f"return {enum.default!r}, {reader.all_words}, {reader.all_flags}")
+    absent = when(operation("is", _DATA, variable("ABSENT")), Return(operation("list", *_ABSENT)))
     return [
         f"def {layout.converters[enum.name]}(data, path):",
         f'    """{enum.name} from received data; in words what was unknown; whether that decided an enum."""',
-        *indent(body),
+        *indent(statement_lines([absent, *Reader(layout, enum.source, used).conversion(enum)])),
     ]

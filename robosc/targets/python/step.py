@@ -6,60 +6,48 @@ other, so whatever is read after it may have been written is first copied to a l
 
 from collections.abc import Iterator, Sequence
 
-from robosc.expressions import (
-    ArrayType,
-    DoubleType,
-    Expression,
-    IntegerType,
-    PathStep,
-    StateTest,
-    Type,
-    VariableRead,
-    leaves,
-)
-from robosc.expressions.text import expression_text
+from robosc.expressions import ArrayType, DoubleType, Expression, IntegerType, StateTest, Type, VariableRead, leaves
 from robosc.model.received import Path, converted_paths
-from robosc.model.structure import Update, Variable
 from robosc.targets.code.expressions import (
     FALSE_CODE,
     TRUE_CODE,
     Code,
-    Kind,
     Sort,
     Unknown,
     bounds_of,
     call,
     integer,
-    literal,
+    operation,
     place,
+    variable,
 )
-from robosc.targets.code.steps import Branch, StepWriter
-from robosc.targets.code.text import indent
-from robosc.targets.paths import path_text, path_type
+from robosc.targets.code.statements import Assign, Block, Do, If, Let, Return, Statement, when
+from robosc.targets.code.steps import StepWriter
+from robosc.targets.paths import path_text
 from robosc.targets.python.changes import noted_change, noted_write
-from robosc.targets.python.expressions import Scope, code_text
+from robosc.targets.python.expressions import Scope, constant
 from robosc.targets.python.naming import PythonNamer
 from robosc.targets.python.received import Reader, reader_namer, received_unknown
-from robosc.targets.python.text import comment, docstring
+from robosc.targets.python.statements import method
 from robosc.targets.python.writer import Writer
+
+_DATA, _SKIPPED, _FOUND = variable("data"), variable("skipped"), variable("found")
 
 
 def read_method(writer: Writer, event: str) -> list[str]:
     """The method that converts what came with an uncontrollable event."""
-    paths = converted_paths(writer.model, event)
-    head = [f"def {writer.layout.methods['read', event]}(self, data):"]
+    name, paths = writer.layout.methods["read", event], converted_paths(writer.model, event)
     if not paths:
-        return [*head, f"    {docstring(f'{event}: nothing of its data is converted.')}", "    return NO_DATA"]
+        words = f"{event}: nothing of its data is converted."
+        return method(name, words, [Return(variable("NO_DATA"))], [_DATA])
     reader = Reader(writer.layout, _event_type(writer, event), writer.used)
     codes = [reader.read(path) for path in paths]
-    entries = ", ".join(f"{path_text(path)!r}: {reader.seen(path)}" for path in paths if not _is_array(reader, path))
-    values = "".join(f"{code.word}, " for code in codes).strip()
-    return [
-        *head,
-        f"    {docstring(f'Convert the data of {event}.')}",
-        *indent(reader.take_lines()),
-        f"    return Reading(({values}), {{{entries}}}, {reader.all_words}, {reader.all_flags})",
-    ]
+    # Arrays can be long, so they are not logged.
+    shown = [path for path in paths if not isinstance(reader.type_at(path), ArrayType)]
+    entries = [operation("entry", constant(path_text(path)), reader.seen(path)) for path in shown]
+    values, seen = operation("tuple", operation("list", *codes)), operation("object", operation("list", *entries))
+    result = Return(call("Reading", values, seen, *reader.noted))
+    return method(name, f"Convert the data of {event}.", [*reader.take(), result], [_DATA])
 
 
 def receive_method(writer: Writer, identifier: str, batch: tuple[str, ...]) -> list[str]:
@@ -71,38 +59,29 @@ def receive_method(writer: Writer, identifier: str, batch: tuple[str, ...]) -> l
         batch: The events, in source order.
     """
     namer = reader_namer()
-    statements: list[str] = []
-    words: list[str] = []
-    steps: list[str] = []
+    read: list[Statement] = []
+    words: list[Code] = []
+    steps: list[Statement] = []
     for event in batch:
-        paths = converted_paths(writer.model, event)
-        values = ""
-        if paths:
-            reader = Reader(writer.layout, _event_type(writer, event), writer.used, namer=namer)
-            values = ", ".join(reader.read(path).word for path in paths)
-            statements += reader.take_lines()
+        values: list[Code] = []
+        if paths := converted_paths(writer.model, event):
+            reader = Reader(writer.layout, _event_type(writer, event), writer.used, namer)
+            values = [reader.read(path) for path in paths]
+            read += reader.take()
             words += reader.words
-        step = f"self.{writer.layout.methods['step', event]}({values})"
+        step = call(f"self.{writer.layout.methods['step', event]}", *values)
         if event in writer.skipping:
-            steps += [f"found = {step}", "if found:", f"    skipped += (({event!r}, found),)"]
+            skipped = operation("tuple", operation("pair", constant(event), _FOUND))
+            steps += [Let(_FOUND, step), when(_FOUND, Assign(_SKIPPED, skipped, "+"))]
         else:
-            steps.append(step)
+            steps.append(Do(step))
     if writer.skipping.isdisjoint(batch):
-        steps.append("return ()")
+        steps.append(Return(constant(())))
     else:
-        steps = ["skipped = ()", *steps, "return skipped"]
+        steps = [Let(_SKIPPED, constant(())), *steps, Return(_SKIPPED)]
+    refusal = [when(operation("or", *words), Return(constant(None)))] if words else []
     title = f"Convert what came on {identifier}, and take {', '.join(batch)}."
-    refusal = [f"if {' or '.join(words)}:", "    return None"] if words else []
-    return [
-        f"def {writer.layout.methods['receive', identifier]}(self, data):",
-        f"    {docstring(title)}",
-        *indent([*statements, *refusal, *steps]),
-    ]
-
-
-def _is_array(reader: Reader, path: Path) -> bool:
-    """Return True if a path leads to an array: those can be long, so they are not logged."""
-    return isinstance(reader.type_at(path), ArrayType)
+    return method(writer.layout.methods["receive", identifier], title, [*read, *refusal, *steps], [_DATA])
 
 
 def _event_type(writer: Writer, event: str) -> Type:
@@ -121,145 +100,106 @@ def step_method(writer: Writer, event: str) -> list[str]:
 
 
 class _StepWriter(StepWriter):
-    """Writes the step method of one event."""
+    """Builds the step method of one event."""
+
+    refused = constant(None)
 
     def __init__(self, writer: Writer, event: str) -> None:
-        super().__init__(writer.layout.executable.events[event], writer.scope)
         self.writer = writer
         self.event = event
-        self.namer = PythonNamer(("self", "skipped"))
         self.paths = converted_paths(writer.model, event)
         self.received: dict[Path, Code] = {}
-        self.copies: dict[str, str] = {}
-        self.may_skip = False
+        self.copies: dict[str, Code] = {}
         root = _event_type(writer, event) if self.paths else None
-        self.scope = Scope(writer.used.add, writer.model, self._variable, self._location, self._received, root)
+        values = Scope(writer.used.add, writer.model, self._variable, self._location, self.received.__getitem__, root)
+        executable, namer = writer.layout.executable.events[event], PythonNamer(("self", "skipped"))
+        super().__init__(executable, writer.scope, values, writer.scope, namer)
 
     def method(self) -> list[str]:
         """The whole method."""
-        self._name_received()
+        for path in self.paths:
+            name = self._namer.name("_".join(["value", *map(str, path)]))
+            type_ = self._values.received_type(path)
+            self.received[path] = place(name, type_, received_unknown(type_, path))
         self._copy_what_is_overwritten()
         body = self._components()
-        parameters = "".join(f", {code.word}" for code in self.received.values())
-        lines = [f"def {self.writer.layout.methods['step', self.event]}(self{parameters}):"]
-        lines.append(f"    {docstring(f'Take {self.event}.')}")
-        lines += indent([*self._refusals(), *self._plant(), *self._copied()])
-        if self.may_skip:
-            lines.append("    skipped = ()")
-        return [*lines, *indent(body), f"    return {'skipped' if self.may_skip else '()'}"]
-
-    def _name_received(self) -> None:
-        if not self.paths:
-            return
-        root = _event_type(self.writer, self.event)
-        for path in self.paths:
-            name = self.namer.name("_".join(["value", *map(str, path)]))
-            type_ = path_type(self.writer.model, root, path)
-            self.received[path] = place(name, type_, received_unknown(type_, path))
-
-    def _refuse_outside(self, automaton: str, locations: tuple[str, ...]) -> list[str]:
-        test = f"!= {locations[0]!r}" if len(locations) == 1 else f"not in {locations!r}"
-        return [f"if {self.writer.scope.location(automaton)} {test}:", "    return None"]
-
-    def _refuse_unless(self, words: str, condition: Code) -> list[str]:
-        return [*comment(words), f"if {code_text(self.scope.negated(condition))}:", "    return None"]
-
-    def _move(self, automaton: str, sources: tuple[str, ...], target: str) -> list[str]:
-        location = self.writer.scope.location(automaton)
-        if target in sources:
-            return noted_write(location, literal(repr(target), Sort.ENUM), self.writer.stale)
-        return [f"{location} = {target!r}", *noted_change(location, self.writer.stale)]
+        copied = [Let(copy, variable(f"self.{attribute}")) for attribute, copy in self.copies.items()]
+        skipped = [Let(_SKIPPED, constant(()))] if self.may_skip else []
+        result = Return(_SKIPPED if self.may_skip else constant(()))
+        body = [*self._refusals(), *self._plant(), *copied, *skipped, *body, result]
+        name = self.writer.layout.methods["step", self.event]
+        return method(name, f"Take {self.event}.", body, [*self.received.values()])
 
     def _copy_what_is_overwritten(self) -> None:
         """Find attributes that are read after a place that may write them; a superset is fine."""
+        layout = self.writer.layout
         written: set[str] = set()
         overwritten: dict[str, None] = {}
         for participant in self._executable.participants:
-            component = participant.component
-            location = self.writer.scope.location(component)
             in_block: set[str] = set()
             for _, transition in participant.branches:
                 for update in transition.updates:
-                    for text in self._reads(update.expression):
-                        if text in written or text in in_block:
-                            overwritten[text] = None
-                    in_block.add(self.writer.scope.variable(component, update.variable)[0])
+                    for attribute in self._reads(update.expression):
+                        if attribute in written or attribute in in_block:
+                            overwritten[attribute] = None
+                    in_block.add(layout.variables[participant.component, update.variable][0])
                 if transition.target is not None:
-                    in_block.add(location)
+                    in_block.add(layout.locations[participant.component])
             written |= in_block
-        for text in overwritten:
-            self.copies[text] = self.namer.name(f"old_{text.removeprefix('self.')}")
+        for attribute in overwritten:
+            self.copies[attribute] = variable(self._namer.name(f"old_{attribute}"))
 
     def _reads(self, expression: Expression) -> Iterator[str]:
+        layout = self.writer.layout
         for leaf in leaves(expression):
             match leaf:
-                case VariableRead(component=component, variable=variable):
-                    yield self.writer.scope.variable(component, variable)[0]
-                case StateTest(component=component):
-                    yield self.writer.scope.location(component)
+                case VariableRead(component=component, variable=name):
+                    yield layout.variables[component, name][0]
+                case StateTest(component=component) if component in layout.locations:
+                    yield layout.locations[component]
 
-    def _copied(self) -> list[str]:
-        return [f"{copy} = {text}" for text, copy in self.copies.items()]
-
-    def _variable(self, component: str, variable: str) -> tuple[str, Type]:
-        text, type_ = self.writer.scope.variable(component, variable)
-        return self.copies.get(text, text), type_
+    def _variable(self, component: str, name: str) -> tuple[str, Type]:
+        attribute, type_ = self.writer.layout.variables[component, name]
+        return self.copies[attribute].word if attribute in self.copies else f"self.{attribute}", type_
 
     def _location(self, automaton: str) -> str:
-        text = self.writer.scope.location(automaton)
-        return self.copies.get(text, text)
+        copy = self.copies.get(self.writer.layout.locations.get(automaton, ""))
+        return self.writer.scope.location(automaton) if copy is None else copy.word
 
-    def _received(self, path: tuple[PathStep, ...]) -> Code:
-        return self.received[path]
+    def _write(self, place: Code, value: Code, may_stay: bool) -> list[Statement]:
+        if may_stay:
+            return noted_write(place, value, self.writer.stale)
+        return [Assign(place, value), *noted_change(place, self.writer.stale)]
 
-    def _choice(self, component: str, branches: Sequence[Branch], states: int) -> list[str]:
-        lines: list[str] = []
-        location = self.writer.scope.location(component)
-        tested = 0
-        for inside, body in branches:
-            if len(inside) == states:
-                lines += body
-            elif tested + len(inside) == states:
-                lines += ["else:", *indent(body)]
-            else:
-                test = f"== {inside[0]!r}" if len(inside) == 1 else f"in {inside!r}"
-                lines += [f"{'elif' if tested else 'if'} {location} {test}:", *indent(body)]
-                tested += len(inside)
-        return lines
+    def _choice(self, branches: Sequence[tuple[Code, Block]], is_whole: bool) -> Block:
+        if not is_whole:
+            return [If(branches)] if branches else []
+        *tested, (_, rest) = branches
+        return [If(tested, rest)] if tested else rest
 
-    def _update(self, component: str, variable: Variable, update: Update) -> list[str]:
-        attribute, _ = self.writer.scope.variable(component, variable.name)
-        code = self._assigned(variable.type, self.scope.value(update.expression))
-        lines = comment(f"{component}: do {variable.name} := {expression_text(update.expression)}")
-        if not (code.is_known and self._is_at_hand(code)):
-            new = code.held_in(self.namer.name(f"new_{variable.name}"))
-            lines.append(f"{new.word} = {code_text(code)}")
-            code = new
-        written = noted_write(attribute, code, self.writer.stale)
-        if code.is_known:
-            return [*lines, *written]
+    def _is_at_hand(self, type_: Type, value: Code) -> bool:
+        is_local = value in self.copies.values() or value in self.received.values()
+        return value.is_known and (is_local or value in (TRUE_CODE, FALSE_CODE))
+
+    def _unless_skipped(self, name: str, type_: Type, held: Code, written: Block) -> Block:
+        if held.is_known:
+            return written
         self.may_skip = True
-        skipped = f"{component}.{variable.name}"
-        return [*lines, f"if {code.word} is None:", f"    skipped += ({skipped!r},)", "else:", *indent(written)]
+        skip = Assign(_SKIPPED, constant((name,)), "+")
+        return [If([(operation("is None", held), [skip])], written)]
 
-    def _is_at_hand(self, code: Code) -> bool:
-        """Return True if a value is a local variable or a truth value."""
-        is_local = code.word in self.copies.values() or code in self.received.values()
-        return code in (TRUE_CODE, FALSE_CODE) or (code.kind is Kind.PLACE and is_local)
-
-    def _assigned(self, type_: Type, code: Code) -> Code:
-        """The value that a variable takes; the update is skipped where it is None."""
+    def _assigned(self, type_: Type, value: Code) -> Code:
         match type_:
-            case DoubleType() if not code.is_known:
-                return self._checked("assignable_double", code)
+            case DoubleType() if not value.is_known:
+                return self._checked("assignable_double", value)
             case DoubleType():
-                return call("float", code) if code.sort is Sort.INTEGER else code
+                return call("float", value) if value.sort is Sort.INTEGER else value
             case IntegerType():
                 low, high = bounds_of(type_)
-                is_within = code.is_within(low, high)
-                return code if is_within else self._checked("assignable_integer", code, integer(low), integer(high))
+                is_within = value.is_within(low, high)
+                return value if is_within else self._checked("assignable_integer", value, integer(low), integer(high))
             case _:
-                return code
+                return value
 
     def _checked(self, function: str, *arguments: Code) -> Code:
         self.writer.used.add(function)

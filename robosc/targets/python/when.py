@@ -4,10 +4,10 @@ from robosc.errors import InternalError
 from robosc.expressions.text import expression_text
 from robosc.model.received import received_paths
 from robosc.model.structure import Communication
-from robosc.targets.code.text import indent
-from robosc.targets.python.expressions import code_text
+from robosc.targets.code.expressions import call, variable
+from robosc.targets.code.statements import Comment, Return
 from robosc.targets.python.received import Reader
-from robosc.targets.python.text import comment, docstring
+from robosc.targets.python.statements import method
 from robosc.targets.python.writer import Writer
 
 
@@ -22,12 +22,10 @@ def matches_method(writer: Writer, communication: Communication) -> list[str]:
     reader = Reader(writer.layout, type_, writer.used)
     for path in received_paths(condition):
         reader.read(path)
-    scope = reader.scope
-    holds = scope.truth(condition)
-    return [
-        f"def {writer.layout.methods['matches', communication.name]}(self, data):",
-        f"    {docstring(f'Tell whether a message is {communication.name}.')}",
-        *indent(reader.take_lines()),
-        *indent(comment(f"when: {expression_text(condition)}")),
-        f"    return Match({code_text(holds)}, {reader.all_words}, {reader.all_flags})",
-    ]
+    name, words = (
+        writer.layout.methods["matches", communication.name],
+        f"Tell whether a message is {communication.name}.",
+    )
+    holds = Return(call("Match", reader.scope.truth(condition), *reader.noted))
+    body = [*reader.take(), Comment(f"when: {expression_text(condition)}"), holds]
+    return method(name, words, body, [variable("data")])

@@ -30,7 +30,7 @@ _CLASSES = {
         "PathJoinSubstitution",
     ],
     "launch_ros": [],
-    "launch_ros.actions": ["Node", "SetRemap"],
+    "launch_ros.actions": ["Node", "PushRosNamespace", "SetParameter", "SetRemap"],
     "launch_ros.parameter_descriptions": ["ParameterValue"],
     "launch_ros.substitutions": ["FindPackageShare"],
     "ament_index_python": [],

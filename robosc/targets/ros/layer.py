@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind
-from robosc.targets.ros.runtime.supervised import BLOCKED, SUPERVISED, robots_name
+from robosc.targets.ros.runtime.supervised import BLOCKED, SUPERVISED
 from robosc.targets.ros.topics import Topic
 
 Renamed = tuple[tuple[str, str], ...]
@@ -37,7 +37,7 @@ def require_names_of_a_layer(found: tuple[Topic, ...], asked: tuple[Communicatio
     for identifier in (*(topic.identifier for topic in found), *(item.identifier for item in asked)):
         _require_own_sides(identifier)
     for topic in found:
-        if robots_name("", topic.identifier) == BLOCKED:
+        if _bare(topic.identifier) == BLOCKED:
             raise UnsupportedModelError(
                 f"the topic {topic.identifier} is where a supervision layer tells what it holds back"
             )
@@ -65,18 +65,23 @@ def require_own_topics(
         UnsupportedModelError: One is; says which.
     """
     parts = {
-        robots_name("", f"{item.identifier}/{part}"): item.name
+        _bare(f"{item.identifier}/{part}"): item.name
         for item in asked
         if item.kind is CommunicationKind.ACTION
         for part in action_topics
     }
     for topic in found:
-        action = parts.get(robots_name("", topic.identifier))
+        action = parts.get(_bare(topic.identifier))
         if action is not None:
             raise UnsupportedModelError(
                 f"the topic {topic.identifier} is a part of the action '{action}', which a supervision layer offers "
                 "by itself"
             )
+
+
+def _bare(identifier: str) -> str:
+    """A name without the slash that makes it absolute: where there is no namespace, the two are one name."""
+    return identifier.lstrip("/")
 
 
 def _require_own_sides(identifier: str) -> None:
@@ -85,7 +90,7 @@ def _require_own_sides(identifier: str) -> None:
             f"the name {identifier} belongs to one node, and a supervision layer stands between two: "
             "give it a name such as /x"
         )
-    if f"{robots_name('', identifier)}/".startswith(f"{SUPERVISED}/"):
+    if f"{_bare(identifier)}/".startswith(f"{SUPERVISED}/"):
         raise UnsupportedModelError(
             f"the name {identifier} is on the existing controller's side of a supervision layer"
         )
@@ -95,10 +100,10 @@ def _require_one_each(what: str, named: Iterable[tuple[str, str]]) -> None:
     """A layer cannot tell apart what comes on one name, but for messages with `when`."""
     first: dict[str, str] = {}
     for identifier, text in named:
-        name = robots_name("", identifier)
+        name = _bare(identifier)
         other = first.setdefault(name, text)
         if other != text:
             raise UnsupportedModelError(
-                f"the {what} '{other}' and '{text}' have one name, {name}: a supervision layer could not tell which of "
-                "them is meant"
+                f"the {what} '{other}' and '{text}' have one name, /{name}: a supervision layer could not tell which "
+                "of them is meant"
             )

@@ -49,7 +49,7 @@ CONTROLLER = ("controller_package", "controller_executable", "controller_launch_
 
 def test_every_name_of_an_existing_controller_is_remapped() -> None:
     names = remapped(["/a", "b", "/a"], ["/go"])
-    assert names[:2] == (("/a", "/supervised/a"), ("/b", "/supervised/b"))
+    assert names[:2] == (("/a", "/supervised/a"), ("b", "supervised/b"))
     assert [old for old, _ in names[2:]] == [
         f"/go/{part}" for part in ("goal", "cancel", "status", "feedback", "result")
     ]
@@ -73,8 +73,10 @@ def test_the_launch_file_starts_the_layer_and_an_existing_controller(files: Gene
     assert layer.find("remap") is None
     expected = [
         ("$(arg topic_prefix)" + old, "$(arg topic_prefix)" + new)
-        for old, new in remapped(["/allowed", "/scan", "/cmd_vel", "volume", "/power"], ["/count"])
+        for old, new in remapped(["/allowed", "/scan", "/cmd_vel", "/volume", "/power"], ["/count"])
     ]
+    # A relative name is found below the prefix or, where there is none, in the namespace.
+    expected.insert(3, ("volume", "supervised/volume"))
     node, included = root.findall("group")
     for parent in (node.find("node"), included):
         assert parent is not None
@@ -99,7 +101,7 @@ def test_the_readme_names_both_sides(files: GeneratedFiles) -> None:
     for row in (
         "| `/scan` | `/supervised/scan` | `sensor_msgs/LaserScan` | sensor, depth 5 | scan |",
         "| `/supervised/cmd_vel` | `/cmd_vel` | `geometry_msgs/Twist` | reliable, depth 10 | walk, halt |",
-        "| `/supervised/volume` | `/volume` | `std_msgs/Float32` | reliable, depth 10 | loud, quiet |",
+        "| `supervised/volume` | `volume` | `std_msgs/Float32` | reliable, depth 10 | loud, quiet |",
         "| `/supervised/power` | `/power` | `std_srvs/SetBool` | | power (service) |",
         "| `/supervised/count` | `/count` | `actionlib/Test` | | count (action) |",
         "/count/feedback:=/supervised/count/feedback",

@@ -7,6 +7,7 @@ import pytest
 
 from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_files
 from robosc.targets.registry import SupervisedController
+from robosc.targets.ros.runtime.supervised import robots_name
 from robosc.targets.ros2.runtime.remapping import remapped, remapping_arguments
 from support.launch_stub import evaluated, launch_actions
 from support.porter import MODEL
@@ -39,12 +40,15 @@ CONTROLLER = ("controller_package", "controller_executable", "controller_launch_
 
 def test_every_name_of_an_existing_controller_is_remapped() -> None:
     names = remapped(["/a", "b", "/a"], ["/go"])
-    assert names[:2] == (("/a", "/supervised/a"), ("/b", "/supervised/b"))
+    assert names[:2] == (("/a", "/supervised/a"), ("b", "supervised/b"))
     assert [old for old, _ in names[2:]] == [
         f"/go/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result", "feedback", "status")
     ]
     assert names[2][1] == "/supervised/go/_action/send_goal"
-    assert remapping_arguments(names[:1], "/r") == ["--ros-args", "-r", "/r/a:=/r/supervised/a"]
+    rules = ["-r", "/r/a:=/r/supervised/a", "-r", "/r/b:=/r/supervised/b"]
+    assert remapping_arguments(names[:2], "/r") == ["--ros-args", *rules]
+    rules = ["-r", "/a:=/supervised/a", "-r", "b:=supervised/b", "-r", "__ns:=/n"]
+    assert remapping_arguments(names[:2], "", "/n") == ["--ros-args", *rules]
 
 
 def test_the_launch_file_starts_the_layer_and_an_existing_controller(folder: Path) -> None:
@@ -55,32 +59,44 @@ def test_the_launch_file_starts_the_layer_and_an_existing_controller(folder: Pat
         "controller_executable",
         "controller_launch_file",
         "topic_prefix",
-        "parameters",
+        "namespace",
+        "use_sim_time",
+        "params_file",
         "log_level",
     }
     assert all(item["description"].endswith(".") for item in arguments.values())
     assert [arguments[name]["default_value"] for name in CONTROLLER] == ["", "controller", ""]
-    assert Path(arguments["parameters"]["default_value"]) == folder / "config/parameters.yaml"
+    assert Path(arguments["params_file"]["default_value"]) == folder / "config/parameters.yaml"
     layer, controller = (node.named for node in found["Node"])
     assert (layer["package"], layer["executable"]) == (PACKAGE, "layer")
     file, override = layer["parameters"]
-    assert file.positional == ("parameters",)
+    assert file.positional == ("params_file",)
+    assert override["use_sim_time"].positional[0].positional == ("use_sim_time",)
+    assert layer["namespace"].positional == controller["namespace"].positional == ("namespace",)
+    assert controller["parameters"][0]["use_sim_time"].positional[0].positional == ("use_sim_time",)
     value = override["topic_prefix"]
     assert (value.positional[0].positional, value.named) == (("topic_prefix",), {"value_type": str})
     assert controller["package"].positional == ("controller_package",)
     assert controller["executable"].positional == ("controller_executable",)
     assert type(layer["on_exit"]).__name__ == type(controller["on_exit"]).__name__ == "Shutdown"
-    rules = []
-    for old, new in controller["remappings"]:
-        assert old[0].positional == new[0].positional == ("topic_prefix",)
-        rules.append((old[1], new[1]))
-    topics, services = ["/allowed", "/scan", "/cmd_vel", "volume"], ["/power"]
-    assert tuple(rules) == remapped([*topics, *services], ["/count"])
     (group,) = found["GroupAction"]
-    *remaps, included = group.positional[0]
-    prefix = {"topic_prefix": "/r"}
-    expected = [("/r" + old, "/r" + new) for old, new in rules]
-    assert [tuple(evaluated(item.named[name], prefix) for name in ("src", "dst")) for item in remaps] == expected
+    pushed, simulated, *remaps, included = group.positional[0]
+    assert pushed.positional[0].positional == ("namespace",)
+    condition = pushed.named["condition"].positional[0]
+    assert [evaluated(condition, {"namespace": name}) for name in ("", "n")] == ["false", "true"]
+    assert (simulated.positional[0], simulated.positional[1].positional) == ("use_sim_time", ("use_sim_time",))
+    topics, services = ["/allowed", "/scan", "/cmd_vel", "volume"], ["/power"]
+    for prefix in ("", "/r"):
+        given = {"topic_prefix": prefix}
+        rules = [tuple(evaluated(name, given) for name in rule) for rule in controller["remappings"]]
+        expected = [
+            (robots_name(prefix, old), robots_name(prefix, new)) for old, new in remapped(topics + services, ["/count"])
+        ]
+        assert set(expected) <= set(rules)
+        # A relative name is found below the prefix, in the namespace, and where there is neither.
+        others = {("volume", "supervised/volume"), ("/volume", "/supervised/volume")}
+        assert set(rules) - set(expected) <= others
+        assert [tuple(evaluated(item.named[name], given) for name in ("src", "dst")) for item in remaps] == rules
     (path,) = included.positional[0].positional
     given = {"controller_package": "drives", "controller_launch_file": "drive.launch.py"}
     assert evaluated(path, given) == "share of drives/launch/drive.launch.py"
@@ -124,7 +140,7 @@ def test_the_readme_names_both_sides(files: GeneratedFiles) -> None:
     for row in (
         "| `/scan` | `/supervised/scan` | `sensor_msgs/msg/LaserScan` | sensor, depth 5 | scan |",
         "| `/supervised/cmd_vel` | `/cmd_vel` | `geometry_msgs/msg/Twist` | reliable, depth 10 | walk, halt |",
-        "| `/supervised/volume` | `/volume` | `std_msgs/msg/Float32` | reliable, depth 10 | loud, quiet |",
+        "| `supervised/volume` | `volume` | `std_msgs/msg/Float32` | reliable, depth 10 | loud, quiet |",
         "| `/supervised/power` | `/power` | `std_srvs/srv/SetBool` | of services | power (service) |",
         "| `/supervised/count` | `/count` | `test_msgs/action/Fibonacci` | of actions | count (action) |",
         "-r /count/_action/feedback:=/supervised/count/_action/feedback",
@@ -138,4 +154,5 @@ def test_the_readme_names_both_sides(files: GeneratedFiles) -> None:
 def test_texts_of_the_model_stay_texts(tmp_path: Path) -> None:
     hostile_package("ros2", tmp_path)
     (node,) = (item.named for item in launch_actions(tmp_path / "launch/layer.launch.py", tmp_path)["Node"][1:])
-    assert ("/import/class", "/supervised/import/class") in {(old[1], new[1]) for old, new in node["remappings"]}
+    rules = {tuple(evaluated(name, {"topic_prefix": ""}) for name in rule) for rule in node["remappings"]}
+    assert ("/import/class", "/supervised/import/class") in rules

@@ -123,13 +123,18 @@ def test_setup_py_installs_what_is_there(folder: Path, monkeypatch: pytest.Monke
 def test_the_launch_file_starts_the_node_with_its_parameters(folder: Path) -> None:
     found = launch_actions(folder / "launch/controller.launch.py", folder)
     arguments = {item.positional[0]: item.named for item in found["DeclareLaunchArgument"]}
-    assert set(arguments) == {"parameters", "log_level"}
-    assert Path(arguments["parameters"]["default_value"]) == folder / "config/parameters.yaml"
+    assert list(arguments) == ["namespace", "use_sim_time", "params_file", "log_level"]
+    assert all(item["description"].endswith(".") for item in arguments.values())
+    assert (arguments["namespace"]["default_value"], arguments["use_sim_time"]["default_value"]) == ("", "false")
+    assert Path(arguments["params_file"]["default_value"]) == folder / "config/parameters.yaml"
     (node,) = found["Node"]
     assert node.named["package"] == PACKAGE
     assert node.named["executable"] == "controller"
-    (parameters,) = node.named["parameters"]
-    assert parameters.positional == ("parameters",)
+    assert node.named["namespace"].positional == ("namespace",)
+    file, simulated = node.named["parameters"]
+    assert file.positional == ("params_file",)
+    value = simulated["use_sim_time"]
+    assert (value.positional[0].positional, value.named) == (("use_sim_time",), {"value_type": bool})
     assert set(found) == {"DeclareLaunchArgument", "Node"}
 
 

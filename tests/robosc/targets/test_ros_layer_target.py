@@ -126,7 +126,12 @@ def test_the_packages_own_tests_can_fail(folder: Path) -> None:
 
 def test_the_two_sides_have_names_of_their_own() -> None:
     assert robots_name("/r", "x") == robots_name("/r", "/x") == "/r/x"
-    assert callers_name("/r", "x") == "/r/supervised/x"
+    assert callers_name("/r", "x") == callers_name("/r", "/x") == "/r/supervised/x"
+
+
+def test_a_relative_name_stays_relative_without_a_prefix() -> None:
+    assert (robots_name("", "x"), callers_name("", "x")) == ("x", "supervised/x")
+    assert (robots_name("", "/x"), callers_name("", "/x")) == ("/x", "/supervised/x")
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,6 @@ from robosc.expressions import ObjectType
 from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets import generate, write_files
-from robosc.targets.ros.runtime.supervised import robots_name
 from robosc.targets.ros.topics import Topic, servers, topics
 from support.equivalence.node_target import IN_CPP, LIMIT_S, NodeTarget, given, node_parameters, set_parts
 from support.equivalence.observation import Issued, Sight
@@ -109,7 +108,7 @@ class Ros1Surroundings:
                 return False
         return all(
             (not topic.received or f"/{self._name}" in self._peer.ends(topic.identifier))
-            and (not topic.published or robots_name("", topic.identifier) in found)
+            and (not topic.published or "/" + topic.identifier.lstrip("/") in found)
             for topic in self._topics
         )
 

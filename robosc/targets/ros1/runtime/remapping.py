@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from robosc.targets.ros.runtime.supervised import old_and_new
+from robosc.targets.ros.runtime.supervised import old_and_new, robots_name
 
 PARTS_OF_ACTIONS = ("goal", "cancel", "status", "feedback", "result")
 """The topics that an action is made of stand below its name."""
@@ -24,4 +24,4 @@ def remapped(messages_and_services: Iterable[str], actions: Iterable[str]) -> tu
 
 def remapping_arguments(names: Iterable[tuple[str, str]], prefix: str) -> list[str]:
     """The arguments that make a program on ROS 1 use the new names."""
-    return [f"{prefix}{old}:={prefix}{new}" for old, new in names]
+    return [f"{robots_name(prefix, old)}:={robots_name(prefix, new)}" for old, new in names]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from robosc.targets.ros.runtime.supervised import old_and_new
+from robosc.targets.ros.runtime.supervised import old_and_new, robots_name
 
 _OF_AN_ACTION = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
 
@@ -21,7 +21,15 @@ def remapped(messages_and_services: Iterable[str], actions: Iterable[str]) -> tu
     return old_and_new([*messages_and_services, *parts])
 
 
-def remapping_arguments(names: Iterable[tuple[str, str]], prefix: str) -> list[str]:
-    """The arguments that make a program on ROS 2 use the new names."""
-    rules = [f"{prefix}{old}:={prefix}{new}" for old, new in names]
+def remapping_arguments(names: Iterable[tuple[str, str]], prefix: str, namespace: str = "/") -> list[str]:
+    """The arguments that make a program on ROS 2 use the new names.
+
+    Args:
+        names: Old and new name of each, without the prefix.
+        prefix: Prefix of every name, or nothing.
+        namespace: Namespace of the layer, in which the program has to be as well: relative names are found there.
+    """
+    rules = [f"{robots_name(prefix, old)}:={robots_name(prefix, new)}" for old, new in names]
+    if namespace != "/":
+        rules.append(f"__ns:={namespace}")
     return ["--ros-args", *(argument for rule in rules for argument in ("-r", rule))]

@@ -179,27 +179,56 @@ def test_diagnostics_follow_a_stale_sensor(start: Callable[..., RosProcess], pee
     peer.spin_until(lambda: watched.level == 0, LIMIT_S, "an OK again", node, see)
 
 
-def test_simulated_time_is_in_headers_and_moves_no_period(start: Callable[..., RosProcess], peer: Peer) -> None:
+class World:
+    """A simulation: its time, which passes when it is told to."""
+
+    def __init__(self, peer: Peer, now_s: float) -> None:
+        self.now_s = now_s
+        self._peer = peer
+        self._see = send(peer, scan(360, 0.0, 1.0))
+
+    def pass_time(self) -> None:
+        from rosgraph_msgs.msg import Clock
+
+        self.now_s += 0.05
+        time = Clock()
+        time.clock.sec, time.clock.nanosec = int(self.now_s), int(self.now_s % 1.0 * 1e9)
+        self._peer.publish(time, "/clock")
+
+    def live(self) -> None:
+        self.pass_time()
+        self._see()
+
+
+def test_a_paused_simulation_lets_nothing_expire_and_one_that_begins_anew_starts_anew(
+    start: Callable[..., RosProcess], peer: Peer
+) -> None:
     from geometry_msgs.msg import TwistStamped
-    from rosgraph_msgs.msg import Clock
 
     commands = peer.receive(TwistStamped, "/cmd")
+    watched = Watched(peer)
     node = start("use_sim_time:=true")
-    time = Clock()
-    time.clock.sec = 12345
+    world = World(peer, 12345.0)
 
-    def repeat() -> None:
-        peer.publish(time, "/clock")
-        send(peer, scan(360, 0.0, 1.0))()
+    def goes_since(sec: int) -> bool:
+        return len(commands) > 10 and all(sec <= item.header.stamp.sec < sec + 1000 for item in commands[-5:])
 
-    # The clock stands still, and the node goes on.
     peer.spin_until(
-        lambda: len(commands) > 10 and all(command.header.stamp.sec == 12345 for command in commands[-5:]),
-        LIMIT_S,
-        "commands in simulated time",
-        node,
-        repeat,
+        lambda: goes_since(12345) and watched.level == 0, LIMIT_S, "commands in simulated time", node, world.live
     )
+    peer.spin_for(0.3)
+    count = len(commands)
+    # Longer than a scan is fresh, and than a report takes; nothing is decided either.
+    peer.spin_for(1.5)
+    assert watched.level == 0
+    assert len(commands) == count
+    peer.spin_until(lambda: watched.level == 2, LIMIT_S, "a stale scan", node, world.pass_time)
+    world.now_s = 100.0
+    commands.clear()
+    peer.spin_until(
+        lambda: goes_since(100) and watched.level == 0, LIMIT_S, "commands after the jump", node, world.live
+    )
+    assert "beginning anew" in node.stderr
 
 
 def test_simulated_time_is_true_or_false(start: Callable[..., RosProcess]) -> None:

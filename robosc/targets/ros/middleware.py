@@ -75,6 +75,7 @@ class Middleware:
         parts_of_actions: Topics that an action is made of, below its name; none where an action has a name of its own.
         parameters: Its own parameters.
         without: Parameters that its nodes have in another way, or not at all.
+        not_in_file: Parameters that the parameter file leaves to whoever starts the node.
         script: Template of the programs, or nothing where something else makes them.
         markers: Paths of its files without content.
     """
@@ -90,6 +91,7 @@ class Middleware:
     parts_of_actions: tuple[str, ...] = ()
     parameters: tuple[Parameter, ...] = ()
     without: frozenset[str] = frozenset()
+    not_in_file: frozenset[str] = frozenset()
     script: str = ""
     markers: tuple[str, ...] = ()
 
@@ -113,6 +115,7 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
     declared = (*declarations(release_identifiers(found), str(deployment)), *middleware.parameters)
     values["dependencies"] = sorted({*middleware.dependencies, *packages(found, asked)})
     values["parameters"] = [item for item in chosen(declared, options) if item.name not in middleware.without]
+    values["not_in_file"] = middleware.not_in_file
     values["supervised"] = options.supervised
     values["remapped"] = remapped_names(found, asked, middleware.remapped)
     files = _python_files(supervisor, name, middleware)

@@ -1,6 +1,7 @@
 """The record of the target `ros2`: ament_python, with a controller or a layer node."""
 
 from robosc.targets.ros.middleware import Middleware
+from robosc.targets.ros.runtime.parameters import USE_SIM_TIME
 from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
 from robosc.targets.ros2.runtime.remapping import remapped
 
@@ -16,10 +17,11 @@ MIDDLEWARE = Middleware(
         "rclpy",
         "std_msgs",
     ),
-    modules=("clients", "lifecycle"),
+    modules=("clients", "lifecycle", "node_time"),
     files=("setup.cfg", "{package}/life.py", "{package}/spinner.py"),
     launch=".launch.py",
     remapped=remapped,
     parameters=(AUTOSTART,),
+    not_in_file=frozenset({USE_SIM_TIME}),
     markers=("resource/{package}",),
 )

@@ -16,7 +16,7 @@ from robosc.execution.interpreter import InterpretedSystem, describe
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_files
-from robosc.targets.ros.runtime.parameters import ParameterError, declarations, prefixed, validate
+from robosc.targets.ros.runtime.parameters import USE_SIM_TIME, ParameterError, declarations, prefixed, validate
 from robosc.targets.ros.state_topic import state_topic
 from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
 from support.generated import example_supervisor, imported
@@ -141,9 +141,11 @@ def test_the_launch_file_starts_the_node_with_its_parameters(folder: Path) -> No
 def test_the_parameter_file_holds_every_default(files: GeneratedFiles) -> None:
     content = yaml.safe_load(files["config/parameters.yaml"])["/**"]["ros__parameters"]
     expected = {item.name: item.default for item in (*declarations(("/cmd_vel",)), AUTOSTART)}
-    assert content == expected
+    # Whoever starts the node says whether time is simulated.
+    assert {**content, USE_SIM_TIME: False} == expected
+    assert USE_SIM_TIME not in content
     description = describe(example_supervisor(FOLLOWER))
-    checked = validate(content, description)
+    checked = validate(expected, description)
     assert checked.settings.period_s == 0.1
     assert checked.settings.release_identifiers == ("/cmd_vel",)
     assert (checked.topic_prefix, checked.log_folder, checked.publish_state) == ("", "", False)

@@ -88,6 +88,7 @@ def declarations(release_identifiers: Sequence[str], deployment: str = CONTROLLE
         Parameter(
             "release_identifiers",
             list(release_identifiers) or [""],
+        use_sim_time: True if time is simulated.
             "Topics that keep acting after a message (velocities): the all-default message is sent there as soon as "
             'the last one is no longer allowed, and at every stop; [""] for none.',
         ),
@@ -96,6 +97,7 @@ def declarations(release_identifiers: Sequence[str], deployment: str = CONTROLLE
             [""],
             "Received topics that count as stale after so many seconds without a message, each as topic=seconds; "
             "a stale topic stops the robot until it is back.",
+    use_sim_time: bool
         ),
         Parameter(
             "on_unknown",
@@ -130,16 +132,16 @@ def declarations(release_identifiers: Sequence[str], deployment: str = CONTROLLE
             "topic_prefix",
             "",
             "Put before every topic, service and action name of the model"
-            + (", before /supervised, /blocked" if is_layer else "")
-            + ' and before /state, such as "/robot1".',
+            + (", before /supervised, blocked" if is_layer else "")
+            + ' and before state, such as "/robot1".',
         ),
         Parameter("log_folder", "", "Folder for the event log (JSON Lines); empty for none."),
         Parameter("publish_state", False, "True if state and transitions are published on /state each period."),
         Parameter(
             USE_SIM_TIME,
             False,
-            "True if the time in headers is that of /clock; periods, ages and timeouts always follow the computer's "
-            "steady clock.",
+            "True if time is that of /clock: in headers, and for periods, ages and timeouts, none of which passes "
+            "while the simulation is paused.",
         ),
     )
 
@@ -168,7 +170,6 @@ def validate(given: Mapping[str, Any], description: Description) -> Parameters:
         raise ParameterError(_in_words_of_parameters(str(error))) from error
     if checked.period_s > MAXIMUM_PERIOD_S:
         raise _wrong("period", checked.period_s, f"at most {MAXIMUM_PERIOD_S:g} seconds")
-    _boolean(given, USE_SIM_TIME)
     return Parameters(
         settings=checked,
         topic_prefix=_prefix(given),
@@ -197,6 +198,7 @@ def _in_words_of_parameters(text: str) -> str:
 def _wrong(name: str, value: Any, expected: str) -> ParameterError:
     return ParameterError(f"parameter '{name}' is {value!r}; it must be {expected}")
 
+        use_sim_time=_boolean(given, USE_SIM_TIME),
 
 def _boolean(given: Mapping[str, Any], name: str) -> bool:
     value = given[name]

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from robosc.cli import synth
@@ -20,7 +21,7 @@ from robosc.json_documents import diagnostics_json
 from robosc.source import Bundle
 
 if TYPE_CHECKING:
-    from robosc.targets import GeneratedFiles, GenerateOptions
+    from robosc.targets import GeneratedFiles, GenerateOptions, PackageMetadata
 
 WRITTEN = "the files are written"
 NOT_WRITTEN = """\
@@ -111,6 +112,22 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
         help="name of the generated package, in lower-case letters, digits and underscores (default: made from the "
         "robot's name)",
     )
+    parser.add_argument(
+        "--maintainer",
+        metavar="NAME",
+        help="maintainer of a generated ROS package, as 'Jane Doe <jane@example.org>' (default: maintainer of "
+        "controller-config.json)",
+    )
+    parser.add_argument(
+        "--license",
+        metavar="NAME",
+        help="licence of a generated ROS package, such as Apache-2.0 (default: license of controller-config.json; MIT)",
+    )
+    parser.add_argument(
+        "--package-version",
+        metavar="X.Y.Z",
+        help="version of a generated ROS package (default: version of controller-config.json; that of RoboSC)",
+    )
     parser.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")
 
 
@@ -131,8 +148,8 @@ def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
     """Return the options for the target; the folder to write to is set where it is not given.
 
     Raises:
-        UsageError: The package cannot be called so, the file beside the model cannot be used, or there is no folder
-            to write to.
+        UsageError: The package cannot be called so, or cannot have such a maintainer, licence or version, the file
+            beside the model cannot be used, or there is no folder to write to.
     """
     from robosc.targets import CONFIG_FILE, ControllerConfigError, read_controller_config
     from robosc.targets.code.naming import require_package_name
@@ -152,7 +169,19 @@ def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
         arguments.output = config.locations.get(arguments.target)
     if arguments.output is None:
         raise UsageError(f"no folder to write to: -o DIR, or outputLocations.{arguments.target} of {CONFIG_FILE}")
-    return config.options(arguments.package)
+    options = config.options(arguments.package)
+    return replace(options, metadata=_metadata(arguments, options.metadata))
+
+
+def _metadata(arguments: argparse.Namespace, found: "PackageMetadata") -> "PackageMetadata":
+    """Return what the command line says of a package, and what the file says where it says nothing."""
+    given = {"license": arguments.license, "version": arguments.package_version}
+    try:
+        if arguments.maintainer is not None:
+            found = found.with_maintainer(arguments.maintainer)
+        return replace(found, **{name: text for name, text in given.items() if text is not None})
+    except ValueError as error:
+        raise UsageError(str(error)) from error
 
 
 def report_generated(

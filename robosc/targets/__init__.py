@@ -22,6 +22,7 @@ from robosc.targets.files import GeneratedFiles, OverwriteError, Removal, remove
 from robosc.targets.refusal import TargetRefusal, apply_target_errors
 from robosc.targets.registry import (
     GenerateOptions,
+    PackageMetadata,
     SupervisedController,
     TargetInfo,
     UnknownTargetError,
@@ -39,6 +40,7 @@ __all__ = [
     "GenerateOptions",
     "GeneratedFiles",
     "OverwriteError",
+    "PackageMetadata",
     "Removal",
     "SupervisedController",
     "TargetInfo",

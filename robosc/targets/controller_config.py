@@ -3,13 +3,13 @@
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from robosc.errors import RoboscError
-from robosc.targets.registry import GenerateOptions, SupervisedController
+from robosc.targets.registry import GenerateOptions, PackageMetadata, SupervisedController
 
 CONFIG_FILE = "controller-config.json"
 MAXIMUM_BYTES = 64 * 1024
@@ -19,7 +19,8 @@ _WRITES = "writeEventsToLog"
 _LOCATIONS = "outputLocations"
 _SUPERVISED = "supervisedController"
 _SUPERVISED_KEYS = ("package", "executable", "launchFile")
-_KEYS = (_PUBLISHES, _WRITES, _LOCATIONS, _SUPERVISED)
+_METADATA = ("maintainer", "license", "version")
+_KEYS = (_PUBLISHES, _WRITES, _LOCATIONS, _SUPERVISED, *_METADATA)
 
 _TARGET = re.compile(r"[a-z0-9-]{1,40}\Z")
 
@@ -37,6 +38,7 @@ class ControllerConfig:
         log_events: True if the event log is written.
         locations: Folder to generate into by target, below the folder of the file.
         supervised: The existing controller, or None.
+        metadata: Maintainer, licence and version of a generated ROS package.
         warnings: Things that were found and not understood, one sentence each.
     """
 
@@ -44,11 +46,12 @@ class ControllerConfig:
     log_events: bool = False
     locations: Mapping[str, Path] = field(default_factory=dict)
     supervised: SupervisedController | None = None
+    metadata: PackageMetadata = field(default_factory=PackageMetadata)
     warnings: tuple[str, ...] = ()
 
     def options(self, package: str | None) -> GenerateOptions:
         """Return the options that a target is asked for."""
-        return GenerateOptions(package, self.publish_state, self.log_events, self.supervised)
+        return GenerateOptions(package, self.publish_state, self.log_events, self.supervised, self.metadata)
 
 
 def read_controller_config(folder: Path) -> ControllerConfig:
@@ -103,6 +106,7 @@ class _Reader:
             log_events=self._boolean(document, _WRITES),
             locations=self._locations(document.get(_LOCATIONS, {})),
             supervised=self._supervised(document.get(_SUPERVISED)),
+            metadata=self._metadata(document),
             warnings=tuple(self._warnings),
         )
 
@@ -136,6 +140,18 @@ class _Reader:
                     f"{_LOCATIONS}.{target}", "the relative path of a folder, with `/` and without `..`; see also -o"
                 )
             found[target] = self._path.parent / folder
+        return found
+
+    def _metadata(self, document: Mapping[str, Any]) -> PackageMetadata:
+        given = {name: document[name] for name in _METADATA if document.get(name) is not None}
+        found = PackageMetadata()
+        for name, value in given.items():
+            if not isinstance(value, str):
+                raise self._wrong(name, "a text")
+            try:
+                found = found.with_maintainer(value) if name == "maintainer" else replace(found, **{name: value})
+            except ValueError as error:
+                raise ControllerConfigError(f"{self._path}: '{name}': {error}") from error
         return found
 
     def _supervised(self, value: object) -> SupervisedController | None:

@@ -7,7 +7,7 @@ Built-in targets are listed here; an installed distribution adds its own through
 import importlib
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from importlib.metadata import entry_points
 
@@ -19,6 +19,11 @@ ENTRY_POINT_GROUP = "robosc.targets"
 
 _PACKAGE = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,199}\Z")
 _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+-]{0,199}\Z")
+_MAINTAINER = re.compile(r"(.*\S)\s*<([^<>]*)>\s*\Z")
+# As catkin_pkg, which reads package.xml, takes it.
+_EMAIL = re.compile(r"[-A-Za-z0-9_%+]+(\.[-A-Za-z0-9_%+]+)*@([-A-Za-z0-9]+\.)+[A-Za-z]{2,}\Z")
+_VERSION = re.compile(r"(0|[1-9][0-9]{0,8})(\.(0|[1-9][0-9]{0,8})){2}\Z")
+_MAXIMUM_TEXT = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +54,49 @@ class SupervisedController:
 
 
 @dataclass(frozen=True, slots=True)
+class PackageMetadata:
+    """Data of a generated ROS package about itself, which stand in its `package.xml`.
+
+    Attributes:
+        maintainer: Name of who maintains it.
+        email: E-mail address of the maintainer.
+        license: Its licence, such as `Apache-2.0`.
+        version: Its version, three numbers, or None for the version of RoboSC.
+
+    Raises:
+        ValueError: One of them is wrong; says which.
+    """
+
+    maintainer: str = "Maintainer"
+    email: str = "maintainer@example.org"
+    license: str = "MIT"
+    version: str | None = None
+
+    def __post_init__(self) -> None:
+        for what, text in (("the maintainer's name", self.maintainer), ("the licence", self.license)):
+            if not text.strip() or not text.isprintable() or len(text) > _MAXIMUM_TEXT:
+                raise ValueError(f"{what} must be one line of at most {_MAXIMUM_TEXT} characters")
+        if not _EMAIL.match(self.email) or len(self.email) > _MAXIMUM_TEXT:
+            raise ValueError(f"the maintainer's e-mail address {self.email[:_MAXIMUM_TEXT]!a} is none")
+        if self.version is not None and not _VERSION.match(self.version):
+            raise ValueError("the version of the package must be three numbers, such as 1.0.0")
+
+    def with_maintainer(self, text: str) -> "PackageMetadata":
+        """Return the same with another maintainer.
+
+        Args:
+            text: Name and e-mail address, as `Jane Doe <jane@example.org>`.
+
+        Raises:
+            ValueError: It is not of that form.
+        """
+        found = _MAINTAINER.match(text)
+        if found is None:
+            raise ValueError("the maintainer must be written as 'Jane Doe <jane@example.org>'")
+        return replace(self, maintainer=found[1], email=found[2])
+
+
+@dataclass(frozen=True, slots=True)
 class GenerateOptions:
     """Choices of a user about generated files.
 
@@ -58,12 +106,14 @@ class GenerateOptions:
         log_events: True if a generated node writes its event log unless its parameters say otherwise.
         supervised: The existing controller that a generated layer's launch file starts, or None to leave that to its
             arguments.
+        metadata: Data of a generated ROS package about itself.
     """
 
     package: str | None = None
     publish_state: bool = False
     log_events: bool = False
     supervised: SupervisedController | None = None
+    metadata: PackageMetadata = PackageMetadata()
 
 
 @dataclass(frozen=True, slots=True)

@@ -288,6 +288,9 @@ GENERATION = st.fixed_dictionaries(
         "publish_state": st.booleans(),
         "log_events": st.booleans(),
         "supervised": SUPERVISED,
+        "metadata": st.fixed_dictionaries(
+            {}, optional={"license": st.sampled_from(["", "MIT"]), "version": st.just("1.0.0")}
+        ),
     },
 )
 BUNDLES = st.tuples(FILES, FILES, st.lists(TEXTS, max_size=2)).filter(
@@ -378,7 +381,8 @@ def meaning_of(kind: TaskKind, given_: dict[str, Any]) -> Any:
     if kind is TaskKind.GENERATE:
         choices = given_["generation"]
         flags = [choices.get(name, False) for name in ("publish_state", "log_events")]
-        return kind, bundle, how, given_["target"], choices.get("package", ""), flags, choices.get("supervised")
+        said = {name: text for name, text in choices.get("metadata", {}).items() if text}
+        return kind, bundle, how, given_["target"], choices.get("package", ""), flags, choices.get("supervised"), said
     claims = given_["properties"], given_["property_files"]
     states = given_["maximum_states"] or 1_000_000
     return kind, bundle, how, claims, is_given and (given_["supervisor"], states, given_["strict"])
@@ -453,6 +457,8 @@ class TestKeys:
                 {"target": "c99"},
                 {"generation": pb.GenerateOptions(package="x")},
                 {"generation": pb.GenerateOptions(publish_state=True)},
+                {"generation": pb.GenerateOptions(metadata=pb.PackageMetadata(license="x"))},
+                {"generation": pb.GenerateOptions(metadata=pb.PackageMetadata(version="x"))},
                 {"generation": pb.GenerateOptions(log_events=True)},
                 {"generation": pb.GenerateOptions(supervised=pb.SupervisedController())},
                 {"generation": pb.GenerateOptions(supervised=pb.SupervisedController(executable="x"))},

@@ -4,7 +4,7 @@ from pathlib import PurePath
 
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, SourceFile
-from robosc.targets import GenerateOptions
+from robosc.targets import GenerateOptions, PackageMetadata
 from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc, synthesis_pb2_grpc
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.errors import RequestRefusedError
@@ -171,7 +171,7 @@ def _engine(name: str) -> str:
 
 
 def _generate_options(options: GenerateOptions) -> pb.GenerateOptions:
-    supervised = None
+    supervised, metadata = None, options.metadata
     if options.supervised is not None:
         supervised = pb.SupervisedController(
             package=options.supervised.package,
@@ -183,6 +183,16 @@ def _generate_options(options: GenerateOptions) -> pb.GenerateOptions:
         publish_state=options.publish_state,
         log_events=options.log_events,
         supervised=supervised,
+        metadata=None if metadata == PackageMetadata() else _metadata(metadata),
+    )
+
+
+def _metadata(metadata: PackageMetadata) -> pb.PackageMetadata:
+    return pb.PackageMetadata(
+        maintainer=metadata.maintainer,
+        email=metadata.email,
+        license=metadata.license,
+        version=metadata.version or "",
     )
 
 

@@ -9,6 +9,7 @@ from robosc._version import __version__
 from robosc.supervisor import Supervisor
 from robosc.targets.code.text import printable
 from robosc.targets.model_text import requirement_texts
+from robosc.targets.registry import PackageMetadata
 
 
 def environment(*packages: str, filters: Mapping[str, Callable[..., object]]) -> jinja2.Environment:
@@ -32,12 +33,14 @@ def environment(*packages: str, filters: Mapping[str, Callable[..., object]]) ->
     return found
 
 
-def shared_values(supervisor: Supervisor, package: str) -> dict[str, object]:
+def shared_values(supervisor: Supervisor, package: str, metadata: PackageMetadata) -> dict[str, object]:
     """Return the values about a supervisor that the templates of every package refer to."""
     return {
         "version": __version__,
         "model": supervisor.model.name,
         "package": package,
+        "metadata": metadata,
+        "package_version": metadata.version or __version__,
         "digest": supervisor.certificate.bundle_sha256,
         "certificate": {
             field: printable(str(getattr(supervisor.certificate, field)))

@@ -133,7 +133,7 @@ def _context(
 
     numbers = {identifier: number for number, identifier in enumerate(received_topics(layout))}
     return {
-        **shared_values(supervisor, package),
+        **shared_values(supervisor, package, options.metadata),
         "prefix": layout.prefix,
         "upper": layout.upper,
         "top": head(supervisor),

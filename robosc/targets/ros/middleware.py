@@ -111,7 +111,7 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
         if deployment is Deployment.LAYER:
             require_names_of_a_layer(found, asked)
             require_own_topics(found, asked, middleware.parts_of_actions)
-        values = context(supervisor, name, found, asked)
+        values = context(supervisor, name, found, asked, options)
     declared = (*declarations(release_identifiers(found), str(deployment)), *middleware.parameters)
     values["dependencies"] = sorted({*middleware.dependencies, *packages(found, asked)})
     values["parameters"] = [item for item in chosen(declared, options) if item.name not in middleware.without]

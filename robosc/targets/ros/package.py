@@ -72,7 +72,11 @@ def release_identifiers(found: tuple[Topic, ...]) -> tuple[str, ...]:
 
 
 def context(
-    supervisor: Supervisor, package: str, found: tuple[Topic, ...], asked: tuple[Communication, ...]
+    supervisor: Supervisor,
+    package: str,
+    found: tuple[Topic, ...],
+    asked: tuple[Communication, ...],
+    options: GenerateOptions,
 ) -> dict[str, object]:
     """Return the values that the templates of every kind of package refer to."""
     model = supervisor.model
@@ -80,7 +84,7 @@ def context(
     tables = state_topic(model)
     requested = [item for item in model.communications if item.kind is not CommunicationKind.OUTGOING_MESSAGE]
     return {
-        **shared_values(supervisor, package),
+        **shared_values(supervisor, package, options.metadata),
         "title": _TITLES[supervisor.deployment],
         "header": header(supervisor),
         "topics": found,

@@ -312,6 +312,9 @@ def _synthesize(message: Any, reader: _RequestReader) -> object:
     return reader.bundle(message.bundle), reader.options(message.options)
 
 
+_METADATA = ("maintainer", "email", "license", "version")
+
+
 def _generate(message: Any, reader: _RequestReader) -> object:
     if not message.target:
         raise _malformed("the request names no target")
@@ -330,6 +333,7 @@ def _generate(message: Any, reader: _RequestReader) -> object:
         choices.publish_state,
         choices.log_events,
         supervised,
+        [reader.name(getattr(choices.metadata, name), f"the package's {name}") for name in _METADATA],
     )
 
 

@@ -17,7 +17,7 @@ from robosc.targets.controller_config import (
     ControllerConfigError,
     read_controller_config,
 )
-from robosc.targets.registry import SupervisedController
+from robosc.targets.registry import PackageMetadata, SupervisedController
 
 MODEL = """\
 robot Blinker {
@@ -48,6 +48,9 @@ def test_everything_that_it_may_say(tmp_path: Path) -> None:
             "writeEventsToLog": True,
             "outputLocations": {"ROS1": "catkin_ws/src/x", "ros2": "ws"},
             "supervisedController": {"package": "turtlebot3_example", "launchFile": "drive.launch.py"},
+            "maintainer": "Jane Doe <jane@example.org>",
+            "license": "Apache-2.0",
+            "version": "1.2.3",
         },
     )
     config = read_controller_config(tmp_path)
@@ -56,6 +59,7 @@ def test_everything_that_it_may_say(tmp_path: Path) -> None:
     options = config.options("name")
     assert (options.package, options.publish_state, options.log_events) == ("name", True, True)
     assert options.supervised == SupervisedController("turtlebot3_example", launch_file="drive.launch.py")
+    assert options.metadata == PackageMetadata("Jane Doe", "jane@example.org", "Apache-2.0", "1.2.3")
 
 
 @pytest.mark.parametrize(
@@ -82,6 +86,13 @@ def test_everything_that_it_may_say(tmp_path: Path) -> None:
         ({"supervisedController": {"package": "p", "executable": "x", "launchFile": "y"}}, "either an executable"),
         ({"supervisedController": {"package": "p", "executable": "../x"}}, "without a path"),
         ({"supervisedController": {"package": "p", "executable": 3}}, "an object of texts"),
+        ({"maintainer": 3}, "'maintainer' must be a text"),
+        ({"maintainer": "Jane"}, "'maintainer': the maintainer must be written as 'Jane Doe <jane@example.org>'"),
+        ({"maintainer": "Jane <jane>"}, "'maintainer': the maintainer's e-mail address 'jane' is none"),
+        ({"license": " "}, "'license': the licence must be one line"),
+        ({"license": "a\nb"}, "'license': the licence must be one line"),
+        ({"version": "1.0"}, "'version': the version of the package must be three numbers, such as 1.0.0"),
+        ({"version": "01.0.0"}, "three numbers"),
         (" " * (MAXIMUM_BYTES + 1), "more than"),
     ],
 )
@@ -151,6 +162,21 @@ class TestCommand:
         assert main(["generate", str(model), "--target", "python", *chosen]) == 0
         assert (tmp_path / "here/blinks.py").is_file()
         assert not (tmp_path / "there").exists()
+
+    def test_a_flag_goes_before_what_the_file_says_of_the_package(self, model: Path, tmp_path: Path) -> None:
+        written(tmp_path, {"maintainer": "Ann <ann@example.org>", "license": "MIT", "version": "1.0.0"})
+        chosen = ["--maintainer", "Bo <bo@example.org>", "--package-version", "2.0.0", "-o", str(tmp_path / "here")]
+        assert main(["generate", str(model), "--target", "ros2", *chosen]) == 0
+        text = (tmp_path / "here/package.xml").read_text()
+        assert '<maintainer email="bo@example.org">Bo</maintainer>' in text
+        assert "<license>MIT</license>" in text
+        assert "<version>2.0.0</version>" in text
+
+    def test_a_maintainer_without_an_address_is_wrong_use(
+        self, model: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert main(["generate", str(model), "--target", "ros2", "-o", "x", "--maintainer", "Bo"]) == 2
+        assert "must be written as 'Jane Doe <jane@example.org>'" in capsys.readouterr().err
 
     def test_without_any_folder_it_says_where_one_can_be_given(
         self, model: Path, capsys: pytest.CaptureFixture[str]

@@ -16,6 +16,7 @@ from robosc.execution.interpreter import InterpretedSystem, describe
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_files
+from robosc.targets.registry import PackageMetadata
 from robosc.targets.ros.runtime.parameters import USE_SIM_TIME, ParameterError, declarations, prefixed, validate
 from robosc.targets.ros.state_topic import state_topic
 from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
@@ -228,6 +229,23 @@ def test_a_package_may_be_called_as_one_likes() -> None:
     files = generate(robot(""), "ros2", GenerateOptions(package="my_robot"))
     assert ElementTree.fromstring(files["package.xml"]).findtext("name") == "my_robot"
     assert "my_robot/node.py" in files
+
+
+def test_a_package_says_who_maintains_it_under_which_licence() -> None:
+    metadata = PackageMetadata('Ann & "Bo" O\'Neil', "ann@example.org", "BSD-3-Clause", "1.2.3")
+    for target in ("ros2", "ros2-cpp", "ros1", "ros1-cpp"):
+        root = ElementTree.fromstring(generate(robot(""), target, GenerateOptions(metadata=metadata))["package.xml"])
+        maintainer = root.find("maintainer")
+        assert maintainer is not None
+        assert (maintainer.text, maintainer.get("email")) == (metadata.maintainer, metadata.email)
+        assert (root.findtext("license"), root.findtext("version")) == (metadata.license, metadata.version)
+    setup = generate(robot(""), "ros2", GenerateOptions(metadata=metadata))["setup.py"]
+    (call,) = (
+        node for node in ast.walk(ast.parse(setup)) if isinstance(node, ast.Call) and "setup" in ast.dump(node.func)
+    )
+    given = {item.arg: item.value.value for item in call.keywords if isinstance(item.value, ast.Constant)}
+    assert (given["maintainer"], given["maintainer_email"]) == (metadata.maintainer, metadata.email)
+    assert (given["license"], given["version"]) == (metadata.license, metadata.version)
 
 
 # What is refused.

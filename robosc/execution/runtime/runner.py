@@ -146,6 +146,11 @@ class Runner:
         return _FAULT in self._safe_stop.reasons
 
     @property
+    def missing_sensors(self) -> Tuple[str, ...]:
+        """Identifiers of the sensors with a maximum age that have not come since the start."""
+        return self._sensors.unseen()
+
+    @property
     def counters(self) -> Counters:
         """Counts of what went wrong so far."""
         return self._recorder.counters()

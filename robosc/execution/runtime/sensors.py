@@ -66,6 +66,10 @@ class Sensors:
         """Return True if every one of the sensors came at least once."""
         return all(sensor.was_seen for sensor in self._sensors.values())
 
+    def unseen(self) -> Tuple[str, ...]:
+        """Identifiers of the sensors that have not come since the start, each once."""
+        return tuple(dict.fromkeys(item.identifier for item in self._sensors.values() if not item.was_seen))
+
     def stale(self, now_s: float) -> List[Tuple[str, str]]:
         """Name and identifier of the messages whose maximum age has passed."""
         return [

@@ -13,6 +13,7 @@ MIDDLEWARE = Middleware(
         "diagnostic_msgs",
         "launch",
         "launch_ros",
+        "lifecycle_msgs",
         "rcl_interfaces",
         "rclpy",
         "std_msgs",

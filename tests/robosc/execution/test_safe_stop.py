@@ -299,11 +299,13 @@ def test_a_restart_forgets_whose_turn_it_was() -> None:
 def test_nothing_is_requested_before_the_first_message_of_a_sensor_with_a_maximum_age() -> None:
     b = bench(ROBOT, policy="priority", priority=("move",), max_age_s={"/scan": 1.0})
     assert b.status() is Status.WAITING
+    assert b.executor.missing_sensors == ("/scan",)
     assert b.tick(3) == []
     b.receive("/battery", 12.0)
     assert b.tick() == []
     b.receive("/scan", True)
     assert b.status() is Status.RUNNING
+    assert b.executor.missing_sensors == ()
     assert b.tick() == [MOVE]
 
 
@@ -327,6 +329,7 @@ def test_a_stale_sensor_stops_the_robot_and_its_return_ends_that() -> None:
     assert b.tick(3) == []
     b.receive("/scan", True)
     assert b.status() is Status.RUNNING
+    assert b.executor.missing_sensors == ()
     assert b.tick() == [MOVE]
     assert b.executor.counters.faults == 0
 

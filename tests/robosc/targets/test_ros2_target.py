@@ -1,6 +1,7 @@
 """The generated ROS 2 package: its files are what colcon, launch and a reader expect; what is refused is named."""
 
 import ast
+import math
 import re
 import subprocess
 import sys
@@ -412,6 +413,20 @@ def test_a_wrong_parameter_is_one_clear_error(changes: dict[str, Any], complaint
     with pytest.raises(ParameterError) as raised:
         validate(given(**changes), describe(example_supervisor(FOLLOWER)))
     assert str(raised.value).startswith(complaint)
+
+
+def test_the_ends_of_a_range_are_valid_and_what_lies_beyond_is_not() -> None:
+    description = describe(example_supervisor(FOLLOWER))
+    ranged = [item for item in declarations(("/cmd_vel",)) if item.range is not None]
+    assert {item.name for item in ranged} == {"period", "service_timeout", "action_timeout", "server_wait"}
+    for item in ranged:
+        assert item.range is not None
+        low, high = item.range
+        for value in (low, item.default, high):
+            validate(given(**{item.name: value}), description)
+        for value in (math.nextafter(low, -math.inf), math.nextafter(high, math.inf)):
+            with pytest.raises(ParameterError):
+                validate(given(**{item.name: value}), description)
 
 
 def test_parameters_become_settings() -> None:

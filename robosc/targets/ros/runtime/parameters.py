@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from robosc.execution.runtime.protocol import Description
-from robosc.execution.runtime.settings import Settings, SettingsError, settings_for
+from robosc.execution.runtime.settings import MINIMUM_PERIOD_S, Settings, SettingsError, settings_for
 
 _PREFIX = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+\Z")
 
@@ -32,15 +33,26 @@ class ParameterError(Exception):
 
 
 class Parameter(NamedTuple):
-    """A parameter as users see it."""
+    """A parameter as users see it.
+
+    Attributes:
+        name: Its name.
+        default: Value that it has if none is given.
+        description: Its meaning, in sentences.
+        range: The smallest and the greatest value of a number; None for what is no number, or any.
+    """
 
     name: str
     default: Any
     description: str
+    range: tuple[float, float] | None = None
 
+
+_PERIODS = (MINIMUM_PERIOD_S, MAXIMUM_PERIOD_S)
+_SECONDS = (0.0, sys.float_info.max)
 
 _OF_A_CONTROLLER = (
-    Parameter("period", 0.1, "Seconds between decisions: at most one request is issued each time."),
+    Parameter("period", 0.1, "Seconds between decisions: at most one request is issued each time.", _PERIODS),
     Parameter("policy", "fair", "Choice among enabled requests: fair, random, priority (the list, then fair)."),
     Parameter("priority", [""], "Messages in order of urgency, for the policy priority."),
     Parameter("seed", 0, "Seed of the policy random."),
@@ -48,12 +60,18 @@ _OF_A_CONTROLLER = (
 )
 
 _OF_A_LAYER = (
-    Parameter("period", 0.1, "Seconds between messages on /state (publish_state): a layer decides nothing by itself."),
+    Parameter(
+        "period",
+        0.1,
+        "Seconds between messages on /state (publish_state): a layer decides nothing by itself.",
+        _PERIODS,
+    ),
     Parameter(
         "command_timeout",
         1.0,
         "Seconds without a message from the existing controller on a release identifier after which its last one is "
         "taken back with the all-default message; 0 for never.",
+        _SECONDS,
     ),
 )
 
@@ -70,6 +88,7 @@ class Parameters(NamedTuple):
         publish_state: True if the state is published on `/state`.
         server_wait_s: Time that the start waits for servers, in seconds.
         resample_scans: True if laser scans are brought to 360 ranges.
+        use_sim_time: True if time is simulated.
     """
 
     settings: Settings
@@ -78,6 +97,7 @@ class Parameters(NamedTuple):
     publish_state: bool
     server_wait_s: float
     resample_scans: bool
+    use_sim_time: bool
 
 
 def declarations(release_identifiers: Sequence[str], deployment: str = CONTROLLER) -> tuple[Parameter, ...]:
@@ -88,7 +108,6 @@ def declarations(release_identifiers: Sequence[str], deployment: str = CONTROLLE
         Parameter(
             "release_identifiers",
             list(release_identifiers) or [""],
-        use_sim_time: True if time is simulated.
             "Topics that keep acting after a message (velocities): the all-default message is sent there as soon as "
             'the last one is no longer allowed, and at every stop; [""] for none.',
         ),
@@ -97,7 +116,6 @@ def declarations(release_identifiers: Sequence[str], deployment: str = CONTROLLE
             [""],
             "Received topics that count as stale after so many seconds without a message, each as topic=seconds; "
             "a stale topic stops the robot until it is back.",
-    use_sim_time: bool
         ),
         Parameter(
             "on_unknown",
@@ -109,17 +127,20 @@ def declarations(release_identifiers: Sequence[str], deployment: str = CONTROLLE
             "service_timeout",
             10.0,
             "Seconds after which a service call without a reply has failed, also if its server was lost; 0 for never.",
+            _SECONDS,
         ),
         Parameter(
             "action_timeout",
             0.0,
             "Seconds after which a goal without a result has failed and is cancelled; 0 for never.",
+            _SECONDS,
         ),
         Parameter(
             "server_wait",
             5.0,
             f"Seconds that the start waits for the servers of all services and actions; the {deployment} then starts "
             "without those that are missing, and their requests fail until they are there.",
+            _SECONDS,
         ),
         Parameter(
             "resample_scans",
@@ -177,6 +198,7 @@ def validate(given: Mapping[str, Any], description: Description) -> Parameters:
         publish_state=_boolean(given, "publish_state"),
         server_wait_s=_seconds(given, "server_wait"),
         resample_scans=_boolean(given, "resample_scans"),
+        use_sim_time=_boolean(given, USE_SIM_TIME),
     )
 
 
@@ -198,7 +220,6 @@ def _in_words_of_parameters(text: str) -> str:
 def _wrong(name: str, value: Any, expected: str) -> ParameterError:
     return ParameterError(f"parameter '{name}' is {value!r}; it must be {expected}")
 
-        use_sim_time=_boolean(given, USE_SIM_TIME),
 
 def _boolean(given: Mapping[str, Any], name: str) -> bool:
     value = given[name]

@@ -288,17 +288,22 @@ def test_parameters_are_set_before_it_is_configured(start: Callable[..., Stage])
     from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
     from rcl_interfaces.srv import SetParameters
 
-    stage = start("autostart:=false", "policy:=best")
+    stage = start("autostart:=false", "policy:=best", "period:=-1.0")
     client = stage.peer.node.create_client(SetParameters, f"/{PACKAGE}/set_parameters")
     stage.until(client.service_is_ready, "the node's parameters")
 
-    def set_policy(policy: str) -> bool:
-        value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=policy)
-        request = SetParameters.Request(parameters=[Parameter(name="policy", value=value)])
+    def set_value(name: str, value: ParameterValue) -> bool:
+        request = SetParameters.Request(parameters=[Parameter(name=name, value=value)])
         return bool(stage.peer.ask(client, request, LIMIT_S, stage.node).results[0].successful)
+
+    def set_policy(policy: str) -> bool:
+        return set_value("policy", ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=policy))
 
     assert not stage.change("configure")
     assert set_policy("fair")
+    # A value out of its range can be set right, too.
+    assert not stage.change("configure")
+    assert set_value("period", ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=0.02))
     assert stage.change("configure") and stage.change("activate")
     stage.walks()
     assert not set_policy("random")
@@ -326,7 +331,7 @@ def test_a_fault_ends_a_node_that_started_itself(start: Callable[..., Stage]) ->
 
 
 def test_what_cannot_be_configured_stays_unconfigured(start: Callable[..., Stage]) -> None:
-    stage = start("autostart:=false", "policy:=best")
+    stage = start("autostart:=false", "policy:=best", "period:=-1.0")
     assert not stage.change("configure")
     assert stage.state == UNCONFIGURED
     assert "parameter 'policy'" in stage.node.stderr

@@ -67,7 +67,8 @@ def model_size(bundle: Bundle) -> CodeSize:
 def target_sizes(supervisor: Supervisor) -> tuple[CodeSize, ...]:
     """Return the size of the code that every target generates of a supervisor.
 
-    Of CIF, it is the synthesis problem alone, as the paper counts it.
+    Of CIF, it is the synthesis problem alone, as the paper counts it. A target without code, such as one of messages
+    alone, has no size.
     """
     found = []
     for target in available_targets():
@@ -79,7 +80,8 @@ def target_sizes(supervisor: Supervisor) -> tuple[CodeSize, ...]:
         if target.name == "cif":
             files = {path: text for path, text in files.items() if path == "controller.cif"}
         counts = [count for path, text in files.items() if (count := count_lines(path, text)) is not None]
-        found.append(CodeSize(target.name, sum(counts), len(counts)))
+        if counts:
+            found.append(CodeSize(target.name, sum(counts), len(counts)))
     return tuple(found)
 
 

@@ -128,6 +128,13 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X.Y.Z",
         help="version of a generated ROS package (default: version of controller-config.json; that of RoboSC)",
     )
+    parser.add_argument(
+        "--state-message",
+        choices=("json", "typed", "both"),
+        help="form of the state of a generated ROS 2 node: json, a text on the topic state; typed, a message of the "
+        "package robosc_msgs (--target ros2-msgs) on ~/state; both (default: stateMessage of controller-config.json; "
+        "json)",
+    )
     parser.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")
 
 
@@ -151,7 +158,7 @@ def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
         UsageError: The package cannot be called so, or cannot have such a maintainer, licence or version, the file
             beside the model cannot be used, or there is no folder to write to.
     """
-    from robosc.targets import CONFIG_FILE, ControllerConfigError, read_controller_config
+    from robosc.targets import CONFIG_FILE, ControllerConfigError, StateMessage, read_controller_config
     from robosc.targets.code.naming import require_package_name
 
     try:
@@ -170,7 +177,11 @@ def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
     if arguments.output is None:
         raise UsageError(f"no folder to write to: -o DIR, or outputLocations.{arguments.target} of {CONFIG_FILE}")
     options = config.options(arguments.package)
-    return replace(options, metadata=_metadata(arguments, options.metadata))
+    return replace(
+        options,
+        metadata=_metadata(arguments, options.metadata),
+        state_message=StateMessage(arguments.state_message or options.state_message),
+    )
 
 
 def _metadata(arguments: argparse.Namespace, found: "PackageMetadata") -> "PackageMetadata":

@@ -23,6 +23,7 @@ from robosc.targets.refusal import TargetRefusal, apply_target_errors
 from robosc.targets.registry import (
     GenerateOptions,
     PackageMetadata,
+    StateMessage,
     SupervisedController,
     TargetInfo,
     UnknownTargetError,
@@ -42,6 +43,7 @@ __all__ = [
     "OverwriteError",
     "PackageMetadata",
     "Removal",
+    "StateMessage",
     "SupervisedController",
     "TargetInfo",
     "TargetRefusal",

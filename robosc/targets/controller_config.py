@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from robosc.errors import RoboscError
-from robosc.targets.registry import GenerateOptions, PackageMetadata, SupervisedController
+from robosc.targets.registry import GenerateOptions, PackageMetadata, StateMessage, SupervisedController
 
 CONFIG_FILE = "controller-config.json"
 MAXIMUM_BYTES = 64 * 1024
@@ -20,7 +20,8 @@ _LOCATIONS = "outputLocations"
 _SUPERVISED = "supervisedController"
 _SUPERVISED_KEYS = ("package", "executable", "launchFile")
 _METADATA = ("maintainer", "license", "version")
-_KEYS = (_PUBLISHES, _WRITES, _LOCATIONS, _SUPERVISED, *_METADATA)
+_STATE_MESSAGE = "stateMessage"
+_KEYS = (_PUBLISHES, _WRITES, _LOCATIONS, _SUPERVISED, *_METADATA, _STATE_MESSAGE)
 
 _TARGET = re.compile(r"[a-z0-9-]{1,40}\Z")
 
@@ -39,6 +40,7 @@ class ControllerConfig:
         locations: Folder to generate into by target, below the folder of the file.
         supervised: The existing controller, or None.
         metadata: Maintainer, licence and version of a generated ROS package.
+        state_message: Form of the state of a generated ROS 2 node.
         warnings: Things that were found and not understood, one sentence each.
     """
 
@@ -47,11 +49,14 @@ class ControllerConfig:
     locations: Mapping[str, Path] = field(default_factory=dict)
     supervised: SupervisedController | None = None
     metadata: PackageMetadata = field(default_factory=PackageMetadata)
+    state_message: StateMessage = StateMessage.JSON
     warnings: tuple[str, ...] = ()
 
     def options(self, package: str | None) -> GenerateOptions:
         """Return the options that a target is asked for."""
-        return GenerateOptions(package, self.publish_state, self.log_events, self.supervised, self.metadata)
+        return GenerateOptions(
+            package, self.publish_state, self.log_events, self.supervised, self.metadata, self.state_message
+        )
 
 
 def read_controller_config(folder: Path) -> ControllerConfig:
@@ -107,6 +112,7 @@ class _Reader:
             locations=self._locations(document.get(_LOCATIONS, {})),
             supervised=self._supervised(document.get(_SUPERVISED)),
             metadata=self._metadata(document),
+            state_message=self._state_message(document.get(_STATE_MESSAGE, StateMessage.JSON)),
             warnings=tuple(self._warnings),
         )
 
@@ -153,6 +159,12 @@ class _Reader:
             except ValueError as error:
                 raise ControllerConfigError(f"{self._path}: '{name}': {error}") from error
         return found
+
+    def _state_message(self, value: object) -> StateMessage:
+        try:
+            return StateMessage(value)
+        except ValueError:
+            raise self._wrong(_STATE_MESSAGE, f"one of {', '.join(StateMessage)}") from None
 
     def _supervised(self, value: object) -> SupervisedController | None:
         if value is None:

@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from enum import StrEnum
 from importlib.metadata import entry_points
 
 from robosc.errors import RoboscError
@@ -96,6 +97,16 @@ class PackageMetadata:
         return replace(self, maintainer=found[1], email=found[2])
 
 
+class StateMessage(StrEnum):
+    """Form in which a generated ROS 2 node publishes its state."""
+
+    JSON = "json"
+    """A text on the topic `state`; needs nothing else."""
+    TYPED = "typed"
+    """`robosc_msgs/msg/SupervisorState` on the topic `~/state`; that package has to be built."""
+    BOTH = "both"
+
+
 @dataclass(frozen=True, slots=True)
 class GenerateOptions:
     """Choices of a user about generated files.
@@ -107,6 +118,7 @@ class GenerateOptions:
         supervised: The existing controller that a generated layer's launch file starts, or None to leave that to its
             arguments.
         metadata: Data of a generated ROS package about itself.
+        state_message: Form of the state of a generated ROS 2 node unless its parameters say otherwise.
     """
 
     package: str | None = None
@@ -114,6 +126,7 @@ class GenerateOptions:
     log_events: bool = False
     supervised: SupervisedController | None = None
     metadata: PackageMetadata = PackageMetadata()
+    state_message: StateMessage = StateMessage.JSON
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,6 +193,10 @@ _BUILT_IN: dict[str, tuple[str, str]] = {
     "ros2-cpp": (
         "a complete ROS 2 package (ament_cmake): an rclcpp node around the supervisor in C99",
         "robosc.targets.ros2_cpp:TARGET",
+    ),
+    "ros2-msgs": (
+        "the ROS 2 messages of ~/state (ament_cmake), the same for every model: state_message typed",
+        "robosc.targets.ros2_msgs:TARGET",
     ),
 }
 

@@ -17,7 +17,7 @@ import robosc_client
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, Location, SourceFile
-from robosc.targets import GenerateOptions, PackageMetadata, SupervisedController
+from robosc.targets import GenerateOptions, PackageMetadata, StateMessage, SupervisedController
 from robosc_api.security import Credentials
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
@@ -705,11 +705,13 @@ class TestConversion:
                 supervised=pb.SupervisedController(package="p", executable="x"),
             ),
         )
-        described = GenerateOptions(metadata=PackageMetadata("Jane", "jane@example.org", "BSD-3-Clause", "1.2.3"))
+        metadata = PackageMetadata("Jane", "jane@example.org", "BSD-3-Clause", "1.2.3")
+        described = GenerateOptions(metadata=metadata, state_message=StateMessage.TYPED)
         found: Any = request_of(Generate(bundle, "ros2", described))
         assert found.generation.metadata == pb.PackageMetadata(
             maintainer="Jane", email="jane@example.org", license="BSD-3-Clause", version="1.2.3"
         )
+        assert found.generation.state_message == "typed"
         launched = GenerateOptions(supervised=SupervisedController("p", launch_file="x.launch.py"))
         found = request_of(Generate(bundle, "ros2", launched))
         assert found.generation.supervised == pb.SupervisedController(package="p", launch_file="x.launch.py")

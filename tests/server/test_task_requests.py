@@ -288,6 +288,7 @@ GENERATION = st.fixed_dictionaries(
         "publish_state": st.booleans(),
         "log_events": st.booleans(),
         "supervised": SUPERVISED,
+        "state_message": st.sampled_from(["", "typed"]),
         "metadata": st.fixed_dictionaries(
             {}, optional={"license": st.sampled_from(["", "MIT"]), "version": st.just("1.0.0")}
         ),
@@ -381,6 +382,7 @@ def meaning_of(kind: TaskKind, given_: dict[str, Any]) -> Any:
     if kind is TaskKind.GENERATE:
         choices = given_["generation"]
         flags = [choices.get(name, False) for name in ("publish_state", "log_events")]
+        flags.append(choices.get("state_message", ""))
         said = {name: text for name, text in choices.get("metadata", {}).items() if text}
         return kind, bundle, how, given_["target"], choices.get("package", ""), flags, choices.get("supervised"), said
     claims = given_["properties"], given_["property_files"]
@@ -457,6 +459,7 @@ class TestKeys:
                 {"target": "c99"},
                 {"generation": pb.GenerateOptions(package="x")},
                 {"generation": pb.GenerateOptions(publish_state=True)},
+                {"generation": pb.GenerateOptions(state_message="typed")},
                 {"generation": pb.GenerateOptions(metadata=pb.PackageMetadata(license="x"))},
                 {"generation": pb.GenerateOptions(metadata=pb.PackageMetadata(version="x"))},
                 {"generation": pb.GenerateOptions(log_events=True)},

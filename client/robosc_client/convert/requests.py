@@ -4,7 +4,7 @@ from pathlib import PurePath
 
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, SourceFile
-from robosc.targets import GenerateOptions, PackageMetadata
+from robosc.targets import GenerateOptions, PackageMetadata, StateMessage
 from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc, synthesis_pb2_grpc
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.errors import RequestRefusedError
@@ -183,6 +183,7 @@ def _generate_options(options: GenerateOptions) -> pb.GenerateOptions:
         publish_state=options.publish_state,
         log_events=options.log_events,
         supervised=supervised,
+        state_message="" if options.state_message is StateMessage.JSON else str(options.state_message),
         metadata=None if metadata == PackageMetadata() else _metadata(metadata),
     )
 

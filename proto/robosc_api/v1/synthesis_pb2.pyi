@@ -236,18 +236,20 @@ class GenerateRequest(_message.Message):
     def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., target: _Optional[str] = ..., generation: _Optional[_Union[GenerateOptions, _Mapping]] = ...) -> None: ...
 
 class GenerateOptions(_message.Message):
-    __slots__ = ("package", "publish_state", "log_events", "supervised", "metadata")
+    __slots__ = ("package", "publish_state", "log_events", "supervised", "metadata", "state_message")
     PACKAGE_FIELD_NUMBER: _ClassVar[int]
     PUBLISH_STATE_FIELD_NUMBER: _ClassVar[int]
     LOG_EVENTS_FIELD_NUMBER: _ClassVar[int]
     SUPERVISED_FIELD_NUMBER: _ClassVar[int]
     METADATA_FIELD_NUMBER: _ClassVar[int]
+    STATE_MESSAGE_FIELD_NUMBER: _ClassVar[int]
     package: str
     publish_state: bool
     log_events: bool
     supervised: SupervisedController
     metadata: PackageMetadata
-    def __init__(self, package: _Optional[str] = ..., publish_state: _Optional[bool] = ..., log_events: _Optional[bool] = ..., supervised: _Optional[_Union[SupervisedController, _Mapping]] = ..., metadata: _Optional[_Union[PackageMetadata, _Mapping]] = ...) -> None: ...
+    state_message: str
+    def __init__(self, package: _Optional[str] = ..., publish_state: _Optional[bool] = ..., log_events: _Optional[bool] = ..., supervised: _Optional[_Union[SupervisedController, _Mapping]] = ..., metadata: _Optional[_Union[PackageMetadata, _Mapping]] = ..., state_message: _Optional[str] = ...) -> None: ...
 
 class PackageMetadata(_message.Message):
     __slots__ = ("maintainer", "email", "license", "version")

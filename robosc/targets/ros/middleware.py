@@ -15,7 +15,7 @@ from robosc.targets.code.naming import package_name
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.python.generate import header
 from robosc.targets.python.package import beside_supervisor, python_text
-from robosc.targets.registry import GenerateOptions
+from robosc.targets.registry import GenerateOptions, StateMessage
 from robosc.targets.ros.layer import Renamed, remapped_names, require_names_of_a_layer, require_own_topics
 from robosc.targets.ros.package import chosen, context, error_context, packages, release_identifiers, require_own_names
 from robosc.targets.ros.runtime.parameters import Parameter, declarations
@@ -75,6 +75,7 @@ class Middleware:
         parts_of_actions: Topics that an action is made of, below its name; none where an action has a name of its own.
         parameters: Its own parameters.
         without: Parameters that its nodes have in another way, or not at all.
+        typed_state: Packages that a typed state needs.
         not_in_file: Parameters that the parameter file leaves to whoever starts the node.
         script: Template of the programs, or nothing where something else makes them.
         markers: Paths of its files without content.
@@ -91,6 +92,7 @@ class Middleware:
     parts_of_actions: tuple[str, ...] = ()
     parameters: tuple[Parameter, ...] = ()
     without: frozenset[str] = frozenset()
+    typed_state: tuple[str, ...] = ()
     not_in_file: frozenset[str] = frozenset()
     script: str = ""
     markers: tuple[str, ...] = ()
@@ -113,7 +115,8 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
             require_own_topics(found, asked, middleware.parts_of_actions)
         values = context(supervisor, name, found, asked, options)
     declared = (*declarations(release_identifiers(found), str(deployment)), *middleware.parameters)
-    values["dependencies"] = sorted({*middleware.dependencies, *packages(found, asked)})
+    typed = set() if options.state_message is StateMessage.JSON else set(middleware.typed_state)
+    values["dependencies"] = sorted({*middleware.dependencies, *packages(found, asked), *typed})
     values["parameters"] = [item for item in chosen(declared, options) if item.name not in middleware.without]
     values["not_in_file"] = middleware.not_in_file
     values["supervised"] = options.supervised

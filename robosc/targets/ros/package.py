@@ -116,4 +116,5 @@ def chosen(parameters: tuple[Parameter, ...], options: GenerateOptions) -> tuple
         values["publish_state"] = True
     if options.log_events:
         values["log_folder"] = EVENT_LOG_FOLDER
+    values["state_message"] = str(options.state_message)
     return tuple(item._replace(default=values.get(item.name, item.default)) for item in parameters)

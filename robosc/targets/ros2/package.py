@@ -4,6 +4,7 @@ from robosc.targets.ros.middleware import Middleware
 from robosc.targets.ros.runtime.parameters import USE_SIM_TIME
 from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
 from robosc.targets.ros2.runtime.remapping import remapped
+from robosc.targets.ros2.runtime.state import STATE_MESSAGE
 
 MIDDLEWARE = Middleware(
     target="ros2",
@@ -18,11 +19,12 @@ MIDDLEWARE = Middleware(
         "rclpy",
         "std_msgs",
     ),
-    modules=("clients", "lifecycle", "node_time"),
-    files=("setup.cfg", "{package}/life.py", "{package}/spinner.py"),
+    modules=("clients", "lifecycle", "node_time", "state"),
+    files=("setup.cfg", "{package}/life.py", "{package}/spinner.py", "{package}/state_publisher.py"),
     launch=".launch.py",
     remapped=remapped,
-    parameters=(AUTOSTART,),
+    parameters=(AUTOSTART, STATE_MESSAGE),
+    typed_state=("robosc_msgs",),
     not_in_file=frozenset({USE_SIM_TIME}),
     markers=("resource/{package}",),
 )

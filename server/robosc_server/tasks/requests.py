@@ -334,6 +334,7 @@ def _generate(message: Any, reader: _RequestReader) -> object:
         choices.log_events,
         supervised,
         [reader.name(getattr(choices.metadata, name), f"the package's {name}") for name in _METADATA],
+        reader.name(choices.state_message, "the form of the state"),
     )
 
 

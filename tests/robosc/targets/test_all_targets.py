@@ -102,9 +102,9 @@ STRICT = """robot Strict {
 }"""
 
 
-@pytest.mark.parametrize("name", [info.name for info in available_targets() if info.name != "cif"])
+@pytest.mark.parametrize("name", [info.name for info in available_targets() if info.name not in ("cif", "ros2-msgs")])
 def test_every_target_tells_every_requirement(name: str) -> None:
-    """Only in CIF they are no words but statements of the model itself."""
+    """Only in CIF they are no words but statements of the model itself, and messages are of no model."""
     files = files_of(outcome_of(STRICT), name)
     requirements = [line.strip() for line in STRICT.splitlines() if line.strip().startswith("requirement ")]
     pages = [text for path, text in files.items() if path.endswith("README.md")] or ["\n".join(files.values())]

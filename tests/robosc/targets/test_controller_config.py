@@ -17,7 +17,7 @@ from robosc.targets.controller_config import (
     ControllerConfigError,
     read_controller_config,
 )
-from robosc.targets.registry import PackageMetadata, SupervisedController
+from robosc.targets.registry import PackageMetadata, StateMessage, SupervisedController
 
 MODEL = """\
 robot Blinker {
@@ -51,6 +51,7 @@ def test_everything_that_it_may_say(tmp_path: Path) -> None:
             "maintainer": "Jane Doe <jane@example.org>",
             "license": "Apache-2.0",
             "version": "1.2.3",
+            "stateMessage": "both",
         },
     )
     config = read_controller_config(tmp_path)
@@ -60,6 +61,7 @@ def test_everything_that_it_may_say(tmp_path: Path) -> None:
     assert (options.package, options.publish_state, options.log_events) == ("name", True, True)
     assert options.supervised == SupervisedController("turtlebot3_example", launch_file="drive.launch.py")
     assert options.metadata == PackageMetadata("Jane Doe", "jane@example.org", "Apache-2.0", "1.2.3")
+    assert options.state_message is StateMessage.BOTH
 
 
 @pytest.mark.parametrize(
@@ -86,6 +88,8 @@ def test_everything_that_it_may_say(tmp_path: Path) -> None:
         ({"supervisedController": {"package": "p", "executable": "x", "launchFile": "y"}}, "either an executable"),
         ({"supervisedController": {"package": "p", "executable": "../x"}}, "without a path"),
         ({"supervisedController": {"package": "p", "executable": 3}}, "an object of texts"),
+        ({"stateMessage": "xml"}, "'stateMessage' must be one of json, typed, both"),
+        ({"stateMessage": ["json"]}, "'stateMessage' must be one of json, typed, both"),
         ({"maintainer": 3}, "'maintainer' must be a text"),
         ({"maintainer": "Jane"}, "'maintainer': the maintainer must be written as 'Jane Doe <jane@example.org>'"),
         ({"maintainer": "Jane <jane>"}, "'maintainer': the maintainer's e-mail address 'jane' is none"),
@@ -165,12 +169,22 @@ class TestCommand:
 
     def test_a_flag_goes_before_what_the_file_says_of_the_package(self, model: Path, tmp_path: Path) -> None:
         written(tmp_path, {"maintainer": "Ann <ann@example.org>", "license": "MIT", "version": "1.0.0"})
-        chosen = ["--maintainer", "Bo <bo@example.org>", "--package-version", "2.0.0", "-o", str(tmp_path / "here")]
+        chosen = [
+            "--maintainer",
+            "Bo <bo@example.org>",
+            "--package-version",
+            "2.0.0",
+            "--state-message",
+            "typed",
+            "-o",
+            str(tmp_path / "here"),
+        ]
         assert main(["generate", str(model), "--target", "ros2", *chosen]) == 0
         text = (tmp_path / "here/package.xml").read_text()
         assert '<maintainer email="bo@example.org">Bo</maintainer>' in text
         assert "<license>MIT</license>" in text
         assert "<version>2.0.0</version>" in text
+        assert "<exec_depend>robosc_msgs</exec_depend>" in text
 
     def test_a_maintainer_without_an_address_is_wrong_use(
         self, model: Path, capsys: pytest.CaptureFixture[str]

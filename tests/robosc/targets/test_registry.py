@@ -19,7 +19,7 @@ from robosc.targets import (
 from robosc.targets.registry import Target
 from support.generated import example_supervisor
 
-BUILT_IN = ["c99", "cif", "promela", "python", "ros1", "ros1-cpp", "ros2", "ros2-cpp"]
+BUILT_IN = ["c99", "cif", "promela", "python", "ros1", "ros1-cpp", "ros2", "ros2-cpp", "ros2-msgs"]
 
 
 @pytest.fixture(autouse=True)

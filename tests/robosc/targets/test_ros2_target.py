@@ -21,6 +21,7 @@ from robosc.targets.registry import PackageMetadata
 from robosc.targets.ros.runtime.parameters import USE_SIM_TIME, ParameterError, declarations, prefixed, validate
 from robosc.targets.ros.state_topic import state_topic
 from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
+from robosc.targets.ros2.runtime.state import STATE_MESSAGE
 from support.generated import example_supervisor, imported
 from support.launch_stub import launch_actions
 from support.models import model_of
@@ -142,7 +143,7 @@ def test_the_launch_file_starts_the_node_with_its_parameters(folder: Path) -> No
 
 def test_the_parameter_file_holds_every_default(files: GeneratedFiles) -> None:
     content = yaml.safe_load(files["config/parameters.yaml"])["/**"]["ros__parameters"]
-    expected = {item.name: item.default for item in (*declarations(("/cmd_vel",)), AUTOSTART)}
+    expected = {item.name: item.default for item in (*declarations(("/cmd_vel",)), AUTOSTART, STATE_MESSAGE)}
     # Whoever starts the node says whether time is simulated.
     assert {**content, USE_SIM_TIME: False} == expected
     assert USE_SIM_TIME not in content

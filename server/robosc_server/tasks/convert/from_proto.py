@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, SourceFile
 from robosc.synthesis import EngineOptions
-from robosc.targets import GenerateOptions, PackageMetadata, SupervisedController
+from robosc.targets import GenerateOptions, PackageMetadata, StateMessage, SupervisedController
 from robosc.verification import DEFAULT_STATES
 from robosc_api.v1 import synthesis_pb2 as pb
 
@@ -64,8 +64,8 @@ def generation(options: pb.GenerateOptions) -> GenerateOptions:
     """Return the options that are chosen for generated files.
 
     Raises:
-        OptionError: A name of the supervised controller is not a valid name, or what the package is to say of itself
-            is not valid.
+        OptionError: A name of the supervised controller, what the package is to say of itself or the form of the
+            state is not valid.
     """
     supervised = None
     if options.HasField("supervised"):
@@ -74,8 +74,17 @@ def generation(options: pb.GenerateOptions) -> GenerateOptions:
             supervised = SupervisedController(named.package, named.executable or None, named.launch_file or None)
         except ValueError as error:
             raise OptionError(f"the supervised controller: {error}") from error
+    try:
+        state_message = StateMessage(options.state_message or StateMessage.JSON)
+    except ValueError as error:
+        raise OptionError(f"the form of the state must be one of {', '.join(StateMessage)}") from error
     return GenerateOptions(
-        options.package or None, options.publish_state, options.log_events, supervised, _metadata(options.metadata)
+        options.package or None,
+        options.publish_state,
+        options.log_events,
+        supervised,
+        _metadata(options.metadata),
+        state_message,
     )
 
 

@@ -1,0 +1,35 @@
+"""The parameter that says in which form a node publishes its state.
+
+A copy of this module stands in generated packages, which run on Python 3.8 and later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from robosc.targets.ros.runtime.parameters import Parameter, ParameterError
+
+JSON, TYPED, BOTH = "json", "typed", "both"
+
+STATE_MESSAGE = Parameter(
+    "state_message",
+    JSON,
+    "Form of the state (publish_state): json, a text on the topic state; typed, robosc_msgs/msg/SupervisorState on the "
+    "topic ~/state; or both.",
+)
+
+
+def valid_state_message(given: Mapping[str, Any]) -> str:
+    """The parameter's value.
+
+    Args:
+        given: Value of every declared parameter.
+
+    Raises:
+        ParameterError: It is none of the three.
+    """
+    value = given[STATE_MESSAGE.name]
+    if value not in (JSON, TYPED, BOTH):
+        raise ParameterError(f"parameter '{STATE_MESSAGE.name}' is {value!r}; it must be one of json, typed, both")
+    return str(value)

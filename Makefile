@@ -55,7 +55,7 @@ $(WHEELS)/.ready: deploy/requirements-build.txt deploy/requirements-server.txt d
 
 DIST := out/dist
 DIST_MACHINE := $(shell uname -m)
-DIST_EXTRAS := client server bridge view plot simulation lsp signing
+DIST_EXTRAS := client server bridge view plot mcap simulation lsp signing
 
 dist: $(READY) ## make out/dist: the wheel, wheels for a machine without network, checksums; DIST_MACHINE=aarch64 for a Raspberry Pi
 	PYTHON=$(BIN)/python EXTRAS='$(DIST_EXTRAS)' MACHINE=$(DIST_MACHINE) sh deploy/make_dist.sh $(DIST)
@@ -153,7 +153,7 @@ bindings: $(READY) ## regenerate the gRPC bindings
 # Extras stay where they are asked for: a lock without them is not complete. `lock_images.py` asks the installed packages
 # what they need, so that the new lock has to be installed before.
 COMPILE := $(BIN)/uv pip compile --quiet --upgrade --no-strip-extras --generate-hashes --python-version 3.12
-EXTRAS := server postgresql dask tracing client signing ros2 examples bridge plot simulation view lsp build dev
+EXTRAS := server postgresql dask tracing client signing ros2 examples bridge plot mcap simulation view lsp build dev
 
 lock: $(READY) ## choose new versions and write the locks
 	$(COMPILE) $(EXTRAS:%=--extra %) --output-file requirements.lock pyproject.toml

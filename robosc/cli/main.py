@@ -13,6 +13,7 @@ from robosc.cli import (
     check,
     check_log,
     completion,
+    convert_log,
     doc,
     doctor,
     explain,
@@ -34,13 +35,13 @@ __all__ = ["guarded", "main", "make_parser", "parse"]
 
 _COMMANDS = (
     new, check, format_, synth, simulate, verify, sign, explore, generate, explain_synthesis, explain, doc, plot,
-    check_log, doctor, completion,
+    check_log, convert_log, doctor, completion,
 )  # fmt: skip
 """In the order of `robosc --help`."""
 
 _NAMES = (
     "new", "check", "format", "synth", "simulate", "verify", "key", "sign", "explore", "generate", "explain-synthesis",
-    "explain", "doc", "plot", "check-log", "doctor", "completion",
+    "explain", "doc", "plot", "check-log", "convert-log", "doctor", "completion",
 )  # fmt: skip
 """Names of the commands: a call of one of them needs no search for commands of other packages."""
 
@@ -82,6 +83,7 @@ def make_parser(plugins: Sequence[Plugin] = ()) -> Parser:
         doc,
         plot,
         check_log,
+        convert_log,
         doctor,
         completion,
     ):

@@ -38,6 +38,7 @@ _TOLD_EXTRAS = (
     "bridge",
     "view",
     "plot",
+    "mcap",
     "simulation",
     "lsp",
     "signing",

@@ -72,9 +72,19 @@ class LoggedRun:
 
     def notes(self) -> tuple[str, ...]:
         """Return remarks on how whole the log is, in sentences."""
-        found = []
-        if self.dropped:
-            found.append(f"the log lacks {self.dropped} entries that its writer lost")
-        if self.torn_line is not None:
-            found.append(f"line {self.torn_line}, the last one, is cut off and was left out")
-        return tuple(found)
+        return notes_of(self.dropped, self.torn_line)
+
+
+def notes_of(dropped: int, torn_line: int | None) -> tuple[str, ...]:
+    """Return remarks on how whole a log is, in sentences.
+
+    Args:
+        dropped: Number of entries that its writer lost.
+        torn_line: Number of the last line, if that was cut off, or None.
+    """
+    found = []
+    if dropped:
+        found.append(f"the log lacks {dropped} entries that its writer lost")
+    if torn_line is not None:
+        found.append(f"line {torn_line}, the last one, is cut off and was left out")
+    return tuple(found)

@@ -1,7 +1,7 @@
 """Reads event logs, which may come from anywhere: every size is bounded, and what is wrong is told with its line."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, Protocol
 
@@ -44,15 +44,42 @@ def read_log(path: str | Path) -> LoggedRun:
         LogError: It is no event log, or too large.
         OSError: It cannot be read.
     """
-    file = Path(path)
-    if file.exists() and not (file.is_file() or file.is_dir()):
-        # A pipe would not even open before somebody writes.
-        raise LogError(f"{path} is no plain file")
-    with file.open("rb") as stream:
-        size = file.stat().st_size
-        if size > MAXIMUM_BYTES:
-            raise LogError(f"{path} has {size} bytes; a log of more than {MAXIMUM_BYTES} is not read")
-        return read_log_stream(stream, str(path))
+    reader = LogReader(path)
+    entries = tuple(reader)
+    return LoggedRun(entries, reader.dropped, reader.torn_line)
+
+
+class LogReader:
+    """Reader of a log (JSON Lines), entry by entry: a long one takes no room. It may be gone through again.
+
+    Args:
+        path: The file; no pipe or device, which might never end.
+
+    Attributes:
+        dropped: Number of entries that the writer of the log lost, by its own word; known at the end.
+        torn_line: Number of the last line, if it is cut off, or None; known at the end.
+
+    Raises:
+        LogError: It is no event log, or too large: when it is made, and while it is gone through.
+        OSError: It cannot be read.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._file = Path(path)
+        self.dropped = 0
+        self.torn_line: int | None = None
+        if self._file.exists() and not (self._file.is_file() or self._file.is_dir()):
+            # A pipe would not even open before somebody writes.
+            raise LogError(f"{path} is no plain file")
+
+    def __iter__(self) -> Iterator[LogEntry]:
+        with self._file.open("rb") as stream:
+            size = self._file.stat().st_size
+            if size > MAXIMUM_BYTES:
+                raise LogError(f"{self._file} has {size} bytes; a log of more than {MAXIMUM_BYTES} is not read")
+            reading = _Reading(str(self._file))
+            yield from reading.entries(stream)
+            self.dropped, self.torn_line = reading.dropped, reading.torn_line
 
 
 class LineStream(Protocol):
@@ -73,7 +100,9 @@ def read_log_stream(stream: LineStream, name: str) -> LoggedRun:
         LogError: It is no event log, or too large.
         OSError: It cannot be read.
     """
-    return _Reading(name).read(stream)
+    reading = _Reading(name)
+    entries = tuple(reading.entries(stream))
+    return LoggedRun(entries, reading.dropped, reading.torn_line)
 
 
 class _Reading:
@@ -81,12 +110,13 @@ class _Reading:
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._entries: list[LogEntry] = []
-        self._dropped = 0
+        self._has_entries = False
         self._torn: list[tuple[int, str]] = []
         self._state: Mapping[str, Any] = {}
+        self.dropped = 0
+        self.torn_line: int | None = None
 
-    def read(self, stream: LineStream) -> LoggedRun:
+    def entries(self, stream: LineStream) -> Iterator[LogEntry]:
         number, is_ended, read_bytes = 0, True, 0
         while content := stream.readline(MAXIMUM_LINE_BYTES + 1):
             number += 1
@@ -97,29 +127,30 @@ class _Reading:
             if read_bytes > MAXIMUM_BYTES or number > MAXIMUM_ENTRIES:
                 # It may also have grown since its size was looked up.
                 self._refuse(number, f"a log of more than {MAXIMUM_ENTRIES} lines is not read")
-            self._take(number, content)
-        torn_line = None
+            entry = self._taken(number, content)
+            if entry is not None:
+                self._has_entries = True
+                yield entry
         if self._torn and self._torn[-1][0] == number and not is_ended:
-            torn_line = self._torn.pop()[0]
-        if len(self._torn) > self._dropped:
+            self.torn_line = self._torn.pop()[0]
+        if len(self._torn) > self.dropped:
             self._refuse(*self._torn[0])
-        return LoggedRun(tuple(self._entries), self._dropped, torn_line)
 
-    def _take(self, number: int, content: bytes) -> None:
+    def _taken(self, number: int, content: bytes) -> LogEntry | None:
         if not content.strip():
-            return
+            return None
         try:
             document = json.loads(content.decode("utf-8"), parse_constant=_refuse_constant)
         except RecursionError:
             self._refuse(number, "nested too deeply")
         except ValueError as error:
-            if not (self._entries or content.startswith(b"{")):
+            if not (self._has_entries or content.startswith(b"{")):
                 self._refuse(number, "no entry of an event log")
             self._torn.append((number, f"no JSON: {str(error)[:200]}"))
-            return
+            return None
         if not isinstance(document, dict):
             self._refuse(number, "no JSON object")
-        self._entries.append(self._entry(number, document))
+        return self._entry(number, document)
 
     def _entry(self, number: int, document: dict[str, Any]) -> LogEntry:
         time_s, kind = document.get("time"), document.get("kind")
@@ -142,7 +173,7 @@ class _Reading:
             count = document.get("count")
             if not isinstance(count, int) or isinstance(count, bool) or count < 0:
                 self._refuse(number, "its 'count' is no number of entries")
-            self._dropped += count
+            self.dropped += count
         return LogEntry(number, float(time_s), kind, event, is_controllable, document)
 
     def _shared_state(self, number: int, state: object) -> Mapping[str, Any]:

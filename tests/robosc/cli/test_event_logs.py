@@ -1,4 +1,4 @@
-"""`robosc plot` and `robosc check-log` as a user runs them."""
+"""`robosc plot`, `robosc convert-log` and `robosc check-log` as a user runs them."""
 
 import json
 from pathlib import Path
@@ -85,6 +85,16 @@ def test_a_plot_is_drawn(folder: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert "Left" in (folder / "left.svg").read_text(encoding="utf-8")
 
 
+def test_a_log_is_converted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["convert-log", "maze.jsonl"]) == 0
+    assert capsys.readouterr().out == "maze.mcap: 22 messages on 8 topics of 7 entries\n"
+    assert (folder / "maze.mcap").read_bytes().startswith(b"\x89MCAP")
+    assert main(["convert-log", "maze.jsonl", "-o", "other.mcap", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["file"], found["entries"], found["motion"], found["notes"]) == ("other.mcap", 7, False, [])
+    assert found["topics"]["/robosc/state/Rotator"] == "std_msgs/msg/String"
+
+
 @pytest.mark.parametrize(
     ("arguments", "status", "problem"),
     [
@@ -95,6 +105,12 @@ def test_a_plot_is_drawn(folder: Path, capsys: pytest.CaptureFixture[str]) -> No
         (["plot", "maze.jsonl", "-o", "no/maze.png"], 2, "cannot write no/maze.png: No such file or directory"),
         (["plot", "maze.jsonl", "--event", "halt"], 2, "no event of the log is called 'halt'"),
         (["plot", "maze.jsonl", "--from", "9"], 2, "no event in the time window"),
+        (["convert-log", "none.jsonl"], 2, "cannot read none.jsonl: No such file or directory"),
+        (["convert-log", "maze.rsup"], 2, "maze.rsup, line 1: "),
+        (["convert-log", "maze.jsonl", "-o", "maze.bag"], 2, "maze.bag: logs are converted to .mcap files"),
+        (["convert-log", "maze.jsonl", "-o", "no/maze.mcap"], 2, "cannot write no/maze.mcap: No such file"),
+        (["convert-log", "maze.jsonl", "--motion", "none.jsonl"], 2, "none.jsonl: there is no such file"),
+        (["convert-log", "maze.jsonl", "--motion", "maze.jsonl"], 2, "maze.jsonl:1: is no entry of a motion record"),
         (["check-log", "maze.jsonl", "--model", "none.rscd"], 2, "there is no file none.rscd"),
         (["check-log", "maze.jsonl", "--model", "none.rsup"], 2, "cannot read none.rsup"),
         (["check-log", "none.jsonl", "--model", "maze.rsup"], 2, "cannot read none.jsonl"),

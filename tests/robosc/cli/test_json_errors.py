@@ -31,6 +31,7 @@ WRONG_USE: dict[str, list[str]] = {
     "sign": ["none.rsup", "--key", "none.key"],
     "plot": ["none.jsonl"],
     "check-log": ["none.jsonl", "--model", LINE_FOLLOWER],
+    "convert-log": ["none.jsonl"],
     "doctor": ["--server", "no host"],
 }
 """For each command arguments that its parser takes, but that are wrong."""

@@ -1,0 +1,78 @@
+"""`robosc convert-log`: an event log as an MCAP file, which Foxglove and the tools of ROS 2 open."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from robosc.cli.arguments import given_path
+from robosc.cli.output import ExitCode, UsageError, print_json
+from robosc.source import visible
+
+_DESCRIPTION = """\
+Convert an event log (JSON Lines, as every node, the bridge and the simulations write it) into an MCAP file, which
+Foxglove, ros2 bag and PlotJuggler open: events with their data, requests that a layer held back, every entry in words,
+each component's state and each variable whenever it changes, and the robot's pose where there is a record of its
+motion. All messages are of types that every ROS 2 has. Needs the extra robosc[mcap].
+"""
+
+
+def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "convert-log", help="convert an event log for Foxglove and ros2 bag (MCAP)", description=_DESCRIPTION
+    )
+    parser.add_argument("log", type=given_path, metavar="LOG", help="the event log, a file of JSON Lines")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=given_path,
+        metavar="FILE",
+        help="output file, .mcap (default: the log's name with .mcap, beside it)",
+    )
+    parser.add_argument(
+        "--motion",
+        type=given_path,
+        metavar="FILE",
+        help="how the robot moved, as a simulator records it (default: motion.jsonl beside the log, if it is of the "
+        "same time)",
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Convert; 0 if that is done.
+
+    Raises:
+        UsageError: The log cannot be read or is none, or the file cannot be written.
+    """
+    from robosc.event_logs import ConversionError, LogError, MotionOfLogError, convert_log
+
+    log: Path = arguments.log
+    output: Path = arguments.output or log.with_suffix(".mcap")
+    if log.exists() and output.exists() and output.samefile(log):
+        raise UsageError(f"{output} is the log itself: convert to another file")
+    try:
+        converted = convert_log(log, output, motion=arguments.motion)
+    except (ConversionError, LogError, MotionOfLogError) as error:
+        raise UsageError(str(error)) from error
+    except OSError as error:
+        what = f"read {log}" if error.filename == str(log) else f"write {output}"
+        raise UsageError(f"cannot {what}: {error.strerror or error}") from error
+    if arguments.json:
+        print_json(
+            {
+                "file": str(converted.path),
+                "entries": converted.entries,
+                "messages": converted.messages,
+                "topics": converted.topics,
+                "motion": converted.has_motion,
+                "notes": list(converted.notes),
+            }
+        )
+    else:
+        motion = ", with the robot's motion" if converted.has_motion else ""
+        told = f"{converted.messages} messages on {len(converted.topics)} topics of {converted.entries} entries{motion}"
+        sys.stdout.write(visible(f"{converted.path}: {told}") + "\n")
+        sys.stdout.write("".join(f"note: {visible(note)}\n" for note in converted.notes))
+    return ExitCode.OK

@@ -1,6 +1,7 @@
 """`robosc convert-log`: an event log as an MCAP file, which Foxglove and the tools of ROS 2 open."""
 
 import argparse
+import json
 import sys
 from pathlib import Path
 
@@ -36,6 +37,12 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="how the robot moved, as a simulator records it (default: motion.jsonl beside the log, if it is of the "
         "same time)",
     )
+    parser.add_argument(
+        "--layout",
+        type=given_path,
+        metavar="FILE",
+        help="also write a layout for Foxglove, .json: states, log, events, plots, and where the robot was",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     parser.set_defaults(run=run)
 
@@ -49,6 +56,8 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc.event_logs import ConversionError, LogError, MotionOfLogError, convert_log
 
     log: Path = arguments.log
+    if arguments.layout is not None and arguments.layout.suffix.lower() != ".json":
+        raise UsageError(f"{arguments.layout}: layouts of Foxglove are .json files")
     output: Path = arguments.output or log.with_suffix(".mcap")
     if log.exists() and output.exists() and output.samefile(log):
         raise UsageError(f"{output} is the log itself: convert to another file")
@@ -59,6 +68,9 @@ def run(arguments: argparse.Namespace) -> int:
     except OSError as error:
         what = f"read {log}" if error.filename == str(log) else f"write {output}"
         raise UsageError(f"cannot {what}: {error.strerror or error}") from error
+    layout: Path | None = arguments.layout
+    if layout is not None:
+        _write_layout(layout, converted.topics)
     if arguments.json:
         print_json(
             {
@@ -67,6 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
                 "messages": converted.messages,
                 "topics": converted.topics,
                 "motion": converted.has_motion,
+                **({"layout": str(layout)} if layout is not None else {}),
                 "notes": list(converted.notes),
             }
         )
@@ -74,5 +87,16 @@ def run(arguments: argparse.Namespace) -> int:
         motion = ", with the robot's motion" if converted.has_motion else ""
         told = f"{converted.messages} messages on {len(converted.topics)} topics of {converted.entries} entries{motion}"
         sys.stdout.write(visible(f"{converted.path}: {told}") + "\n")
+        if layout is not None:
+            sys.stdout.write(visible(f"{layout}: a layout for Foxglove") + "\n")
         sys.stdout.write("".join(f"note: {visible(note)}\n" for note in converted.notes))
     return ExitCode.OK
+
+
+def _write_layout(path: Path, topics: dict[str, str]) -> None:
+    from robosc.event_logs.foxglove import layout_of
+
+    try:
+        path.write_text(json.dumps(layout_of(topics), indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"cannot write {path}: {error.strerror or error}") from error

@@ -89,6 +89,9 @@ def test_a_log_is_converted(folder: Path, capsys: pytest.CaptureFixture[str]) ->
     assert main(["convert-log", "maze.jsonl"]) == 0
     assert capsys.readouterr().out == "maze.mcap: 22 messages on 8 topics of 7 entries\n"
     assert (folder / "maze.mcap").read_bytes().startswith(b"\x89MCAP")
+    assert main(["convert-log", "maze.jsonl", "--layout", "maze.json"]) == 0
+    assert capsys.readouterr().out.endswith("maze.json: a layout for Foxglove\n")
+    assert "/robosc/state/Rotator.data" in (folder / "maze.json").read_text(encoding="utf-8")
     assert main(["convert-log", "maze.jsonl", "-o", "other.mcap", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["file"], found["entries"], found["motion"], found["notes"]) == ("other.mcap", 7, False, [])
@@ -109,6 +112,8 @@ def test_a_log_is_converted(folder: Path, capsys: pytest.CaptureFixture[str]) ->
         (["convert-log", "maze.rsup"], 2, "maze.rsup, line 1: "),
         (["convert-log", "maze.jsonl", "-o", "maze.bag"], 2, "maze.bag: logs are converted to .mcap files"),
         (["convert-log", "maze.jsonl", "-o", "no/maze.mcap"], 2, "cannot write no/maze.mcap: No such file"),
+        (["convert-log", "maze.jsonl", "--layout", "maze.yaml"], 2, "maze.yaml: layouts of Foxglove are .json files"),
+        (["convert-log", "maze.jsonl", "--layout", "no/maze.json"], 2, "cannot write no/maze.json: No such file"),
         (["convert-log", "maze.jsonl", "--motion", "none.jsonl"], 2, "none.jsonl: there is no such file"),
         (["convert-log", "maze.jsonl", "--motion", "maze.jsonl"], 2, "maze.jsonl:1: is no entry of a motion record"),
         (["check-log", "maze.jsonl", "--model", "none.rscd"], 2, "there is no file none.rscd"),

@@ -12,11 +12,17 @@ from pathlib import Path
 from typing import Any
 
 from robosc.errors import RoboscError
+from robosc.event_logs.bands import on_robots_clock
 from robosc.event_logs.entries import LoggedRun
 from robosc.event_logs.sequence import PlotError, sequence_of
+from robosc.motion_record import Motion
 
 CONTROLLABLE = "#D55E00"
 UNCONTROLLABLE = "#0072B2"
+BLOCKED = "#000000"
+
+STATES = ("#BFDDF0", "#F6D9A8", "#BFE3D2", "#EBCFE0", "#D9D9D9", "#F5F0B0", "#C9C3E6", "#F2C4B3")
+"""Colours of states by their number in a band, light enough for a black text; more states begin anew."""
 
 SUFFIXES = (".png", ".svg", ".html")
 """Kinds of plots that can be drawn, by the suffix of the file's name."""
@@ -38,6 +44,9 @@ class Drawn:
         begin_s: Begin of the time axis, in seconds since the begin of the log.
         end_s: End of the time axis.
         notes: Remarks on what is not shown, in sentences.
+        bands: Names of the components and variables that are shown as bands, from top to bottom.
+        curves: Names of the variables that are shown as curves.
+        blocked: Number of requests that were held back.
     """
 
     path: Path
@@ -47,6 +56,9 @@ class Drawn:
     begin_s: float
     end_s: float
     notes: tuple[str, ...]
+    bands: tuple[str, ...] = ()
+    curves: tuple[str, ...] = ()
+    blocked: int = 0
 
 
 def draw_sequence(
@@ -58,6 +70,9 @@ def draw_sequence(
     events: Sequence[str] = (),
     only_changes: bool = False,
     title: str = "",
+    has_bands: bool = True,
+    variables: Sequence[str] = (),
+    motion: Motion | None = None,
 ) -> Drawn:
     """Draw a log. The same log gives the same file.
 
@@ -69,6 +84,9 @@ def draw_sequence(
         events: Names, or patterns such as `*.request`, of the events to show; empty: all.
         only_changes: True if events are left out that carry what they carried before and leave the state as it was.
         title: Text above it.
+        has_bands: True if a band shows the states of each component.
+        variables: Names, or patterns such as `Arm.*`, of the variables to show, numbers as curves, all else as bands.
+        motion: Record of the robot's motion, by whose time everything is drawn; None: by the time of the log.
 
     Raises:
         PlotError: There is nothing to show, or no such kind of file.
@@ -79,7 +97,16 @@ def draw_sequence(
     suffix = target.suffix.lower()
     if suffix not in SUFFIXES:
         raise PlotError(f"{target}: plots are {', '.join(SUFFIXES)} files")
-    sequence = sequence_of(run, begin_s, end_s, events, only_changes=only_changes)
+    sequence = sequence_of(
+        run if motion is None else on_robots_clock(run, motion),
+        begin_s,
+        end_s,
+        events,
+        only_changes=only_changes,
+        has_bands=has_bands,
+        variables=variables,
+        is_robots_time=motion is not None,
+    )
     if suffix == ".html":
         content, drawn = _drawer("page", "plotly").page(sequence, title)
     else:
@@ -93,6 +120,9 @@ def draw_sequence(
         begin_s=drawn.begin_s,
         end_s=drawn.end_s,
         notes=drawn.notes,
+        bands=tuple(band.name for band in drawn.bands),
+        curves=tuple(curve.name for curve in drawn.curves),
+        blocked=sum(len(row.times_s) for row in sequence.blocked),
     )
 
 

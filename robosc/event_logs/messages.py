@@ -11,7 +11,6 @@ All types are of packages that every ROS 2 has, so that its tools show them with
     /robosc/path, /tf                nav_msgs/msg/Path, the whole way; tf2_msgs/msg/TFMessage, `map` to `base_link`
 """
 
-import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -20,6 +19,7 @@ from typing import Any, NamedTuple
 
 from robosc.event_logs.entries import LogEntry
 from robosc.event_logs.reading import LogError, LogReader
+from robosc.event_logs.values import Kind, Path, as_kind, common_kind, kind_of, leaves, text_of
 from robosc.interfaces import nested_types, parse_definition
 from robosc.interfaces.distributions import JAZZY
 from robosc.motion_record import Motion
@@ -48,10 +48,7 @@ _SECONDS_END = 1 << 31
 """The first second that builtin_interfaces/Time cannot tell."""
 
 _LONGEST_TOKEN = 80
-_DEEPEST = 8
 _MOST_POSES = 2000
-_INT64 = 1 << 63
-_NONFINITE = frozenset({"nan", "inf", "-inf"})
 _INFO, _WARN, _ERROR = 20, 30, 40
 _LEVELS = {"event": _INFO, "release": _INFO, "resume": _INFO, "restart": _INFO, "fault": _ERROR}
 _WORDS = ("identifier", "what", "why", "unknown", "count")
@@ -80,7 +77,7 @@ class LogTopics:
         begin_s: Earliest time of an entry, in seconds since 1970-01-01 UTC; 0 if there is none.
         end_s: Latest time of an entry; 0 if there is none.
         states: Topic of each component's state, by the component.
-        variables: Topic and type of each variable, by component and path of names.
+        variables: Topic and kind of each variable, by component and path of names.
         has_blocked: True if a request was held back.
     """
 
@@ -88,7 +85,7 @@ class LogTopics:
     begin_s: float
     end_s: float
     states: Mapping[str, str]
-    variables: Mapping[tuple[str, ...], tuple[str, str]]
+    variables: Mapping[Path, tuple[str, Kind]]
     has_blocked: bool
 
     def types(self, motion: Motion | None) -> dict[str, str]:
@@ -101,7 +98,7 @@ class LogTopics:
         names += [POSE, VELOCITY, PATH, TF] if motion is not None else []
         found = {name: _TYPES[name] for name in names}
         found |= dict.fromkeys(self.states.values(), "std_msgs/msg/String")
-        return found | dict(self.variables.values())
+        return found | {topic: f"std_msgs/msg/{kind.value}" for topic, kind in self.variables.values()}
 
 
 def definition_text(type_: str) -> str:
@@ -135,7 +132,7 @@ def topics_of(reader: LogReader, name: str) -> LogTopics:
         OSError: It cannot be read.
     """
     components: dict[str, Any] = {}
-    kinds: dict[tuple[str, ...], set[str]] = {}
+    kinds: dict[Path, set[Kind]] = {}
     count, begin_s, end_s, has_blocked = 0, math.inf, -math.inf, False
     for entry in reader:
         count += 1
@@ -148,13 +145,13 @@ def topics_of(reader: LogReader, name: str) -> LogTopics:
         for component, part in entry.state.items():
             if components.get(component) is not part:
                 components[component] = part
-                for path, value in _leaves(part["variables"], (component,)):
-                    kinds.setdefault(path, set()).add(_kind(value))
+                for path, value in leaves(part["variables"], (component,)):
+                    kinds.setdefault(path, set()).add(kind_of(value))
         if len(components) + len(kinds) > MAXIMUM_TOPICS:
             raise LogError(f"{name}, line {entry.line}: more than {MAXIMUM_TOPICS} components and variables")
     taken: set[str] = set()
     states = {component: _topic(("state", component), taken) for component in components}
-    variables = {path: (_topic(("variables", *path), taken), _type(found)) for path, found in kinds.items()}
+    variables = {path: (_topic(("variables", *path), taken), common_kind(found)) for path, found in kinds.items()}
     return LogTopics(count, begin_s if count else 0.0, end_s if count else 0.0, states, variables, has_blocked)
 
 
@@ -188,9 +185,9 @@ def log_messages(entries: Iterable[LogEntry], topics: LogTopics, name: str) -> I
             components[component] = part
             if before is None or before["state"] != part["state"]:
                 yield Message(time_ns, topics.states[component], {"data": part["state"]})
-            for path, value in _leaves(part["variables"], (component,)):
-                topic, type_ = topics.variables[path]
-                converted = _converted(value, type_)
+            for path, value in leaves(part["variables"], (component,)):
+                topic, kind = topics.variables[path]
+                converted = as_kind(value, kind)
                 if topic not in told or told[topic] != converted:
                     told[topic] = converted
                     yield Message(time_ns, topic, {"data": converted})
@@ -260,52 +257,9 @@ def _topic(names: Iterable[str], taken: set[str]) -> str:
     return found
 
 
-def _leaves(value: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """The values of an object's fields, each with its path; None is left out."""
-    if isinstance(value, Mapping) and len(path) < _DEEPEST:
-        for name, part in value.items():
-            yield from _leaves(part, (*path, str(name)))
-    elif value is not None:
-        yield path, value
-
-
-def _kind(value: Any) -> str:
-    match value:
-        case bool():
-            return "Bool"
-        case int():
-            return "Int64" if -_INT64 <= value < _INT64 else "Float64"
-        case float():
-            return "Float64"
-        case str() if value in _NONFINITE:
-            return "nonfinite"
-        case _:
-            return "String"
-
-
-def _type(kinds: set[str]) -> str:
-    """Return the type of a variable whose values are of these kinds."""
-    numbers = kinds & {"Int64", "Float64"}
-    if len(kinds) == 1 and kinds != {"nonfinite"}:
-        (kind,) = kinds
-    else:
-        kind = "Float64" if numbers and kinds <= numbers | {"nonfinite"} else "String"
-    return f"std_msgs/msg/{kind}"
-
-
-def _converted(value: Any, type_: str) -> Any:
-    if type_ == "std_msgs/msg/Float64":
-        return float(value)
-    return _text(value) if type_ == "std_msgs/msg/String" else value
-
-
-def _text(value: Any) -> str:
-    return value if isinstance(value, str) else json.dumps(value)
-
-
 def _pairs(value: Any, name: str = "data") -> list[dict[str, str]]:
     """The parts of data, as names and texts."""
-    return [{"key": ".".join(path[1:]) or name, "value": _text(part)} for path, part in _leaves(value, (name,))]
+    return [{"key": ".".join(path[1:]) or name, "value": text_of(part)} for path, part in leaves(value, (name,))]
 
 
 def _diagnostics(
@@ -325,7 +279,7 @@ def _log(entry: LogEntry, stamp: Mapping[str, int], name: str) -> dict[str, Any]
 
 
 def _words(value: Any) -> str:
-    return ", ".join(map(_text, value)) if isinstance(value, list) else _text(value)
+    return ", ".join(map(text_of, value)) if isinstance(value, list) else text_of(value)
 
 
 def _log_fields(

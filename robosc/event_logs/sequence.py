@@ -2,10 +2,10 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
-from robosc.errors import RoboscError
+from robosc.event_logs.bands import Band, Curve, PlotError, bands_of, variables_of
 from robosc.event_logs.entries import LogEntry, LoggedRun
 
 MAXIMUM_ROWS = 80
@@ -15,10 +15,6 @@ MAXIMUM_INTERRUPTIONS = 200
 
 _INTERRUPTIONS = ("fault", "stop", "resume", "restart")
 _MAXIMUM_LABEL = 60
-
-
-class PlotError(RoboscError):
-    """Nothing can be drawn as asked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +70,10 @@ class EventSequence:
         end_s: End of the time axis.
         count: Number of events in it.
         notes: Remarks on what is not shown of what was asked for, in sentences.
+        bands: States of components, then variables that are no numbers; they stand above the rows.
+        curves: Variables that are numbers; they stand below the rows.
+        blocked: Requests that were held back, by identifier; they stand below the events.
+        is_robots_time: True if the times are those of the robot's world.
     """
 
     rows: tuple[Row, ...]
@@ -82,6 +82,15 @@ class EventSequence:
     end_s: float
     count: int
     notes: tuple[str, ...]
+    bands: tuple[Band, ...] = ()
+    curves: tuple[Curve, ...] = ()
+    blocked: tuple[Row, ...] = ()
+    is_robots_time: bool = False
+
+    @property
+    def axis(self) -> str:
+        """The name of the time axis."""
+        return f"{'robot’s time' if self.is_robots_time else 'time'} since the begin of the log (s)"
 
     @property
     def drawn(self) -> int:
@@ -92,10 +101,21 @@ class EventSequence:
         """The same with at most one mark of an event in each of so many places along the time axis."""
         rows = tuple(row.thinned(self.begin_s, self.end_s, places) for row in self.rows)
         left_out = self.drawn - sum(len(row.times_s) for row in rows)
-        if not left_out:
-            return self
-        note = f"of {self.drawn} events {left_out} are not drawn: they stand where a mark of the same event is"
-        return EventSequence(rows, self.interruptions, self.begin_s, self.end_s, self.count, (*self.notes, note))
+        notes = list(self.notes)
+        if left_out:
+            told = f"of {self.drawn} events {left_out} are not drawn: they stand where a mark of the same event is"
+            notes.append(told)
+        bands = tuple(band.thinned(self.begin_s, self.end_s, places) for band in self.bands)
+        if any(len(band.spans) < len(whole.spans) for band, whole in zip(bands, self.bands, strict=True)):
+            notes.append("of states that change more often than can be seen the longer ones are drawn")
+        return replace(
+            self,
+            rows=rows,
+            notes=tuple(notes),
+            bands=bands,
+            curves=tuple(curve.thinned(self.begin_s, self.end_s, places) for curve in self.curves),
+            blocked=tuple(row.thinned(self.begin_s, self.end_s, places) for row in self.blocked),
+        )
 
 
 def sequence_of(
@@ -105,6 +125,9 @@ def sequence_of(
     events: Sequence[str] = (),
     *,
     only_changes: bool = False,
+    has_bands: bool = True,
+    variables: Sequence[str] = (),
+    is_robots_time: bool = False,
 ) -> EventSequence:
     """Return the events of a log in a time window.
 
@@ -114,6 +137,9 @@ def sequence_of(
         end_s: Its end; None: the last event or interruption.
         events: Names, or patterns such as `*.request`, of the events to show; empty: all.
         only_changes: True if events are left out that say nothing new.
+        has_bands: True if the states of components are shown.
+        variables: Names, or patterns such as `Arm.*`, of the variables to show; empty: none.
+        is_robots_time: True if the times of the log are those of the robot's world.
 
     Raises:
         PlotError: There is nothing to show.
@@ -135,7 +161,8 @@ def sequence_of(
         raise PlotError(f"no event in the time window; the last one is at {last_s:.3f} s")
     # A fault that ends a run comes after its last event.
     interrupted = [entry for entry in run.entries if entry.kind in _INTERRUPTIONS]
-    times_s = [time_s for time_s, _ in inside] + [entry.time_s - run.begin_s for entry in interrupted]
+    held = [(entry.time_s - run.begin_s, entry) for entry in run.entries if entry.kind == "blocked"]
+    times_s = [time_s for time_s, _ in inside + held] + [entry.time_s - run.begin_s for entry in interrupted]
     first_s = min(times_s) if begin_s is None else begin_s
     last_s = max(times_s) if end_s is None else end_s
     shown, notes = _most_frequent([entry for _, entry in inside])
@@ -148,14 +175,33 @@ def sequence_of(
     )
     if len(interruptions) > MAXIMUM_INTERRUPTIONS:
         notes += (f"of {len(interruptions)} faults, stops and restarts the first {MAXIMUM_INTERRUPTIONS} are drawn",)
+    bands, band_notes = bands_of(run, first_s, last_s) if has_bands else ((), ())
+    values, curves, value_notes = variables_of(run, first_s, last_s, variables)
+    blocked = [(time_s, entry) for time_s, entry in held if first_s <= time_s <= last_s]
     return EventSequence(
         rows=_rows(inside, shown),
         interruptions=interruptions[:MAXIMUM_INTERRUPTIONS],
         begin_s=first_s,
         end_s=last_s,
         count=len(inside),
-        notes=(*run.notes(), *notes),
+        notes=(*run.notes(), *notes, *band_notes, *value_notes),
+        bands=bands + values,
+        curves=curves,
+        blocked=_blocked(blocked),
+        is_robots_time=is_robots_time,
     )
+
+
+def _blocked(held: Iterable[tuple[float, LogEntry]]) -> tuple[Row, ...]:
+    """The requests that were held back, in one row for each identifier."""
+    found: dict[str, list[tuple[float, LogEntry]]] = {}
+    for time_s, entry in held:
+        found.setdefault(entry.text("identifier"), []).append((time_s, entry))
+    rows = (
+        Row(f"{name} blocked", True, tuple(time_s for time_s, _ in marks), tuple(entry.line for _, entry in marks))
+        for name, marks in found.items()
+    )
+    return tuple(rows)[:MAXIMUM_ROWS]
 
 
 def _news(happened: Iterable[LogEntry]) -> list[LogEntry]:

@@ -79,8 +79,9 @@ def test_a_plot_is_drawn(folder: Path, capsys: pytest.CaptureFixture[str]) -> No
     arguments = ["--from", "0.05", "--to", "0.15", "--event", "*.request", "--title", "Left", "--json"]
     assert main(["plot", "maze.jsonl", "-o", "left.svg", *arguments]) == 0
     assert json.loads(capsys.readouterr().out) == {
-        "file": "left.svg", "events": 1, "marks": 1, "rows": ["rotate_left.request"], "begin_s": 0.05, "end_s": 0.15,
-        "notes": [],
+        "file": "left.svg", "events": 1, "marks": 1, "blocked": 0, "curves": [],
+        "bands": ["LidarSensor", "Rotator", "Platform"], "rows": ["rotate_left.request"], "begin_s": 0.05,
+        "end_s": 0.15, "notes": [],
     }  # fmt: skip
     assert "Left" in (folder / "left.svg").read_text(encoding="utf-8")
 
@@ -107,6 +108,10 @@ def test_a_log_is_converted(folder: Path, capsys: pytest.CaptureFixture[str]) ->
         (["plot", "maze.jsonl", "-o", "maze.gif"], 2, "plots are .png, .svg, .html files"),
         (["plot", "maze.jsonl", "-o", "no/maze.png"], 2, "cannot write no/maze.png: No such file or directory"),
         (["plot", "maze.jsonl", "--event", "halt"], 2, "no event of the log is called 'halt'"),
+        (["plot", "maze.jsonl", "--variable", "Lidar.*"], 2, "no variable of the log is called 'Lidar.*'; there are "),
+        (["plot", "maze.jsonl", "--clock", "robot"], 2, "--clock robot needs a record of the robot's motion"),
+        (["plot", "maze.jsonl", "--clock", "robot", "--motion", "none.jsonl"], 2, "none.jsonl: there is no such file"),
+        (["plot", "maze.jsonl", "--motion", "motion.jsonl"], 2, "--motion goes with --clock robot"),
         (["plot", "maze.jsonl", "--from", "9"], 2, "no event in the time window"),
         (["convert-log", "none.jsonl"], 2, "cannot read none.jsonl: No such file or directory"),
         (["convert-log", "maze.rsup"], 2, "maze.rsup, line 1: "),

@@ -458,7 +458,7 @@ class Server(LanguageServer):
             if is_tried and time.monotonic() > until_s:
                 break
             is_tried = is_first = True
-            for fix in fixes(item, analysis.text.line_of(item.location)):
+            for fix in fixes(item, analysis.text.line_of(item.location), analysis.text.behind_line_of(item.location)):
                 changes = self._changes(analysis, item, fix)
                 if not self._is_fixed(analysis, item, changes):
                     continue
@@ -483,7 +483,8 @@ class Server(LanguageServer):
             except JsonRpcInvalidParams:
                 return {}
             return {} if renamed is None or renamed.changes is None else dict(renamed.changes)
-        return {analysis.uri: [lsp.TextEdit(place, fix.text)]}
+        more = [lsp.TextEdit(analysis.text.range_of(other), text) for other, text in fix.more]
+        return {analysis.uri: [lsp.TextEdit(place, fix.text), *more]}
 
     def _is_fixed(self, analysis: Analysis, found: Diagnostic, changes: Mapping[str, Iterable[lsp.TextEdit]]) -> bool:
         """Return True if some edits remove a finding and do not increase the number of findings."""

@@ -86,6 +86,10 @@ class Text:
         end = self._own_starts[number] - 1 if number < len(self._own_starts) else len(self.text)
         return self.text[self._own_starts[number - 1] : end]
 
+    def behind_line_of(self, location: Location) -> str:
+        """The text behind the line in which a location is, and behind its end."""
+        return self.text[self._own_starts[location.line] :] if location.line < len(self._own_starts) else ""
+
     def line_and_column(self, offset: int) -> tuple[int, int]:
         """Line and column of an offset as findings count them, from 1."""
         line = bisect_right(self._own_starts, offset)

@@ -4,13 +4,20 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from robosc.errors import Diagnostic
+from robosc.errors import Diagnostic, LanguageError
+from robosc.formatting import format_text
+from robosc.language.tokens import Kind, tokenize
 from robosc.source import Location
 
 _WRITE = re.compile(r"(?:Write |or |write )'([^']+)'")
 _INSTEAD = re.compile(r"Write '(.+?)' instead of '(.+)'\.", re.DOTALL)
+_NODE = re.compile(
+    r"(?:Write '(?P<meant>.+?)'(?P<elsewhere> in the robot(?:, and '(?P<here>.+?)')?)? instead of|Remove) "
+    r"'(?P<written>.+)'\."
+)
 _BEFORE = re.compile(r"Write '([^']+)' before it\b")
 _WORDS = {"&": "and", "|": "or"}
+_LONGEST_TITLE = 60
 _PREPOSITIONS = {"request": "to"}
 _RANGE = re.compile(r"(integer\s*\()([^.]+?)(\s*\.\.\s*)([^.]+?)(\s*\))")
 
@@ -21,30 +28,46 @@ class Fix:
 
     Attributes:
         title: Effect of the change, as an instruction.
-        location: Place of the text that is replaced.
+        location: Place of the text that is replaced; its length may reach over the ends of lines.
         text: Replacement that stands there then.
+        more: Places of other texts that are replaced, behind the first, and what stands there then.
     """
 
     title: str
     location: Location
     text: str
+    more: tuple[tuple[Location, str], ...] = ()
 
 
-def fixes(found: Diagnostic, line: str) -> tuple[Fix, ...]:
+def fixes(found: Diagnostic, line: str, rest: str = "") -> tuple[Fix, ...]:
     """Return the changes that would fix a finding, the likeliest first; empty where a person has to think.
 
     Args:
         found: The finding.
         line: The line of the text that it is in.
+        rest: The text behind that line and its end; without it only what stands on the line is changed.
     """
-    return () if found.location is None else tuple(_Line(found.location, line).fixes(found))
+    return () if found.location is None else tuple(_Line(found.location, line, rest).fixes(found))
+
+
+def _laid_out(text: str, indent: str) -> str:
+    """Definitions, communications or states with the line breaks of the formatter, lines after the first indented."""
+    around = {"component": 1, "requirement": 1, "behaviour": 2, "incoming": 2}.get(text.split()[0], 3)
+    begin = "robot R { component C { behaviour {".split("{")[:around]
+    try:
+        formatted = format_text("{".join([*begin, text]) + "}" * around)
+    except LanguageError:
+        return text
+    lines = formatted.rstrip("\n").split("\n")[around:-around]
+    return f"\n{indent}".join(line.removeprefix("    " * around) for line in lines)
 
 
 class _Line:
     """The line of a finding: what it covers there, and what stands before it."""
 
-    def __init__(self, location: Location, line: str) -> None:
+    def __init__(self, location: Location, line: str, rest: str = "") -> None:
         self._location = location
+        self._rest = rest
         self._line = line
         self._begin = location.column - 1
         self._end = min(self._begin + location.length, len(line))
@@ -52,6 +75,9 @@ class _Line:
         self._before = line[: self._begin]
 
     def fixes(self, found: Diagnostic) -> Iterator[Fix]:
+        if found.message.startswith("there is no '") and (node := _NODE.fullmatch(found.fix)):
+            yield from self._node(node["meant"] or "", node["written"], node["elsewhere"] and (node["here"] or ""))
+            return
         if instead := _INSTEAD.fullmatch(found.fix):
             yield from self._instead(instead[1], instead[2])
             return
@@ -110,6 +136,26 @@ class _Line:
             right = " " * bool(re.search(r"\w\Z", meant) and re.match(r"\w", self._line[end:]))
             yield from self._changed(f"Write '{meant}'", begin, end, f"{left}{meant}{right}")
 
+    def _node(self, meant: str, written: str, here: str | None) -> Iterator[Fix]:
+        """Text for a control node, which may end on a later line; or text at the end of the robot, and some here."""
+        behind = f"{self._line[self._begin :]}\n{self._rest}"
+        length = _length(written, behind)
+        if length is None:
+            return
+        title = f"Write '{meant if len(meant) <= _LONGEST_TITLE else meant[:_LONGEST_TITLE] + '...'}'"
+        place = Location(self._location.file, self._location.line, self._location.column, length)
+        if here is None:
+            indent = self._line[: len(self._line) - len(self._line.lstrip())]
+            yield Fix(title if meant else f"Remove '{written}'", place, meant and _laid_out(meant, indent))
+            return
+        end = behind.rfind("}")
+        if end >= length:
+            before = f"{self._before}{behind[:end]}"
+            line, column = before.count("\n"), len(before) - before.rfind("\n") - 1
+            closing = Location(place.file, place.line + line, column + 1, 1)
+            more = f"    {_laid_out(meant, '    ')}\n}}"
+            yield Fix(f"{title} in the robot", place, here, ((closing, more),))
+
     def _directions(self, fix: str) -> Iterator[Fix]:
         right = re.match(r"Write '(incoming|outgoing) message'", fix)
         head = re.search(r"\b(incoming|outgoing)(?=\s+message\s+\Z)", self._before)
@@ -162,6 +208,22 @@ class _Line:
             yield self._written(meant[1])
         elif missing := _BEFORE.match(fix):
             yield Fix(f"Write '{missing[1]}' before it", self._location, f"{missing[1]} {token}")
+
+
+def _length(written: str, text: str) -> int | None:
+    """The length of what a fix quotes, at the begin of a text; None: it is not there."""
+    if text.startswith(written):
+        return len(written)
+    head = written.removesuffix(" ... }")
+    if head == written or not text.startswith(head):
+        return None
+    depth = 0
+    for token, kind, start in zip(*tokenize(text), strict=True):
+        if kind == Kind.SIGN:
+            depth += (token == "{") - (token == "}")
+            if token == "}" and not depth:
+                return start + 1
+    return None
 
 
 __all__ = ["Fix", "fixes"]

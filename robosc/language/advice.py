@@ -24,16 +24,23 @@ _NEEDLESS = frozenset(
 )
 """Words before declarations of other languages."""
 
-_CONTROL_NODES = frozenset("sequence fallback selector parallel decorator root behaviortree reactivesequence".split())
-"""Words of behaviour trees for which this language has no single one."""
+_TICKS = frozenset("tick ticked loop spin update execute always entry enter timer step cycle".split())
+"""Events of other languages that happen by themselves, as silent transitions do."""
 
 _OF_COMPONENTS = frozenset({"incoming", "outgoing"})
 
+_LEAF_NODES = (
+    "action_node actionnode leaf leaf_node leafnode treenode tree_node btnode rosactionnode bt_action_node "
+    "btactionnode conditionnode statefulactionnode syncactionnode simpleactionnode coroactionnode asyncactionnode"
+)
+_SMACH_STATES = "simpleactionstate servicestate monitorstate conditionstate cbstate"
+
 _SAID_ELSEWHERE = {
-    "action": "task skill",
+    "action": f"task skill {_LEAF_NODES} {_SMACH_STATES}",
     "array": "list vector sequence",
     "behaviour": "behavior automaton fsm statemachine state_machine machine",
-    "component": "class node module actor part block device package",
+    "cancel": "cancelled canceled preempted preempt halted",
+    "component": f"class node module actor part block device package {_LEAF_NODES} {_SMACH_STATES}",
     "constant": "const define final static let parameter param blackboard setting",
     "datatype": "type typedef data struct enum record",
     "disables": "forbids blocks prevents excludes inhibits",
@@ -60,9 +67,9 @@ _SAID_ELSEWHERE = {
     "provide": "sends send with_data fill",
     "request": "req goal command call send",
     "requirement": "require requires rule constraint spec property assert ensure",
-    "response": "resp reply result answer receive received message success done",
+    "response": "resp reply result answer receive received message success succeeded done",
     "robot": "system model program controller main",
-    "service": "srv client server rpc",
+    "service": "srv client server rpc service_node servicenode rosservicenode btservicenode servicestate",
     "state": "location mode step phase node",
     "transition": "trans edge step tau jump",
     "type": "msg_type message_type datatype data payload",
@@ -73,11 +80,16 @@ _SAID_ELSEWHERE = {
 """Words of other languages and of robotics for those of ours; one may stand for several, of which one is expected."""
 
 
-def _said_elsewhere(token: str, words: Iterable[str]) -> str | None:
+def _said_elsewhere(token: str, words: Sequence[str]) -> str | None:
     """The first of some words that a token says in another language, or in another case."""
     folded = token.casefold()
     cased = (word for word in words if word == folded)
     return next(cased, None) or next((word for word in words if folded in _SAID_ELSEWHERE.get(word, "").split()), None)
+
+
+def is_said_elsewhere(token: str, expected: Iterable[str]) -> bool:
+    """Return True if a token is another language's word for one of those expected."""
+    return _said_elsewhere(token, [word.strip("'") for word in expected if word[0] == "'"]) is not None
 
 
 def _near_word(token: str, expected: Iterable[str]) -> str | None:
@@ -197,8 +209,8 @@ def _of_words(token: str, expected: Sequence[str], following: Sequence[str]) -> 
         return "Did you mean 'datatype object'?"
     if token in ("message", "topic", "msg") and "'incoming'" in expected:
         return "Write 'incoming message' or 'outgoing message'."
-    if token.casefold() in _CONTROL_NODES and "'requirement'" in expected:
-        return "Remove it: states say what follows what, and requirements what must wait for what."
+    if token.casefold() in _TICKS and "'request'" in expected and following[0] in ("goto", "if", "}"):
+        return f"Write 'transition' instead of 'on {token}'."
     near = _near_word(token, expected)
     if near is not None and near != token:
         is_message = near in _OF_COMPONENTS and following[0] not in ("message", "topic", "msg")
@@ -301,4 +313,4 @@ def _of_what_is_missing(token: str, expected: Sequence[str]) -> str:
     return "Write one of the expected words here, or look for a bracket or comma missing before."
 
 
-__all__ = ["fix_syntax", "is_foreign_operator", "misplaced", "type_elsewhere"]
+__all__ = ["fix_syntax", "is_foreign_operator", "is_said_elsewhere", "misplaced", "type_elsewhere"]

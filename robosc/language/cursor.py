@@ -14,7 +14,9 @@ from typing import NamedTuple
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.language import syntax
-from robosc.language.advice import fix_syntax, misplaced
+from robosc.language.advice import fix_syntax, is_said_elsewhere, misplaced
+from robosc.language.control_node_advice import Place, advise, why
+from robosc.language.control_nodes import Declared, NodeReader, family_of
 from robosc.language.limits import MAXIMUM_NAME, MAXIMUM_NESTING, MAXIMUM_SYNTAX_ERRORS
 from robosc.language.tokens import Kind, Places, Tokens
 from robosc.language.words import RESERVED_WORDS, STARTS, expected_words, unescape
@@ -26,6 +28,8 @@ _NAME, _WORD, _NUMBER, _STRING, _END = (
 _UNQUOTED = re.compile(r"[“”‘’]?([\w/~{}.\-]+)[“”‘’]?")
 _MAXIMUM_SHOWN = 40
 _MAXIMUM_FIX = 300
+_MAXIMUM_NODE_FIX = 2000
+"""Characters of a fix with states and requirements in it."""
 _NEAR = 0.75
 """Share that a misspelt word must have in common with the one that was meant."""
 
@@ -84,6 +88,8 @@ class Cursor:
         self._resumed = -1
         self._depth = 0
         self._faults = 0
+        self._declared = Declared(tokens)
+        self._nodes = NodeReader(file.text, tokens, self._declared)
 
     # Places
 
@@ -99,9 +105,11 @@ class Cursor:
 
     # Faults
 
-    def report(self, code: str, message: str, location: Location, fix: str, *related: RelatedPlace) -> None:
-        """An error that does not keep the parser from reading on."""
-        if len(fix) > _MAXIMUM_FIX or "\n" in fix:
+    def report(
+        self, code: str, message: str, location: Location, fix: str, *related: RelatedPlace, limit: int = _MAXIMUM_FIX
+    ) -> None:
+        """An error that does not keep the parser from reading on; a fix of more characters is not told."""
+        if len(fix) > limit or "\n" in fix:
             # The text there is longer than anyone would read in a message.
             fix = "Write one of the expected words here, or look for a bracket or comma missing before."
         self.diagnostics.append(Diagnostic(Severity.ERROR, code, message, location, fix, related))
@@ -318,6 +326,8 @@ class Cursor:
             return True
         # Behind a brace too many nothing is left to close.
         is_at_end = self.kinds[index] == _END and self.texts[self._braces[-1]] == "}"
+        if self._is_control_node(index, expected):
+            return False
         if index != self._resumed and not is_at_end:
             related: tuple[RelatedPlace, ...] = ()
             fix = ""
@@ -332,6 +342,51 @@ class Cursor:
         if self.kinds[index] == _END:
             return True
         return self.texts[index] not in self._lists[-1] and self._begins_item(index)
+
+    def _is_control_node(self, index: int, expected: tuple[str, ...]) -> bool:
+        """Return True if a node of a behaviour tree stands in the list, after reporting it and reading behind it."""
+        word = self.texts[index]
+        family = family_of(word) if self._lists[-1] and self.kinds[index] in (_NAME, _WORD) else None
+        if family is None:
+            return False
+        read = self._nodes.read(index)
+        if read is None:
+            return False
+        node, end = read
+        place = self._place_of_node(index, end)
+        is_empty = not any(True for _ in node.leaves())
+        if is_empty and place is Place.COMPONENT and is_said_elsewhere(word, expected):
+            return False
+        fix = advise(node, self._declared, place, self._quoted(index, end))
+        message = f"there is no {shown(word)} in the language: {why(family)}"
+        self.report("syntax-error", message, self.at(index), fix, limit=_MAXIMUM_NODE_FIX)
+        self.told()
+        self.place = end
+        return True
+
+    def _quoted(self, begin: int, end: int) -> str:
+        """Some tokens as a fix quotes them; what is in braces may be of several lines."""
+        last = self._starts[end - 1] + len(self.texts[end - 1])
+        text = self._file.text[self._starts[begin] : last]
+        if self.texts[end - 1] != "}" or (len(text) <= _MAXIMUM_SHOWN and "\n" not in text):
+            return text
+        return f"{text[: text.index('{')]}{{ ... }}"
+
+    def _place_of_node(self, begin: int, end: int) -> Place:
+        """Return the kind of the list that a control node stands in."""
+        if "component" in self._lists[-1]:
+            return Place.ROBOT
+        opening = self._braces[-1]
+        if "variable" in self._lists[-1] and opening + 1 == begin and self.texts[end] == "}":
+            return Place.BEHAVIOUR
+        if "behaviour" in self._lists[-1]:
+            depth, index = 1, opening + 1
+            while depth and self.kinds[index] != _END and self.texts[index] != "behaviour":
+                depth += (self.texts[index] == "{") - (self.texts[index] == "}")
+                index += 1
+            if self.texts[index] != "behaviour" or not depth:
+                return Place.COMPONENT
+        return Place.ELSEWHERE
 
     def _begins_item(self, index: int) -> bool:
         """Return True if a token looks like the first word of an item of an open list."""

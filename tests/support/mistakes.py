@@ -15,7 +15,7 @@ from random import Random
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from robosc.editing.fixes import fixes
+from robosc.editing.fixes import Fix, fixes
 from robosc.errors import Diagnostic, Severity
 from robosc.language.tokens import Kind, tokenize
 from robosc.model.check import inspect
@@ -79,10 +79,18 @@ def obeyed(text: str, found: Diagnostic) -> str | None:
     place = found.location
     assert place is not None
     lines = text.split("\n")
-    for fix in fixes(found, lines[place.line - 1]):
-        begin = _offset(lines, fix.location.line, fix.location.column)
-        return text[:begin] + fix.text + text[begin + fix.location.length :]
+    for fix in fixes(found, lines[place.line - 1], "\n".join(lines[place.line :])):
+        return changed(text, fix)
     return None
+
+
+def changed(text: str, fix: Fix) -> str:
+    """Return a text with the changes of a fix, the last one first."""
+    lines = text.split("\n")
+    for place, written in reversed(((fix.location, fix.text), *fix.more)):
+        begin = _offset(lines, place.line, place.column)
+        text = text[:begin] + written + text[begin + place.length :]
+    return text
 
 
 def judge(mistake: Mistake) -> Verdict:

@@ -44,10 +44,23 @@ def compiled(supervisor: Supervisor, folder: Path, *options: str) -> Path:
     packages = sorted((Path(sys.prefix) / "include").iterdir())
     includes = [word for path in packages if path.is_dir() for word in ("-isystem", str(path))]
     program = folder / PROGRAM
+    sources = ("main.cpp", "node.cpp")
     both = [*WARNINGS, *options, "-ffp-contract=off"]
     for command in (
         ["gcc", "-std=c99", *both, "-c", engine.name, "-o", "engine.o"],
-        ["g++", "-std=c++17", *both, "-I.", f"-I{STAND_IN}", *includes, "node.cpp", "engine.o", "-o", str(program)],
+        [
+            "g++",
+            "-std=c++17",
+            *both,
+            "-I.",
+            f"-I{STAND_IN}",
+            *includes,
+            *sources,
+            "engine.o",
+            "-pthread",
+            "-o",
+            str(program),
+        ],
     ):
         done = subprocess.run(command, cwd=source, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr[:6000]
@@ -69,9 +82,12 @@ def courier() -> Supervisor:
     return made.supervisor
 
 
-def run(program: Path, lines: Sequence[str], *parameters: str) -> subprocess.CompletedProcess[str]:
+def run(
+    program: Path, lines: Sequence[str], *parameters: str, namespace: str = "/"
+) -> subprocess.CompletedProcess[str]:
     """Run a node on what happens to it, with parameters such as `period:=0.02`; the last line is to end it."""
     arguments = [word for parameter in parameters for word in ("-p", parameter)]
+    arguments += ["-r", f"__ns:={namespace}"]
     return subprocess.run(
         [str(program), "--ros-args", *arguments],
         input="".join(f"{line}\n" for line in lines),

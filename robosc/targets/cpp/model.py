@@ -63,7 +63,8 @@ class Writer:
         answers = [line for item in layout.requests for event in answers_of(item) for line in self._take(event)]
         fills = [line for item in layout.requests for line in self._fill(item)]
         body = [*tables, *states, *requests, *self._functions, *received, *answers, *fills]
-        return "\n".join([*_TOP.splitlines(), "", *body, *_BOTTOM]) + "\n"
+        head = [*_INCLUDES.splitlines(), "", f"namespace {self.package} {{", "", *_TOP.splitlines(), ""]
+        return "\n".join([*head, *body, "}  // namespace model", "", f"}}  // namespace {self.package}"]) + "\n"
 
     # Tables.
 
@@ -451,7 +452,7 @@ def _function(head: str, body: list[str], words: list[str]) -> list[str]:
     return [*words, *head.splitlines(), "{", *indent(body), "}", ""]
 
 
-_TOP = """\
+_INCLUDES = """\
 #pragma once
 
 #include <cstddef>
@@ -465,9 +466,9 @@ _TOP = """\
 #include "runtime/notes.hpp"
 #include "runtime/parameters.hpp"
 #include "runtime/values.hpp"
+"""
 
-namespace robosc {
-
+_TOP = """\
 namespace model {
 
 inline void put_transition(std::vector<int>& taken, int number)
@@ -477,5 +478,3 @@ inline void put_transition(std::vector<int>& taken, int number)
     }
 }
 """
-
-_BOTTOM = ["}  // namespace model", "", "}  // namespace robosc"]

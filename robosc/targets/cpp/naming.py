@@ -16,6 +16,28 @@ KEYWORDS = frozenset(
 )
 
 
+_TAKEN = frozenset(
+    """
+    actionlib boost diagnostic_msgs lifecycle_msgs main rcl_interfaces rclcpp rclcpp_action rclcpp_components
+    rclcpp_lifecycle ros std std_msgs
+    """.split()
+)
+"""Names that a program around the supervisor has anyway."""
+
+
+def require_namespace(package: str) -> None:
+    """Do nothing if the generated package can have this name, which is that of its namespace.
+
+    Raises:
+        UnsupportedModelError: It cannot.
+    """
+    if package in KEYWORDS or package in _TAKEN:
+        raise UnsupportedModelError(
+            f"the generated package would be called {package}, which cannot be its namespace in C++: choose another "
+            "name for it"
+        )
+
+
 def require_field_name(name: str) -> None:
     """Do nothing if a message in C++ can have a field of this name.
 

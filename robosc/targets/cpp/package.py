@@ -18,7 +18,7 @@ from robosc.targets.code import templates
 from robosc.targets.code.naming import package_name
 from robosc.targets.code.templates import shared_values
 from robosc.targets.cpp.model import Writer, fill_name, received_topics, take_name
-from robosc.targets.cpp.naming import require_package_name
+from robosc.targets.cpp.naming import require_namespace, require_package_name
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros.package import chosen, error_context, packages, release_identifiers, require_own_names
@@ -53,6 +53,8 @@ class Middleware:
         module: The Python package that has its runtime and its templates.
         templates: Path of each file from a template: the template's name.
         without: Parameters that nodes of this middleware have in another way, or not at all.
+        parameters: Parameters that only nodes of this middleware have.
+        packages: Packages of messages that its headers use, beside those of every node.
     """
 
     target: str
@@ -62,6 +64,8 @@ class Middleware:
     module: str
     templates: dict[str, str]
     without: frozenset[str]
+    parameters: tuple[Parameter, ...] = ()
+    packages: tuple[str, ...] = ()
 
 
 def generate_package(middleware: Middleware, supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles:
@@ -82,6 +86,7 @@ def _generate(supervisor: Supervisor, name: str, options: GenerateOptions, middl
             "this version generates controllers only"
         )
     found, asked = topics(supervisor.model), servers(supervisor.model)
+    require_namespace(name)
     require_own_names(name, found, asked)
     for package in sorted(packages(found, asked)):
         require_package_name(package)
@@ -97,7 +102,9 @@ def _generate(supervisor: Supervisor, name: str, options: GenerateOptions, middl
     for module, headers in (("robosc.targets.cpp", _RUNTIME), (middleware.module, middleware.runtime)):
         for path in headers:
             text = resources.files(f"{module}.runtime").joinpath(path).read_text(encoding="utf-8")
-            files[f"src/runtime/{path}"] = f"{top}\n{with_prefix(unit.layout, text)}"
+            # Each package has a namespace of its own: two of them may be loaded into one process.
+            text = with_prefix(unit.layout, text).replace("namespace robosc", f"namespace {name}")
+            files[f"src/runtime/{path}"] = f"{top}\n{text}"
     environment = _environment(middleware.module)
     context = _context(supervisor, unit, name, found, asked, options, middleware)
     for path, template in middleware.templates.items():
@@ -128,8 +135,8 @@ def _context(
     types = [("msg", topic.interface) for topic in found]
     types += [(_kind(item), item.interface) for item in asked if item.interface]
 
-    def without(parameters: tuple[Parameter, ...]) -> list[Parameter]:
-        return [item for item in parameters if item.name not in middleware.without]
+    declared = tuple(item for item in declarations(released) if item.name not in middleware.without)
+    declared += middleware.parameters
 
     numbers = {identifier: number for number, identifier in enumerate(received_topics(layout))}
     return {
@@ -139,15 +146,15 @@ def _context(
         "top": head(supervisor),
         "hash_top": head(supervisor, "# ", "# ", ""),
         "includes": sorted({middleware.include(kind, type_) for kind, type_ in (*types, *_own_types())}),
-        "packages": sorted({type_.package for _, type_ in (*types, *_own_types())}),
+        "packages": sorted({*middleware.packages, *(type_.package for _, type_ in (*types, *_own_types()))}),
         "has_actions": any(item.kind is CommunicationKind.ACTION for item in asked),
         "has_services": any(item.kind is CommunicationKind.SERVICE for item in asked),
         "topics": [_topic(unit, topic, numbers, middleware) for topic in found],
         "servers": [_server(unit, number, item, middleware) for number, item in enumerate(asked)],
         "topic_table": found,
         "server_table": asked,
-        "parameters": without(declarations(released)),
-        "chosen": without(chosen(declarations(released), options)),
+        "parameters": declared,
+        "chosen": chosen(declared, options),
     }
 
 

@@ -3,7 +3,7 @@
 from robosc.model.structure import Interface
 from robosc.targets.cpp.naming import file_name
 from robosc.targets.cpp.package import Middleware
-from robosc.targets.ros.runtime.parameters import USE_SIM_TIME
+from robosc.targets.ros.runtime.parameters import AUTOSTART, USE_SIM_TIME
 
 _PARTS = {
     "goal": ("action", "::Goal"),
@@ -24,7 +24,7 @@ MIDDLEWARE = Middleware(
     target="ros2-cpp",
     include=lambda kind, type_: f"{type_.package}/{kind}/{file_name(type_.type)}.hpp",
     type_name=_type_name,
-    runtime=("ros2.hpp", "ros2_actions.hpp"),
+    runtime=("ros2.hpp", "ros2_actions.hpp", "ros2_life.hpp"),
     module="robosc.targets.ros2_cpp",
     templates={
         "CMakeLists.txt": "CMakeLists.txt.j2",
@@ -32,8 +32,12 @@ MIDDLEWARE = Middleware(
         "config/parameters.yaml": "parameters.yaml.j2",
         "launch/controller.launch.py": "controller.launch.py.j2",
         "package.xml": "package.xml.j2",
+        "src/main.cpp": "main.cpp.j2",
         "src/node.cpp": "node.cpp.j2",
+        "src/node.hpp": "node.hpp.j2",
     },
     # Every ROS 2 node has it by itself.
     without=frozenset({USE_SIM_TIME}),
+    parameters=(AUTOSTART,),
+    packages=("lifecycle_msgs", "rcl_interfaces"),
 )

@@ -1,5 +1,6 @@
 // The world of a node on the stand-in for rclcpp: the test writes on standard input what happens to the node, a line
-// each, and the node's doings are printed on standard output. One thread, no network.
+// each, and the node's doings are printed on standard output. No network. The executor of the controller's callback
+// group takes the lines, but those of the process: these the executor takes that the node was added to.
 //
 //   message TOPIC DATA            a message comes
 //   server NAME 1                 a service or action has a server (0: it has none)
@@ -10,17 +11,22 @@
 //   refuse NAME CODE              the answer to a cancel (0: it is accepted)
 //   signal NUMBER
 //   wait WORD NAME                go on when the node has done that once more
+//   change TRANSITION             whoever manages the node asks for it: configure, activate, deactivate, cleanup, shutdown
+//   set NAME VALUE                somebody sets a parameter
+//   end                           the context ends, as by a signal to a container
 //
 // DATA depends on the type: the value of `data`, the ranges of a scan, `success` and `message` of a reply, `sequence`,
 // x, y and z of a point, four parts of a test_msgs/NestedMessage.
 
 #pragma once
 
+#include <atomic>
 #include <csignal>
 #include <cstdint>
 #include <functional>
 #include <iostream>
 #include <map>
+#include <mutex>
 #include <poll.h>
 #include <sstream>
 #include <string>
@@ -94,7 +100,11 @@ struct World {
     std::map<std::string, bool> servers;
     std::map<std::string, int> done;
     std::string input;
-    bool is_over = false;
+    std::atomic<bool> is_over{false};
+    // Protects what both executors look at: what was done, and the input.
+    std::recursive_mutex mutex;
+    // Lines of the process, by their first word.
+    std::map<std::string, Handler> manager;
 };
 
 inline World& world()
@@ -130,42 +140,86 @@ inline void obey(const std::string& line)
     }
 }
 
-// Handle one line, waiting for it for so long: whether there was one.
-inline bool step(int timeout_ms)
+// Read what has come on standard input.
+inline void read_input()
 {
     World& here = world();
-    std::size_t end = here.input.find('\n');
-    if (end == std::string::npos && !here.is_over) {
-        pollfd waited{0, POLLIN, 0};
-        if (poll(&waited, 1, timeout_ms) > 0) {
-            char buffer[65536];
-            const ssize_t count = read(0, buffer, sizeof buffer);
-            here.is_over = count == 0;
-            if (count > 0) {
-                here.input.append(buffer, static_cast<std::size_t>(count));
-            }
+    pollfd waited{0, POLLIN, 0};
+    if (!here.is_over && poll(&waited, 1, 0) > 0) {
+        char buffer[65536];
+        const ssize_t count = read(0, buffer, sizeof buffer);
+        here.is_over = count == 0;
+        if (count > 0) {
+            here.input.append(buffer, static_cast<std::size_t>(count));
         }
-        end = here.input.find('\n');
-    } else if (end == std::string::npos) {
-        poll(nullptr, 0, timeout_ms);
     }
-    if (end != std::string::npos) {
-        const std::string line = here.input.substr(0, end);
-        if (line.compare(0, 5, "wait ") == 0 && here.done[line.substr(5)]-- <= 0) {
+}
+
+// Take the next line if it is there and for this executor; what a manager asks for stays in line until it is done.
+inline bool take_line(bool is_manager, std::string& line)
+{
+    World& here = world();
+    const std::lock_guard<std::recursive_mutex> lock(here.mutex);
+    if (here.input.find('\n') == std::string::npos) {
+        read_input();
+    }
+    const std::size_t end = here.input.find('\n');
+    if (end == std::string::npos) {
+        return false;
+    }
+    line = here.input.substr(0, end);
+    const bool is_of_manager = here.manager.count(line.substr(0, line.find(' '))) > 0;
+    if (line.compare(0, 5, "wait ") == 0) {
+        if (here.done[line.substr(5)]-- <= 0) {
             here.done[line.substr(5)] = 0;
-            poll(nullptr, 0, timeout_ms < 5 ? timeout_ms : 5);
             return false;
         }
+    } else if (line.compare(0, 7, "signal ") != 0 && is_of_manager != is_manager) {
+        return false;
+    }
+    if (!is_of_manager) {
         here.input.erase(0, end + 1);
-        if (line.compare(0, 5, "wait ") != 0) {
-            obey(line);
+    }
+    return true;
+}
+
+// Handle one line, waiting for it for so long: whether there was one.
+inline bool step(int timeout_ms, bool is_manager = false)
+{
+    World& here = world();
+    std::string line;
+    if (!take_line(is_manager, line)) {
+        bool is_quiet = false;
+        {
+            const std::lock_guard<std::recursive_mutex> lock(here.mutex);
+            is_quiet = here.input.empty();
+        }
+        pollfd waited{0, POLLIN, 0};
+        if (is_quiet && !here.is_over) {
+            poll(&waited, 1, timeout_ms);
+        } else {
+            // The other executor may be done with its line at any time.
+            poll(nullptr, 0, timeout_ms < 2 || here.is_over ? timeout_ms : 2);
+        }
+        if (!take_line(is_manager, line)) {
+            return false;
         }
     }
-    return end != std::string::npos;
+    const std::string word = line.substr(0, line.find(' '));
+    if (here.manager.count(word) > 0) {
+        std::istringstream in(line.substr(word.size()));
+        here.manager.at(word)(in);
+        const std::lock_guard<std::recursive_mutex> lock(here.mutex);
+        here.input.erase(0, here.input.find('\n') + 1);
+    } else if (word != "wait") {
+        obey(line);
+    }
+    return true;
 }
 
 inline void print(const std::string& what, const std::string& name, const std::string& yaml)
 {
+    const std::lock_guard<std::recursive_mutex> lock(world().mutex);
     world().done[what + " " + name]++;
     std::cout << what << " " << name << " " << yaml << std::endl;
 }

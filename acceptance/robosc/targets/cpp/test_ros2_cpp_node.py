@@ -295,3 +295,98 @@ def test_states_and_prefix(maze_node: Path) -> None:
 
 
 ROTATIONS = ("rotate_left", "rotate_right")
+
+
+def drives(sent_by_node: list[tuple[str, str, str]]) -> list[bool]:
+    """Return for each command to the wheels whether they turn."""
+    return [bool(numbers_of(data)) for word, name, data in sent_by_node if (word, name) == ("publish", "/cmd_vel")]
+
+
+CONFIGURED = ["change configure", *SERVERS]
+COUNTING = ["message /allowed 1", "message /order/count", "wait goal /count", "accept /count"]
+CANCELLED = ["wait cancel /count", "refuse /count 0", "result /count 5"]
+MANAGED = ("period:=0.01", "autostart:=false")
+
+
+def test_others_manage_the_node(courier_node: Path, tmp_path: Path) -> None:
+    lines = [
+        *CONFIGURED,
+        # It is held.
+        "message /order/power",
+        "change activate",
+        "wait call /power",
+        "answer /power 1 fine",
+        *COUNTING,
+        "wait publish /cmd_vel",
+        "change deactivate",
+        *CANCELLED,
+        "change activate",
+        "message /order/wind",
+        "wait call /wind",
+        "change deactivate",
+        "change cleanup",
+        "set period 0.02",
+        "change configure",
+        "change shutdown",
+    ]
+    done = run(courier_node, lines, *MANAGED, f"log_folder:={tmp_path}")
+    assert done.returncode == 0, done.stderr
+    found = sent(done.stdout)
+    states = [(name, data) for word, name, data in found if word == "state"]
+    asked = ["configure 2", "activate 3", "deactivate 2", "activate 3", "deactivate 2", "cleanup 1", "configure 2"]
+    assert [" ".join(item) for item in states] == [*asked, "shutdown 4"]
+    doings = [(word, name) for word, name, _ in found]
+    assert doings.index(("state", "activate")) < doings.index(("call", "/power"))
+    assert drives(found)[-1] is False
+    # The wheels stop before the goal is cancelled, and both before the answer to whoever manages the node.
+    place = doings.index(("state", "deactivate"))
+    assert doings[place - 2 : place] == [("publish", "/cmd_vel"), ("cancel", "/count")]
+    # Each configuration begins a log.
+    logs = [[json.loads(line)["kind"] for line in file.read_text().splitlines()] for file in tmp_path.iterdir()]
+    inactive, active = sorted(logs, key=len)
+    assert "event" not in inactive
+    assert (active.count("stop"), active.count("restart")) == (2, 1)
+
+
+def test_parameters_are_taken_when_the_node_is_configured(courier_node: Path) -> None:
+    lines = ["set period fast", "change configure", "set period 0.05", *CONFIGURED, "set period 0.1", "change activate"]
+    done = run(courier_node, [*lines, "set autostart true", "change shutdown"], *MANAGED)
+    assert done.returncode == 0
+    refused = "a node takes its parameters when it is configured"
+    found = [data for word, _, data in sent(done.stdout) if word == "set"]
+    assert found == ["done", "done", refused, refused]
+    states = [data for word, name, data in sent(done.stdout) if (word, name) == ("state", "configure")]
+    assert states == ["1", "2"]
+    assert "[ERROR] parameter 'period' is 'fast'; it must be" in done.stderr
+    # A node that starts itself has taken them.
+    done = run(courier_node, ["set period 0.1", END])
+    assert [data for word, _, data in sent(done.stdout) if word == "set"] == [refused]
+
+
+def test_a_fault_of_a_managed_node_leaves_it_at_rest(courier_node: Path) -> None:
+    fault = [*COUNTING, "message /allowed 0", "wait cancel /count", "refuse /count 1", *A_WHILE]
+    again = ["result /count 5", "change deactivate", "change activate", "message /order/power", "wait call /power"]
+    parameters = (*WATCHED, "autostart:=false")
+    done = run(courier_node, [*CONFIGURED, "change activate", *fault, *again, "change shutdown"], *parameters)
+    assert done.returncode == 0
+    assert "[ERROR] stopped: the cancel of a running goal was refused" in done.stderr
+    assert ("call", "/power", "{data: true}") in sent(done.stdout)
+    # Left in that state, it says so.
+    done = run(courier_node, [*CONFIGURED, "change activate", *fault, "change shutdown"], *parameters)
+    assert done.returncode == 1
+    assert done.stderr.endswith("courier_controller: the cancel of a running goal was refused\n")
+
+
+def test_the_end_of_a_container_stops_the_robot(courier_node: Path) -> None:
+    done = run(courier_node, [*DRIVING, "accept /count", "wait publish /cmd_vel", "end"], "period:=0.01")
+    found = sent(done.stdout)
+    assert drives(found) == [True, False]
+    assert [word for word, name, _ in found if name == "/count"] == ["goal", "cancel"]
+
+
+def test_names_without_a_slash_are_found_in_the_namespace(maze_node: Path) -> None:
+    lines = [f"message /scan {' '.join(['3.0'] * 360)}", *["wait publish /robot1/state"] * 3, END]
+    done = run(maze_node, lines, "publish_state:=true", "period:=0.001", namespace="/robot1")
+    assert done.returncode == 0, done.stderr
+    # The model's own names are absolute.
+    assert {name for _, name, _ in sent(done.stdout)} <= {"/robot1/state", "/cmd_vel", *(f"/{n}" for n in ROTATIONS)}

@@ -231,6 +231,13 @@ public:
         tell_health();
     }
 
+    /* Bring the robot to rest until `start`; what comes meanwhile is held, as before the first one. */
+    void pause()
+    {
+        stop("deactivated");
+        is_held_ = true;
+    }
+
     /* Return true if it is at rest, but the ends of cancelled goals are awaited. */
     bool is_stopping() const
     {
@@ -291,7 +298,12 @@ private:
         }
         missing_.clear();
         begin();
-        robot_start(&robot_, began_us_);
+        if (reasons_.empty()) {
+            robot_start(&robot_, began_us_);
+        } else {
+            /* It was stopped; whatever it did before, it begins anew. */
+            robot_restart(&robot_, began_us_);
+        }
         before_ = robot_.state;
         take_held();
         tell_reasons();
@@ -356,7 +368,7 @@ private:
             cancel_abandoned();
         }
         tell_health();
-        if (fault() != nullptr) {
+        if (fault() != nullptr && parameters_.ends_by_fault) {
             return;
         }
         if (reasons_.empty()) {

@@ -50,6 +50,8 @@ struct Parameters {
     std::string log_folder;
     bool publish_state = false;
     bool resample_scans = false;
+    /* True if the process ends by a fault, and tells it then. */
+    bool ends_by_fault = true;
 };
 
 /* Part of the model that parameters may name. */

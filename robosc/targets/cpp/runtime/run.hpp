@@ -23,9 +23,27 @@ inline void complain(const std::string& text)
     std::cerr << model::PACKAGE << ": " << line << std::endl;
 }
 
+/* Finish what was stopped: await the ends of cancelled goals, let `deliver` give what was sent last time to arrive, and
+   close the event log. */
+template <class Spin, class Deliver>
+void finish(Controller& controller, const Spin& spin, const Deliver& deliver)
+{
+    try {
+        const std::uint64_t limit = now_us() + CANCEL_WAIT_US;
+        while (controller.is_stopping() && now_us() < limit) {
+            spin(20000);
+            controller.advance();
+        }
+    } catch (const std::exception& failure) {
+        controller.stop(failure.what(), true);
+    }
+    deliver();
+    controller.close();
+}
+
 /* Run until a signal, a fault or `is_over`, then stop the robot: the exit status. `spin` waits at most so many
    microseconds for the first that comes, and handles all that is there by then: nothing is decided on less. `is_over`
-   throws where the end is a fault. `deliver` gives what was sent last time to arrive. */
+   throws where the end is a fault. */
 template <class Spin, class IsOver, class Deliver>
 int run(Controller& controller, const Spin& spin, const IsOver& is_over, const Deliver& deliver)
 {
@@ -40,17 +58,7 @@ int run(Controller& controller, const Spin& spin, const IsOver& is_over, const D
     } catch (const std::exception& failure) {
         controller.stop(failure.what(), true);
     }
-    try {
-        const std::uint64_t limit = now_us() + CANCEL_WAIT_US;
-        while (controller.is_stopping() && now_us() < limit) {
-            spin(20000);
-            controller.advance();
-        }
-    } catch (const std::exception& failure) {
-        controller.stop(failure.what(), true);
-    }
-    deliver();
-    controller.close();
+    finish(controller, spin, deliver);
     const std::string* fault = controller.fault();
     if (fault != nullptr) {
         complain(*fault);

@@ -78,6 +78,15 @@ _OF_A_LAYER = (
 _RESAMPLED_IN_A_LAYER = " Only the supervisor sees it so: what is passed on is unchanged."
 
 
+AUTOSTART = Parameter(
+    "autostart",
+    True,
+    "True if the node configures and activates itself at its start; if not, a lifecycle manager does so, and a fault "
+    "leaves the node at rest until it is deactivated and activated again.",
+)
+"""Parameter of ROS 2, where nodes can be managed."""
+
+
 class Parameters(NamedTuple):
     """Valid values.
 

@@ -1,4 +1,4 @@
-"""The parameter that says who starts a node: it itself, or whoever manages it.
+"""The check of the parameter that says who starts a node: it itself, or whoever manages it.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -7,14 +7,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from robosc.targets.ros.runtime.parameters import Parameter, ParameterError
+from robosc.targets.ros.runtime.parameters import AUTOSTART, ParameterError
 
-AUTOSTART = Parameter(
-    "autostart",
-    True,
-    "True if the node configures and activates itself at its start; if not, a lifecycle manager does so, and a fault "
-    "leaves the node at rest until it is deactivated and activated again.",
-)
+__all__ = ["AUTOSTART", "valid_autostart"]
 
 
 def valid_autostart(value: Any) -> bool:

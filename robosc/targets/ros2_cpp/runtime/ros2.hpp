@@ -10,9 +10,9 @@
 #include <vector>
 
 #include <rclcpp/rclcpp.hpp>
+#include <rclcpp_lifecycle/lifecycle_node.hpp>
 
 #include "controller.hpp"
-#include "signals.hpp"
 
 namespace robosc {
 
@@ -37,6 +37,13 @@ inline rclcpp::QoS profile(Quality quality, std::size_t depth)
     return result;
 }
 
+/* Messages that are kept for who comes later cannot be handed over within a process in every distribution. */
+inline rclcpp::IntraProcessSetting within_process(const rclcpp::QoS& quality)
+{
+    return quality.durability() == rclcpp::DurabilityPolicy::TransientLocal ? rclcpp::IntraProcessSetting::Disable
+                                                                            : rclcpp::IntraProcessSetting::NodeDefault;
+}
+
 #if ROBOT_SERVICE_COUNT > 0
 /* The calls of one service: nothing waits. */
 template <class Service>
@@ -46,13 +53,13 @@ public:
     using Response = typename Service::Response;
     using Answer = void (*)(robot_t*, std::uint64_t, std::uint32_t, const Response&, Notes&);
 
-    ServiceCalls(const std::shared_ptr<rclcpp::Node>& node, Reports& reports, const Parameters& parameters,
-        const std::string& name, Answer answer)
+    ServiceCalls(rclcpp_lifecycle::LifecycleNode& node, const rclcpp::CallbackGroup::SharedPtr& group, Reports& reports,
+        const Parameters& parameters, const std::string& name, Answer answer)
         : reports_(reports)
         , timeout_us_(parameters.settings.service_timeout_us)
         , name_(prefixed(parameters.topic_prefix, name))
         , answer_(answer)
-        , client_(node->create_client<Service>(name_))
+        , client_(node.create_client<Service>(name_, rclcpp::ServicesQoS(), group))
     {
     }
 
@@ -153,23 +160,32 @@ inline rclcpp::ParameterValue ros_value_of(const Value& value)
     return std::visit(Make{}, value);
 }
 
-/* Declare every parameter: the value of each. */
-inline Given given_parameters(rclcpp::Node& node, const std::vector<Declaration>& declarations)
+/* Declare every parameter. */
+template <class Node>
+void declare_parameters_of(Node& node, const std::vector<Declaration>& declarations)
 {
-    Given given;
     for (const Declaration& item : declarations) {
         rcl_interfaces::msg::ParameterDescriptor descriptor;
         descriptor.description = item.description;
-        descriptor.read_only = true;
         /* A wrong type gets the same kind of error as a wrong value, and 1 is as good as 1.0. */
         descriptor.dynamic_typing = true;
-        given[item.name] = value_of(node.declare_parameter(item.name, ros_value_of(item.value), descriptor));
+        node.declare_parameter(item.name, ros_value_of(item.value), descriptor);
     }
     /* A misspelt parameter would leave a default in force; one file may serve several nodes, so it is no error. */
     for (const auto& [name, value] : node.get_node_parameters_interface()->get_parameter_overrides()) {
         if (!node.has_parameter(name) && name.compare(0, 14, "qos_overrides.") != 0) {
             RCLCPP_WARN(node.get_logger(), "there is no parameter '%s'", name.c_str());
         }
+    }
+}
+
+/* The value of every declared parameter. */
+template <class Node>
+Given given_parameters(const Node& node, const std::vector<Declaration>& declarations)
+{
+    Given given;
+    for (const Declaration& item : declarations) {
+        given[item.name] = value_of(node.get_parameter(item.name).get_parameter_value());
     }
     return given;
 }

@@ -29,13 +29,13 @@ public:
     using TakeResult = void (*)(robot_t*, std::uint64_t, std::uint32_t, const Result&, Notes&);
     using TakeFeedback = void (*)(robot_t*, std::uint64_t, std::uint32_t, const Feedback&, Notes&);
 
-    ActionGoals(const std::shared_ptr<rclcpp::Node>& node, Reports& reports, const Parameters& parameters,
-        const std::string& name, TakeResult result, TakeFeedback feedback)
+    ActionGoals(rclcpp_lifecycle::LifecycleNode& node, const rclcpp::CallbackGroup::SharedPtr& group, Reports& reports,
+        const Parameters& parameters, const std::string& name, TakeResult result, TakeFeedback feedback)
         : reports_(reports)
         , name_(prefixed(parameters.topic_prefix, name))
         , result_(result)
         , feedback_(feedback)
-        , client_(rclcpp_action::create_client<Action>(node, name_))
+        , client_(rclcpp_action::create_client<Action>(&node, name_, group))
     {
     }
 

@@ -12,7 +12,7 @@ from robosc.certification import make_supervisor
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
-from robosc.targets import generate, write_files
+from robosc.targets import GenerateOptions, generate, write_files
 from robosc.targets.cpp.naming import file_name
 from robosc.targets.ros.runtime.parameters import declarations
 from support.generated import example_supervisor
@@ -79,6 +79,8 @@ def test_parameters_stand_in_file_code_and_readme(target: str) -> None:
     given = yaml.safe_load(files["config/parameters.yaml"])
     values = given if target == "ros1-cpp" else given["/**"]["ros__parameters"]
     expected = {item.name: item.default for item in declarations(("/cmd_vel",)) if item.name != "use_sim_time"}
+    if target == "ros2-cpp":
+        expected["autostart"] = True
     assert values == expected
     for name, default in expected.items():
         assert f"| `{name}` | `{json.dumps(default)}` |" in files["README.md"]
@@ -95,7 +97,7 @@ def test_the_readme_names_every_topic_and_says_how_far_it_was_tested(target: str
         "/emergency_stop/stop",
         "/cmd_vel",
         "/diagnostics",
-        "/state",
+        "state",
     ):
         assert f"| `{topic}` |" in text
     assert ("were not\nlinked to rclcpp itself" in text) is (target == "ros2-cpp")
@@ -114,6 +116,46 @@ def test_the_launch_files_start_the_node_with_its_parameters(tmp_path: Path) -> 
     found = launch_actions(tmp_path / "launch/controller.launch.py", tmp_path)
     (started,) = found["Node"]
     assert (started.named["package"], started.named["executable"]) == (PACKAGE, "controller")
+    (loaded,) = found["LoadComposableNodes"]
+    (component,) = loaded.named["composable_node_descriptions"]
+    assert (component.named["package"], component.named["plugin"]) == (PACKAGE, f"{PACKAGE}::ControllerNode")
+    assert component.named["extra_arguments"] == [{"use_intra_process_comms": True}]
+    arguments = [item.positional[0] for item in found["DeclareLaunchArgument"]]
+    assert arguments == ["namespace", "use_sim_time", "params_file", "log_level", "container"]
+    for given in (started.named, component.named):
+        assert given["name"] == PACKAGE
+        assert given["namespace"].positional == ("namespace",)
+        file, simulated = given["parameters"]
+        assert file.positional == ("params_file",)
+        assert simulated["use_sim_time"].positional[0].positional == ("use_sim_time",)
+    # Either a process or a component.
+    conditions = [item.named["condition"].positional[0] for item in (started, loaded)]
+    assert [type(item).__name__ for item in conditions] == ["EqualsSubstitution", "NotEqualsSubstitution"]
+    assert all((item.positional[0].positional, item.positional[1]) == (("container",), "") for item in conditions)
+
+
+def test_two_packages_can_be_loaded_into_one_process() -> None:
+    for package in ("one", "two"):
+        files = generate(example_supervisor(FOLLOWER), "ros2-cpp", GenerateOptions(package=package))
+        assert f"RCLCPP_COMPONENTS_REGISTER_NODE({package}::ControllerNode)" in files["src/node.cpp"]
+        assert (
+            f'rclcpp_components_register_nodes(${{PROJECT_NAME}} "{package}::ControllerNode")'
+            in files["CMakeLists.txt"]
+        )
+        sources = [text for path, text in files.items() if path.endswith((".hpp", "node.cpp"))]
+        assert len(sources) > 10
+        # Inline variables and functions of one namespace would be those of whichever package was loaded first.
+        for text in sources:
+            named = re.findall(r"^namespace(?: (\w+))? \{", text, re.MULTILINE)
+            assert named[0] == package
+            assert set(named) <= {package, "", "detail", "model"}
+
+
+@pytest.mark.parametrize("package", ["std", "rclcpp", "main", "namespace"])
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_package_whose_name_is_no_namespace_is_refused(target: str, package: str) -> None:
+    with pytest.raises(UnsupportedModelError, match=f"would be called {package}, which cannot be its namespace"):
+        generate(example_supervisor(FOLLOWER), target, GenerateOptions(package=package))
 
 
 @pytest.mark.parametrize(

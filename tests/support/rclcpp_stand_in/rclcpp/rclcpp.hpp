@@ -2,6 +2,7 @@
 
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
@@ -17,6 +18,7 @@
 
 #include "builtin_interfaces/msg/time.hpp"
 #include "rcl_interfaces/msg/parameter_descriptor.hpp"
+#include "rcl_interfaces/msg/set_parameters_result.hpp"
 #include "rosidl_runtime_cpp/traits.hpp"
 #include "stand_in.hpp"
 
@@ -36,9 +38,43 @@ class InitOptions {};
 
 enum class SignalHandlerOptions { All, SigInt, SigTerm, None };
 
-class Context;
+class PreShutdownCallbackHandle {
+public:
+    std::size_t number = 0;
+};
+
+class Context {
+public:
+    using SharedPtr = std::shared_ptr<Context>;
+
+    template <typename FunctionT>
+    PreShutdownCallbackHandle add_pre_shutdown_callback(FunctionT callback)
+    {
+        PreShutdownCallbackHandle handle;
+        handle.number = ++last_;
+        before_shutdown[handle.number] = std::move(callback);
+        return handle;
+    }
+
+    bool remove_pre_shutdown_callback(const PreShutdownCallbackHandle& callback_handle)
+    {
+        return before_shutdown.erase(callback_handle.number) != 0U;
+    }
+
+    std::map<std::size_t, std::function<void()>> before_shutdown;
+
+private:
+    std::size_t last_ = 0;
+};
 
 namespace detail {
+
+inline const Context::SharedPtr& context()
+{
+    static const auto made = std::make_shared<Context>();
+    return made;
+}
+
 
 inline std::vector<std::string>& arguments()
 {
@@ -46,13 +82,23 @@ inline std::vector<std::string>& arguments()
     return made;
 }
 
-inline bool& is_running()
+inline std::atomic<bool>& is_running()
 {
-    static bool made = false;
+    static std::atomic<bool> made{false};
     return made;
 }
 
 }  // namespace detail
+
+inline bool ok(std::shared_ptr<Context> = nullptr) { return detail::is_running(); }
+
+inline bool shutdown(std::shared_ptr<Context> = nullptr, const std::string& = "user called rclcpp::shutdown()")
+{
+    for (const auto& [number, callback] : detail::context()->before_shutdown) {
+        callback();
+    }
+    return detail::is_running().exchange(false);
+}
 
 inline void init(int argc, char const* const* argv, const InitOptions& = InitOptions(),
     SignalHandlerOptions options = SignalHandlerOptions::All)
@@ -62,13 +108,7 @@ inline void init(int argc, char const* const* argv, const InitOptions& = InitOpt
     }
     detail::arguments().assign(argv, argv + argc);
     detail::is_running() = true;
-}
-
-inline bool ok(std::shared_ptr<Context> = nullptr) { return detail::is_running(); }
-
-inline bool shutdown(std::shared_ptr<Context> = nullptr, const std::string& = "user called rclcpp::shutdown()")
-{
-    return std::exchange(detail::is_running(), false);
+    stand_in::world().manager["end"] = [](std::istream&) { shutdown(); };
 }
 
 class Logger {};
@@ -94,6 +134,8 @@ struct KeepLast {
     size_t depth;
 };
 
+enum class DurabilityPolicy { Volatile, TransientLocal };
+
 class QoS {
 public:
     QoS(const KeepLast& history) : depth_(history.depth) {}  // NOLINT: it is implicit there, too
@@ -101,11 +143,42 @@ public:
     QoS& reliable() { return *this; }
     QoS& best_effort() { return *this; }
     QoS& durability_volatile() { return *this; }
-    QoS& transient_local() { return *this; }
+    QoS& transient_local()
+    {
+        durability_ = DurabilityPolicy::TransientLocal;
+        return *this;
+    }
+    DurabilityPolicy durability() const { return durability_; }
 
 private:
     size_t depth_;
+    DurabilityPolicy durability_ = DurabilityPolicy::Volatile;
 };
+
+class ServicesQoS : public QoS {
+public:
+    ServicesQoS() : QoS(10) {}
+};
+
+enum class IntraProcessSetting { Enable, Disable, NodeDefault };
+
+enum class CallbackGroupType { MutuallyExclusive, Reentrant };
+
+class CallbackGroup {
+public:
+    using SharedPtr = std::shared_ptr<CallbackGroup>;
+};
+
+struct PublisherOptions {
+    IntraProcessSetting use_intra_process_comm = IntraProcessSetting::NodeDefault;
+};
+
+struct SubscriptionOptions {
+    IntraProcessSetting use_intra_process_comm = IntraProcessSetting::NodeDefault;
+    CallbackGroup::SharedPtr callback_group;
+};
+
+class NodeOptions {};
 
 class PublisherBase {
 public:
@@ -123,6 +196,8 @@ public:
     using SharedPtr = std::shared_ptr<Publisher>;
 
     explicit Publisher(std::string topic) : topic_(std::move(topic)) {}
+
+    void publish(std::unique_ptr<MessageT> message) { publish(*message); }
 
     void publish(const MessageT& message) { stand_in::print("publish", topic_, to_yaml(message, true)); }
 
@@ -234,7 +309,29 @@ private:
 
 inline std::string to_string(const ParameterValue&) { return "not set"; }
 
+class Parameter {
+public:
+    Parameter(std::string name, ParameterValue value) : name_(std::move(name)), value_(std::move(value)) {}
+    const std::string& get_name() const { return name_; }
+    const ParameterValue& get_parameter_value() const { return value_; }
+
+private:
+    std::string name_;
+    ParameterValue value_;
+};
+
 namespace node_interfaces {
+
+class NodeBaseInterface {
+public:
+    using SharedPtr = std::shared_ptr<NodeBaseInterface>;
+    Context::SharedPtr get_context() { return detail::context(); }
+};
+
+struct OnSetParametersCallbackHandle {
+    using SharedPtr = std::shared_ptr<OnSetParametersCallbackHandle>;
+    std::function<rcl_interfaces::msg::SetParametersResult(const std::vector<Parameter>&)> callback;
+};
 
 class NodeParametersInterface {
 public:
@@ -247,25 +344,40 @@ public:
 
 }  // namespace node_interfaces
 
-class Node {
+// What nodes of every kind have; the text is the same for rclcpp::Node and rclcpp_lifecycle::LifecycleNode there.
+class StandInNode {
 public:
-    using SharedPtr = std::shared_ptr<Node>;
+    using OnSetParametersCallbackHandle = node_interfaces::OnSetParametersCallbackHandle;
 
-    explicit Node(const std::string& name)
-        : name_(name), parameters_(std::make_shared<node_interfaces::NodeParametersInterface>())
+    explicit StandInNode(const std::string& name)
+        : name_(name)
+        , base_(std::make_shared<node_interfaces::NodeBaseInterface>())
+        , parameters_(std::make_shared<node_interfaces::NodeParametersInterface>())
     {
         const std::vector<std::string>& given = detail::arguments();
         for (size_t k = 0; k + 1 < given.size(); k++) {
             const size_t mark = given[k + 1].find(":=");
-            if (given[k] == "-p" && mark != std::string::npos) {
+            if (given[k] == "-r" && given[k + 1].substr(0, mark) == "__ns") {
+                namespace_ = given[k + 1].substr(mark + 2);
+            } else if (given[k] == "-p" && mark != std::string::npos) {
                 parameters_->overrides[given[k + 1].substr(0, mark)] = parsed(given[k + 1].substr(mark + 2));
             }
         }
+        stand_in::world().manager["set"] = [this](std::istream& in) { set(in); };
+    }
+
+    // Relative names are found in the namespace.
+    std::string resolved(const std::string& name) const
+    {
+        const std::string space = namespace_ == "/" ? "" : namespace_;
+        return name.front() == '/' ? name
+            : name.front() == '~'  ? space + "/" + name_ + name.substr(1)
+                                   : space + "/" + name;
     }
 
     const char* get_fully_qualified_name() const
     {
-        full_ = "/" + name_;
+        full_ = resolved(name_);
         return full_.c_str();
     }
 
@@ -289,32 +401,64 @@ public:
 
     bool has_parameter(const std::string& name) const { return declared_.count(name) > 0; }
 
-    node_interfaces::NodeParametersInterface::SharedPtr get_node_parameters_interface() { return parameters_; }
+    Parameter get_parameter(const std::string& name) const { return Parameter(name, declared_.at(name)); }
 
-    template <typename MessageT>
-    typename Publisher<MessageT>::SharedPtr create_publisher(const std::string& topic_name, const QoS&)
+    [[nodiscard]] OnSetParametersCallbackHandle::SharedPtr add_on_set_parameters_callback(
+        std::function<rcl_interfaces::msg::SetParametersResult(const std::vector<Parameter>&)> callback)
     {
-        return std::make_shared<Publisher<MessageT>>(topic_name);
+        const auto handle = std::make_shared<OnSetParametersCallbackHandle>();
+        handle->callback = std::move(callback);
+        may_set_ = handle;
+        return handle;
     }
+
+    node_interfaces::NodeBaseInterface::SharedPtr get_node_base_interface() { return base_; }
+
+    CallbackGroup::SharedPtr create_callback_group(
+        CallbackGroupType, bool automatically_add_to_executor_with_node = true)
+    {
+        (void)automatically_add_to_executor_with_node;
+        return std::make_shared<CallbackGroup>();
+    }
+
+    node_interfaces::NodeParametersInterface::SharedPtr get_node_parameters_interface() { return parameters_; }
 
     template <typename MessageT, typename CallbackT>
     typename Subscription<MessageT>::SharedPtr create_subscription(
-        const std::string& topic_name, const QoS&, CallbackT&& callback)
+        const std::string& topic_name, const QoS&, CallbackT&& callback, const SubscriptionOptions& = {})
     {
-        stand_in::world().topics[topic_name].push_back(
-            [function = std::function<void(typename MessageT::ConstSharedPtr)>(callback)](std::istream& in) {
-                function(std::make_shared<const MessageT>(stand_in::parsed<MessageT>(in)));
+        const auto made = std::make_shared<Subscription<MessageT>>();
+        stand_in::world().topics[resolved(topic_name)].push_back(
+            [made = std::weak_ptr<Subscription<MessageT>>(made),
+                function = std::function<void(typename MessageT::ConstSharedPtr)>(callback)](std::istream& in) {
+                if (made.lock() != nullptr) {
+                    function(std::make_shared<const MessageT>(stand_in::parsed<MessageT>(in)));
+                }
             });
-        return std::make_shared<Subscription<MessageT>>();
+        return made;
     }
 
     template <typename ServiceT>
-    typename Client<ServiceT>::SharedPtr create_client(const std::string& service_name)
+    typename Client<ServiceT>::SharedPtr create_client(
+        const std::string& service_name, const QoS& = ServicesQoS(), CallbackGroup::SharedPtr = nullptr)
     {
-        return std::make_shared<Client<ServiceT>>(service_name);
+        return std::make_shared<Client<ServiceT>>(resolved(service_name));
     }
 
 private:
+    void set(std::istream& in)
+    {
+        std::string name;
+        std::string text;
+        in >> name >> text;
+        const auto handle = may_set_.lock();
+        const auto result = handle->callback({Parameter(name, parsed(text))});
+        if (result.successful) {
+            declared_[name] = parsed(text);
+        }
+        stand_in::print("set", name, result.successful ? "done" : result.reason);
+    }
+
     static ParameterValue parsed(const std::string& text)
     {
         if (text == "true" || text == "false") {
@@ -342,36 +486,60 @@ private:
     }
 
     std::string name_;
+    std::string namespace_ = "/";
     mutable std::string full_;
+    node_interfaces::NodeBaseInterface::SharedPtr base_;
+    std::weak_ptr<OnSetParametersCallbackHandle> may_set_;
     node_interfaces::NodeParametersInterface::SharedPtr parameters_;
     std::map<std::string, ParameterValue> declared_;
+};
+
+template <typename MessageT, typename NodeT>
+typename Publisher<MessageT>::SharedPtr create_publisher(
+    NodeT&& node, const std::string& topic_name, const QoS&, const PublisherOptions& = PublisherOptions())
+{
+    return std::make_shared<Publisher<MessageT>>(node.resolved(topic_name));
+}
+
+struct ExecutorOptions {
+    Context::SharedPtr context;
 };
 
 namespace executors {
 
 class SingleThreadedExecutor {
 public:
-    void add_node(std::shared_ptr<Node> node_ptr, bool notify = true)
+    explicit SingleThreadedExecutor(const ExecutorOptions& = ExecutorOptions()) {}
+
+    void add_node(std::shared_ptr<node_interfaces::NodeBaseInterface> node_ptr, bool notify = true)
     {
         (void)notify;
         node_ = std::move(node_ptr);
     }
 
+    void add_callback_group(
+        CallbackGroup::SharedPtr group_ptr, node_interfaces::NodeBaseInterface::SharedPtr, bool notify = true)
+    {
+        (void)notify;
+        group_ = std::move(group_ptr);
+    }
+
     void spin_once(std::chrono::nanoseconds timeout = std::chrono::nanoseconds(-1))
     {
         const auto whole = std::chrono::duration_cast<std::chrono::milliseconds>(timeout);
-        stand_in::step(static_cast<int>(whole.count()));
+        stand_in::step(static_cast<int>(whole.count()), node_ != nullptr);
     }
 
     void spin_all(std::chrono::nanoseconds max_duration)
     {
         const auto limit = std::chrono::steady_clock::now() + max_duration;
-        while (std::chrono::steady_clock::now() < limit && stand_in::step(0)) {
+        while (std::chrono::steady_clock::now() < limit && stand_in::step(0, node_ != nullptr)) {
         }
     }
 
 private:
-    std::shared_ptr<Node> node_;
+    node_interfaces::NodeBaseInterface::SharedPtr node_;
+    CallbackGroup::SharedPtr group_;
 };
 
 }  // namespace executors

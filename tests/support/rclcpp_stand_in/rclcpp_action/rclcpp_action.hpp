@@ -119,9 +119,10 @@ private:
 };
 
 template <typename ActionT, typename NodeT>
-typename Client<ActionT>::SharedPtr create_client(NodeT, const std::string& name)
+typename Client<ActionT>::SharedPtr create_client(
+    NodeT node, const std::string& name, rclcpp::CallbackGroup::SharedPtr = nullptr)
 {
-    return std::make_shared<Client<ActionT>>(name);
+    return std::make_shared<Client<ActionT>>(node->resolved(name));
 }
 
 }  // namespace rclcpp_action

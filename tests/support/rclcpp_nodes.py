@@ -22,6 +22,7 @@ WARNINGS = "-Wall -Wextra -Wpedantic -Werror".split()
 SANITIZERS = "-g1 -fsanitize=address,undefined -fno-sanitize-recover=all".split()
 LIMIT_S = 60.0
 PROGRAM = "controller"
+RECORDED_RUN = "test/test_recorded_run.cpp"
 
 
 def missing(*packages: str) -> str | None:
@@ -63,6 +64,22 @@ def compiled(supervisor: Supervisor, folder: Path, *options: str) -> Path:
         ],
     ):
         done = subprocess.run(command, cwd=source, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr[:6000]
+    return program
+
+
+def compiled_test(supervisor: Supervisor, folder: Path) -> Path:
+    """The program of a package's own test, compiled without a warning; `folder` may hold the package already."""
+    if not folder.exists():
+        write_files(generate(supervisor, "ros2-cpp"), folder)
+    (engine,) = (folder / "src").glob("*_supervisor.c")
+    program = folder / "recorded_run"
+    both = [*WARNINGS, "-ffp-contract=off"]
+    for command in (
+        ["gcc", "-std=c99", *both, "-c", str(engine), "-o", "engine_of_test.o"],
+        ["g++", "-std=c++17", *both, "-Isrc", f"-I{STAND_IN}", RECORDED_RUN, "engine_of_test.o", "-o", str(program)],
+    ):
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr[:6000]
     return program
 

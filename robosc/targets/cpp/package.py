@@ -19,6 +19,7 @@ from robosc.targets.code.naming import package_name
 from robosc.targets.code.templates import shared_values
 from robosc.targets.cpp.model import Writer, fill_name, received_topics, take_name
 from robosc.targets.cpp.naming import require_namespace, require_package_name
+from robosc.targets.cpp.recording import PERIOD_S, record
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros.package import chosen, error_context, packages, release_identifiers, require_own_names
@@ -143,6 +144,7 @@ def _context(
         **shared_values(supervisor, package, options.metadata),
         "prefix": layout.prefix,
         "upper": layout.upper,
+        **_recorded(supervisor, unit, middleware),
         "top": head(supervisor),
         "hash_top": head(supervisor, "# ", "# ", ""),
         "includes": sorted({middleware.include(kind, type_) for kind, type_ in (*types, *_own_types())}),
@@ -156,6 +158,13 @@ def _context(
         "parameters": declared,
         "chosen": chosen(declared, options),
     }
+
+
+def _recorded(supervisor: Supervisor, unit: Unit, middleware: Middleware) -> dict[str, object]:
+    """Return the run that the package's test repeats, if it has one."""
+    if not any(path.startswith("test/") for path in middleware.templates):
+        return {}
+    return {"recording": record(supervisor, unit.layout), "period_us": int(PERIOD_S * 1e6)}
 
 
 def _own_types() -> list[tuple[str, Interface]]:

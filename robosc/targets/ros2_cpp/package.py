@@ -35,6 +35,7 @@ MIDDLEWARE = Middleware(
         "src/main.cpp": "main.cpp.j2",
         "src/node.cpp": "node.cpp.j2",
         "src/node.hpp": "node.hpp.j2",
+        "test/test_recorded_run.cpp": "test_recorded_run.cpp.j2",
     },
     # Every ROS 2 node has it by itself.
     without=frozenset({USE_SIM_TIME}),

@@ -86,6 +86,9 @@ public:
     /* The controller that is at work; in the thread only. */
     std::unique_ptr<Host> host;
 
+    /* True while nothing that has come is looked at; in the thread only. */
+    bool is_waiting = false;
+
     /* True once a fault has stopped the controller. */
     std::atomic<bool> has_fault{false};
 
@@ -103,17 +106,19 @@ private:
             std::deque<std::packaged_task<void()>> tasks;
             {
                 std::unique_lock<std::mutex> lock(mutex_);
-                changed_.wait(lock, [this] { return host != nullptr || !tasks_.empty(); });
+                changed_.wait(lock, [this] { return is_at_work() || !tasks_.empty(); });
                 tasks.swap(tasks_);
             }
             for (auto& task : tasks) {
                 task();
             }
-            if (host != nullptr) {
+            if (is_at_work()) {
                 step();
             }
         }
     }
+
+    bool is_at_work() const { return host != nullptr && !is_waiting; }
 
     void step()
     {
@@ -159,11 +164,14 @@ public:
         may_set_ = add_on_set_parameters_callback(
             [this](const std::vector<rclcpp::Parameter>& parameters) { return may_set(parameters); });
         if (starts_itself_) {
+            /* It begins at once: nothing that comes is held as by an inactive node. */
+            loop_.perform([this] { loop_.is_waiting = true; });
             configure();
             if (get_current_state().id() != lifecycle_msgs::msg::State::PRIMARY_STATE_INACTIVE) {
                 throw ParameterError(problem_);
             }
             activate();
+            loop_.perform([this] { loop_.is_waiting = false; });
         }
         /* A signal to a container ends its context: the last moment in which the robot can be stopped. */
         shutdown_ = get_node_base_interface()->get_context()->add_pre_shutdown_callback([this] { leave("shutdown"); });

@@ -23,8 +23,6 @@ from robosc_simulated.values import option, seed
 
 ROOT = Path(__file__).resolve().parents[2]
 SPEED = 10.0
-SHOWN_S = 3.0
-"""Length of the log that the picture of events begins with, in seconds: all of it would be a wall of strokes."""
 
 
 class Progress:
@@ -84,19 +82,18 @@ def _keep(outcome: Outcome, folder: Path) -> list[Path]:
     """Draw what happened, and keep what it was drawn from."""
     folder.mkdir(parents=True, exist_ok=True)
     trajectory, sequence = folder / "trajectory.png", folder / "events.png"
-    draw_map(outcome.scene, read_motion(outcome.motion), trajectory)
-    run = read_log(outcome.event_log)
-    draw_sequence(run, sequence, end_s=_window_s(outcome), title=f"{outcome.scene.name}: the first events")
+    motion = read_motion(outcome.motion)
+    draw_map(outcome.scene, motion, trajectory)
+    # What says nothing new would be a wall of strokes.
+    draw_sequence(
+        read_log(outcome.event_log), sequence, only_changes=True, motion=motion, title=f"{outcome.scene.name}: the run"
+    )
     kept = [
         shutil.copy(outcome.event_log, folder / "events.jsonl"),
         shutil.copy(outcome.motion, folder / "motion.jsonl"),
         shutil.copy(outcome.supervisor, folder / outcome.supervisor.name),
     ]
     return [trajectory, sequence, *map(Path, kept)]
-
-
-def _window_s(outcome: Outcome) -> float:
-    return min(SHOWN_S, max(outcome.figures.get("wall_s", SHOWN_S), 0.1))
 
 
 def _tell(outcome: Outcome, written: list[Path]) -> None:

@@ -6,6 +6,7 @@ import math
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
@@ -30,7 +31,7 @@ from robosc_simulated import (
     read_motion,
     room,
 )
-from robosc_simulated.map_picture import draw_map
+from robosc_simulated.map_picture import draw_map, outlined
 from robosc_simulated.motion import Sample
 from robosc_simulated.motion_checks import Halt, check_line, check_maze, lateral_errors_m, way_m
 
@@ -347,3 +348,28 @@ def test_a_sample_has_the_keys_that_its_page_tells() -> None:
     keys = ["time", "world_s", "x_m", "y_m", "heading_rad", "linear_m_s", "angular_rad_s", "collisions"]
     assert list(msgspec.to_builtins(sample)) == keys
     assert math.isfinite(sample.time)
+
+
+def test_the_robot_is_drawn_at_like_distances() -> None:
+    def at(x_m: float) -> Sample:
+        return Sample(EPOCH_S, 0.0, x_m, 0.0, 0.0, 0.0, 0.0, 0)
+
+    short = outlined([at(0.01 * number) for number in range(101)], 0.1)
+    assert [round(each.x_m, 2) for each in short] == [0.0, 0.5, 1.0]
+    assert [each.x_m for each in outlined([at(0.0)] * 50, 0.1)] == [0.0, 0.0]
+    long = outlined([at(0.05 * number) for number in range(10_001)], 0.1)
+    assert len(long) <= 26
+    gaps_m = [after.x_m - before.x_m for before, after in pairwise(long)]
+    assert min(gaps_m) > 0.2
+    assert max(gaps_m) < 22.0
+
+
+def test_a_robot_is_drawn_to_scale_with_its_heading(path: Path, tmp_path: Path) -> None:
+    motion = recorded(YARD, lambda world: drive(world, 2.0, 2.0, 4.0), path)
+    drawn = {}
+    for robot in ("burger", "waffle"):
+        picture = tmp_path / f"{robot}.svg"
+        draw_map(YARD, motion, picture, robot)
+        drawn[robot] = picture.read_text(encoding="utf-8")
+    assert drawn["burger"] != drawn["waffle"]
+    assert "<!-- robot, to scale -->" in drawn["burger"]

@@ -14,10 +14,12 @@ from robosc.cli.arguments import add_given_supervisor_options, suggest
 from robosc.cli.output import CommandError, ExitCode, UsageError
 
 if TYPE_CHECKING:
+    from robosc.event_logs import LoggedRun
     from robosc.source import Bundle
     from robosc.supervisor import Supervisor
     from robosc_bridge.daemon.view_settings import ViewSettings
     from robosc_view.definition import Robot
+    from robosc_view.motion import SeenMotion
     from robosc_view.sources import Source
     from robosc_view.watched_model import WatchedModel
 
@@ -64,6 +66,13 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     source.add_argument("--bridge", type=_bridge, metavar="HOST[:PORT]", help="a bridge, by its gRPC service")
     source.add_argument("--ros2", action="store_true", help="a generated ROS 2 node, by its topic /state")
     source.add_argument("--log", type=Path, metavar="FILE", help="an event log, which is replayed; needs --model")
+    parser.add_argument(
+        "--motion",
+        type=Path,
+        metavar="FILE",
+        help="with --log: how the robot moved, as a simulator records it, for the map (default: motion.jsonl beside "
+        "the log, if it is of the same time)",
+    )
     parser.add_argument("--namespace", default="", metavar="NAME", help="with --ros2: what stands before /state")
     parser.add_argument(
         "--model",
@@ -212,6 +221,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError("--log needs --model: the model that the log is of")
     if arguments.model is not None and arguments.bridge is not None:
         raise UsageError("--model goes with --log or --ros2, or alone: a bridge tells its model itself")
+    if arguments.motion is not None and arguments.log is None:
+        raise UsageError("--motion goes with --log")
     if arguments.namespace and not arguments.ros2:
         raise UsageError("--namespace goes with --ros2")
     try:
@@ -276,7 +287,8 @@ def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool,
     from robosc_view.replay import Recording, Replay
 
     assert supervisor is not None  # noqa: S101  # `run` has seen to that.
-    recording = Recording(_log(arguments.log), supervisor, scene)
+    run_ = _log(arguments.log)
+    recording = Recording(run_, supervisor, scene, _motion(arguments, run_))
     return lambda: Replay(recording), False, recording.robot
 
 
@@ -370,7 +382,7 @@ def _require_ros2() -> None:
         raise UsageError("there is no ROS 2 here: install one and source it, or install robosc[ros2]") from error
 
 
-def _log(path: Path) -> Any:
+def _log(path: Path) -> "LoggedRun":
     from robosc.event_logs import LogError, read_log
 
     try:
@@ -382,6 +394,20 @@ def _log(path: Path) -> Any:
     for note in found.notes():
         sys.stderr.write(f"robosc: {note}\n")
     return found
+
+
+def _motion(arguments: argparse.Namespace, run_: "LoggedRun") -> "SeenMotion | None":
+    from robosc.event_logs import MotionOfLogError
+    from robosc.event_logs.motions import motion_of_log
+    from robosc_view.motion import SeenMotion
+    from robosc_view.scene_map import scene_start
+
+    times_s = [entry.time_s for entry in run_.entries] or [0.0]
+    try:
+        found = motion_of_log(arguments.log, arguments.motion, min(times_s), max(times_s))
+    except MotionOfLogError as error:
+        raise UsageError(str(error)) from error
+    return None if found is None else SeenMotion(found, scene_start(arguments.scene, arguments.scene_seed))
 
 
 def _supervisor(arguments: argparse.Namespace) -> "Supervisor":

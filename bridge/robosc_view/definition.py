@@ -105,7 +105,7 @@ class Robot:
         supervisor: Supervisor with its model; None: not known.
         can_command: True if it can be stopped and commanded through the source.
         log: The log that is replayed; None: it is live.
-        scene: Walls and line on the floor, for the map; None: not known.
+        scene: Walls and line on the floor, and the way of a recorded run, for the map; None: not known.
         play: Events that a page can have happen, with the data that they carry; None: it is not led by hand.
     """
 

@@ -19,6 +19,7 @@ from robosc.supervisor import Supervisor
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.definition import robot_of
 from robosc_view.messages import TransitionTracker
+from robosc_view.motion import SeenMotion
 from robosc_view.reports import EventBatch, LogSpan, SourceKind, Status
 from robosc_view.sources import Pause, Play, RefusedError, ReplayCommand, Seek, Sink, ViewError
 
@@ -61,18 +62,24 @@ class Recording:
         run: The log.
         supervisor: It was written under, with its model.
         scene: For the map.
+        motion: Motion of the robot in the map; None: nobody has recorded it.
 
     Raises:
         ViewError: The log is empty, or one of another model.
     """
 
-    def __init__(self, run: LoggedRun, supervisor: Supervisor, scene: Any = None) -> None:
+    def __init__(
+        self, run: LoggedRun, supervisor: Supervisor, scene: Any = None, motion: SeenMotion | None = None
+    ) -> None:
         if not run.entries:
             raise ViewError("the log has no entries")
         self.documents = [entry.document for entry in run.entries]
         # A clock that was set back would hide what came after it.
         self.times_s = list(accumulate((entry.time_s for entry in run.entries), max))
         self._frames = _frames(run, supervisor.model)
+        self.motion = motion
+        if motion is not None:
+            scene = {**(scene or {"walls": [], "line": []}), "way": motion.way()}
         span = LogSpan(self.begin_s, self.end_s, len(self.documents))
         self.robot = robot_of(supervisor, SourceKind.LOG, version="", can_command=False, log=span, scene=scene)
         self._last = LastTaken(TransitionTracker(self.robot), self.documents)
@@ -304,7 +311,7 @@ class Replay:
         sink.show_position(self._player.time_s, self._player.speed, is_playing=self._player.is_playing)
 
     def _status(self, count: int) -> Status:
-        frame = self._recording.frame(count)
+        frame, motion = self._recording.frame(count), self._recording.motion
         return Status(
             time_s=self._player.time_s,
             problem=frame.problem,
@@ -312,4 +319,5 @@ class Replay:
             components=frame.components,
             communications=frame.communications,
             last=self._recording.last(count),
+            drive=None if motion is None else motion.drive(self._player.time_s),
         )

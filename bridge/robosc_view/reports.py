@@ -69,14 +69,14 @@ class Drive:
         linear_m_s: Forward speed.
         angular_rad_s: Yaw rate, counter-clockwise.
         battery_v: Battery voltage; None: not known.
-        is_torque_on: True if the motors hold.
+        is_torque_on: True if the motors hold; None: not known.
     """
 
     pose: tuple[float, float, float]
     linear_m_s: float
     angular_rad_s: float
     battery_v: float | None
-    is_torque_on: bool
+    is_torque_on: bool | None
 
 
 @dataclass(frozen=True, slots=True)

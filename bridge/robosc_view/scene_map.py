@@ -31,6 +31,16 @@ def scene_map(source: str | None, seed: int = 0) -> Mapping[str, Any] | None:
         raise ViewError(f"the scene: {error}") from error
 
 
+def scene_start(source: str | None, seed: int = 0) -> tuple[float, float, float]:
+    """Return where the robot begins in a scene: x and y in metres, heading in radians; the origin without a scene.
+
+    Args:
+        source: Name or file of a scene that `scene_map` has accepted, or None.
+        seed: Seed of what the scene leaves to chance.
+    """
+    return (0.0, 0.0, 0.0) if source is None else load_scene(source, seed).start
+
+
 def seen_from_start(scene: Scene) -> Mapping[str, Any]:
     """A scene as `scene_map` tells it."""
     begin_x_m, begin_y_m, heading_rad = scene.start

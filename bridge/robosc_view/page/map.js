@@ -37,9 +37,9 @@ export function startMap() {
     follow(false);
   };
   const fit = () => {
-    const { walls = [], line = [] } = received.definition?.scene ?? {};
+    const { walls = [], line = [], way = [] } = received.definition?.scene ?? {};
     const pose = poseOf();
-    view.fit([...walls.flatMap(([x1, y1, x2, y2]) => [[x1, y1], [x2, y2]]), ...line, ...path.points, ...(pose ? [pose] : [])]);
+    view.fit([...walls.flatMap(([x1, y1, x2, y2]) => [[x1, y1], [x2, y2]]), ...line, ...way, ...path.points, ...(pose ? [pose] : [])]);
     follow(false);
   };
 
@@ -157,7 +157,7 @@ function inWords() {
   }
   if (drive) parts.push(`Moves at ${figure(drive.linear_m_s, 2)} m/s, rotates at ${figure(drive.angular_rad_s, 2)} rad/s.`);
   if (Number.isFinite(drive?.battery_v)) parts.push(`Battery ${figure(drive.battery_v, 1)} V.`);
-  if (drive) parts.push(drive.is_torque_on ? "Motors hold." : "Motors do not hold.");
+  if (typeof drive?.is_torque_on === "boolean") parts.push(drive.is_torque_on ? "Motors hold." : "Motors do not hold.");
   const nearest = nearestOf(received.scan?.ranges_m ?? []);
   if (nearest) parts.push(`Nearest thing ${figure(nearest.range, 2)} m away, ${nearest.where}.`);
   return parts.join(" ") || "Nothing is known about where the robot is.";

@@ -37,6 +37,12 @@ export function paintMap(context, view, { scene, path, scan, pose }) {
     strokes(context, view, scene.line ? [scene.line] : [], now.line, Math.max(0.02 * view.scale, 2));
     strokes(context, view, (scene.walls ?? []).map(([a, b, c, d]) => [[a, b], [c, d]]), now.wall, 3);
   }
+  if (scene?.way) {
+    // Of a recorded run all of it is known: what is still to come is seen through.
+    context.globalAlpha = 0.35;
+    strokes(context, view, [scene.way], now.path, 2);
+    context.globalAlpha = 1;
+  }
   way(context, view, path, now.path);
   if (scan) beams(context, view, scan.ranges_m ?? [], scan.pose ?? pose ?? [0, 0, 0], now.scan);
   if (pose) robot(context, view, pose, now.robot);

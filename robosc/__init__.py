@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         UnsupportedModelError,
     )
     from robosc.explanation import RequestError
+    from robosc.graphviz import DrawingUnavailableError
     from robosc.model.structure import Deployment
     from robosc.pipeline.checking import check
     from robosc.pipeline.conditions import Condition, Conditions
@@ -44,8 +45,10 @@ if TYPE_CHECKING:
     from robosc.pipeline.files import FileAccessError
     from robosc.pipeline.findings import Findings
     from robosc.pipeline.generating import generate
+    from robosc.pipeline.led_run import EventNotPossibleError, Step, UnknownEventError
     from robosc.pipeline.loading import LoadedModel, load
     from robosc.pipeline.options import SynthesisOptions
+    from robosc.pipeline.received_data import DataError
     from robosc.pipeline.results import (
         Generation,
         NoSupervisor,
@@ -55,9 +58,10 @@ if TYPE_CHECKING:
         Verification,
         VerificationStatus,
     )
-    from robosc.pipeline.simulation import DataError, EventNotPossibleError, Run, Step, UnknownEventError, simulate
+    from robosc.pipeline.simulation import Run, simulate
     from robosc.pipeline.supervisors import Supervisor
     from robosc.pipeline.synthesis import Synthesis, synthesize
+    from robosc.pipeline.system_runs import ChoiceError, SystemRun
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
     from robosc.pipeline.verifying import verify
     from robosc.pipeline.walking import Trouble, TroubleKind
@@ -65,12 +69,14 @@ if TYPE_CHECKING:
     from robosc.targets import GenerateOptions, OverwriteError, UnknownTargetError
 
 _HOMES = {
+    "ChoiceError": "pipeline.system_runs",
     "Condition": "pipeline.conditions",
     "Conditions": "pipeline.conditions",
-    "DataError": "pipeline.simulation",
+    "DataError": "pipeline.received_data",
     "Deployment": "model.structure",
     "Diagnostic": "errors",
-    "EventNotPossibleError": "pipeline.simulation",
+    "DrawingUnavailableError": "graphviz",
+    "EventNotPossibleError": "pipeline.led_run",
     "Explained": "pipeline.explaining",
     "Exploration": "pipeline.exploring",
     "FileAccessError": "pipeline.files",
@@ -91,20 +97,21 @@ _HOMES = {
     "RoboscError": "errors",
     "Run": "pipeline.simulation",
     "Severity": "errors",
-    "Step": "pipeline.simulation",
+    "Step": "pipeline.led_run",
     "Summary": "pipeline.results",
     "Supervisor": "pipeline.supervisors",
     "Synthesis": "pipeline.synthesis",
     "SynthesisCancelled": "errors",
     "SynthesisOptions": "pipeline.options",
     "SynthesisStatus": "pipeline.results",
+    "SystemRun": "pipeline.system_runs",
     "SystemSupervisor": "pipeline.systems",
     "SystemSynthesis": "pipeline.systems",
     "Trouble": "pipeline.walking",
     "TroubleKind": "pipeline.walking",
     "UnknownCodeError": "diagnostics",
     "UnknownEngineError": "synthesis",
-    "UnknownEventError": "pipeline.simulation",
+    "UnknownEventError": "pipeline.led_run",
     "UnknownNameError": "errors",
     "UnknownTargetError": "targets",
     "UnsupportedModelError": "errors",
@@ -121,11 +128,13 @@ _HOMES = {
 }
 
 __all__ = [
+    "ChoiceError",
     "Condition",
     "Conditions",
     "DataError",
     "Deployment",
     "Diagnostic",
+    "DrawingUnavailableError",
     "EventNotPossibleError",
     "Explained",
     "Exploration",
@@ -154,6 +163,7 @@ __all__ = [
     "SynthesisCancelled",
     "SynthesisOptions",
     "SynthesisStatus",
+    "SystemRun",
     "SystemSupervisor",
     "SystemSynthesis",
     "Trouble",

@@ -4,11 +4,12 @@ Everything allowed is in it, not only what an executor would choose. It works on
 added conditions alone, so it says nothing that synthesis could have hidden.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from robosc.automata.compile import State
 from robosc.automata.controlled import TRANSITIONS_PER_STATE, Added, ControlledGraph, controlled_graph
+from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.semantics import Semantics
 from robosc.automata.state import Subject, subjects
@@ -16,11 +17,15 @@ from robosc.automata.structure import System
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import Value
 from robosc.expressions.text import automaton_text
-from robosc.model.structure import CommunicationKind, Model
+from robosc.graphviz import can_draw, drawn
+from robosc.model.structure import Communication, Model
 from robosc.tables import html_table
 
 DEFAULT_LIMIT = 100_000
 """States beyond which exploring is given up."""
+
+MAXIMUM_DRAWN = 100
+"""States beyond which a notebook shows a table and no picture."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,16 +33,19 @@ class GraphState:
     """One state of the controlled system; all of it in source order.
 
     Attributes:
-        components: State of every component with a behaviour, by its name.
+        components: State of every component with a behaviour, by its name; of automata without a model, the location of
+            each.
         variables: Value of every synthesis variable, by `Component.variable`.
         communications: Location of every service and action, by its name.
         enabled: Events that can happen here, sorted by name.
+        is_marked: True if it counts as completed.
     """
 
     components: dict[str, str]
     variables: dict[str, Value]
     communications: dict[str, str]
     enabled: tuple[str, ...]
+    is_marked: bool
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -45,22 +53,27 @@ class Graph:
     """The controlled system.
 
     Attributes:
-        name: The robot's name.
-        initial: Number of the initial state.
+        name: Name of the robot, or of the automata.
+        initial_states: Numbers of the initial states; a robot has one.
         columns: Names of the parts of a state in a table: its components, variables and communications.
         states: States, breadth-first from the initial one; a state's number is its place.
         transitions: State, event, state: sorted by the first, then by event and by the values of the second.
     """
 
     name: str
-    initial: int
+    initial_states: tuple[int, ...]
     columns: tuple[str, ...]
     states: tuple[GraphState, ...]
     transitions: tuple[tuple[int, str, int], ...]
 
     @property
+    def initial(self) -> int:
+        """Number of the initial state; of several, the first."""
+        return self.initial_states[0]
+
+    @property
     def dot(self) -> str:
-        """The graph in Graphviz's language."""
+        """The graph in Graphviz's language: marked states have a double border."""
         return graph_dot(self)
 
     def to_json(self) -> dict[str, object]:
@@ -81,21 +94,29 @@ class Graph:
         )
         return html_table(("state", *self.columns, "events"), rows, caption=_head(self))
 
+    def _repr_svg_(self) -> str | None:
+        """The picture that Graphviz draws; None where it is not installed, or the graph is too large to look at."""
+        if len(self.states) > MAXIMUM_DRAWN or len(self.transitions) > 10 * MAXIMUM_DRAWN or not can_draw():
+            return None
+        return drawn(self.dot, "svg").decode()
+
 
 def explore(
     system: System,
     added: Added,
-    model: Model,
+    model: Model | None,
     *,
+    initial: Callable[[State], bool] = lambda state: True,
     limit: int = DEFAULT_LIMIT,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Graph:
     """The controlled system's graph, the same for the same input.
 
     Args:
-        system: The automata of `model`.
+        system: The automata of `model`, or others.
         added: The conditions that the supervisor adds to events, over states.
-        model: The checked robot.
+        model: The checked robot; None where the automata are of none.
+        initial: The initial states in which the supervisor lets the system begin.
         limit: Number of states beyond which to give up.
         should_stop: Asked now and then; once true, the work ends.
 
@@ -103,17 +124,19 @@ def explore(
         UnsupportedModelError: There are more than `limit` states.
         SynthesisCancelled: `should_stop` became true.
     """
-    graph = controlled_graph(Semantics(system), added, limit=limit, should_stop=should_stop)
+    semantics = Semantics(system)
+    graph = controlled_graph(semantics, added, limit=limit, initial=initial, should_stop=should_stop)
+    name = system.name if model is None else model.name
     if graph is None:
         raise UnsupportedModelError(
-            f"the controlled system of {model.name} has more than {limit} states, or "
+            f"the controlled system of {name} has more than {limit} states, or "
             f"{TRANSITIONS_PER_STATE * limit} transitions: too many to list; raise the limit"
         )
     return Graph(
-        name=model.name,
-        initial=0,
+        name=name,
+        initial_states=tuple(number for number, parent in enumerate(graph.parents) if parent is None),
         columns=graph_columns(system, model),
-        states=_states(system, model, graph),
+        states=_states(semantics, model, graph),
         transitions=tuple(
             (number, event, target)
             for number, steps in enumerate(graph.steps)
@@ -123,15 +146,11 @@ def explore(
     )
 
 
-def _states(system: System, model: Model, graph: ControlledGraph) -> tuple[GraphState, ...]:
-    places = {subject: place for place, subject in enumerate(subjects(system))}
-    components = [item.name for item in model.components if item.behaviour]
+def _states(semantics: Semantics, model: Model | None, graph: ControlledGraph) -> tuple[GraphState, ...]:
+    places = {subject: place for place, subject in enumerate(subjects(semantics.system))}
+    components = _automata_shown(semantics.system, model)
     variables = [subject for subject in places if subject.variable is not None]
-    communications = [
-        (item.name, places[Subject(communication_plant_name(item))])
-        for item in model.communications
-        if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
-    ]
+    communications = [(item.name, places[Subject(communication_plant_name(item))]) for item in _called(model)]
 
     def graph_state(state: State, enabled: tuple[str, ...]) -> GraphState:
         return GraphState(
@@ -139,6 +158,7 @@ def _states(system: System, model: Model, graph: ControlledGraph) -> tuple[Graph
             variables={str(subject): state[places[subject]] for subject in variables},
             communications={name: str(state[place]) for name, place in communications},
             enabled=enabled,
+            is_marked=semantics.is_marked(state),
         )
 
     return tuple(
@@ -147,24 +167,43 @@ def _states(system: System, model: Model, graph: ControlledGraph) -> tuple[Graph
     )
 
 
-def graph_columns(system: System, model: Model) -> tuple[str, ...]:
-    """Return the names of the parts of a state in a table."""
-    return tuple(_columns(system, model))
+def graph_columns(system: System, model: Model | None) -> tuple[str, ...]:
+    """Return the names of the parts of a state in a table; without a model, those of automata and variables."""
+    components = () if model is None else tuple(item.name for item in model.components)
+    return (
+        *_automata_shown(system, model),
+        *(str(subject) for subject in subjects(system) if subject.variable is not None),
+        *(automaton_text(communication_plant_name(item), components) for item in _called(model)),
+    )
 
 
-def _columns(system: System, model: Model) -> Iterator[str]:
-    components = [item.name for item in model.components]
-    yield from (item.name for item in model.components if item.behaviour)
-    yield from (str(subject) for subject in subjects(system) if subject.variable is not None)
-    for item in model.communications:
-        if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
-            yield automaton_text(communication_plant_name(item), components)
+def marks(system: System, model: Model) -> Callable[[Mapping[str, str], Mapping[str, str]], bool]:
+    """Return a function that tells from the states of components and the locations of communications what is marked."""
+    components = {name: system.automaton(name).marked for name in _automata_shown(system, model)}
+    called = {item.name: system.automaton(communication_plant_name(item)).marked for item in _called(model)}
+    return lambda at, location: (
+        all(at.get(name) in marked for name, marked in components.items())
+        and all(location.get(name) in marked for name, marked in called.items())
+    )
+
+
+def _automata_shown(system: System, model: Model | None) -> list[str]:
+    """The automata that are told by their own names: components, or all where there is no model."""
+    if model is None:
+        return [automaton.name for automaton in system.automata]
+    return [item.name for item in model.components if item.behaviour]
+
+
+def _called(model: Model | None) -> list[Communication]:
+    """The services and actions of a model."""
+    return [] if model is None else [item for item in model.communications if item.kind in CALLED_KINDS]
 
 
 def graph_json(graph: Graph) -> dict[str, object]:
-    """The graph as JSON values: `initial`, `states`, `transitions`."""
+    """The graph as JSON values: `initial`, `states`, `transitions`; of several initial states `initial_states`, too."""
     return {
         "initial": graph.initial,
+        **({"initial_states": list(graph.initial_states)} if len(graph.initial_states) > 1 else {}),
         "states": [
             {
                 "components": state.components,
@@ -198,18 +237,18 @@ def graph_text(graph: Graph) -> str:
 
 def _head(graph: Graph) -> str:
     counts = f"{graph.name}: {len(graph.states)} states, {len(graph.transitions)} transitions"
-    return f"{counts}; it starts in state {graph.initial}"
+    return f"{counts}; it starts in state {' or '.join(map(str, graph.initial_states))}"
 
 
 def graph_dot(graph: Graph) -> str:
-    """The graph in Graphviz's language: a box for each state, events of one arrow on its label."""
+    """The graph in Graphviz's language: a box for each state, double if marked; events of one arrow on its label."""
     lines = [f"digraph {_quoted(graph.name)} {{", "  node [shape=box];", '  start [shape=point, label=""];']
-    lines.append(f"  start -> {graph.initial};")
+    lines += [f"  start -> {number};" for number in graph.initial_states]
     for number, state in enumerate(graph.states):
         label = "\n".join(
             [str(number), *(f"{name} = {text}" for name, text in zip(graph.columns, _values(state), strict=True))]
         )
-        lines.append(f"  {number} [label={_quoted(label)}];")
+        lines.append(f"  {number} [label={_quoted(label)}{', peripheries=2' if state.is_marked else ''}];")
     arrows: dict[tuple[int, int], list[str]] = {}
     for source, event, target in graph.transitions:
         arrows.setdefault((source, target), []).append(event)

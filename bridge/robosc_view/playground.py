@@ -16,9 +16,10 @@ from typing import Any
 
 from robosc.errors import RoboscError
 from robosc.pipeline.event_scripts import parse_event
+from robosc.pipeline.led_run import Step, changes_text, event_text
 from robosc.pipeline.received_data import NO_DATA
 from robosc.pipeline.saved_runs import ModelOfTest, entries_of, event_log, pytest_module, state_by_component
-from robosc.pipeline.simulation import Run, Step, changes_text, event_text
+from robosc.pipeline.simulation import Run
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.definition import Robot, robot_of
 from robosc_view.messages import TransitionTracker, run_text, saved_text

@@ -11,7 +11,7 @@ from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.automata.structure import System
 from robosc.certification import OutcomeStatus, SynthesisOutcome
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
-from robosc.exploration import Graph, GraphState, graph_columns
+from robosc.exploration import Graph, GraphState, graph_columns, marks
 from robosc.expressions import Value
 from robosc.model import check
 from robosc.model.structure import Deployment, Model
@@ -87,20 +87,22 @@ def graph_of(found: StateGraph, bundle: Bundle, deployment: Deployment) -> Graph
         ServiceError: It is a graph of another robot.
     """
     model = _model(bundle)
-    columns = graph_columns(to_automata(model, deployment), model)
+    system = to_automata(model, deployment)
+    columns, is_marked = graph_columns(system, model), marks(system, model)
     states = tuple(
         GraphState(
             components=_printable(state.components),
             variables={visible(name): _printable_value(value) for name, value in state.variables.items()},
             communications=_printable(state.communications),
             enabled=tuple(map(visible, state.enabled)),
+            is_marked=is_marked(state.components, state.communications),
         )
         for state in found.states
     )
     if any(len((*item.components, *item.variables, *item.communications)) != len(columns) for item in states):
         raise malformed("the graph belongs to another robot")
     transitions = tuple((source, visible(event), target) for source, event, target in found.transitions)
-    return Graph(model.name, found.initial, columns, states, transitions)
+    return Graph(model.name, (found.initial,), columns, states, transitions)
 
 
 def _printable(items: Mapping[str, str]) -> dict[str, str]:

@@ -59,6 +59,15 @@ class Decision:
             number = node.child(self.indices[node.place](state[node.place]))
         return number == 1
 
+    def tested(self, state: State) -> tuple[int, ...]:
+        """The places that it looks at in a state, in order."""
+        number, found = self.root, list[int]()
+        while number > 1:
+            node = self.nodes[number - 2]
+            found.append(node.place)
+            number = node.child(self.indices[node.place](state[node.place]))
+        return tuple(found)
+
     def places(self) -> frozenset[int]:
         """The places of a state that it may look at."""
         seen, stack = set[int](), [self.root]

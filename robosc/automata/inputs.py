@@ -7,9 +7,9 @@ is unknown when its index, or the index of an array around it, lies outside.
 from collections.abc import Iterable, Iterator
 from itertools import product
 
-from robosc.automata.compile import Data, Path
+from robosc.automata.compile import NO_DATA, Data, Path
 from robosc.automata.structure import InputVariable
-from robosc.expressions import Value, domain
+from robosc.expressions import BooleanType, Value, domain
 
 
 def connected_inputs(inputs: Iterable[InputVariable]) -> tuple[tuple[InputVariable, ...], ...]:
@@ -20,9 +20,19 @@ def connected_inputs(inputs: Iterable[InputVariable]) -> tuple[tuple[InputVariab
     return tuple(tuple(group) for group in groups.values())
 
 
-def valuations(inputs: Iterable[InputVariable]) -> Iterator[Data]:
-    """Every choice of data for inputs of one event, unknown included where it is possible."""
-    groups = [tuple(_group_valuations(group)) for group in connected_inputs(inputs)]
+def valuations(inputs: Iterable[InputVariable], given: Data = NO_DATA) -> Iterator[Data]:
+    """Every choice of data for inputs of one event, unknown included where it is possible.
+
+    Args:
+        inputs: The inputs.
+        given: Data that is not chosen, None where it is unknown. It counts also where none of the inputs is it: what is
+            known of an array tells of its other elements.
+    """
+    inputs = dict.fromkeys(inputs)
+    paths = {item.path for item in inputs}
+    beside = [path for path in given if path not in paths and any(isinstance(step, int) for step in path)]
+    inputs |= dict.fromkeys(InputVariable("", path, BooleanType(), may_be_unknown=True) for path in beside)
+    groups = [tuple(_group_valuations(group, given)) for group in connected_inputs(inputs)]
     for choice in product(*groups):
         yield {path: value for part in choice for path, value in part.items()}
 
@@ -41,9 +51,15 @@ def _arrays(item: InputVariable) -> tuple[tuple[Path, int], ...]:
     return found or ((item.path, 0),)
 
 
-def _group_valuations(group: tuple[InputVariable, ...]) -> Iterator[dict[Path, Value | None]]:
+def _group_valuations(group: tuple[InputVariable, ...], given: Data) -> Iterator[dict[Path, Value | None]]:
+    fixed = {item.path: given[item.path] for item in group if item.path in given}
     for known in _known_sets(group):
-        domains = [tuple(domain(item.type)) if item.path in known else (None,) for item in group]
+        if any((value is None) == (path in known) for path, value in fixed.items()):
+            continue
+        domains = [
+            (fixed[item.path],) if item.path in fixed else tuple(domain(item.type)) if item.path in known else (None,)
+            for item in group
+        ]
         for values in product(*domains):
             yield dict(zip((item.path for item in group), values, strict=True))
 

@@ -121,7 +121,11 @@ class _Rule:
             found = self.outcomes[key] = self._work_out(state)
         return found
 
-    def _work_out(self, state: State) -> _Outcome:
+    def outcome_given(self, state: State, given: Data) -> _Outcome:
+        """Return the outcome of those choices alone in which received data is as given."""
+        return self._work_out(state, given)
+
+    def _work_out(self, state: State, given: Data = NO_DATA) -> _Outcome:
         meets_condition = all(condition(state, NO_DATA) is True for condition in self.conditions)
         choices = [self._taken(participant, state) for participant in self.participants]
         watched = [self._taken(observer, state) for observer in self.observers]
@@ -134,7 +138,7 @@ class _Rule:
         leaves_range = False
         writes: dict[_Writes, None] = {}
         for arcs in product(*choices):
-            leaves, results = _joint_step(arcs, state)
+            leaves, results = _joint_step(arcs, state, given)
             leaves_range = leaves_range or leaves
             writes.update(dict.fromkeys(results))
         return _Outcome(True, leaves_range, meets_condition, tuple(writes))
@@ -172,7 +176,7 @@ class _Rule:
         return taken
 
 
-def _joint_step(arcs: tuple[_Arc, ...], state: State) -> tuple[bool, list[_Writes]]:
+def _joint_step(arcs: tuple[_Arc, ...], state: State, given: Data) -> tuple[bool, list[_Writes]]:
     """Return whether the arcs, taken together, may leave a range, and what they write for each choice of data."""
     leaves_range = False
     moves = tuple((arc.place, arc.target) for arc in arcs)
@@ -181,7 +185,7 @@ def _joint_step(arcs: tuple[_Arc, ...], state: State) -> tuple[bool, list[_Write
         return False, [moves]
     parts: list[list[_Writes]] = [[moves]]
     for updates in _independent_updates(all_updates):
-        leaves, results = _updates_together(updates, state)
+        leaves, results = _updates_together(updates, state, given)
         leaves_range = leaves_range or leaves
         parts.append(results)
     _require_few(len(part) for part in parts)
@@ -199,13 +203,13 @@ def _require_few(counts: Iterable[int]) -> None:
         raise TooManyChoicesError(f"{combinations} choices are too many to go through them")
 
 
-def _updates_together(updates: list[_Update], state: State) -> tuple[bool, list[_Writes]]:
+def _updates_together(updates: list[_Update], state: State, given: Data) -> tuple[bool, list[_Writes]]:
     """Return whether updates that share data may leave a range, and what they write for each choice of data."""
     leaves_range = False
     results: dict[_Writes, None] = {}
     inputs = dict.fromkeys(item for update in updates for item in update.inputs)
-    _require_few(len(domain(item.type)) + item.may_be_unknown for item in inputs)
-    for data in valuations(inputs):
+    _require_few(1 if item.path in given else len(domain(item.type)) + item.may_be_unknown for item in inputs)
+    for data in valuations(inputs, given):
         values = [(update, update.function(state, data)) for update in updates]
         known = [(update, value) for update, value in values if value is not None]
         if all(update.stays_in_range(value) for update, value in known):
@@ -292,15 +296,23 @@ class Semantics:
         rule = self._rules[event]
         return not (rule.conditions or rule.observers) or rule.outcome(state).meets_condition
 
-    def targets(self, state: State, event: str) -> frozenset[State]:
+    def targets(self, state: State, event: str, given: Data = NO_DATA) -> frozenset[State]:
         """The states that an event can lead to, over all received data and edges; none if it is not enabled.
 
         Choices that would leave a variable's range have no target: see `bad`.
+
+        Args:
+            state: The state before it.
+            event: The event.
+            given: Received data that is the same in all choices, None where it is unknown; the rest is open.
         """
         rule = self._rules[event]
         outcome = rule.outcome(state)
+        # A controllable event is disabled where any data would take a variable out of its range.
         if rule.event.is_controllable and outcome.may_leave_range:
             return frozenset()
+        if given:
+            outcome = rule.outcome_given(state, given)
         results = set[State]()
         for writes in outcome.writes:
             target = list(state)

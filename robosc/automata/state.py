@@ -57,3 +57,8 @@ def initial_values(system: System) -> tuple[tuple[Value, ...], ...]:
         for automaton in system.automata
         for values in (automaton.initial, *(variable.initial for variable in automaton.variables))
     )
+
+
+def whole_names(system: System) -> frozenset[str]:
+    """The names that keep those of a system's automata whole in texts: see `automaton_text`."""
+    return frozenset(automaton.name.rpartition(" ")[2] for automaton in system.automata)

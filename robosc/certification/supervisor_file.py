@@ -35,7 +35,7 @@ class StateInWords:
     """A state in the words of the model, in source order.
 
     Attributes:
-        components: The state of each component with a behaviour.
+        components: The state of each component with a behaviour; of automata without a model, the location of each.
         variables: The value of each synthesis variable, by `Component.variable`.
         communications: Location of each service and action; of one that is named like a component, by `service name`
             or `action name`.
@@ -45,16 +45,18 @@ class StateInWords:
     variables: dict[str, Value]
     communications: dict[str, str]
 
+    @property
+    def parts(self) -> dict[str, Value]:
+        """Every part by its name."""
+        return {**self.components, **self.variables, **self.communications}
+
     def __str__(self) -> str:
         return self.text()
 
     def text(self) -> str:
         """In one line."""
-        values = {
-            name: str(value).lower() if isinstance(value, bool) else value for name, value in self.variables.items()
-        }
         return ", ".join(
-            f"{name} = {value}" for name, value in {**self.components, **values, **self.communications}.items()
+            f"{name} = {str(value).lower() if isinstance(value, bool) else value}" for name, value in self.parts.items()
         )
 
 
@@ -246,10 +248,15 @@ def _beliefs(certificate: Certificate, found: Verification) -> list[str]:
     return [f"the certificate says 'passed' for what was not checked here: {', '.join(claimed)}"] if claimed else []
 
 
-def state_in_words(system: System, model: Model, state: State) -> StateInWords:
-    """A state of a model's automata in the words of the model."""
-    components = {item.name for item in model.components}
+def state_in_words(system: System, model: Model | None, state: State) -> StateInWords:
+    """A state of automata in the words of their model; without one, the location of each automaton is told."""
     values = {(item.automaton, item.variable): value for item, value in zip(subjects(system), state, strict=True)}
+    variables = {f"{owner}.{name}": value for (owner, name), value in values.items() if name is not None}
+    if model is None:
+        return StateInWords(
+            {owner: str(value) for (owner, name), value in values.items() if name is None}, variables, {}
+        )
+    components = {item.name for item in model.components}
     plants = [
         communication_plant_name(item)
         for item in model.communications
@@ -257,6 +264,6 @@ def state_in_words(system: System, model: Model, state: State) -> StateInWords:
     ]
     return StateInWords(
         components={item.name: str(values[item.name, None]) for item in model.components if item.behaviour},
-        variables={f"{owner}.{name}": value for (owner, name), value in values.items() if name is not None},
+        variables=variables,
         communications={automaton_text(plant, components): str(values[plant, None]) for plant in plants},
     )

@@ -15,8 +15,9 @@ from robosc.source import visible
 
 if TYPE_CHECKING:
     from robosc.certification.supervisor_file import StateInWords
+    from robosc.pipeline.led_run import Step
     from robosc.pipeline.saved_runs import ModelOfTest
-    from robosc.pipeline.simulation import Run, Step
+    from robosc.pipeline.simulation import Run
     from robosc.pipeline.walking import Trouble
 
 DEFAULT_STEPS = 1000
@@ -181,8 +182,8 @@ def _take_events(name: str, run_: "Run", report: Callable[["Step"], None]) -> st
         UsageError: The file cannot be read.
     """
     from robosc.pipeline.event_scripts import ScriptError, read_script
+    from robosc.pipeline.led_run import EventNotPossibleError, UnknownEventError
     from robosc.pipeline.received_data import NO_DATA, DataError
-    from robosc.pipeline.simulation import EventNotPossibleError, UnknownEventError
 
     shown = "standard input" if name == "-" else name
     try:
@@ -292,7 +293,7 @@ def trouble_json(trouble: "Trouble") -> dict[str, object]:
 
 def step_lines(number: int, step: "Step", before: "StateInWords") -> list[str]:
     """A step in lines: the event with its data, what it changed, what a request sends, and what was unknown."""
-    from robosc.pipeline.simulation import changes_text, event_text
+    from robosc.pipeline.led_run import changes_text, event_text
 
     lines = [f"{number:4}  {': '.join(filter(None, (event_text(step), changes_text(before, step.state))))}"]
     if step.provided is not None:

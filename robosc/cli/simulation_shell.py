@@ -14,8 +14,9 @@ from robosc.pipeline.received_data import NO_DATA, DataField
 from robosc.source import visible
 
 if TYPE_CHECKING:
+    from robosc.pipeline.led_run import Step
     from robosc.pipeline.saved_runs import ModelOfTest
-    from robosc.pipeline.simulation import Run, Step
+    from robosc.pipeline.simulation import Run
 
 PROMPT = "> "
 

@@ -21,7 +21,7 @@ from robosc.automata.executable import CALLED_KINDS, ExecutableEvent, Executable
 from robosc.automata.plants import communication_plant, communication_plant_name
 from robosc.automata.state import Subject
 from robosc.errors import RoboscError
-from robosc.explanation.notation import requirement_text, value_text
+from robosc.explanation.notation import MAXIMUM_NAMES, bracketed, cut, listed, requirement_text, value_text
 from robosc.expressions import (
     BooleanType,
     DoubleType,
@@ -46,12 +46,6 @@ from robosc.supervisor import AddedCondition, DecisionDiagram
 
 MAXIMUM_REASONS = 8
 """Sentences for one request."""
-
-MAXIMUM_TEXT = 300
-"""Characters of a text of the model that a sentence repeats."""
-
-MAXIMUM_NAMES = 8
-"""Names, and values, that a sentence lists."""
 
 MAXIMUM_DIGITS = 400
 """Characters of a number that comes as a text."""
@@ -207,7 +201,7 @@ class Requests:
                 allowed, tested = self._decided(rule.added, state)
                 is_unknown = is_unknown or allowed is None
                 if allowed is False:
-                    why = (f"the supervisor forbids it, because of what can follow{_bracketed(tested)}",)
+                    why = (f"the supervisor forbids it, because of what can follow{bracketed(tested)}",)
             if why:
                 blocked.append(Blocked(rule.event, why))
             elif is_unknown:
@@ -244,7 +238,7 @@ class Requests:
     def _need(self, item: Requirement) -> _Need:
         is_needs = item.form is RequirementForm.NEEDS
         return _Need(
-            _cut(requirement_text(item, self._components)),
+            cut(requirement_text(item, self._components)),
             is_needs,
             self._condition(item.condition),
             tuple(map(self._condition, conjuncts(item.expression))) if is_needs else (),
@@ -252,7 +246,7 @@ class Requests:
 
     def _condition(self, expression: Expression) -> _Condition:
         reads = sorted(subjects_read(expression), key=self._places.__getitem__)
-        text = _cut(expression_text(expression, self._components))
+        text = cut(expression_text(expression, self._components))
         return _Condition(compile_expression(expression, self._places), text, tuple(reads))
 
     def _decision(self, diagram: DecisionDiagram) -> Decision:
@@ -315,7 +309,7 @@ class Requests:
         if rule.moves is not None:
             location = state[self._places[Subject(rule.moves.plant)]]
             if location is not None and location not in rule.moves.targets:
-                needed = _listed(list(rule.moves.targets))
+                needed = listed(list(rule.moves.targets))
                 yield f"{automaton_text(rule.moves.plant, self._components)} is in {location}, not in {needed}"
         for part in rule.parts:
             yield from self._hindered(part, state)
@@ -326,7 +320,7 @@ class Requests:
     def _hindered(self, part: _Part, state: State) -> Iterator[str]:
         location = str(state[self._places[Subject(part.name)]])
         if location not in part.kept:
-            yield f"{part.name} is in {location}, not in {_listed(list(part.kept))}"
+            yield f"{part.name} is in {location}, not in {listed(list(part.kept))}"
             return
         for item in part.kept[location]:
             value = item.function(state, _NO_DATA)
@@ -347,12 +341,12 @@ class Requests:
         return f"{need.text}: {told} do{'' if len(failing) > 1 else 'es'} not hold{self._values(read, state)}"
 
     def _values(self, read: Iterable[Subject], state: State) -> str:
-        return _bracketed([self._told(subject, state) for subject in read])
+        return bracketed([self._told(subject, state) for subject in read])
 
     def _told(self, subject: Subject, state: State) -> str:
         value = state[self._places[subject]]
         name = automaton_text(subject.automaton, self._components) if subject.variable is None else str(subject)
-        return f"{name} is {_cut(value_text(value))}"
+        return f"{name} is {cut(value_text(value))}"
 
     def _decided(self, decision: Decision, state: State) -> tuple[bool | None, list[str]]:
         """Return whether a diagram is true, None where it looks at what is not known, and what it looked at."""
@@ -404,20 +398,3 @@ def _double(raw: Any) -> float | None:
         return float(raw)
     except (ValueError, OverflowError):
         return None
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= MAXIMUM_TEXT else text[: MAXIMUM_TEXT - 4] + " ..."
-
-
-def _listed(names: list[str]) -> str:
-    shown = names[:MAXIMUM_NAMES]
-    more = "" if len(names) <= MAXIMUM_NAMES else f" or {len(names) - MAXIMUM_NAMES} more"
-    return (
-        ", ".join(shown[:-1]) + (" or " if len(shown) > 1 and not more else ", " * (len(shown) > 1)) + shown[-1] + more
-    )
-
-
-def _bracketed(told: list[str]) -> str:
-    shown = ", ".join(told[:MAXIMUM_NAMES]) + (", ..." if len(told) > MAXIMUM_NAMES else "")
-    return f" ({shown})" if shown else ""

@@ -9,6 +9,12 @@ from robosc.model.structure import Requirement, RequirementForm
 MAXIMUM_EVENTS = 30
 """Events of a run that a text shows."""
 
+MAXIMUM_TEXT = 300
+"""Characters of a text of the model that a sentence repeats."""
+
+MAXIMUM_NAMES = 8
+"""Names, and values, that a sentence lists."""
+
 
 def value_text(value: Value) -> str:
     """A value as the language writes it."""
@@ -34,3 +40,23 @@ def requirement_text(item: Requirement, components: Collection[str]) -> str:
     if item.form is RequirementForm.NEEDS:
         return f"requirement {shown} needs {expression}"
     return f"requirement {expression} disables {shown}"
+
+
+def cut(text: str) -> str:
+    """A text of the model, cut where it is long."""
+    return text if len(text) <= MAXIMUM_TEXT else text[: MAXIMUM_TEXT - 4] + " ..."
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names joined by `or`, at least one; of very many the first."""
+    shown = names[:MAXIMUM_NAMES]
+    more = "" if len(names) <= MAXIMUM_NAMES else f" or {len(names) - MAXIMUM_NAMES} more"
+    return (
+        ", ".join(shown[:-1]) + (" or " if len(shown) > 1 and not more else ", " * (len(shown) > 1)) + shown[-1] + more
+    )
+
+
+def bracketed(told: Sequence[str]) -> str:
+    """Values that were looked at, in brackets with a blank before; empty where there are none."""
+    shown = ", ".join(told[:MAXIMUM_NAMES]) + (", ..." if len(told) > MAXIMUM_NAMES else "")
+    return f" ({shown})" if shown else ""

@@ -1,18 +1,24 @@
-"""Exploration of everything that a robot may do under its supervisor."""
+"""Exploration of everything that a robot, or automata, may do under their supervisor."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
+from robosc.automata import System
 from robosc.certification import Progress, SynthesisOutcome
 from robosc.errors import UnsupportedModelError
 from robosc.explanation import EmptyExplanation
 from robosc.exploration import DEFAULT_LIMIT, Graph
 from robosc.exploration import explore as explore_system
+from robosc.graphviz import FORMATS, drawn
+from robosc.json_documents import json_text
+from robosc.pipeline.files import FileAccessError, given_path, write_whole
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.loading import ModelLike, loaded
+from robosc.pipeline.loading import FileName, ModelLike, loaded
 from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
-from robosc.pipeline.results import NoSupervisor, Outcome, SynthesisStatus
+from robosc.pipeline.results import NoSupervisor, NothingGeneratedError, Outcome, SynthesisStatus
 from robosc.pipeline.supervisors import Supervisor
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, findings_of, ignored, make, never, status_of, why_not
+from robosc.pipeline.systems import SystemSupervisor, synthesize_system
 from robosc.supervisor import Supervisor as CoreSupervisor
 from robosc.supervisor.predicates import state_predicates
 
@@ -35,23 +41,59 @@ class Exploration(Outcome):
     graph: Graph | None
     explanation: EmptyExplanation | NoSupervisor | None = None
 
+    def write(self, file: FileName) -> Path:
+        """Write the graph, whole or not at all, and return the file's path.
+
+        Its name ends in what it becomes: `.json` is what `robosc explore --json` prints, `.txt` the table, `.dot` and
+        `.gv` are for Graphviz, `.svg`, `.png` and `.pdf` are the picture that Graphviz draws.
+
+        Raises:
+            NothingGeneratedError: There is no graph.
+            FileAccessError: The file cannot be written, or its name ends in something else.
+            DrawingUnavailableError: A picture is wanted, and Graphviz is not installed or gave up.
+        """
+        if self.graph is None:
+            raise NothingGeneratedError(f"there is no graph to write: {self.reason or self.status}")
+        path = given_path(file)
+        write_whole(path, _content(self.graph, path))
+        return path
+
     def _made(self) -> object:
         return self.graph
 
+    def _repr_svg_(self) -> str | None:
+        return None if self.graph is None else self.graph._repr_svg_()
+
+
+def _content(graph: Graph, path: Path) -> bytes:
+    """The graph as the end of a file's name says."""
+    match path.suffix.removeprefix("."):
+        case "json":
+            return json_text(graph.to_json()).encode()
+        case "txt":
+            return str(graph).encode()
+        case "dot" | "gv":
+            return graph.dot.encode()
+        case format_ if format_ in FORMATS:
+            return drawn(graph.dot, format_)
+    ends = ", ".join(f".{item}" for item in ("json", "txt", "dot", "gv", *FORMATS))
+    raise FileAccessError(f"{path}: the name of a written graph ends in one of {ends}")
+
 
 def explore(
-    model: ModelLike | CoreSupervisor,
+    model: ModelLike | CoreSupervisor | System | SystemSupervisor,
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     maximum_states: int | None = None,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Exploration:
-    """Return the graph of everything that a robot may do under its supervisor.
+    """Return the graph of everything that a robot, or automata, may do under their supervisor.
 
     Args:
-        model: The model, as `load` returns it, the path of one, or a supervisor that was made.
-        options: Options for making the supervisor of a model; silent steps that never end are allowed.
+        model: The model, as `load` returns it, the path of one, a `robosc.automata.System`, or a supervisor that was
+            made of either.
+        options: Options for making the supervisor; silent steps that never end are allowed.
         maximum_states: States beyond which it is given up; None: 100,000.
         on_progress: Function called with the progress of the work.
         should_stop: Function called again and again; once it returns true, the work ends.
@@ -59,6 +101,7 @@ def explore(
     Raises:
         FileAccessError: The file is not there or cannot be read.
         LanguageError: A file is too large or not UTF-8.
+        InvalidSystemError: The automata do not fit together.
         NodeLimitError: Decision diagrams became larger than the options allow.
         UnknownEngineError: There is no such engine.
         SynthesisCancelled: `should_stop` became true.
@@ -70,6 +113,13 @@ def explore(
     if isinstance(model, CoreSupervisor):
         known = model.diagnostics if isinstance(model, Supervisor) else None
         return _explored(model, limit, known or Findings(), on_progress, should_stop)
+    if isinstance(model, System):
+        made = synthesize_system(model, options, on_progress, should_stop)
+        if made.supervisor is None:
+            return Exploration(made.status, Findings(), made.reason, None, NoSupervisor(made.reason, Findings()))
+        model = made.supervisor
+    if isinstance(model, SystemSupervisor):
+        return _explored(model, limit, Findings(), on_progress, should_stop)
     bundle = loaded(model)
     # The graph is of everything allowed, whatever an executor would choose.
     attempt = make(bundle, options, on_progress, should_stop, allow_livelock=True)
@@ -81,9 +131,14 @@ def explore(
 
 
 def _explored(
-    supervisor: CoreSupervisor, limit: int, diagnostics: Findings, on_progress: OnProgress, should_stop: ShouldStop
+    supervisor: CoreSupervisor | SystemSupervisor,
+    limit: int,
+    diagnostics: Findings,
+    on_progress: OnProgress,
+    should_stop: ShouldStop,
 ) -> Exploration:
-    on_progress(Progress("exploration", f"{supervisor.certificate.states} states"))
+    states = supervisor.states if isinstance(supervisor, SystemSupervisor) else supervisor.certificate.states
+    on_progress(Progress("exploration", f"{states} states"))
     try:
         graph = graph_of(supervisor, limit=limit, should_stop=should_stop)
     except UnsupportedModelError as error:
@@ -93,13 +148,25 @@ def _explored(
     return Exploration(SynthesisStatus.SUPERVISOR, diagnostics, "", graph)
 
 
-def graph_of(supervisor: CoreSupervisor, *, limit: int = DEFAULT_LIMIT, should_stop: ShouldStop = never) -> Graph:
+def graph_of(
+    supervisor: CoreSupervisor | SystemSupervisor, *, limit: int = DEFAULT_LIMIT, should_stop: ShouldStop = never
+) -> Graph:
     """Return the graph of the system that a supervisor controls.
 
     Raises:
         UnsupportedModelError: There are more than `limit` states.
         SynthesisCancelled: `should_stop` became true.
     """
+    if isinstance(supervisor, SystemSupervisor):
+        system = supervisor.system
+        return explore_system(
+            system,
+            state_predicates(system, supervisor.added),
+            None,
+            initial=supervisor.may_begin,
+            limit=limit,
+            should_stop=should_stop,
+        )
     system = supervisor.executable.automata
     added = state_predicates(system, supervisor.added)
     return explore_system(system, added, supervisor.model, limit=limit, should_stop=should_stop)

@@ -101,6 +101,15 @@ def loaded(model: ModelLike) -> LoadedModel:
         return _loaded(model)
     if isinstance(model, str | os.PathLike):
         return load(model)
+    from robosc.automata import System
+    from robosc.pipeline.systems import SystemSupervisor
+
+    if isinstance(model, System | SystemSupervisor):
+        raise TypeError(
+            f"this takes a RoboSC model, not automata ({model.name if isinstance(model, System) else repr(model)}), "
+            "which have no text to find faults in, and no messages or ROS interfaces to generate code for: write the "
+            "robot as a model, or use synthesize, verify, explore or simulate"
+        )
     raise TypeError(
         f"a model is the path of a file or what robosc.load returns, not {type(model).__name__}: {model!r:.80}"
     )

@@ -15,7 +15,8 @@ from robosc.pipeline.received_data import NO_DATA
 
 if TYPE_CHECKING:
     from robosc.certification.supervisor_file import StateInWords
-    from robosc.pipeline.simulation import Run, Step
+    from robosc.pipeline.led_run import LedRun, Step
+    from robosc.pipeline.simulation import Run
 
 _WIDTH = 112
 
@@ -37,7 +38,7 @@ class ModelOfTest:
     interface_paths: tuple[Path, ...] = ()
 
 
-def event_log(run: "Run") -> str:
+def event_log(run: "LedRun") -> str:
     """Return the text of an event log of a run; its clock counts the events, a second each."""
     return "".join(json_line(entry) for number, step in enumerate(run, start=1) for entry in entries_of(step, number))
 
@@ -71,7 +72,7 @@ def state_by_component(state: "StateInWords") -> dict[str, dict[str, Any]]:
         name: {"state": place, "variables": {}} for name, place in state.components.items()
     }
     for name, value in state.variables.items():
-        component, _, variable = name.partition(".")
+        component, _, variable = name.rpartition(".")
         found[component]["variables"][variable] = value
     return found
 
@@ -126,12 +127,12 @@ def pytest_module(run: "Run", model: ModelOfTest, file: Path) -> str:
     from robosc.pipeline.simulation import Run
 
     again = Run(run.supervisor)
-    enabled, state = again.enabled, _values(again.initial)
+    enabled, state = again.enabled, again.initial.parts
     initial, steps = dict(state), list[tuple[Any, ...]]()
     for step in run.history:
         given = _plain(step.given)
         again.step(step.event, *(() if given is ... else (given,)))
-        now = _values(again.state)
+        now = again.state.parts
         changes = {name: value for name, value in now.items() if not _is_same(state[name], value)}
         steps.append((step.event, given, again.enabled, changes))
         state = now
@@ -156,10 +157,6 @@ def pytest_module(run: "Run", model: ModelOfTest, file: Path) -> str:
 
 def _seen_from(file: Path, path: Path) -> str:
     return os.path.relpath(os.path.realpath(path), os.path.realpath(file.parent))
-
-
-def _values(state: "StateInWords") -> dict[str, Any]:
-    return {**state.components, **state.variables, **state.communications}
 
 
 def _is_same(a: object, b: object) -> bool:

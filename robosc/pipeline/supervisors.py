@@ -147,5 +147,9 @@ def supervisor_of(given: SupervisorLike) -> Supervisor:
         return Supervisor.of(decode(given))
     if isinstance(given, str | os.PathLike):
         return Supervisor.read(given)
-    hint = ": no supervisor was made, print the result to see why" if given is None else ""
+    hint = ""
+    if given is None:
+        hint = ": no supervisor was made, print the result to see why"
+    elif isinstance(given, System):
+        hint = ": make it with robosc.synthesize(system).supervisor"
     raise TypeError(f"a supervisor is wanted, or the path of its file, not {type(given).__name__}{hint}")

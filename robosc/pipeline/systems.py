@@ -6,7 +6,9 @@ from functools import cached_property
 from typing import Any
 
 from robosc.automata import System, check_system
-from robosc.automata.state import subjects
+from robosc.automata.compile import State
+from robosc.automata.decision import Decision
+from robosc.automata.state import subjects, whole_names
 from robosc.certification import Progress
 from robosc.conditions.rendering import Formulas
 from robosc.errors import UnsupportedModelError
@@ -45,7 +47,7 @@ class SystemSupervisor:
     @cached_property
     def conditions(self) -> Conditions:
         """For each controllable event what it adds, in words."""
-        return conditions_of(self.added, self.system, self._names())
+        return conditions_of(self.added, self.system, whole_names(self.system))
 
     @property
     def initial_condition(self) -> Condition | None:
@@ -53,15 +55,20 @@ class SystemSupervisor:
         if self.initial is None:
             return None
         formula = Formulas(diagram_domains(self.system)).formula(self.initial)
-        return condition_of(INITIALLY, self.initial, formula, self.system, self._names())
+        return condition_of(INITIALLY, self.initial, formula, self.system, whole_names(self.system))
+
+    def may_begin(self, state: State) -> bool:
+        """Return True if the system may begin in a state, one of its initial ones, in the order of `subjects`."""
+        return self._may_begin is None or self._may_begin(state)
+
+    @cached_property
+    def _may_begin(self) -> Decision | None:
+        return None if self.initial is None else state_predicate(self.system, self.initial)
 
     @property
     def states(self) -> int:
         """Reachable states of the controlled system."""
         return self.statistics.states
-
-    def _names(self) -> frozenset[str]:
-        return frozenset(automaton.name for automaton in self.system.automata)
 
     def __repr__(self) -> str:
         events = f"{len(self.added)} event{'s' if len(self.added) != 1 else ''}"
@@ -202,7 +209,7 @@ def _verified(
     found = verify_explicitly(
         system,
         added,
-        initial=state_predicate(system, supervisor.initial),
+        initial=supervisor.may_begin,
         limit=limits.states,
         permissive_limit=limits.recomputed,
         should_stop=should_stop,

@@ -1,6 +1,7 @@
 """Walks by chance through the controlled system, and the trouble that they may end in."""
 
-from collections.abc import Collection, Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from random import Random
@@ -11,7 +12,8 @@ from robosc.model.structure import EventKind, Model, is_tau
 from robosc.pipeline.received_data import RandomData
 
 if TYPE_CHECKING:
-    from robosc.pipeline.simulation import Run, Step
+    from robosc.pipeline.led_run import LedRun, Step
+    from robosc.pipeline.simulation import Run
 
 
 class TroubleKind(StrEnum):
@@ -53,24 +55,39 @@ class Trouble:
         return f"{self.kind}{place} after {self.steps} step{'s' if self.steps != 1 else ''}: {'; '.join(self.why)}"
 
 
-class Walker:
+class Walker(ABC):
     """Walker of one run.
 
     Args:
         run: The run that it leads.
-        system: The system of that run.
-        model: Its model.
-        data: Data that the environment sends.
     """
 
-    def __init__(self, run: "Run", system: InterpretedSystem, model: Model, data: RandomData) -> None:
+    def __init__(self, run: "LedRun") -> None:
         self._run = run
-        self._system = system
-        self._data = data
-        self._identifiers = {event: item.identifier for item in model.communications for event in item.events}
-        self._sensors = {item.identifier for item in model.communications if item.max_age is not None}
         # Trouble that was found before.
         self._told: set[tuple[TroubleKind, str, tuple[str, ...]]] = set()
+
+    # Parts that differ
+
+    @abstractmethod
+    def _candidates(self) -> Iterable[str]:
+        """The events that could happen next."""
+
+    @abstractmethod
+    def _forbidden(self) -> Iterable[str]:
+        """The controllable events that could happen if they were not forbidden."""
+
+    @abstractmethod
+    def _is_issued(self, event: str) -> bool:
+        """Return False for an event that could happen, but would not be taken."""
+
+    @abstractmethod
+    def _take(self, event: str, dice: Random) -> "Step":
+        """Take an event, with data by chance."""
+
+    @abstractmethod
+    def _at_event(self, event: str, count: int) -> Trouble | None:
+        """Trouble with an event that is therefore not taken."""
 
     def forget(self) -> None:
         """Begin anew: all trouble is news again."""
@@ -108,11 +125,59 @@ class Walker:
         candidates = [*self._candidates(), *(self._forbidden() if TroubleKind.BLOCKED in kinds else ())]
         while candidates:
             event = dice.choice(candidates)
-            found = self._at_request(event, count)
+            found = self._at_event(event, count)
             if found is None or self._is_news(found, kinds):
                 return event, found
             candidates.remove(event)
         return None, None
+
+    # Trouble
+
+    def _in_state(self, count: int) -> Trouble | None:
+        run = self._run
+        if run.enabled or run.is_marked:
+            return None
+        left = run.possible
+        places = {**run.state.components, **run.state.communications}
+        where = ", ".join(f"{name} is {place}" for name, place in places.items())
+        if not left:
+            return Trouble(TroubleKind.DEADLOCK, "", (f"nothing can happen while {where}",), count)
+        if any(place in ("waiting", "executing") for place in run.state.communications.values()):
+            return None
+        why = f"nothing is allowed while {where}: it can only wait for {', '.join(left)}"
+        return Trouble(TroubleKind.WAITING, "", (why,), count)
+
+    def _at_step(self, step: "Step", count: int) -> Trouble | None:
+        why = (*step.unknown, *(f"{variable} keeps its value: its update is unknown" for variable in step.skipped))
+        return Trouble(TroubleKind.UNKNOWN, step.event, why, count) if why else None
+
+    def _is_news(self, found: Trouble | None, kinds: Collection[TroubleKind]) -> bool:
+        """Return True if there is trouble of a kind that is looked for, and it was not told before."""
+        if found is None or found.kind not in kinds:
+            return False
+        key = (found.kind, found.event, found.why)
+        is_news = key not in self._told
+        self._told.add(key)
+        return is_news
+
+
+class ModelWalker(Walker):
+    """Walker of a robot's run: takes what an executor could in some world.
+
+    Args:
+        run: The run that it leads.
+        system: The system of that run.
+        model: Its model.
+        data: Data that the environment sends.
+    """
+
+    def __init__(self, run: "Run", system: InterpretedSystem, model: Model, data: RandomData) -> None:
+        super().__init__(run)
+        self._run: Run = run
+        self._system = system
+        self._data = data
+        self._identifiers = {event: item.identifier for item in model.communications for event in item.events}
+        self._sensors = {item.identifier for item in model.communications if item.max_age is not None}
 
     def _candidates(self) -> Iterator[str]:
         """Yield the events that an executor and its environment could have happen now."""
@@ -148,24 +213,7 @@ class Walker:
     def _take(self, event: str, dice: Random) -> "Step":
         return self._run.step(event, self._data.draw(event, dice))
 
-    # Trouble
-
-    def _in_state(self, count: int) -> Trouble | None:
-        run = self._run
-        if run.enabled or run.is_marked:
-            return None
-        left = run.possible
-        places = {**run.state.components, **run.state.communications}
-        where = ", ".join(f"{name} is {place}" for name, place in places.items())
-        if not left:
-            return Trouble(TroubleKind.DEADLOCK, "", (f"nothing can happen while {where}",), count)
-        if any(place in ("waiting", "executing") for place in run.state.communications.values()):
-            return None
-        why = f"nothing is allowed while {where}: it can only wait for {', '.join(left)}"
-        return Trouble(TroubleKind.WAITING, "", (why,), count)
-
-    def _at_request(self, event: str, count: int) -> Trouble | None:
-        """Trouble with a request that is therefore not made."""
+    def _at_event(self, event: str, count: int) -> Trouble | None:
         if not _is_request(event):
             return None
         if not self._system.enabled(event):
@@ -174,19 +222,6 @@ class Walker:
             why = "what it sends is unknown, so that it is not issued"
             return Trouble(TroubleKind.UNKNOWN, event, (why,), count)
         return None
-
-    def _at_step(self, step: "Step", count: int) -> Trouble | None:
-        why = (*step.unknown, *(f"{variable} keeps its value: its update is unknown" for variable in step.skipped))
-        return Trouble(TroubleKind.UNKNOWN, step.event, why, count) if why else None
-
-    def _is_news(self, found: Trouble | None, kinds: Collection[TroubleKind]) -> bool:
-        """Return True if there is trouble of a kind that is looked for, and it was not told before."""
-        if found is None or found.kind not in kinds:
-            return False
-        key = (found.kind, found.event, found.why)
-        is_news = key not in self._told
-        self._told.add(key)
-        return is_news
 
 
 def _is_request(event: str) -> bool:

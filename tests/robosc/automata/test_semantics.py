@@ -1,16 +1,15 @@
 """The explicit semantics, by hand and against a naive reading of the definition."""
 
 import math
-from collections.abc import Iterator
 from itertools import product
 
 import pytest
 from hypothesis import given, settings
 
-from robosc.automata import DiscreteVariable, Edge, InputVariable, Semantics, System
+from robosc.automata import DiscreteVariable, InputVariable, Semantics, System
 from robosc.automata.compile import State, compile_expression
 from robosc.automata.inputs import valuations
-from robosc.automata.state import Subject, subject_domain, subjects
+from robosc.automata.state import subjects
 from robosc.expressions import (
     FALSE,
     TRUE,
@@ -23,11 +22,9 @@ from robosc.expressions import (
     PathStep,
     StateTest,
     Unary,
-    Value,
-    domain,
 )
-from robosc.expressions.evaluate import evaluate
 from support.effort import examples
+from support.naive_system import NaiveSystem
 from support.random_systems import any_systems
 from support.systems import automaton, edge, operation, read, received, state, system
 
@@ -258,68 +255,6 @@ def test_a_comparison_with_an_infinity_is_an_ordinary_one() -> None:
     assert subject.enabled(subject.initial, "go")
 
 
-# The naive reading: no compilation, no memory, all received data of the event at once.
-
-
-class _Naive:
-    def __init__(self, system_: System) -> None:
-        self.system = system_
-        self.subjects = subjects(system_)
-
-    def evaluate(self, expression: Expression, at: State, data: dict[tuple[PathStep, ...], Value | None]) -> object:
-        values = dict(zip(self.subjects, at, strict=True))
-        return evaluate(
-            expression,
-            lambda automaton, variable: values[Subject(automaton, variable)],
-            lambda automaton: str(values[Subject(automaton)]),
-            lambda path: data[path],
-        )
-
-    def data(self, event: str) -> Iterator[dict[tuple[PathStep, ...], Value | None]]:
-        inputs = [item for item in self.system.inputs if item.event == event]
-        values = [[*domain(item.type), *([None] if item.may_be_unknown else [])] for item in inputs]
-        for choice in product(*values):
-            known = dict(zip((item.path for item in inputs), choice, strict=True))
-            elements = sorted((path for path in known if path[0] == "scan"), key=lambda path: path[1])
-            unknown = [known[path] is None for path in elements]
-            if unknown == sorted(unknown):
-                yield known
-
-    def edges(self, at: State, event: str) -> list[tuple[tuple[str, Edge], ...]]:
-        values = dict(zip(self.subjects, at, strict=True))
-        choices = [
-            [
-                (item.name, arc)
-                for arc in item.edges
-                if arc.event == event and arc.source == values[Subject(item.name)]
-                if self.evaluate(arc.guard, at, {}) is True
-            ]
-            for item in self.system.automata
-            if event in item.alphabet
-        ]
-        return list(product(*choices))
-
-    def step(self, at: State, event: str) -> tuple[frozenset[State], bool]:
-        """Targets, and whether some choice leaves a range."""
-        targets, leaves_range = set[State](), False
-        for combination in self.edges(at, event):
-            for data in self.data(event):
-                values = dict(zip(self.subjects, at, strict=True))
-                in_range = True
-                for name, arc in combination:
-                    values[Subject(name)] = arc.target
-                    for update in arc.updates:
-                        value = self.evaluate(update.expression, at, data)
-                        place = Subject(name, update.variable)
-                        if value is not None:
-                            in_range = in_range and value in subject_domain(self.system, place)
-                            values[place] = value  # type: ignore[assignment]
-                leaves_range = leaves_range or not in_range
-                if in_range:
-                    targets.add(tuple(values.values()))
-        return frozenset(targets), leaves_range
-
-
 def _some_states(subject: Semantics, count: int) -> list[State]:
     found, frontier = {subject.initial: None}, [subject.initial]
     while frontier and len(found) < count:
@@ -334,7 +269,7 @@ def _some_states(subject: Semantics, count: int) -> list[State]:
 @settings(max_examples=examples(100))
 @given(any_systems())
 def test_agrees_with_the_naive_reading_of_the_definition(drawn: System) -> None:
-    subject, naive = Semantics(drawn), _Naive(drawn)
+    subject, naive = Semantics(drawn), NaiveSystem(drawn)
     for at in _some_states(subject, 12):
         is_bad = not all(naive.evaluate(item, at, {}) is True for item in drawn.invariants)
         for event in drawn.events:
@@ -357,7 +292,7 @@ def test_agrees_with_the_naive_reading_of_the_definition(drawn: System) -> None:
 @given(any_systems())
 def test_compiled_expressions_mean_the_same_as_evaluated_ones(drawn: System) -> None:
     places = {subject: place for place, subject in enumerate(subjects(drawn))}
-    naive = _Naive(drawn)
+    naive = NaiveSystem(drawn)
     expressions = [item.condition for item in drawn.conditions] + [
         arc.guard for item in drawn.automata for arc in item.edges
     ]

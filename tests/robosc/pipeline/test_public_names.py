@@ -12,11 +12,19 @@ FUNCTIONS = ["check", "explain", "explore", "generate", "load", "simulate", "syn
 VALUES = [
     *("Condition", "Conditions", "Deployment", "Diagnostic", "Explained", "Exploration", "Findings", "GenerateOptions"),
     *("Generation", "LoadedModel", "NoSupervisor", "Progress", "Run", "Severity", "Step", "Summary", "Supervisor"),
-    *("Synthesis", "SynthesisOptions", "SynthesisStatus", "SystemSupervisor", "SystemSynthesis", "Trouble"),
-    *("TroubleKind", "Verification", "VerificationStatus"),
+    *("Synthesis", "SynthesisOptions", "SynthesisStatus", "SystemRun", "SystemSupervisor", "SystemSynthesis"),
+    *("Trouble", "TroubleKind", "Verification", "VerificationStatus"),
 ]
 ERRORS = [
-    *("DataError", "EventNotPossibleError", "FileAccessError", "InternalError", "InvalidSupervisorError"),
+    *(
+        "ChoiceError",
+        "DataError",
+        "DrawingUnavailableError",
+        "EventNotPossibleError",
+        "FileAccessError",
+        "InternalError",
+        "InvalidSupervisorError",
+    ),
     *("InvalidSystemError", "LanguageError", "NodeLimitError", "NothingGeneratedError", "OverwriteError"),
     *("RequestError", "RoboscError", "SynthesisCancelled", "UnknownCodeError", "UnknownEngineError"),
     *("UnknownEventError", "UnknownNameError", "UnknownTargetError", "UnsupportedModelError"),

@@ -98,7 +98,3 @@ def test_other_doors_are_closed() -> None:
     assert supervisor is not None
     with pytest.raises(TypeError, match="properties and supervisor= need a model"):
         robosc.verify(supervisor, "invariant true")  # type: ignore[call-overload]
-    with pytest.raises(TypeError, match="a supervisor is wanted"):
-        robosc.simulate(supervisor)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match="a model is the path of a file"):
-        robosc.generate(supervisor, "ros2")  # type: ignore[arg-type]

@@ -34,6 +34,10 @@ def right(system: System) -> None:
     of_system: robosc.SystemSynthesis = robosc.synthesize(system)
     if of_system.supervisor is not None:
         print(robosc.verify(of_system.supervisor, is_strict=True).passed, of_system.supervisor.conditions["a"])
+        by_hand: robosc.SystemRun = robosc.simulate(of_system.supervisor, initial={"A": "idle"})
+        taken: robosc.Step = by_hand.step("a", to={"A": "busy", "A.n": 3})
+        saved = robosc.explore(of_system.supervisor).write("graph.svg")
+        print(taken.state.components, by_hand.choices("a"), robosc.explore(system).graph, saved)
 
 
 def wrong(system: System, model: robosc.LoadedModel, result: robosc.Synthesis, run: robosc.Run) -> None:
@@ -45,7 +49,7 @@ def wrong(system: System, model: robosc.LoadedModel, result: robosc.Synthesis, r
     robosc.SynthesisOptions(deployment="layer")  # type: ignore[arg-type]
     robosc.SynthesisOptions(robosc.Deployment.LAYER)  # type: ignore[call-arg]
     # There may be no supervisor.
-    robosc.simulate(result.supervisor)  # type: ignore[arg-type]
+    robosc.simulate(result.supervisor)  # type: ignore[call-overload]
     robosc.generate(result.supervisor, "ros2")  # type: ignore[arg-type]
     print(result.supervisor.conditions)  # type: ignore[union-attr]
     print(robosc.explore(model).graph.states)  # type: ignore[union-attr]
@@ -55,7 +59,9 @@ def wrong(system: System, model: robosc.LoadedModel, result: robosc.Synthesis, r
     robosc.verify(system)  # type: ignore[call-overload]
     robosc.explain()  # type: ignore[call-overload]
     robosc.explain(model, code="unknown-name")  # type: ignore[call-overload]
-    robosc.explore(system)  # type: ignore[arg-type]
+    robosc.generate(system, "ros2")  # type: ignore[arg-type]
+    robosc.simulate(system)  # type: ignore[call-overload]
+    robosc.simulate("robot.rsup", initial={"A": "idle"})  # type: ignore[call-overload]
     run.step(3)  # type: ignore[arg-type]
     run.step(event="scan.response")  # type: ignore[call-arg]
     run.enabled = ()  # type: ignore[misc]

@@ -1,0 +1,124 @@
+"""Reasons why an event of automata cannot happen in a state, one sentence for each cause.
+
+They follow the definition of the controlled system (`robosc.automata.controlled`): a plant has no edge whose guard is
+true, a requirement automaton has none, an event condition does not hold, an update would leave a variable's range, or
+the supervisor forbids it. The last is told where nothing else is: what it adds means nothing elsewhere.
+"""
+
+from collections.abc import Iterator
+
+from robosc.automata import Automaton, Edge, Role, System
+from robosc.automata.compile import NO_DATA, State, compile_expression, paths_read, subjects_read
+from robosc.automata.controlled import Added
+from robosc.automata.decision import Decision
+from robosc.automata.inputs import valuations
+from robosc.automata.state import Subject, subject_type, subjects, whole_names
+from robosc.explanation.notation import MAXIMUM_NAMES, bracketed, cut, listed, value_text
+from robosc.expressions import Expression, IntegerType, Unary
+from robosc.expressions.text import expression_text
+
+
+class Disabled:
+    """Events of one controlled system that cannot happen.
+
+    Args:
+        system: The automata.
+        added: The conditions that the supervisor adds to events, over states.
+    """
+
+    def __init__(self, system: System, added: Added) -> None:
+        self._system = system
+        self._added = added
+        self._subjects = subjects(system)
+        self._places = {subject: place for place, subject in enumerate(self._subjects)}
+        self._names = whole_names(system)
+
+    def reasons(self, state: State, event: str) -> tuple[str, ...]:
+        """Return the reasons why an event cannot happen in a state, which it cannot; at least one.
+
+        Raises:
+            KeyError: There is no such event.
+        """
+        is_controllable = self._system.event(event).is_controllable
+        # Requirements do not hold back what the environment does.
+        automata = [
+            item
+            for item in self._system.automata
+            if event in item.alphabet and (is_controllable or item.role is Role.PLANT)
+        ]
+        if not any(item.role is Role.PLANT for item in automata):
+            return ("no plant has it in its alphabet",)
+        found = [reason for item in automata for reason in self._without_edge(item, state, event)]
+        if is_controllable:
+            found += self._conditions(state, event)
+        if not found:
+            found += self._out_of_range(automata, state, event)
+        if not found:
+            found.append(f"the supervisor forbids it, because of what can follow{self._decided(state, event)}")
+        return tuple(found[:MAXIMUM_NAMES])
+
+    def _without_edge(self, automaton: Automaton, state: State, event: str) -> Iterator[str]:
+        """Yield why an automaton has no edge to take."""
+        name = automaton.name if automaton.role is Role.PLANT else f"requirement {automaton.name}"
+        edges = [edge for edge in automaton.edges if edge.event == event]
+        here = self._from(edges, automaton, state)
+        if not here:
+            location = state[self._places[Subject(automaton.name)]]
+            sources = tuple(dict.fromkeys(edge.source for edge in edges))
+            yield f"{name} is in {location}, not in {listed(sources)}" if sources else f"{name} has no edge for it"
+        elif not any(self._holds(edge.guard, state) for edge in here):
+            for guard in dict.fromkeys(edge.guard for edge in here):
+                yield f"{name}: {self._text(guard)} does not hold{self._values(guard, state)}"
+
+    def _from(self, edges: list[Edge], automaton: Automaton, state: State) -> list[Edge]:
+        return [edge for edge in edges if edge.source == state[self._places[Subject(automaton.name)]]]
+
+    def _conditions(self, state: State, event: str) -> Iterator[str]:
+        for item in self._system.conditions:
+            if item.event != event or self._holds(item.condition, state):
+                continue
+            match item.condition:
+                case Unary(operator="not", operand=Unary(operator="holds", operand=disabling)):
+                    yield f"{self._text(disabling)} disables it, and that holds{self._values(disabling, state)}"
+                case condition:
+                    yield f"it needs {self._text(condition)}, which does not hold{self._values(condition, state)}"
+
+    def _out_of_range(self, automata: list[Automaton], state: State, event: str) -> Iterator[str]:
+        """Yield the variables that could leave their ranges."""
+        for automaton in automata:
+            edges = [edge for edge in automaton.edges if edge.event == event]
+            for edge in self._from(edges, automaton, state):
+                for update in edge.updates if self._holds(edge.guard, state) else ():
+                    subject = Subject(automaton.name, update.variable)
+                    match subject_type(self._system, subject):
+                        case IntegerType(low=int(low), high=int(high)):
+                            if not self._stays(update.expression, state, event, low, high):
+                                now = value_text(state[self._places[subject]])
+                                yield f"it could take {subject}, which is {now}, out of its range {low}..{high}"
+
+    def _stays(self, expression: Expression, state: State, event: str, low: int, high: int) -> bool:
+        paths = set(paths_read(expression))
+        inputs = [item for item in self._system.inputs if item.event == event and item.path in paths]
+        function = compile_expression(expression, self._places)
+        found = (function(state, data) for data in valuations(inputs))
+        return all(value is None or low <= value <= high for value in found)  # type: ignore[operator]  # a number
+
+    def _decided(self, state: State, event: str) -> str:
+        """The values at which the supervisor looks, in brackets."""
+        condition = self._added.get(event)
+        if not isinstance(condition, Decision):
+            return ""
+        return bracketed([self._told(self._subjects[place], state) for place in condition.tested(state)])
+
+    def _holds(self, condition: Expression, state: State) -> bool:
+        return compile_expression(condition, self._places)(state, NO_DATA) is True
+
+    def _text(self, expression: Expression) -> str:
+        return cut(expression_text(expression, self._names))
+
+    def _values(self, expression: Expression, state: State) -> str:
+        read = sorted(subjects_read(expression), key=self._places.__getitem__)
+        return bracketed([self._told(subject, state) for subject in read])
+
+    def _told(self, subject: Subject, state: State) -> str:
+        return f"{subject} is {cut(value_text(state[self._places[subject]]))}"

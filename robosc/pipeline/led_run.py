@@ -1,0 +1,299 @@
+"""Runs that somebody leads event by event: what is the same of a robot's and of automata that have no model."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from robosc.certification.supervisor_file import StateInWords
+from robosc.errors import RoboscError, UnknownNameError
+from robosc.pipeline.conditions import unknown_event
+from robosc.pipeline.files import FileAccessError, given_path, write_whole
+from robosc.pipeline.loading import FileName
+from robosc.pipeline.received_data import NO_DATA
+from robosc.pipeline.saved_runs import event_log
+from robosc.pipeline.walking import ALL_TROUBLE, Trouble, TroubleKind, Walker
+from robosc.tables import html_table
+
+
+class UnknownEventError(UnknownNameError):
+    """An event that the model does not have; the message names the nearest one."""
+
+
+class EventNotPossibleError(RoboscError, ValueError):
+    """An event that cannot happen in the current state; the message says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One event of a run.
+
+    Attributes:
+        event: The event.
+        data: Data that it carried as the model saw it, by name (`value.front`); None where a part was unknown.
+        state: The state that it led to.
+        provided: Data that a request sends, by the model's `provide`; None where the middleware's default is sent, or
+            where it is unknown.
+        skipped: Variables that kept their value, because what they were to take was unknown.
+        unknown: Descriptions of what was unknown or moved into its range: parts of the data, what a request sends.
+        is_controllable: True if it is one that the controller takes by itself.
+        given: Data as it was given.
+    """
+
+    event: str
+    data: Mapping[str, Any] = field(hash=False)
+    state: StateInWords = field(hash=False)
+    provided: Any = field(default=None, hash=False)
+    skipped: tuple[str, ...] = ()
+    unknown: tuple[str, ...] = ()
+    is_controllable: bool = False
+    given: Any = field(default=NO_DATA, hash=False)
+
+    def __str__(self) -> str:
+        return f"{self.event}: {self.state}"
+
+
+class LedRun(ABC):
+    """A run of a controlled system, from its initial state.
+
+    Args:
+        name: Name of the system.
+        events: Every event in source order, with True if it is controllable.
+    """
+
+    def __init__(self, name: str, events: Mapping[str, bool]) -> None:
+        self._name = name
+        self._events = dict(events)
+        # The steps, each with the state before it; and those that were taken back, the last one first.
+        self._taken: list[tuple[Step, Any]] = []
+        self._undone: list[tuple[Step, Any]] = []
+        self._initial = self.state
+        self._walker = self._make_walker()
+
+    # Parts that differ
+
+    @property
+    @abstractmethod
+    def state(self) -> StateInWords:
+        """The current state."""
+
+    @property
+    @abstractmethod
+    def is_marked(self) -> bool:
+        """True if the state counts as completed."""
+
+    @abstractmethod
+    def _make_walker(self) -> Walker:
+        """The walker of this run."""
+
+    @abstractmethod
+    def _can_happen(self, event: str) -> bool:
+        """Return True if an event can happen now."""
+
+    @abstractmethod
+    def _why_not(self, event: str) -> tuple[str, ...]:
+        """The reasons why an event cannot happen now, which it cannot."""
+
+    @abstractmethod
+    def _snapshot(self) -> Any:
+        """The current state, as `_restore` takes it."""
+
+    @abstractmethod
+    def _restore(self, snapshot: Any) -> None:
+        """Back to a state."""
+
+    @abstractmethod
+    def _begin(self) -> None:
+        """Back to the initial state."""
+
+    # What can happen
+
+    @property
+    def initial(self) -> StateInWords:
+        """The initial state."""
+        return self._initial
+
+    @property
+    def events(self) -> tuple[str, ...]:
+        """Every event, in source order."""
+        return tuple(self._events)
+
+    @property
+    def enabled(self) -> tuple[str, ...]:
+        """Controllable events that are allowed now, in source order."""
+        return tuple(name for name, is_own in self._events.items() if is_own and self._can_happen(name))
+
+    @property
+    def possible(self) -> tuple[str, ...]:
+        """Every event that can happen now, in source order: `enabled`, and those of the environment."""
+        return tuple(filter(self._can_happen, self._events))
+
+    def is_controllable(self, event: str) -> bool:
+        """Return True if the controller takes an event by itself.
+
+        Raises:
+            UnknownEventError: There is no such event; the message names the nearest one.
+        """
+        return self._events[self._known(event)]
+
+    def hindrances(self) -> dict[str, tuple[str, ...]]:
+        """Every event that cannot happen now, with the reasons why not, one sentence each."""
+        return {event: self._why_not(event) for event in self._events if not self._can_happen(event)}
+
+    def reasons(self, event: str) -> tuple[str, ...]:
+        """Return the reasons why an event cannot happen now, one sentence each; none if it can.
+
+        Raises:
+            UnknownEventError: There is no such event; the message names the nearest one.
+        """
+        return () if self._can_happen(self._known(event)) else self._why_not(event)
+
+    def _known(self, event: str) -> str:
+        """The event, which there is.
+
+        Raises:
+            UnknownEventError: There is not.
+        """
+        if event not in self._events:
+            raise UnknownEventError(unknown_event(event, self._events))
+        return event
+
+    def _require_possible(self, event: str) -> None:
+        """Do nothing if an event can happen now.
+
+        Raises:
+            EventNotPossibleError: It cannot; the message says why.
+        """
+        if not self._can_happen(event):
+            verb = "is not allowed" if self._events[event] else "cannot happen"
+            raise EventNotPossibleError(f"'{event}' {verb} now: {'; '.join(self.reasons(event))}; {self._allowed()}")
+
+    # Steps
+
+    @property
+    def history(self) -> tuple[Step, ...]:
+        """The events so far."""
+        return tuple(step for step, _ in self._taken)
+
+    @property
+    def undone(self) -> tuple[Step, ...]:
+        """The events that were taken back, in the order in which `redo` takes them again."""
+        return tuple(step for step, _ in reversed(self._undone))
+
+    def _take(self, step: Step, before: Any) -> Step:
+        """Add a step that has been taken to the history."""
+        self._taken.append((step, before))
+        self._undone.clear()
+        return step
+
+    def undo(self) -> Step | None:
+        """Take back the last event, and return it; None if there is none."""
+        return self._move(self._taken, self._undone)
+
+    def redo(self) -> Step | None:
+        """Take the event again that was taken back last, and return it; None if there is none."""
+        return self._move(self._undone, self._taken)
+
+    def _move(self, source: list[tuple[Step, Any]], target: list[tuple[Step, Any]]) -> Step | None:
+        if not source:
+            return None
+        step, other = source.pop()
+        target.append((step, self._snapshot()))
+        self._restore(other)
+        return step
+
+    def restart(self) -> None:
+        """Back to the initial state, with an empty history."""
+        self._begin()
+        self._taken.clear()
+        self._undone.clear()
+        self._walker.forget()
+
+    def walk(self, steps: int, seed: int = 0) -> tuple[Step, ...]:
+        """Take events by chance, as an executor could in some world; ends early where nothing can happen.
+
+        Resets and tau transitions are taken as soon as they are allowed, and nothing is requested before the first
+        message of a sensor with a `max_age`, as an executor does. Otherwise each event that can happen is as likely
+        as the others, with data that is known, and near to the numbers that the model names.
+
+        Args:
+            steps: Number of events.
+            seed: Seed of the chance: the same one leads the same way.
+        """
+        return self._walker.walk(steps, seed)
+
+    def walk_until_trouble(
+        self, steps: int = 1000, seed: int = 0, kinds: Collection[TroubleKind] = ALL_TROUBLE
+    ) -> Trouble | None:
+        """Walk by chance until there is trouble, and return it; None if there was none.
+
+        What was found stays told: the next walk of this run goes on to something else.
+
+        Args:
+            steps: Most events to take.
+            seed: Seed of the chance.
+            kinds: Kinds of trouble to look for.
+        """
+        return self._walker.walk_until_trouble(steps, seed, kinds)
+
+    def save(self, file: FileName) -> Path:
+        """Write the events so far, an event log (`.jsonl`) whose clock counts them, a second each; returns its path.
+
+        Raises:
+            FileAccessError: The file cannot be written, or its name ends in something else.
+        """
+        path = given_path(file)
+        if path.suffix != ".jsonl":
+            raise FileAccessError(f"{path}: the name of a saved run ends in .jsonl, as event logs do")
+        write_whole(path, event_log(self).encode())
+        return path
+
+    # What it shows of itself
+
+    def _allowed(self) -> str:
+        enabled = self.enabled
+        return f"allowed are {', '.join(enabled)}" if enabled else "nothing is allowed"
+
+    def __repr__(self) -> str:
+        count = len(self._taken)
+        return f"<run of {self._name}: {count} step{'s' if count != 1 else ''}; {self._allowed()}>"
+
+    def __str__(self) -> str:
+        lines = [f"{number:4}  {': '.join(filter(None, row))}" for number, row in self._rows()]
+        return "\n".join([*lines, f"now {self.state}", self._allowed()])
+
+    def __iter__(self) -> Iterator[Step]:
+        return iter(self.history)
+
+    def __len__(self) -> int:
+        return len(self._taken)
+
+    def _repr_html_(self) -> str:
+        rows = ((number, *row) for number, row in self._rows())
+        return html_table(("", "event", "changes"), rows, caption=f"{self._name}: {self._allowed()}")
+
+    def _rows(self) -> Iterator[tuple[int, tuple[str, str]]]:
+        """Yield for each step its number, the event with its data, and what it changed."""
+        before = self._initial
+        for number, step in enumerate(self.history, start=1):
+            yield number, (event_text(step), changes_text(before, step.state))
+            before = step.state
+
+
+def event_text(step: Step) -> str:
+    """An event with the data that came with it: `level.response (value = 3)`."""
+    data = ", ".join(f"{name} = {_shown(value)}" for name, value in step.data.items())
+    return f"{step.event} ({data})" if data else step.event
+
+
+def changes_text(before: StateInWords, after: StateInWords) -> str:
+    """Changes between two states: `Base = driving, Base.charges = 2`."""
+    old = before.parts
+    return ", ".join(f"{name} = {_shown(value)}" for name, value in after.parts.items() if old[name] != value)
+
+
+def _shown(value: object) -> str:
+    if value is None:
+        return "unknown"
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -13,10 +13,10 @@ from functools import cached_property
 
 import msgspec
 
-from robosc.automata.lowering import to_automata
+from robosc.automata.lowering import cancel_condition, to_automata
 from robosc.automata.plants import PLANT_LOCATIONS, communication_plant, is_blocking
 from robosc.automata.structure import System
-from robosc.expressions import Type
+from robosc.expressions import Expression, Type
 from robosc.model.structure import (
     EVENT_KINDS,
     ISSUED_KINDS,
@@ -97,8 +97,9 @@ class ExecutableEvent:
         received: Type of the data that it carries to the controller, or None.
         moves: Moves of its service or action; None for a message or tau.
         participants: The components whose behaviours mention it, in source order.
-        requirements: The requirements on its communication: a request needs all of them, a cancel of the executor's
-            own that one of them does not hold. Empty for any other event, and for the cancel of a layer.
+        requirements: The requirements on its communication; empty for any event but a request or a cancel of the
+            executor's own.
+        needs: The conditions that they make: of a request that of each, of a cancel that one of them does not hold.
     """
 
     name: str
@@ -109,6 +110,7 @@ class ExecutableEvent:
     moves: Moves | None
     participants: tuple[Participant, ...]
     requirements: tuple[Requirement, ...]
+    needs: tuple[Expression, ...]
 
 
 class ExecutableSystem:
@@ -145,6 +147,7 @@ class ExecutableSystem:
             for kind in EVENT_KINDS[communication.kind]:
                 name = communication.event(kind)
                 targets = {edge.source: edge.target for edge in plant.edges if edge.event == name}
+                requirements, needs = self._requirements(communication, kind)
                 found[name] = ExecutableEvent(
                     name,
                     communication,
@@ -153,11 +156,12 @@ class ExecutableSystem:
                     communication.received_type(kind),
                     Moves(plant.name, targets) if communication.kind in CALLED_KINDS else None,
                     self._participants.get(name, ()),
-                    self._requirements(communication, kind),
+                    requirements,
+                    needs,
                 )
         for name in self.model.taus:
             participants = self._participants[name]
-            found[name] = ExecutableEvent(name, None, None, True, None, None, participants, ())
+            found[name] = ExecutableEvent(name, None, None, True, None, None, participants, (), ())
         return found
 
     @cached_property
@@ -190,11 +194,15 @@ class ExecutableSystem:
                 found.setdefault(event, []).append(participant)
         return {event: tuple(participants) for event, participants in found.items()}
 
-    def _requirements(self, communication: Communication, kind: EventKind) -> tuple[Requirement, ...]:
-        is_own_cancel = kind is EventKind.CANCEL and self.deployment is Deployment.CONTROLLER
-        if kind is EventKind.REQUEST or is_own_cancel:
-            return self.model.requirements_on(communication.name)
-        return ()
+    def _requirements(
+        self, communication: Communication, kind: EventKind
+    ) -> tuple[tuple[Requirement, ...], tuple[Expression, ...]]:
+        """The requirements on an event, and the conditions that they make."""
+        requirements = self.model.requirements_on(communication.name)
+        if kind is EventKind.REQUEST:
+            return requirements, tuple(item.condition for item in requirements)
+        condition = cancel_condition(self.model, communication, self.deployment) if kind is EventKind.CANCEL else None
+        return ((), ()) if condition is None else (requirements, (condition,))
 
     def _executed(self, component: Component) -> Component:
         """The component with those transitions only that an executor takes."""

@@ -12,13 +12,13 @@ from robosc.automata.structure import Automaton, Event, EventCondition, InputVar
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import (
     ArrayType,
-    Binary,
     Expression,
     ObjectType,
     PathStep,
     Received,
     Type,
     Unary,
+    conjunction,
     is_finite,
     leaves,
     type_text,
@@ -152,14 +152,18 @@ def _request_conditions(model: Model) -> Iterator[EventCondition]:
 
 
 def _cancel_conditions(model: Model, deployment: Deployment) -> Iterator[EventCondition]:
-    """An action with requirements may be cancelled only where one of them does not hold."""
-    if deployment is Deployment.LAYER:
-        return
     for communication in model.communications:
-        requirements = model.requirements_on(communication.name)
-        if communication.kind is CommunicationKind.ACTION and requirements:
-            broken: list[Expression] = [Unary("not", Unary("holds", item.condition)) for item in requirements]
-            condition = broken[0]
-            for item in broken[1:]:
-                condition = Binary("or", condition, item)
+        condition = cancel_condition(model, communication, deployment)
+        if condition is not None:
             yield EventCondition(communication.event(EventKind.CANCEL), condition)
+
+
+def cancel_condition(model: Model, communication: Communication, deployment: Deployment) -> Expression | None:
+    """Return the condition for a cancel: one of the action's requirements does not hold.
+
+    It is None where a cancel needs nothing: the action has no requirements, or the caller of a layer cancels.
+    """
+    requirements = model.requirements_on(communication.name)
+    if communication.kind is not CommunicationKind.ACTION or deployment is Deployment.LAYER or not requirements:
+        return None
+    return Unary("not", Unary("holds", conjunction(*(item.condition for item in requirements))))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from robosc.automata.executable import ExecutableEvent, Participant
 from robosc.expressions import FALSE, TRUE, Expression, IntegerType, StateTest, Unary, conjunction
 from robosc.expressions.text import expression_text
-from robosc.model.structure import EventKind, Requirement, Transition
+from robosc.model.structure import EventKind, Transition
 from robosc.targets.model_text import requirement_text
 
 
@@ -48,10 +48,10 @@ def enabling_conditions(event: ExecutableEvent) -> list[tuple[str, Condition]]:
         plant, sources = event.moves.plant, event.moves.sources
         result.append((f"{plant} is {' or '.join(sources)}", InOneOf(plant, sources)))
     result += accepting_conditions(event)
-    if event.kind is EventKind.CANCEL:
-        result += _cancel_condition(event.requirements)
-    else:
-        result += [(requirement_text(item), item.condition) for item in event.requirements]
+    words = [requirement_text(item) for item in event.requirements]
+    if event.kind is EventKind.CANCEL and words:
+        words = ["at least one of the action's requirements does not hold"]
+    result += zip(words, event.needs, strict=True)
     return result
 
 
@@ -60,14 +60,6 @@ def accepting_conditions(event: ExecutableEvent) -> list[tuple[str, Condition]]:
     if event.communication is None:
         return [_tau_condition(event)]
     return [condition for participant in event.participants for condition in _component_conditions(participant)]
-
-
-def _cancel_condition(requirements: tuple[Requirement, ...]) -> list[tuple[str, Condition]]:
-    """Cancel only where at least one requirement does not hold; where there is none, anywhere."""
-    if not requirements:
-        return []
-    all_hold = conjunction(*(requirement.condition for requirement in requirements))
-    return [("at least one of the action's requirements does not hold", Unary("not", Unary("holds", all_hold)))]
 
 
 def _tau(event: ExecutableEvent) -> tuple[str, Transition]:

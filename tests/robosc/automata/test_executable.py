@@ -4,7 +4,7 @@ import pytest
 
 from robosc.automata import ExecutableSystem
 from robosc.execution.interpreter.rules import event_rules
-from robosc.model.structure import Deployment, EventKind
+from robosc.model.structure import Deployment
 from support.models import model_of
 from support.random_supervisors import random_supervisor
 
@@ -37,10 +37,8 @@ def test_random_models(seed: int) -> None:
         event = events[name]
         assert event.received == rule.received
         assert (None if event.moves is None else (event.moves.plant, dict(event.moves.targets))) == rule.plant
-        if event.kind is EventKind.CANCEL:
-            assert bool(event.requirements) == bool(rule.conditions)
-        else:
-            assert len(event.requirements) == len(rule.conditions)
+        assert bool(event.requirements) == bool(rule.conditions)
+        assert len(event.needs) == len(rule.conditions)
         assert len(event.participants) == len(rule.participants)
         for mine, other in zip(event.participants, rule.participants, strict=True):
             assert (mine.component, mine.may_block) == (other.name, other.may_block)

@@ -254,8 +254,8 @@ def test_cancel_where_one_of_several_requirements_does_not_hold() -> None:
         ("open", "empty"): True,
         ("open", "full"): False,
     }
-    broken = [Unary("not", Unary("holds", condition)) for condition in (OPEN, Unary("not", EMPTY))]
-    assert system.conditions[-1] == EventCondition("go.cancel", Binary("or", broken[0], broken[1]))
+    all_hold = Unary("holds", Binary("and", OPEN, Unary("not", EMPTY)))
+    assert system.conditions[-1] == EventCondition("go.cancel", Unary("not", all_hold))
 
 
 def test_cancel_without_requirements_is_free() -> None:

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.event_log import plain
-from robosc.explanation.blocked import MAXIMUM_NAMES, MAXIMUM_REASONS, Requests, StateError, read_value
+from robosc.explanation.blocked import MAXIMUM_REASONS, Requests, StateError, read_value
+from robosc.explanation.notation import MAXIMUM_NAMES
 from robosc.expressions import BooleanType, DoubleType, EnumType, IntegerType, StringType
 from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor

@@ -238,7 +238,7 @@ def test_a_supervisor_may_be_a_file_or_its_bytes(supervisor: robosc.Supervisor, 
     with pytest.raises(robosc.InvalidSupervisorError):
         robosc.simulate(b"{}")
     with pytest.raises(TypeError, match="not NoneType: no supervisor was made, print the result to see why"):
-        robosc.simulate(None)  # type: ignore[arg-type]
+        robosc.simulate(None)  # type: ignore[call-overload]
 
 
 def _navigation() -> robosc.Supervisor:

@@ -1,7 +1,7 @@
 """Exploration and simulation of automata: against a product that is built by hand, state by state."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from random import Random
@@ -157,9 +157,9 @@ def _lead(
             )
             if narrowed:
                 target = dice.choice(sorted(narrowed))
-                step = run.step(event, told, to=parts(drawn, target))
-                assert len(step.data) == len(known)
-                assert run.undo() == step
+                taken = run.step(event, told, to=parts(drawn, target))
+                assert len(taken.data) == len(known)
+                assert run.undo() == taken
         assert run.step(event, to=parts(drawn, target)).state.parts == parts(drawn, target)
         past.append(target)
         now = target
@@ -317,10 +317,15 @@ def test_ways_to_begin() -> None:
 
 def test_what_needs_a_model_says_so() -> None:
     supervisor = supervised(LINE)
-    for use in (robosc.check, robosc.explain, lambda given: robosc.generate(given, "ros2")):
+    uses: tuple[Callable[[Any], object], ...] = (
+        robosc.check,
+        robosc.explain,
+        lambda given: robosc.generate(given, "ros2"),
+    )
+    for use in uses:
         for given_ in (LINE, supervisor):
             with pytest.raises(TypeError, match=r"this takes a RoboSC model, not automata .*, which have no text"):
-                use(given_)  # type: ignore[operator]
+                use(given_)
     with pytest.raises(TypeError, match=r"make it with robosc\.synthesize\(system\)\.supervisor"):
         robosc.simulate(LINE)  # type: ignore[call-overload]
     robot = robosc.synthesize(robosc.load(text="robot R { component C { incoming message m with type: none } }"))

@@ -49,7 +49,7 @@ def wrong(system: System, model: robosc.LoadedModel, result: robosc.Synthesis, r
     robosc.SynthesisOptions(deployment="layer")  # type: ignore[arg-type]
     robosc.SynthesisOptions(robosc.Deployment.LAYER)  # type: ignore[call-arg]
     # There may be no supervisor.
-    robosc.simulate(result.supervisor)  # type: ignore[call-overload]
+    robosc.simulate(result.supervisor)  # type: ignore[arg-type]
     robosc.generate(result.supervisor, "ros2")  # type: ignore[arg-type]
     print(result.supervisor.conditions)  # type: ignore[union-attr]
     print(robosc.explore(model).graph.states)  # type: ignore[union-attr]

@@ -161,10 +161,9 @@ class _Reader:
         return found
 
     def _state_message(self, value: object) -> StateMessage:
-        try:
-            return StateMessage(value)
-        except ValueError:
-            raise self._wrong(_STATE_MESSAGE, f"one of {', '.join(StateMessage)}") from None
+        if not isinstance(value, str) or value not in set(StateMessage):
+            raise self._wrong(_STATE_MESSAGE, f"one of {', '.join(StateMessage)}")
+        return StateMessage(value)
 
     def _supervised(self, value: object) -> SupervisedController | None:
         if value is None:

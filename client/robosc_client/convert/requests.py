@@ -183,7 +183,7 @@ def _generate_options(options: GenerateOptions) -> pb.GenerateOptions:
         publish_state=options.publish_state,
         log_events=options.log_events,
         supervised=supervised,
-        state_message="" if options.state_message is StateMessage.JSON else str(options.state_message),
+        state_message="" if options.state_message == StateMessage.JSON else str(options.state_message),
         metadata=None if metadata == PackageMetadata() else _metadata(metadata),
     )
 

@@ -115,7 +115,7 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
             require_own_topics(found, asked, middleware.parts_of_actions)
         values = context(supervisor, name, found, asked, options)
     declared = (*declarations(release_identifiers(found), str(deployment)), *middleware.parameters)
-    typed = set() if options.state_message is StateMessage.JSON else set(middleware.typed_state)
+    typed = set() if options.state_message == StateMessage.JSON else set(middleware.typed_state)
     values["dependencies"] = sorted({*middleware.dependencies, *packages(found, asked), *typed})
     values["parameters"] = [item for item in chosen(declared, options) if item.name not in middleware.without]
     values["not_in_file"] = middleware.not_in_file

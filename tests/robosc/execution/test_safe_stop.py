@@ -305,7 +305,7 @@ def test_nothing_is_requested_before_the_first_message_of_a_sensor_with_a_maximu
     assert b.tick() == []
     b.receive("/scan", True)
     assert b.status() is Status.RUNNING
-    assert b.executor.missing_sensors == ()
+    assert not b.executor.missing_sensors
     assert b.tick() == [MOVE]
 
 
@@ -329,7 +329,7 @@ def test_a_stale_sensor_stops_the_robot_and_its_return_ends_that() -> None:
     assert b.tick(3) == []
     b.receive("/scan", True)
     assert b.status() is Status.RUNNING
-    assert b.executor.missing_sensors == ()
+    assert not b.executor.missing_sensors
     assert b.tick() == [MOVE]
     assert b.executor.counters.faults == 0
 

@@ -100,11 +100,11 @@ def courier() -> Supervisor:
 
 
 def run(
-    program: Path, lines: Sequence[str], *parameters: str, namespace: str = "/"
+    program: Path, lines: Sequence[str], *parameters: str, namespace: str = "/", level: str = "warn"
 ) -> subprocess.CompletedProcess[str]:
     """Run a node on what happens to it, with parameters such as `period:=0.02`; the last line is to end it."""
     arguments = [word for parameter in parameters for word in ("-p", parameter)]
-    arguments += ["-r", f"__ns:={namespace}"]
+    arguments += ["-r", f"__ns:={namespace}", "--log-level", level]
     return subprocess.run(
         [str(program), "--ros-args", *arguments],
         input="".join(f"{line}\n" for line in lines),

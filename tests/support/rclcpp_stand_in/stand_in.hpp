@@ -10,6 +10,7 @@
 //   result NAME CODE DATA         4: succeeded, 5: canceled, 6: aborted
 //   refuse NAME CODE              the answer to a cancel (0: it is accepted)
 //   signal NUMBER
+//   clock SECONDS                 simulated time goes on, or back
 //   wait WORD NAME                go on when the node has done that once more
 //   change TRANSITION             whoever manages the node asks for it: configure, activate, deactivate, cleanup, shutdown
 //   set NAME VALUE                somebody sets a parameter
@@ -99,6 +100,7 @@ struct World {
     std::map<std::pair<std::string, std::string>, Handler> orders;
     std::map<std::string, bool> servers;
     std::map<std::string, int> done;
+    std::atomic<std::int64_t> clock_ns{0};
     std::string input;
     std::atomic<bool> is_over{false};
     // Protects what both executors look at: what was done, and the input.
@@ -126,6 +128,8 @@ inline void obey(const std::string& line)
                     : static_cast<std::size_t>(in.tellg())));
             handler(rest);
         }
+    } else if (word == "clock") {
+        world().clock_ns = static_cast<std::int64_t>(std::stod(name) * 1e9);
     } else if (word == "server") {
         in >> world().servers[name];
     } else if (word == "signal") {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <cstdio>
 #include <deque>
 #include <exception>
 #include <functional>
@@ -107,6 +108,15 @@ public:
     virtual bool has_abandoned() const = 0;
     virtual void cancel_abandoned() = 0;
 
+    /* The time of periods, ages and timeouts: steady, or simulated. It never goes back. */
+    virtual std::uint64_t time_us() { return now_us(); }
+    /* False as long as no time is known. */
+    virtual bool has_time() { return true; }
+    /* Return the time by which it should have gone back since this was last asked. */
+    virtual std::uint64_t take_jump_us() { return 0; }
+    /* Time, on the steady clock, after which it is to be asked again. */
+    virtual std::uint64_t longest_wait_us() const { return WATCH_US; }
+
     virtual void tell_state(const std::string& json) = 0;
     virtual void tell_health(const Health& health) = 0;
     virtual void info(const std::string& text) = 0;
@@ -143,11 +153,10 @@ public:
         }
         before_ = robot_.state;
         last_ = robot_.counters;
-        const std::uint64_t now = now_us();
         period_us_ = std::max<std::uint64_t>(detail::microseconds(parameters.period_s), 1);
-        next_tick_us_ = now + period_us_;
-        next_watch_us_ = now + WATCH_US;
-        next_diagnosis_us_ = now + DIAGNOSTICS_US;
+        next_tick_us_ = now() + period_us_;
+        next_watch_us_ = now_us() + WATCH_US;
+        next_diagnosis_us_ = now_us() + DIAGNOSTICS_US;
     }
 
     Controller(const Controller&) = delete;
@@ -156,7 +165,11 @@ public:
     /* Begin as soon as every server is there, or not much later without it. */
     void start()
     {
-        start_by_us_ = now_us() + detail::microseconds(parameters_.server_wait_s);
+        middleware_.take_jump_us();
+        if (!middleware_.has_time()) {
+            middleware_.warn("use_sim_time is true: no time passes before the first message on /clock");
+        }
+        start_by_us_ = now() + detail::microseconds(parameters_.server_wait_s);
         is_starting_ = true;
         start_if_ready();
     }
@@ -164,8 +177,9 @@ public:
     /* A message came on the topic with this number among those received; of each as many are held as its depth. */
     void receive(int topic, std::size_t depth, Take take)
     {
+        begin_anew_after_jump();
         if (is_held_) {
-            held_.push_back({topic, now_us(), std::move(take)});
+            held_.push_back({topic, now(), std::move(take)});
             const auto is_same = [topic](const Held& item) { return item.topic == topic; };
             if (static_cast<std::size_t>(std::count_if(held_.begin(), held_.end(), is_same)) > depth) {
                 held_.erase(std::find_if(held_.begin(), held_.end(), is_same));
@@ -182,11 +196,13 @@ public:
     void run_due()
     {
         advance();
-        const std::uint64_t now = now_us();
-        if (now >= next_tick_us_) {
-            next_tick_us_ = next_after(next_tick_us_, period_us_, now);
+        begin_anew_after_jump();
+        const std::uint64_t time = this->now();
+        if (time >= next_tick_us_) {
+            next_tick_us_ = next_after(next_tick_us_, period_us_, time);
             tick();
         }
+        const std::uint64_t now = now_us();
         if (now >= next_watch_us_) {
             next_watch_us_ = next_after(next_watch_us_, WATCH_US, now);
             watch();
@@ -203,9 +219,9 @@ public:
     /* Return the time during which nothing will be due, in microseconds; never long, so that signals are noticed. */
     std::uint64_t idle_us() const
     {
-        const std::uint64_t now = now_us();
-        const std::uint64_t next = std::min({next_tick_us_, next_watch_us_, next_diagnosis_us_});
-        return next > now ? std::min(next - now, WATCH_US) : 0;
+        const auto until = [](std::uint64_t next, std::uint64_t now) { return next > now ? next - now : 0; };
+        return std::min({until(next_tick_us_, now()), until(next_watch_us_, now_us()),
+            until(next_diagnosis_us_, now_us()), middleware_.longest_wait_us()});
     }
 
     /* Return the reason why a fault stopped it; NULL if none did. */
@@ -223,25 +239,26 @@ public:
     void stop(const std::string& reason, bool is_fault = false)
     {
         is_starting_ = false;
+        is_active_ = false;
         reason_ = reason;
         begin();
-        robot_stop(&robot_, now_us(), is_fault);
+        robot_stop(&robot_, now(), is_fault);
         cancel_abandoned();
         told_ = reasons_;
         tell_health();
     }
 
     /* Bring the robot to rest until `start`; what comes meanwhile is held, as before the first one. */
-    void pause()
+    void pause(const std::string& reason = "deactivated")
     {
-        stop("deactivated");
+        stop(reason);
         is_held_ = true;
     }
 
     /* Return true if it is at rest, but the ends of cancelled goals are awaited. */
     bool is_stopping() const
     {
-        return robot_status(&robot_, now_us()) == ROBOT_STATUS_STOPPING || middleware_.has_abandoned();
+        return robot_status(&robot_, now()) == ROBOT_STATUS_STOPPING || middleware_.has_abandoned();
     }
 
     /* Tell the engine what became of calls and goals. */
@@ -271,7 +288,26 @@ private:
         return due + ((now - due) / period + 1) * period;
     }
 
-    void begin() { began_us_ = now_us(); }
+    std::uint64_t now() const { return middleware_.time_us(); }
+
+    void begin()
+    {
+        began_us_ = now();
+        began_steady_us_ = now_us();
+    }
+
+    /* Begin in the initial state if time has gone back: a simulation or a replayed bag has begun anew. */
+    void begin_anew_after_jump()
+    {
+        const std::uint64_t jump_us = middleware_.take_jump_us();
+        if (jump_us > 0 && is_active_ && fault() == nullptr) {
+            char text[80];
+            std::snprintf(text, sizeof text, "time has gone back by %.3f s", static_cast<double>(jump_us) * 1e-6);
+            middleware_.warn(std::string(text) + ": beginning anew");
+            pause(text);
+            start();
+        }
+    }
 
     void take_in(const Take& take)
     {
@@ -281,20 +317,25 @@ private:
             take(&robot_, began_us_, notes_);
         } catch (const std::exception& failure) {
             reason_ = failure.what();
-            robot_stop(&robot_, now_us(), true);
+            robot_stop(&robot_, now(), true);
         }
         notes_.clear();
     }
 
     void start_if_ready()
     {
-        missing_ = middleware_.missing_servers();
-        if (!missing_.empty() && now_us() < start_by_us_) {
+        const Texts missed = std::exchange(missing_, middleware_.missing_servers());
+        if (!missing_.empty() && now() < start_by_us_) {
+            if (missing_ != missed) {
+                middleware_.info("waiting for the servers of " + joined(missing_));
+            }
             return;
         }
         is_starting_ = false;
         if (!missing_.empty()) {
             middleware_.warn("starting without a server of " + joined(missing_));
+        } else if (!missed.empty()) {
+            middleware_.info("every server is there");
         }
         missing_.clear();
         begin();
@@ -306,6 +347,8 @@ private:
         }
         before_ = robot_.state;
         take_held();
+        is_active_ = true;
+        told_status_ = ROBOT_STATUS_NEW;
         tell_reasons();
     }
 
@@ -333,12 +376,12 @@ private:
 
     void tick()
     {
-        const bool decides = robot_status(&robot_, now_us()) == ROBOT_STATUS_RUNNING;
+        const bool decides = robot_status(&robot_, now()) == ROBOT_STATUS_RUNNING;
         begin();
         robot_tick(&robot_, began_us_);
         notes_.clear();
         if (decides) {
-            decision_us_ = static_cast<double>(now_us() - began_us_);
+            decision_us_ = static_cast<double>(now_us() - began_steady_us_);
         }
         tell_reasons();
         if (parameters_.publish_state) {
@@ -351,7 +394,7 @@ private:
         if (is_starting_) {
             start_if_ready();
         }
-        middleware_.check_servers(now_us());
+        middleware_.check_servers(now());
         begin();
         robot_watch(&robot_, began_us_);
         tell_reasons();
@@ -360,6 +403,7 @@ private:
     /* Say why the robot is stopped, and when it no longer is; on the console a fault is told at the end. */
     void tell_reasons()
     {
+        tell_status();
         if (reasons_ == told_) {
             return;
         }
@@ -376,6 +420,29 @@ private:
         } else {
             middleware_.error("stopped: " + reasons_text());
         }
+    }
+
+    /* Say what it waits for, and when it no longer does. */
+    void tell_status()
+    {
+        const robot_status_t status = robot_status(&robot_, now());
+        if (status == told_status_) {
+            return;
+        }
+        if (status == ROBOT_STATUS_WAITING) {
+            Texts unseen;
+            for (int sensor = 0; sensor < ROBOT_SENSOR_COUNT; sensor++) {
+                const Nameable& item = model::SENSORS[static_cast<std::size_t>(sensor)];
+                const bool is_awaited = robot_.settings.max_age_us[item.number] > 0 && !robot_.sensors[sensor].was_seen;
+                if (is_awaited && std::find(unseen.begin(), unseen.end(), item.identifier) == unseen.end()) {
+                    unseen.emplace_back(item.identifier);
+                }
+            }
+            middleware_.info("waiting for the first message of " + joined(unseen));
+        } else if (status == ROBOT_STATUS_RUNNING && told_status_ <= ROBOT_STATUS_WAITING) {
+            middleware_.info("running");
+        }
+        told_status_ = status;
     }
 
     /* The engine knows nothing any more of goals that were told to be lost, but they may be running. */
@@ -434,7 +501,7 @@ private:
     {
         static const char* const STATUSES[] = {"new", "waiting", "running", "stopping", "stopped"};
         Health result;
-        const robot_status_t status = robot_status(&robot_, now_us());
+        const robot_status_t status = robot_status(&robot_, now());
         const std::uint64_t dropped = log_.dropped();
         result.values = {
             {"status", STATUSES[status]},
@@ -648,7 +715,7 @@ private:
         line += notes_.of(event).empty() ? "null" : notes_.of(event);
         line += ",\"state\":";
         model::put_state(line, robot_.state, false);
-        line += ",\"decision_us\":" + number_text(static_cast<double>(now_us() - began_us_)) + "}";
+        line += ",\"decision_us\":" + number_text(static_cast<double>(now_us() - began_steady_us_)) + "}";
         log_.write(std::move(line));
     }
 
@@ -686,6 +753,9 @@ private:
     bool is_starting_ = false;
     std::uint64_t start_by_us_ = 0;
     std::uint64_t began_us_ = 0;
+    std::uint64_t began_steady_us_ = 0;
+    robot_status_t told_status_ = ROBOT_STATUS_NEW;
+    bool is_active_ = false;
     std::uint64_t period_us_ = 1;
     std::uint64_t next_tick_us_ = 0;
     std::uint64_t next_watch_us_ = 0;

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <functional>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <variant>
@@ -33,10 +34,16 @@ struct OtherValue {
 
 using Value = std::variant<OtherValue, bool, std::int64_t, double, std::string, Texts>;
 
+struct Range {
+    double low;
+    double high;
+};
+
 struct Declaration {
     const char* name;
     Value value;
     const char* description;
+    std::optional<Range> range;        /* of a number */
 };
 
 using Given = std::map<std::string, Value>;

@@ -37,6 +37,62 @@ inline rclcpp::QoS profile(Quality quality, std::size_t depth)
     return result;
 }
 
+/* Time of periods, ages and timeouts: the steady clock, or with `use_sim_time` that of ROS. No simulated time passes
+   before the first message on /clock, which would seem to be years after zero. Where it jumps back, as a replayed bag
+   does at its end, time goes on from where it was. */
+class NodeTime {
+public:
+    explicit NodeTime(const rclcpp_lifecycle::LifecycleNode& node)
+        : node_(node), is_simulated_(node.get_parameter("use_sim_time").get_parameter_value().get<bool>())
+    {
+    }
+
+    bool is_simulated() const { return is_simulated_; }
+
+    bool has_begun()
+    {
+        us();
+        return !is_simulated_ || last_ns_ > 0;
+    }
+
+    std::uint64_t us()
+    {
+        if (!is_simulated_) {
+            return now_us();
+        }
+        const std::int64_t now_ns = node_.now().nanoseconds();
+        if (now_ns > 0) {
+            if (last_ns_ > 0 && now_ns >= last_ns_) {
+                passed_ns_ += now_ns - last_ns_;
+            } else if (last_ns_ > 0) {
+                went_back_ns_ += last_ns_ - now_ns;
+            }
+            last_ns_ = now_ns;
+        }
+        return static_cast<std::uint64_t>(passed_ns_ / 1000);
+    }
+
+    std::uint64_t take_jump_us()
+    {
+        us();
+        return static_cast<std::uint64_t>(std::exchange(went_back_ns_, 0) / 1000);
+    }
+
+private:
+    const rclcpp_lifecycle::LifecycleNode& node_;
+    bool is_simulated_;
+    std::int64_t last_ns_ = 0;
+    std::int64_t passed_ns_ = 0;
+    std::int64_t went_back_ns_ = 0;
+};
+
+/* Policies that a parameter file may override for a topic. */
+inline rclcpp::QosOverridingOptions overridable()
+{
+    return rclcpp::QosOverridingOptions({rclcpp::QosPolicyKind::Depth, rclcpp::QosPolicyKind::Durability,
+        rclcpp::QosPolicyKind::History, rclcpp::QosPolicyKind::Reliability});
+}
+
 /* Messages that are kept for who comes later cannot be handed over within a process in every distribution. */
 inline rclcpp::IntraProcessSetting within_process(const rclcpp::QoS& quality)
 {
@@ -53,9 +109,10 @@ public:
     using Response = typename Service::Response;
     using Answer = void (*)(robot_t*, std::uint64_t, std::uint32_t, const Response&, Notes&);
 
-    ServiceCalls(rclcpp_lifecycle::LifecycleNode& node, const rclcpp::CallbackGroup::SharedPtr& group, Reports& reports,
-        const Parameters& parameters, const std::string& name, Answer answer)
-        : reports_(reports)
+    ServiceCalls(rclcpp_lifecycle::LifecycleNode& node, const rclcpp::CallbackGroup::SharedPtr& group, NodeTime& time,
+        Reports& reports, const Parameters& parameters, const std::string& name, Answer answer)
+        : time_(time)
+        , reports_(reports)
         , timeout_us_(parameters.settings.service_timeout_us)
         , name_(prefixed(parameters.topic_prefix, name))
         , answer_(answer)
@@ -75,7 +132,7 @@ public:
         }
         const auto sent = client_->async_send_request(std::make_shared<Request>(request),
             [this, id](typename rclcpp::Client<Service>::SharedFuture future) { answered(id, future.get()); });
-        const std::uint64_t now = now_us();
+        const std::uint64_t now = time_.us();
         const std::uint64_t deadline = timeout_us_ > UINT64_MAX - now ? UINT64_MAX : now + timeout_us_;
         calls_[id] = {sent.request_id, deadline};
         if (calls_.size() > MAXIMUM_PENDING) {
@@ -119,6 +176,7 @@ private:
         reports_.add([id](robot_t* robot, std::uint64_t now, Notes&) { robot_call_failed(robot, now, id); });
     }
 
+    NodeTime& time_;
     Reports& reports_;
     std::uint64_t timeout_us_;
     std::string name_;
@@ -160,16 +218,44 @@ inline rclcpp::ParameterValue ros_value_of(const Value& value)
     return std::visit(Make{}, value);
 }
 
-/* Declare every parameter. */
+constexpr const char* AUTOSTART = "autostart";
+
+/* Declare every parameter. What nobody else manages is configured at once, and keeps its parameters: read-only. */
 template <class Node>
 void declare_parameters_of(Node& node, const std::vector<Declaration>& declarations)
 {
-    for (const Declaration& item : declarations) {
+    bool is_fixed = true;
+    const auto declare = [&](const Declaration& item) {
         rcl_interfaces::msg::ParameterDescriptor descriptor;
         descriptor.description = item.description;
+        descriptor.additional_constraints = "taken when the node is configured";
+        descriptor.read_only = is_fixed;
         /* A wrong type gets the same kind of error as a wrong value, and 1 is as good as 1.0. */
         descriptor.dynamic_typing = true;
-        node.declare_parameter(item.name, ros_value_of(item.value), descriptor);
+        if (item.range) {
+            descriptor.floating_point_range.resize(1);
+            descriptor.floating_point_range.front().from_value = item.range->low;
+            descriptor.floating_point_range.front().to_value = item.range->high;
+        }
+        try {
+            return value_of(node.declare_parameter(item.name, ros_value_of(item.value), descriptor));
+        } catch (const rclcpp::exceptions::InvalidParameterValueException&) {
+            /* The value that was given is out of its range: `validated` tells of that. */
+            descriptor.floating_point_range.clear();
+            return value_of(node.declare_parameter(item.name, ros_value_of(item.value), descriptor));
+        }
+    };
+    for (const Declaration& item : declarations) {
+        if (item.name == std::string(AUTOSTART)) {
+            const Value value = declare(item);
+            const bool* const starts_itself = std::get_if<bool>(&value);
+            is_fixed = starts_itself == nullptr || *starts_itself;
+        }
+    }
+    for (const Declaration& item : declarations) {
+        if (!node.has_parameter(item.name)) {
+            declare(item);
+        }
     }
     /* A misspelt parameter would leave a default in force; one file may serve several nodes, so it is no error. */
     for (const auto& [name, value] : node.get_node_parameters_interface()->get_parameter_overrides()) {

@@ -29,9 +29,11 @@ public:
     using TakeResult = void (*)(robot_t*, std::uint64_t, std::uint32_t, const Result&, Notes&);
     using TakeFeedback = void (*)(robot_t*, std::uint64_t, std::uint32_t, const Feedback&, Notes&);
 
-    ActionGoals(rclcpp_lifecycle::LifecycleNode& node, const rclcpp::CallbackGroup::SharedPtr& group, Reports& reports,
-        const Parameters& parameters, const std::string& name, TakeResult result, TakeFeedback feedback)
-        : reports_(reports)
+    ActionGoals(rclcpp_lifecycle::LifecycleNode& node, const rclcpp::CallbackGroup::SharedPtr& group, NodeTime& time,
+        Reports& reports, const Parameters& parameters, const std::string& name, TakeResult result,
+        TakeFeedback feedback)
+        : time_(time)
+        , reports_(reports)
         , name_(prefixed(parameters.topic_prefix, name))
         , result_(result)
         , feedback_(feedback)
@@ -209,7 +211,7 @@ private:
         } else {
             /* The server may say so because the goal has just ended: its result may be on its way. */
             found->second.is_refused = true;
-            found->second.refused_us = now_us();
+            found->second.refused_us = time_.us();
             found->second.is_unknown = response.return_code == CancelResponse::ERROR_UNKNOWN_GOAL_ID;
         }
     }
@@ -226,6 +228,7 @@ private:
         reports_.add([id](robot_t* robot, std::uint64_t now, Notes&) { robot_goal_ended(robot, now, id); });
     }
 
+    NodeTime& time_;
     Reports& reports_;
     std::string name_;
     TakeResult result_;

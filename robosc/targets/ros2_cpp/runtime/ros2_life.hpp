@@ -148,10 +148,10 @@ public:
     using MakeHost = std::function<std::unique_ptr<Host>(
         rclcpp_lifecycle::LifecycleNode&, const rclcpp::CallbackGroup::SharedPtr&, const Parameters&)>;
 
-    /* `make` makes what the node does; `is_program` tells that a fault ends the process unless others manage the node.
+    /* `make` makes what the node does; `about` says in a line what it is; `is_program` tells that a fault ends the process unless others manage the node.
        Throws ParameterError where the node starts itself and cannot. */
     ManagedNode(const rclcpp::NodeOptions& options, const std::vector<Declaration>& declarations, MakeHost make,
-        bool is_program)
+        const char* about, bool is_program)
         : LifecycleNode(model::PACKAGE, options)
         , declarations_(declarations)
         , make_(std::move(make))
@@ -161,6 +161,7 @@ public:
         declare_parameters_of(*this, declarations_);
         starts_itself_ = detail::boolean(given_parameters(*this, declarations_), AUTOSTART);
         ends_by_fault_ = is_program && starts_itself_;
+        RCLCPP_INFO(get_logger(), "%s", about);
         may_set_ = add_on_set_parameters_callback(
             [this](const std::vector<rclcpp::Parameter>& parameters) { return may_set(parameters); });
         if (starts_itself_) {
@@ -275,8 +276,6 @@ public:
     const std::string& fault() const { return fault_; }
 
 private:
-    static constexpr const char* AUTOSTART = "autostart";
-
     /* Finish what has been stopped. */
     void forget()
     {
@@ -298,6 +297,10 @@ private:
         rcl_interfaces::msg::SetParametersResult result;
         result.successful = true;
         for (const rclcpp::Parameter& parameter : parameters) {
+            if (parameter.get_name() == "use_sim_time" && is_configured_) {
+                result.successful = false;
+                result.reason = "use_sim_time cannot be changed while the node is configured";
+            }
             for (const Declaration& item : declarations_) {
                 if (parameter.get_name() == item.name
                     && (starts_itself_ || is_configured_ || parameter.get_name() == AUTOSTART)) {

@@ -48,5 +48,10 @@ def test_the_package_tells_its_test() -> None:
     files = generate(example_supervisor("maze_solver/maze_solver"), "ros2-cpp")
     assert "ament_add_gtest(test_recorded_run test/test_recorded_run.cpp" in files["CMakeLists.txt"]
     assert "<test_depend>ament_cmake_gtest</test_depend>" in files["package.xml"]
+    linters = re.findall(r"<test_depend>ament_cmake_(\w+)</test_depend>", files["package.xml"])
+    assert linters == ["flake8", "gtest", "lint_cmake", "pep257", "xmllint"]
+    assert "ament_lint_auto_find_test_dependencies()" in files["CMakeLists.txt"]
+    # The longest line that its linter takes.
+    assert max(map(len, files["launch/controller.launch.py"].splitlines())) <= 99
     assert "colcon test" in files["README.md"]
     assert 'SCOPED_TRACE("step 40");' in files["test/test_recorded_run.cpp"]

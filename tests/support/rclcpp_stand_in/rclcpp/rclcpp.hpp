@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <functional>
 #include <future>
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <stdexcept>
@@ -28,7 +29,12 @@
         std::fprintf(stderr, "[" level "] " __VA_ARGS__);                                                              \
         std::fprintf(stderr, "\n");                                                                                    \
     } while (0)
-#define RCLCPP_INFO(logger, ...) RCLCPP_STAND_IN_LOG("INFO", logger, __VA_ARGS__)
+#define RCLCPP_INFO(logger, ...)                                                                                       \
+    do {                                                                                                               \
+        if (rclcpp::detail::tells_info()) {                                                                            \
+            RCLCPP_STAND_IN_LOG("INFO", logger, __VA_ARGS__);                                                          \
+        }                                                                                                              \
+    } while (0)
 #define RCLCPP_WARN(logger, ...) RCLCPP_STAND_IN_LOG("WARN", logger, __VA_ARGS__)
 #define RCLCPP_ERROR(logger, ...) RCLCPP_STAND_IN_LOG("ERROR", logger, __VA_ARGS__)
 
@@ -82,6 +88,18 @@ inline std::vector<std::string>& arguments()
     return made;
 }
 
+// Unlike there, only if the arguments ask for it.
+inline bool tells_info()
+{
+    const std::vector<std::string>& given = arguments();
+    for (std::size_t k = 0; k + 1 < given.size(); k++) {
+        if (given[k] == "--log-level" && given[k + 1] == "info") {
+            return true;
+        }
+    }
+    return false;
+}
+
 inline std::atomic<bool>& is_running()
 {
     static std::atomic<bool> made{false};
@@ -111,11 +129,21 @@ inline void init(int argc, char const* const* argv, const InitOptions& = InitOpt
     stand_in::world().manager["end"] = [](std::istream&) { shutdown(); };
 }
 
+namespace exceptions {
+
+class InvalidParameterValueException : public std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+}  // namespace exceptions
+
 class Logger {};
 
 class Time {
 public:
     explicit Time(int64_t nanoseconds = 0) : nanoseconds_(nanoseconds) {}
+
+    int64_t nanoseconds() const { return nanoseconds_; }
 
     operator builtin_interfaces::msg::Time() const
     {
@@ -149,6 +177,7 @@ public:
         return *this;
     }
     DurabilityPolicy durability() const { return durability_; }
+    size_t depth() const { return depth_; }
 
 private:
     size_t depth_;
@@ -158,6 +187,14 @@ private:
 class ServicesQoS : public QoS {
 public:
     ServicesQoS() : QoS(10) {}
+};
+
+enum class QosPolicyKind { Depth, Durability, History, Reliability };
+
+struct QosOverridingOptions {
+    QosOverridingOptions() = default;
+    QosOverridingOptions(std::initializer_list<QosPolicyKind> given) : kinds(given) {}
+    std::vector<QosPolicyKind> kinds;
 };
 
 enum class IntraProcessSetting { Enable, Disable, NodeDefault };
@@ -170,10 +207,12 @@ public:
 };
 
 struct PublisherOptions {
+    QosOverridingOptions qos_overriding_options;
     IntraProcessSetting use_intra_process_comm = IntraProcessSetting::NodeDefault;
 };
 
 struct SubscriptionOptions {
+    QosOverridingOptions qos_overriding_options;
     IntraProcessSetting use_intra_process_comm = IntraProcessSetting::NodeDefault;
     CallbackGroup::SharedPtr callback_group;
 };
@@ -209,6 +248,8 @@ class SubscriptionBase {
 public:
     using SharedPtr = std::shared_ptr<SubscriptionBase>;
     virtual ~SubscriptionBase() = default;
+    QoS get_actual_qos() const { return qos; }
+    QoS qos{10};
 };
 
 template <typename MessageT>
@@ -363,6 +404,8 @@ public:
                 parameters_->overrides[given[k + 1].substr(0, mark)] = parsed(given[k + 1].substr(mark + 2));
             }
         }
+        const auto simulated = parameters_->overrides.find("use_sim_time");
+        declared_["use_sim_time"] = simulated == parameters_->overrides.end() ? ParameterValue(false) : simulated->second;
         stand_in::world().manager["set"] = [this](std::istream& in) { set(in); };
     }
 
@@ -383,19 +426,32 @@ public:
 
     Logger get_logger() const { return {}; }
 
+    // Simulated time is what the last line `clock` said.
     Time now() const
     {
+        if (declared_.at("use_sim_time").get<bool>()) {
+            return Time(stand_in::world().clock_ns);
+        }
         return Time(std::chrono::duration_cast<std::chrono::nanoseconds>(
             std::chrono::system_clock::now().time_since_epoch())
                         .count());
     }
 
     const ParameterValue& declare_parameter(const std::string& name, const ParameterValue& default_value,
-        const rcl_interfaces::msg::ParameterDescriptor& = rcl_interfaces::msg::ParameterDescriptor(),
+        const rcl_interfaces::msg::ParameterDescriptor& descriptor = rcl_interfaces::msg::ParameterDescriptor(),
         bool ignore_override = false)
     {
         const auto found = parameters_->overrides.find(name);
         const bool is_given = found != parameters_->overrides.end() && !ignore_override;
+        if (is_given && found->second.get_type() == PARAMETER_DOUBLE) {
+            for (const auto& range : descriptor.floating_point_range) {
+                const double value = found->second.get<double>();
+                if (!(value >= range.from_value && value <= range.to_value)) {
+                    throw exceptions::InvalidParameterValueException("out of its range: " + name);
+                }
+            }
+        }
+        read_only_[name] = descriptor.read_only;
         return declared_[name] = is_given ? found->second : default_value;
     }
 
@@ -425,9 +481,10 @@ public:
 
     template <typename MessageT, typename CallbackT>
     typename Subscription<MessageT>::SharedPtr create_subscription(
-        const std::string& topic_name, const QoS&, CallbackT&& callback, const SubscriptionOptions& = {})
+        const std::string& topic_name, const QoS& qos, CallbackT&& callback, const SubscriptionOptions& = {})
     {
         const auto made = std::make_shared<Subscription<MessageT>>();
+        made->qos = qos;
         stand_in::world().topics[resolved(topic_name)].push_back(
             [made = std::weak_ptr<Subscription<MessageT>>(made),
                 function = std::function<void(typename MessageT::ConstSharedPtr)>(callback)](std::istream& in) {
@@ -452,7 +509,11 @@ private:
         std::string text;
         in >> name >> text;
         const auto handle = may_set_.lock();
-        const auto result = handle->callback({Parameter(name, parsed(text))});
+        auto result = handle->callback({Parameter(name, parsed(text))});
+        if (read_only_[name]) {
+            result.successful = false;
+            result.reason = "parameter '" + name + "' cannot be set because it is read-only";
+        }
         if (result.successful) {
             declared_[name] = parsed(text);
         }
@@ -492,6 +553,7 @@ private:
     std::weak_ptr<OnSetParametersCallbackHandle> may_set_;
     node_interfaces::NodeParametersInterface::SharedPtr parameters_;
     std::map<std::string, ParameterValue> declared_;
+    std::map<std::string, bool> read_only_;
 };
 
 template <typename MessageT, typename NodeT>

@@ -1,7 +1,7 @@
 """Fixes that can be made by a machine: the same that findings tell in words."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from robosc.errors import Diagnostic, LanguageError
@@ -39,13 +39,14 @@ class Fix:
     more: tuple[tuple[Location, str], ...] = ()
 
 
-def fixes(found: Diagnostic, line: str, rest: str = "") -> tuple[Fix, ...]:
+def fixes(found: Diagnostic, line: str, rest: Callable[[], str] = str) -> tuple[Fix, ...]:
     """Return the changes that would fix a finding, the likeliest first; empty where a person has to think.
 
     Args:
         found: The finding.
         line: The line of the text that it is in.
-        rest: The text behind that line and its end; without it only what stands on the line is changed.
+        rest: Function that returns the text behind that line and its end, for the few fixes that reach so far; without
+            it only what stands on the line is changed.
     """
     return () if found.location is None else tuple(_Line(found.location, line, rest).fixes(found))
 
@@ -65,7 +66,7 @@ def _laid_out(text: str, indent: str) -> str:
 class _Line:
     """The line of a finding: what it covers there, and what stands before it."""
 
-    def __init__(self, location: Location, line: str, rest: str = "") -> None:
+    def __init__(self, location: Location, line: str, rest: Callable[[], str] = str) -> None:
         self._location = location
         self._rest = rest
         self._line = line
@@ -138,7 +139,7 @@ class _Line:
 
     def _node(self, meant: str, written: str, here: str | None) -> Iterator[Fix]:
         """Text for a control node, which may end on a later line; or text at the end of the robot, and some here."""
-        behind = f"{self._line[self._begin :]}\n{self._rest}"
+        behind = f"{self._line[self._begin :]}\n{self._rest()}"
         length = _length(written, behind)
         if length is None:
             return
@@ -214,14 +215,14 @@ def _length(written: str, text: str) -> int | None:
     """The length of what a fix quotes, at the begin of a text; None: it is not there."""
     if text.startswith(written):
         return len(written)
-    head = written.removesuffix(" ... }")
-    if head == written or not text.startswith(head):
+    head, _, closing = written.rpartition(" ... ")
+    if closing not in ("}", ")") or not text.startswith(head):
         return None
-    depth = 0
+    opening, depth = head[-1:], 0
     for token, kind, start in zip(*tokenize(text), strict=True):
         if kind == Kind.SIGN:
-            depth += (token == "{") - (token == "}")
-            if token == "}" and not depth:
+            depth += (token == opening) - (token == closing)
+            if token == closing and not depth:
                 return start + 1
     return None
 

@@ -156,9 +156,11 @@ class Declared:
         found: dict[str, Leaf] = {}
         used: dict[str, Leaf] = {}
         first: dict[str, Leaf] = {}
-        component = ""
+        component, is_in_set = "", False
         for index in range(1, kinds.index(Kind.END)):
             word, name = texts[index], texts[index + 1]
+            # The names in braces of a requirement.
+            is_in_set = (word == "{" and texts[index - 1] in ("requirement", "disables")) or (is_in_set and word != "}")
             if kinds[index + 1] != Kind.NAME:
                 continue
             leaf = None
@@ -173,6 +175,10 @@ class Declared:
                 # Of an imported component only the use is in the text.
                 is_incoming = texts[index - 1] == "request"
                 used.setdefault(name.casefold(), Leaf(name, is_requested=is_incoming, is_answered=not is_incoming))
+            elif (
+                is_in_set or word in ("provide", "disables") or (word == "requirement" and texts[index + 2] == "needs")
+            ):
+                used.setdefault(name.casefold(), Leaf(name, is_requested=True))
             if leaf is not None:
                 found.setdefault(name.casefold(), leaf)
                 if leaf.is_requested:

@@ -28,8 +28,6 @@ _NAME, _WORD, _NUMBER, _STRING, _END = (
 _UNQUOTED = re.compile(r"[“”‘’]?([\w/~{}.\-]+)[“”‘’]?")
 _MAXIMUM_SHOWN = 40
 _MAXIMUM_FIX = 300
-_MAXIMUM_NODE_FIX = 2000
-"""Characters of a fix with states and requirements in it."""
 _NEAR = 0.75
 """Share that a misspelt word must have in common with the one that was meant."""
 
@@ -105,11 +103,9 @@ class Cursor:
 
     # Faults
 
-    def report(
-        self, code: str, message: str, location: Location, fix: str, *related: RelatedPlace, limit: int = _MAXIMUM_FIX
-    ) -> None:
-        """An error that does not keep the parser from reading on; a fix of more characters is not told."""
-        if len(fix) > limit or "\n" in fix:
+    def report(self, code: str, message: str, location: Location, fix: str, *related: RelatedPlace) -> None:
+        """An error that does not keep the parser from reading on."""
+        if len(fix) > _MAXIMUM_FIX or "\n" in fix:
             # The text there is longer than anyone would read in a message.
             fix = "Write one of the expected words here, or look for a bracket or comma missing before."
         self.diagnostics.append(Diagnostic(Severity.ERROR, code, message, location, fix, related))
@@ -359,18 +355,20 @@ class Cursor:
             return False
         fix = advise(node, self._declared, place, self._quoted(index, end))
         message = f"there is no {shown(word)} in the language: {why(family)}"
-        self.report("syntax-error", message, self.at(index), fix, limit=_MAXIMUM_NODE_FIX)
+        # With states and requirements in it, it may be longer than what `report` lets pass.
+        self.diagnostics.append(Diagnostic(Severity.ERROR, "syntax-error", message, self.at(index), fix))
         self.told()
         self.place = end
         return True
 
     def _quoted(self, begin: int, end: int) -> str:
-        """Some tokens as a fix quotes them; what is in braces may be of several lines."""
+        """Some tokens as a fix quotes them; what is in brackets may be of several lines."""
         last = self._starts[end - 1] + len(self.texts[end - 1])
         text = self._file.text[self._starts[begin] : last]
-        if self.texts[end - 1] != "}" or (len(text) <= _MAXIMUM_SHOWN and "\n" not in text):
+        opening = {"}": "{", ")": "("}.get(self.texts[end - 1])
+        if opening is None or (len(text) <= _MAXIMUM_SHOWN and "\n" not in text):
             return text
-        return f"{text[: text.index('{')]}{{ ... }}"
+        return f"{text[: text.index(opening) + 1]} ... {self.texts[end - 1]}"
 
     def _place_of_node(self, begin: int, end: int) -> Place:
         """Return the kind of the list that a control node stands in."""

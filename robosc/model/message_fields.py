@@ -24,6 +24,7 @@ from robosc.expressions import (
 )
 from robosc.interfaces import TIMES, Field, Part
 from robosc.interfaces.catalogue import Catalogue
+from robosc.language.words import spelled
 from robosc.model.types import Types
 from robosc.source import Location
 
@@ -318,4 +319,6 @@ def _unknown_field(name: str, message: Message, place: Location, used: Location)
         return Fault("unknown-field", text, hint, place, "Remove the property, and write the value instead.", related)
     hint = f"; it has {_listed(fields)}" if fields else "; it has none"
     fix = "Remove the property, or give it the name of a field."
+    if len(fields) == 1:
+        fix = f"Write '{spelled(next(iter(fields)))}', or remove the property."
     return Fault("unknown-field", text, hint, place, fix, related, name, tuple(fields))

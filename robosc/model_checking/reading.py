@@ -147,7 +147,24 @@ class _PropertyParser(ExpressionParser):
                 self.report("invalid-character", "the text contains a NUL character", self.at(index), "Remove it.")
                 raise Fault
 
+    def _refuse_requirement_words(self) -> None:
+        """Refuse `always ...` and `never ...`, which requirements begin with."""
+        begin = self.place
+        word, following = self.texts[begin], self.texts[begin + 1]
+        is_name = self.kinds[begin + 1] == _NAME or following in ("!", "(", "true", "false")
+        if word not in ("always", "never") or not is_name:
+            return
+        last = self.kinds.index(_END) - 1
+        start, end = self._offsets[begin + 1], self._offsets[last] + len(self.texts[last])
+        meant = self._text[start:end]
+        written = self._text[self._offsets[begin] : end]
+        fix = f"Write 'invariant {meant if word == 'always' else f'!({meant})'}' instead of '{written}'."
+        message = f"'{word}' begins requirements; a property that holds in every state begins with 'invariant'"
+        self.report("syntax-error", message, self.at(begin), fix)
+        raise Fault
+
     def _claim(self) -> syntax.Expression:
+        self._refuse_requirement_words()
         begin = self.place
         operator = CLAIMS.get(self.texts[begin])
         if operator is None or not self._is_operator(begin):

@@ -79,7 +79,7 @@ def obeyed(text: str, found: Diagnostic) -> str | None:
     place = found.location
     assert place is not None
     lines = text.split("\n")
-    for fix in fixes(found, lines[place.line - 1], "\n".join(lines[place.line :])):
+    for fix in fixes(found, lines[place.line - 1], lambda: "\n".join(lines[place.line :])):
         return changed(text, fix)
     return None
 

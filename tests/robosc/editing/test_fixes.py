@@ -110,3 +110,14 @@ def test_bars_are_a_word() -> None:
 )
 def test_types_and_fields_of_ros_are_put_right(right: str, wrong: str) -> None:
     assert BATTERY in titles_and_texts(BATTERY.replace(right, wrong)).values()
+
+
+def test_a_field_that_is_the_only_one_is_meant() -> None:
+    text = """robot R {
+    interface i use SetBool from std_srvs
+    datatype object Wish { data: boolean }
+    datatype object Answer { success: boolean }
+    component C { service lid with request: Wish, response: Answer links i }
+}
+"""
+    assert text in titles_and_texts(text.replace("data: boolean", "openn: boolean")).values()

@@ -193,6 +193,22 @@ def test_what_is_written_is_laid_out() -> None:
     after = mended(written("    Sequence {\n        go\n        halt // }\n    }"))
     assert "    component Order {\n        behaviour {\n            initial marked state step_1 {" in after
     assert "halt // }" not in after
+    assert mended(written("Sequence(\n go,\n halt)")) == mended(written("Sequence { go halt }"))
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        "requirement walk needs B.x",
+        "requirement { stop, walk } needs B.x",
+        "B.x disables { walk }",
+        "provide walk with 1",
+    ],
+)
+def test_names_of_imported_components_are_known_by_their_uses(use: str) -> None:
+    diagnostics = parse(SourceFile("r.rscd", f"robot R {{ Sequence {{ walk halt }} {use} }}")).diagnostics
+    assert "incoming message halt with type: none behaviour" in diagnostics[0].fix
+    assert "message walk" not in diagnostics[0].fix
 
 
 def test_without_any_names_there_is_nothing_to_write() -> None:

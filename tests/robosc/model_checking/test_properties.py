@@ -155,6 +155,15 @@ def test_misspelt_names() -> None:
     assert "the end of the property" in faults("AG (A.G or")[0]
 
 
+def test_words_of_requirements_are_told_as_a_claim() -> None:
+    for written, meant in (("always A.G", "invariant A.G"), ("never A.G and A.X", "invariant !(A.G and A.X)")):
+        with pytest.raises(LanguageError) as error:
+            properties_of(MODEL, [SourceFile("p", written)], [])
+        (found,) = error.value.diagnostics
+        assert found.fix == f"Write '{meant}' instead of '{written}'."
+        assert len(properties_of(MODEL, [SourceFile("p", meant)], [])) == 1
+
+
 def test_listings() -> None:
     text = "# don't read \"this\nfirst: AG A.G # why\n\n   // nothing\n  EF A.X // x\r\nrequest: A.G"
     found = properties_of(MODEL, [], [SourceFile("f", text)])

@@ -437,7 +437,10 @@ class Server(LanguageServer):
         return lsp.CompletionList(is_incomplete=False, items=items)
 
     def actions(self, uri: str, where: lsp.Range, kinds: Sequence[str] | None = None) -> list[lsp.CodeAction]:
-        """Return the fixes of the findings in a range, within a time limit.
+        """Return the fixes of the findings in a range, each tried before it is offered.
+
+        Those that are not tried within a time limit come without their edit, which `resolved` adds; an editor that
+        cannot ask for it later gets a log message.
 
         Args:
             uri: URI of the file.
@@ -450,29 +453,72 @@ class Server(LanguageServer):
         findings = self._findings(uri, analysis)
         actions: list[lsp.CodeAction] = []
         until_s = time.monotonic() + _FIX_TIME_S
-        is_tried = False
+        is_tried, untried = False, 0
         for item, shown in zip(findings, diagnostics(analysis, self.project, findings), strict=True):
             if item.location is None or item.location.file != analysis.file or not _touch(shown.range, where):
                 continue
             # Try at least one, even on a slow machine.
-            if is_tried and time.monotonic() > until_s:
-                break
+            is_late = is_tried and time.monotonic() > until_s
             is_tried = is_first = True
-            for fix in fixes(item, analysis.text.line_of(item.location), analysis.text.behind_line_of(item.location)):
-                changes = self._changes(analysis, item, fix)
-                if not self._is_fixed(analysis, item, changes):
-                    continue
-                actions.append(
-                    lsp.CodeAction(
-                        fix.title,
-                        kind=lsp.CodeActionKind.QuickFix,
-                        diagnostics=[shown],
-                        is_preferred=is_first,
-                        edit=lsp.WorkspaceEdit(changes=changes),
-                    )
+            if is_late and not self._resolves_edits:
+                untried += 1
+                continue
+            for fix in self._fixes(analysis, item):
+                action = lsp.CodeAction(
+                    fix.title, kind=lsp.CodeActionKind.QuickFix, diagnostics=[shown], is_preferred=is_first
                 )
+                if is_late:
+                    action.data = {"uri": uri, "finding": _key(item), "title": fix.title}
+                else:
+                    changes = self._changes(analysis, item, fix)
+                    if not self._is_fixed(analysis, item, changes):
+                        continue
+                    action.edit = lsp.WorkspaceEdit(changes=changes)
+                actions.append(action)
                 is_first = False
+        if untried:
+            more = f"{untried} finding{'' if untried == 1 else 's'} of this range"
+            self._log(f"{more} not tried for fixes within {_FIX_TIME_S} s; ask at one of them alone")
         return actions
+
+    def resolved(self, action: lsp.CodeAction) -> lsp.CodeAction:
+        """Return an action with its edit, if it still fixes its finding in the current text; else without one."""
+        data = action.data if isinstance(action.data, dict) else {}
+        uri = data.get("uri")
+        analysis = self.project.analysis(uri) if isinstance(uri, str) else None
+        for item in self._findings(analysis.uri, analysis) if analysis is not None else ():
+            if analysis is None or item.location is None or _key(item) != data.get("finding"):
+                continue
+            for fix in self._fixes(analysis, item):
+                changes = self._changes(analysis, item, fix)
+                if fix.title == data.get("title") and self._is_fixed(analysis, item, changes):
+                    return lsp.CodeAction(
+                        action.title,
+                        kind=action.kind,
+                        diagnostics=action.diagnostics,
+                        is_preferred=action.is_preferred,
+                        edit=lsp.WorkspaceEdit(changes=changes),
+                        data=action.data,
+                    )
+        self._log(f"{action.title}: this does not fix the finding in the current text")
+        return action
+
+    @property
+    def _resolves_edits(self) -> bool:
+        """True if the editor asks for the edit of an action when it is chosen."""
+        document = self.client_capabilities.text_document
+        actions = document.code_action if document is not None else None
+        support = actions.resolve_support if actions is not None and actions.data_support else None
+        return support is not None and "edit" in support.properties
+
+    def _log(self, message: str) -> None:
+        self.window_log_message(lsp.LogMessageParams(lsp.MessageType.Info, message))
+
+    def _fixes(self, analysis: Analysis, found: Diagnostic) -> tuple[Fix, ...]:
+        place = found.location
+        if place is None:
+            return ()
+        return fixes(found, analysis.text.line_of(place), lambda: analysis.text.behind_line_of(place))
 
     def _changes(self, analysis: Analysis, found: Diagnostic, fix: Fix) -> dict[str, Sequence[lsp.TextEdit]]:
         """Return the edits of a fix: another name of a property is written wherever the property is named."""
@@ -525,6 +571,11 @@ class Server(LanguageServer):
 
 def _paths(uris: Sequence[str]) -> list[Path]:
     return [Path(path) for uri in uris if uri.startswith("file:") and (path := to_fs_path(uri))]
+
+
+def _key(found: Diagnostic) -> str:
+    """Text by which a finding is known again after it went to the editor and back."""
+    return f"{found.location} {found.code} {found.message}"
 
 
 def _touch(first: lsp.Range, second: lsp.Range) -> bool:
@@ -691,9 +742,16 @@ def make_server(
             return []  # The findings are shown instead.
         return [] if formatted == text.text else [lsp.TextEdit(text.whole, formatted)]
 
-    @feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions(code_action_kinds=[lsp.CodeActionKind.QuickFix]))
+    @feature(
+        lsp.TEXT_DOCUMENT_CODE_ACTION,
+        lsp.CodeActionOptions(code_action_kinds=[lsp.CodeActionKind.QuickFix], resolve_provider=True),
+    )
     def code_action(parameters: lsp.CodeActionParams) -> list[lsp.CodeAction]:
         return server.actions(parameters.text_document.uri, parameters.range, parameters.context.only)
+
+    @feature(lsp.CODE_ACTION_RESOLVE)
+    def code_action_resolve(action: lsp.CodeAction) -> lsp.CodeAction:
+        return server.resolved(action)
 
     @feature(lsp.TEXT_DOCUMENT_CODE_LENS)
     def code_lens(parameters: lsp.CodeLensParams) -> list[lsp.CodeLens]:

@@ -9,6 +9,7 @@ from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 
 from robosc.formatting import format_text
+from robosc_lsp import server
 from robosc_lsp.project import Project
 from support.editor import Editor, part_of, position_of, with_edits
 from support.editor_models import LIBRARY, ROBOT, write_definitions
@@ -521,6 +522,59 @@ def test_fixes_are_of_the_text_as_it_is(editor: Editor) -> None:
         "walker.rscd", (at, at + len("/* x */ on response from power goto onn_"), "on response from power goto on_")
     )
     assert actions(editor, "walker.rscd", "power goto o|n_") == []
+
+
+TWO_MISTAKES = ROBOT.replace("Base.calm", "Base.clam").replace("goto on_", "goto onn_")
+
+
+def everywhere(editor: Editor, name: str) -> list[lsp.CodeAction]:
+    """The fixes of a whole file."""
+    where = lsp.Range(lsp.Position(0, 0), lsp.Position(10_000, 0))
+    parameters = lsp.CodeActionParams(lsp.TextDocumentIdentifier(editor.uri(name)), where, lsp.CodeActionContext([]))
+    return list(editor.run(editor.client.text_document_code_action_async(parameters)))
+
+
+def test_what_takes_too_long_is_tried_when_it_is_chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "_FIX_TIME_S", -1.0)
+    with Editor(tmp_path, "--synthesis-seconds", "0", resolves_edits=True) as editor:
+        editor.open("parts.rscd", LIBRARY)
+        editor.open("walker.rscd", TWO_MISTAKES)
+        first, second = everywhere(editor, "walker.rscd")
+        assert first.edit is not None and first.data is None
+        assert second.edit is None and second.data is not None
+        resolved = editor.run(editor.client.code_action_resolve_async(second))
+        assert resolved.title == second.title and resolved.is_preferred
+        text = editor.texts["walker.rscd"]
+        for action in (resolved, first):
+            text = with_edits(text, action.edit.changes[editor.uri("walker.rscd")])
+        assert text == ROBOT
+        assert editor.logged == []
+        # Meanwhile somebody has put it right.
+        editor.replace("walker.rscd", ROBOT)
+        assert editor.run(editor.client.code_action_resolve_async(second)).edit is None
+        assert editor.logged == [f"{second.title}: this does not fix the finding in the current text"]
+
+
+def test_an_editor_that_cannot_ask_later_is_told_what_was_not_tried(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "_FIX_TIME_S", -1.0)
+    with Editor(tmp_path, "--synthesis-seconds", "0") as editor:
+        editor.open("parts.rscd", LIBRARY)
+        editor.open("walker.rscd", TWO_MISTAKES)
+        assert len(everywhere(editor, "walker.rscd")) == 1
+        (told,) = editor.logged
+        assert told.startswith("1 finding of this range not tried for fixes")
+
+
+def test_a_control_node_of_several_lines_is_written_as_states(editor: Editor) -> None:
+    tree = ROBOT.rstrip().removesuffix("}") + "    Sequence {\n        walk\n        walk\n    }\n}\n"
+    editor.open("tree.rscd", tree)
+    (action,) = actions(editor, "tree.rscd", "Seq|uence {")
+    assert action.edit is not None and action.edit.changes is not None
+    changed = with_edits(tree, action.edit.changes[editor.uri("tree.rscd")])
+    assert "    component Order {\n        behaviour {" in changed
+    assert "Sequence" not in changed
 
 
 def test_other_kinds_of_actions_are_none_of_these(editor: Editor) -> None:

@@ -79,13 +79,18 @@ class Editor:
         folder: Folder with the files.
         options: Options of the server's command line; a synthesis may take any time unless they say otherwise.
         encodings: Encodings in which it can count columns, in its order.
+        resolves_edits: True if it asks for the edit of an action when it is chosen.
     """
 
-    def __init__(self, folder: Path, *options: str, encodings: Sequence[str] = ("utf-16",)) -> None:
+    def __init__(
+        self, folder: Path, *options: str, encodings: Sequence[str] = ("utf-16",), resolves_edits: bool = False
+    ) -> None:
         self.folder = folder
         self.texts: dict[str, str] = {}
         self.told: dict[str, lsp.PublishDiagnosticsParams] = {}
         self.faults: list[str] = []
+        self.logged: list[str] = []
+        self._resolves_edits = resolves_edits
         self.lenses_refreshed = 0
         self.watched: list[lsp.Registration] = []
         # A synthesis leaves the processor to everybody else, and so may take long where others have much to do.
@@ -117,6 +122,10 @@ class Editor:
         @self.client.feature(lsp.WINDOW_SHOW_MESSAGE)  # type: ignore[untyped-decorator]
         def fault(told: lsp.ShowMessageParams) -> None:
             self.faults.append(told.message)
+
+        @self.client.feature(lsp.WINDOW_LOG_MESSAGE)  # type: ignore[untyped-decorator]
+        def log(told: lsp.LogMessageParams) -> None:
+            self.logged.append(told.message)
 
     def run(self, coroutine: Any) -> Any:
         """Wait for something, at most `LIMIT_S`."""
@@ -169,6 +178,11 @@ class Editor:
             text_document=lsp.TextDocumentClientCapabilities(
                 publish_diagnostics=lsp.PublishDiagnosticsClientCapabilities(related_information=True),
                 document_symbol=lsp.DocumentSymbolClientCapabilities(hierarchical_document_symbol_support=True),
+                code_action=lsp.CodeActionClientCapabilities(
+                    data_support=True, resolve_support=lsp.ClientCodeActionResolveOptions(["edit"])
+                )
+                if self._resolves_edits
+                else None,
             ),
         )
         folders = [lsp.WorkspaceFolder(self.folder.as_uri(), self.folder.name)]

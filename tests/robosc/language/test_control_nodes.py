@@ -1,7 +1,7 @@
 """Control nodes of behaviour trees become states and requirements that do the same."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from random import Random
 
 import pytest
@@ -221,7 +221,6 @@ def test_without_any_names_there_is_nothing_to_write() -> None:
 
 REQUESTS = ("go", "halt", "dock", "find")
 CONDITIONS = ("Sensor.a", "Sensor.b")
-type Ticks = Iterator[str]
 type Tree = tuple[str, tuple["Tree", ...]] | str
 type _Run = Callable[[str], bool]
 
@@ -348,6 +347,12 @@ def leaf_of(text: str, state: syntax.State) -> tuple[str, dict[bool, str | None]
     return next(iter(names), ""), targets
 
 
+def outcomes_of(seed: int) -> Callable[[str], bool]:
+    """Outcomes by chance, the same for a seed; a message never fails."""
+    dice = Random(seed)
+    return lambda leaf: dice.random() < 0.5 or leaf in ("go", "halt")
+
+
 def test_random_trees_do_the_same_as_states() -> None:
     dice = Random(3)
     compared = 0
@@ -357,16 +362,8 @@ def test_random_trees_do_the_same_as_states() -> None:
         if isinstance(tree, str) or not told(line).startswith("Write 'component Order"):
             continue
         after = mended(written(line))
-        # The same outcomes for both; a message never fails.
-        seed = number
-        runs = []
-        for follow, what in ((expected, tree), (followed, after)):
-            outcome = Random(seed)
-
-            def outcomes(leaf: str, outcome: Random = outcome) -> bool:
-                return outcome.random() < 0.5 or leaf in ("go", "halt")
-
-            runs.append(follow(what, outcomes, 60))  # type: ignore[operator]
-        assert runs[1] == runs[0][: len(runs[1])], line
+        wanted = expected(tree, outcomes_of(number), 60)
+        found = followed(after, outcomes_of(number), 60)
+        assert found == wanted[: len(found)], line
         compared += 1
     assert compared > 100

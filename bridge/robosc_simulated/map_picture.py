@@ -71,7 +71,7 @@ def draw_map(scene: Scene, motion: Motion | None, path: Path, robot: str = "burg
         for number, sample in enumerate(shown):
             is_end = number in (0, len(shown) - 1)
             _draw_robot(axes, sample, BODIES[robot], 1.0 if is_end else 0.45)
-        outline = {"linestyle": "", "markersize": 9, "markerfacecolor": "none", "markeredgecolor": _WAY}
+        outline: dict[str, Any] = {"linestyle": "", "markersize": 9, "markerfacecolor": "none", "markeredgecolor": _WAY}
         axes.plot([], [], marker="o", label="robot, to scale", **outline)
         axes.plot(xs[:1], ys[:1], marker="o", markersize=4, color=_WAY, linestyle="", label="start")
         axes.plot(xs[-1:], ys[-1:], marker="s", markersize=4, color=_WAY, linestyle="", label="end")

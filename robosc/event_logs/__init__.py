@@ -5,13 +5,13 @@ target, the bridge and the simulations. Drawing needs the extra `robosc[plot]`, 
 `robosc[mcap]`; reading and checking need nothing more.
 """
 
+from robosc.event_logs.bands import PlotError
 from robosc.event_logs.checking import LogCheck, Violation, WrongDeploymentError, check_log
 from robosc.event_logs.conversion import ConversionError, ConversionUnavailableError, Converted, convert_log
 from robosc.event_logs.drawing import Drawn, PlottingUnavailableError, draw_sequence
 from robosc.event_logs.entries import LogEntry, LoggedRun
 from robosc.event_logs.motions import MotionOfLogError
 from robosc.event_logs.reading import LogError, LogReader, read_log
-from robosc.event_logs.sequence import PlotError
 
 __all__ = [
     "ConversionError",

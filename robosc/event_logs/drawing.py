@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from robosc.errors import RoboscError
-from robosc.event_logs.bands import on_robots_clock
+from robosc.event_logs.bands import PlotError, on_robots_clock
 from robosc.event_logs.entries import LoggedRun
-from robosc.event_logs.sequence import PlotError, sequence_of
+from robosc.event_logs.sequence import sequence_of
 from robosc.motion_record import Motion
 
 CONTROLLABLE = "#D55E00"

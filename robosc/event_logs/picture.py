@@ -150,7 +150,7 @@ def _beside(axes: Axes, place: int, texts: Sequence[str], colors: Mapping[str, s
     if len(texts) > _MOST_BESIDE:
         shown.append((f"and {len(texts) - _MOST_BESIDE} more", "white"))
     points = _STATE_POINTS if len(shown) <= 2 else _SMALL_POINTS
-    areas = [
+    areas: list[Artist] = [
         TextArea(
             text,
             textprops={
@@ -162,7 +162,7 @@ def _beside(axes: Axes, place: int, texts: Sequence[str], colors: Mapping[str, s
         for text, color in shown
     ]
     half = len(areas) if len(areas) <= 2 else -(-len(areas) // 2)
-    lines = [HPacker(children=part, pad=0, sep=5) for part in (areas[:half], areas[half:]) if part]
+    lines: list[Artist] = [HPacker(children=part, pad=0, sep=5) for part in (areas[:half], areas[half:]) if part]
     box = AnnotationBbox(
         VPacker(children=lines, pad=0, sep=2.5), (1.006, place), xycoords=axes.get_yaxis_transform(),
         box_alignment=(0, 0.5), frameon=False, pad=0.0, annotation_clip=False,

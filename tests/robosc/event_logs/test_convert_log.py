@@ -153,7 +153,7 @@ def test_the_last_messages_by_any_time_are_the_state_of_the_log(tmp_path: Path, 
 
 
 def test_names_that_ros_refuses_are_changed_and_stay_different(tmp_path: Path) -> None:
-    parts = {name: {"state": name, "variables": {}} for name in ("a b", "a-b", "4wd", "")}
+    parts: dict[str, Any] = {name: {"state": name, "variables": {}} for name in ("a b", "a-b", "4wd", "")}
     found = convert_log(written(tmp_path, event(0.0, "e", parts)), tmp_path / "run.mcap")
     states = {topic: content.data for topic, _, _, content in messages(found.path) if "/state/" in topic}
     assert states == {

@@ -1,6 +1,6 @@
 """Start of an installed command: Ctrl-C ends it with one line at any time, even while it is imported or closed.
 
-So does a package that is not installed, since each command but `robosc` needs an extra.
+So does a package that is not installed, since each command but `robosc` needs an extra, and a Python that is too old.
 """
 
 import contextlib
@@ -9,6 +9,8 @@ import signal
 import sys
 from collections.abc import Callable
 from typing import NoReturn
+
+from robosc.python_versions import FIX, OLDEST, unsupported
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as of a shell."""
@@ -24,6 +26,11 @@ def start(program: str, load: Callable[[], Callable[[], int]], extra: str | None
         load: Function that imports the command and returns its `main`.
         extra: Extra of the distribution that has what the command needs; None: it needs none.
     """
+    if sys.version_info[:2] < OLDEST:
+        # The rest cannot even be read.
+        message = f"Python {unsupported(sys.version_info[:3])} ({sys.executable}); {FIX}"
+        sys.stderr.write(f"{program}: {message}\n")
+        sys.exit(_WRONG_USE)
 
     def leave(*_: object) -> NoReturn:
         # Not by an exception: an import that is interrupted may swallow it, and threads of gRPC may wait for ever.

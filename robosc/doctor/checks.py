@@ -7,8 +7,7 @@ from enum import StrEnum
 from robosc.dd_modules import has_cudd
 from robosc.doctor.findings import Finding, Grade
 from robosc.doctor.machine import Machine
-
-OLDEST_PYTHON = (3, 12)
+from robosc.python_versions import FIX, unsupported
 
 _IMPORT_S = 30.0
 _SERVER_S = 20.0
@@ -89,13 +88,10 @@ def _lack(is_needed: bool) -> Grade:
 
 
 def _python(machine: Machine) -> Iterator[Finding]:
-    version = ".".join(map(str, machine.python_version))
-    if machine.python_version[:2] < OLDEST_PYTHON:
-        wanted = ".".join(map(str, OLDEST_PYTHON))
-        yield Finding(
-            "Python", Grade.MISSING, f"{version} is too old", f"install Python {wanted}, with 'uv python install'"
-        )
+    if wrong := unsupported(machine.python_version):
+        yield Finding("Python", Grade.MISSING, f"{wrong} ({machine.python})", FIX)
     else:
+        version = ".".join(map(str, machine.python_version))
         yield Finding("Python", Grade.OK, f"{version} ({machine.python})")
 
 

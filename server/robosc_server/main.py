@@ -52,9 +52,13 @@ def _serve(settings: Settings) -> int:
 
 
 def _announce(address: str) -> None:
-    """Print the address; the server runs even if standard output cannot be written."""
+    """Print the address, to a person with the way to more; the server runs even if standard output cannot be written.
+
+    Programs that start a server read the address at the end of the line.
+    """
+    more = "; 'robosc-server --help' lists its settings and commands, Ctrl-C stops it" if sys.stdout.isatty() else ""
     try:
-        sys.stdout.write(f"robosc-server listening on {address}\n")
+        sys.stdout.write(f"robosc-server listening on {address}{more}\n")
         sys.stdout.flush()
     except OSError as error:
         logging.getLogger(__name__).warning(

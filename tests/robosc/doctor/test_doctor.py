@@ -1,9 +1,11 @@
 """Examination of machines that are made up, one part missing at a time."""
 
+import ast
 import json
 import os
 import sys
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Callable, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -11,7 +13,11 @@ import pytest
 
 from robosc.cli import doctor as command
 from robosc.cli.main import main
+from robosc.cli.starting import start
 from robosc.doctor import Finding, Grade, Machine, Output, Purpose, examine, is_ready
+from robosc.python_versions import NEWEST, OLDEST, unsupported
+
+ROOT = Path(__file__).parents[3]
 
 REQUIREMENTS = (
     "dd>=0.6",
@@ -119,6 +125,7 @@ def test_everything_is_told_where_no_purpose_is(machine: MadeUp) -> None:
 
 MISSING = [
     (Purpose.SYNTH, "Python", "python_version", (3, 11, 9)),
+    (Purpose.SYNTH, "Python", "python_version", (3, 14, 0)),
     (Purpose.SYNTH, "robosc", "versions", {"dd": "0.6.0"}),
     (Purpose.SYNTH, "robosc", "versions", {**VERSIONS, "dd": "0.5.99"}),
     (Purpose.SERVER, "extra server", "versions", {**VERSIONS, "sqlalchemy": "2.0.35"}),
@@ -295,3 +302,45 @@ def test_the_command_knows_every_purpose() -> None:
 def test_what_is_no_server(server: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doctor", f"--server={server}"]) == 2
     assert "neither HOST nor HOST:PORT" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("version", "told"),
+    [
+        ((3, 10, 12), "3.10.12 is too old; RoboSC needs 3.12 or 3.13"),
+        ((3, 11, 7), "3.11.7 is too old; RoboSC needs 3.12 or 3.13"),
+        ((3, 12, 0), ""),
+        ((3, 13, 9), ""),
+        ((3, 14, 0), "3.14.0 is newer than what is tested; RoboSC needs 3.12 or 3.13"),
+    ],
+)
+def test_versions_of_python(version: tuple[int, ...], told: str) -> None:
+    assert unsupported(version) == told
+
+
+def test_the_metadata_has_the_same_versions_of_python() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    versions = [f"{OLDEST[0]}.{minor}" for minor in range(OLDEST[1], NEWEST[1] + 1)]
+    assert project["requires-python"] == f">={versions[0]},<{NEWEST[0]}.{NEWEST[1] + 1}"
+    told = [line.rpartition(" ")[2] for line in project["classifiers"] if line.startswith("Programming Language")]
+    assert told == versions
+    matrix = (ROOT / "docs" / "install.md").read_text("utf-8")
+    assert all(f"| {version} |" in matrix for version in versions)
+
+
+def test_an_old_python_tells_that_it_is(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, "version_info", (3, 11, 7, "final", 0))
+
+    def load() -> Callable[[], int]:
+        raise AssertionError("it is read all the same")
+
+    with pytest.raises(SystemExit) as left:
+        start("robosc", load)
+    assert left.value.code == 2
+    assert "robosc: Python 3.11.7 is too old; RoboSC needs 3.12 or 3.13" in capsys.readouterr().err
+
+
+def test_what_an_old_python_reads_has_nothing_newer() -> None:
+    names = ("__init__.py", "_version.py", "python_versions.py", "cli/__init__.py", "cli/command.py", "cli/starting.py")
+    for name in names:
+        ast.parse((ROOT / "robosc" / name).read_text("utf-8"), feature_version=(3, 10))

@@ -546,6 +546,7 @@ def test_what_takes_too_long_is_tried_when_it_is_chosen(tmp_path: Path, monkeypa
         assert resolved.title == second.title and resolved.is_preferred
         text = editor.texts["walker.rscd"]
         for action in (resolved, first):
+            assert action.edit is not None and action.edit.changes is not None
             text = with_edits(text, action.edit.changes[editor.uri("walker.rscd")])
         assert text == ROBOT
         assert editor.logged == []

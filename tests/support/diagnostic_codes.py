@@ -16,13 +16,13 @@ _IS_A_CODE = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 NO_CODES = frozenset(
     {
         *("utf-8", "utf-8-sig", "robosc-supervisor", "explain-synthesis"),
-        *("ssh-ed25519", "check-log", "convert-log", "triangle-up", "until-trouble", "site-functions", "bash-completion"),
+        *("ssh-ed25519", "check-log", "convert-log", "until-trouble", "site-functions", "bash-completion"),
         # Words of Matplotlib and Foxglove.
-        *("steps-post", "x-thin", "follow-none"),
+        *("triangle-up", "steps-post", "x-thin", "follow-none"),
         *(info.name for info in available_targets()),
     }
 )
-"""Texts of the source that look like codes and are none: commands, options, kinds of keys, marks, styles, folders, targets."""
+"""Texts of the source that look like codes and are none: commands, options, kinds of keys, marks, folders, targets."""
 
 # The pages themselves, the models that a new robot begins with, and names of programs and packages.
 _ELSEWHERE = ("diagnostics", "starter", "doctor")

@@ -4,7 +4,7 @@ The test repeats the run on the generated supervisor in C99, with structures of 
 needs no middleware.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from random import Random
@@ -125,7 +125,7 @@ class _Recorder:
     def __init__(self, supervisor: Supervisor, layout: Layout) -> None:
         self._model: Model = supervisor.model
         self._layout = layout
-        self._dice = Random(_SEED)
+        self._dice = Random(_SEED)  # noqa: S311  # It draws the data of a test.
         self._structures = _Structures()
         self._system = InterpretedSystem(supervisor)
         self._issued = ExecutableSystem(supervisor.model, Deployment.CONTROLLER).issued
@@ -176,7 +176,7 @@ class _Recorder:
         return [f"{type_name} message;", *_assigned("message", shape, data), call]
 
     def _answers(self) -> Iterator[tuple[str, str]]:
-        """Whatever a server may do now: the service or action, and a word for it."""
+        """Answers that a server may give now: the service or action, and a word for each."""
         for item in self._model.communications:
             if self._world.open.get(item.name):
                 words = ("reply", "fail") if item.kind is CommunicationKind.SERVICE else ("accept", "feedback", "end")
@@ -225,7 +225,8 @@ class _Recorder:
 
     def _topic_shapes(self) -> Iterator[tuple[str, tuple[dict[str, Any], bool, str]]]:
         for identifier in received_topics(self._layout):
-            types = [event_data(self._model, item.event(EventKind.RESPONSE)) for item in batch(self._layout, identifier)]
+            events = (item.event(EventKind.RESPONSE) for item in batch(self._layout, identifier))
+            types = [event_data(self._model, event) for event in events]
             try:
                 shape, is_basic = self._shape([type_ for type_ in types if type_ is not None])
             except _MixedError:
@@ -241,20 +242,20 @@ class _Recorder:
             return self._merged(sources), False
         return {"data": self._merged(sources)}, True
 
-    def _merged(self, sources: list[Type]) -> Any:
+    def _merged(self, sources: Sequence[Type]) -> Any:
         first = sources[0]
         if any(type(source) is not type(first) for source in sources):
             raise _MixedError
         if isinstance(first, ObjectType):
             found: dict[str, list[Type]] = {}
-            for source in sources:
-                assert isinstance(source, ObjectType)
-                for part in self._model.object(source.name).properties:
+            for name in (source.name for source in sources if isinstance(source, ObjectType)):
+                for part in self._model.object(name).properties:
                     if not isinstance(part.type, NoneType):
                         found.setdefault(part.name, []).append(self._layout.source(part.type))
             return {name: self._merged(parts) for name, parts in found.items()}
         if isinstance(first, ArrayType):
-            return [self._merged([self._layout.source(item.element) for item in sources if isinstance(item, ArrayType)])]
+            elements = [self._layout.source(item.element) for item in sources if isinstance(item, ArrayType)]
+            return [self._merged(elements)]
         return first
 
     def _data(self, shape: Any) -> Any:

@@ -18,6 +18,7 @@ from robosc.targets import GeneratedFiles, generate, write_files
 from robosc.targets.ros.runtime.parameters import USE_SIM_TIME, ParameterError, declarations, validate
 from robosc.targets.ros.runtime.supervised import callers_name, robots_name
 from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
+from robosc.targets.ros2.runtime.state import STATE_MESSAGE
 from support import porter, porter_ros1
 from support.generated import example_supervisor
 from support.own_tests import own_tests
@@ -207,8 +208,8 @@ def test_what_a_controller_sends_may_be_read_as_an_enum(ros: Ros) -> None:
 
 def test_parameters_about_decisions_do_not_exist(ros: Ros, files: GeneratedFiles) -> None:
     content = yaml.safe_load(files["config/parameters.yaml"])
-    others = {USE_SIM_TIME: False} if ros.target == "ros1" else {}  # Which all nodes of ROS 1 share.
-    extra = (AUTOSTART,) if ros.target == "ros2" else ()
+    others = {USE_SIM_TIME: False}  # Which all nodes of ROS 1 share, and launch files of ROS 2 give.
+    extra = (AUTOSTART, STATE_MESSAGE) if ros.target == "ros2" else ()
     content = content["/**"]["ros__parameters"] if ros.target == "ros2" else content
     expected = {item.name: item.default for item in (*declarations(("/cmd_vel",), "layer"), *extra)}
     assert {**content, **others} == expected

@@ -132,7 +132,8 @@ class Node:
         self._parameter_overrides: dict[str, Any] = {}
 
     def __getattr__(self, name: str) -> Any:
-        return lambda *arguments, **named: SimpleNamespace(publish=lambda message: None, warning=lambda text: None)
+        nothing = dict.fromkeys(("publish", "warning", "info"), lambda told: None)
+        return lambda *arguments, **named: SimpleNamespace(**nothing)
 
     def has_parameter(self, name: str) -> bool:
         return name in self._values

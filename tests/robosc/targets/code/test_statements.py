@@ -7,6 +7,7 @@ from robosc.targets.c99 import statements as c99
 from robosc.targets.code.expressions import TRUE_CODE, Code, Sort, call, integer, operation, place, variable, words_of
 from robosc.targets.code.statements import Assign, Block, Comment, Do, If, Let, Return, Statement, codes, when
 from robosc.targets.python import statements as python
+from robosc.targets.python.expressions import code_text
 
 A, B = (place(name, BooleanType()) for name in "ab")
 N, M = (place(name, IntegerType(0, 9)) for name in "nm")
@@ -83,9 +84,9 @@ def _execute(block: Block, names: dict[str, int]) -> None:
         match item:
             case Assign(target, value, operator):
                 before = names[target.word] if operator else 0
-                names[target.word] = before + eval(python.code_text(value), {}, names)
+                names[target.word] = before + eval(code_text(value), {}, names)
             case If(branches, otherwise):
-                chosen = (body for test, body in branches if eval(python.code_text(test), {}, names))
+                chosen = (body for test, body in branches if eval(code_text(test), {}, names))
                 _execute(next(chosen, otherwise), names)
 
 

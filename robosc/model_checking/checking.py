@@ -145,11 +145,4 @@ class _Checker:
 
     def _forever(self, states: Any) -> Any:
         """The greatest fixed point of `states and EX ...`."""
-        rounds = 0
-        while True:
-            kept = states & self._structure.before(states)
-            rounds += 1
-            self._monitor.tell("states that can stay", rounds, kept)
-            if kept == states:
-                return kept
-            states = kept
+        return self._structure.lasting(states, self._structure.before, "states that can stay")

@@ -111,6 +111,23 @@ class KripkeStructure:
         """The states in which an event can happen."""
         return self._enabled[event]
 
+    def lasting(self, states: Any, step: Callable[[Any], Any], phase: str) -> Any:
+        """The greatest set within `states` that lies in what `step` makes of it.
+
+        Args:
+            states: States to begin with.
+            step: Such as `before` or `after`.
+            phase: Name of the work, for its progress.
+        """
+        rounds = 0
+        while True:
+            kept = states & step(states)
+            rounds += 1
+            self.monitor.tell(phase, rounds, kept)
+            if kept == states:
+                return kept
+            states = kept
+
     def before(self, states: Any) -> Any:
         """The states that some move leads into `states` from."""
         found = self.manager.false

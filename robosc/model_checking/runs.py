@@ -108,14 +108,7 @@ class Runs:
             if grown == ahead:
                 break
             ahead = grown
-        rounds = 0
-        while True:
-            kept = ahead & self._structure.after(ahead)
-            rounds += 1
-            self._monitor.tell("cycles", rounds, kept)
-            if kept == ahead:
-                return kept
-            ahead = kept
+        return self._structure.lasting(ahead, self._structure.after, "cycles")
 
     def search(self, start: Any, within: Any, goal: Any) -> Path | None:
         """The same from one of several states, or None if there is no such path."""

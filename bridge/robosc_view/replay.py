@@ -13,7 +13,7 @@ from typing import Any
 
 from robosc.automata.plants import communication_plant
 from robosc.event_logs import LoggedRun
-from robosc.event_logs.stops import is_ended
+from robosc.event_logs.entries import is_ended
 from robosc.model.structure import CommunicationKind, Model
 from robosc.supervisor import Supervisor
 from robosc_bridge.daemon.states import OperatorCommand

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 from robosc.errors import RoboscError
 from robosc.event_logs.data import is_provided
-from robosc.event_logs.entries import LogEntry, LoggedRun
+from robosc.event_logs.entries import LogEntry, LoggedRun, is_ended
 from robosc.event_logs.replay import Replay
-from robosc.event_logs.stops import is_ended
 from robosc.model.structure import CommunicationKind, Deployment, EventKind
 from robosc.supervisor import Supervisor
 

@@ -88,3 +88,16 @@ def notes_of(dropped: int, torn_line: int | None) -> tuple[str, ...]:
     if torn_line is not None:
         found.append(f"line {torn_line}, the last one, is cut off and was left out")
     return tuple(found)
+
+
+def is_ended(stop: str, resumed: str) -> bool:
+    """Return True if an entry `resume` ends a stop.
+
+    `scan is back` ends `scan on /scan is stale`, and no other.
+
+    Args:
+        stop: Text of the entry `stop`.
+        resumed: Text of the entry `resume`.
+    """
+    # Whoever stops by hand may give a reason that begins with a sensor's name.
+    return stop.startswith(f"{resumed.removesuffix(' is back')} on ") and stop.endswith(" is stale")

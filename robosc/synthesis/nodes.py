@@ -21,18 +21,6 @@ def is_constant(manager: Manager, node: Any) -> bool:
     return bool(node == manager.true or node == manager.false)
 
 
-def node_count(manager: Manager, node: Any) -> int:
-    """Decision nodes that a predicate takes, its complemented parts counted apart."""
-    seen: dict[int, Any] = {}
-    stack = [node]
-    while stack:
-        item = stack.pop()
-        if int(item) not in seen and not is_constant(manager, item):
-            seen[int(item)] = item
-            stack.extend(cofactors(item))
-    return len(seen)
-
-
 def support(manager: Manager, node: Any) -> set[str]:
     """The variables that a predicate depends on."""
     found: set[str] = set()

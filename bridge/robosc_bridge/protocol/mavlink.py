@@ -61,11 +61,6 @@ class Codec:
             signing.allow_unsigned_callback = lambda codec, number: number == _RADIO_STATUS or number in unsigned
 
     @property
-    def is_signing(self) -> bool:
-        """True if it has a key."""
-        return self._codec.signing.secret_key is not None
-
-    @property
     def timestamp(self) -> int:
         """Timestamp of the next signed packet; received packets may move it forward."""
         return int(self._codec.signing.timestamp)

@@ -1,7 +1,7 @@
 """Scenario of a controller, independent of any target: a list of actions, one line of JSON each in a file."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any
@@ -90,10 +90,3 @@ def _unpacked(data: Any) -> Any:
     if isinstance(data, list):
         return [_unpacked(part) for part in data]
     return data
-
-
-def scenario_lines(scenario: Scenario) -> Iterable[str]:
-    """A scenario as lines of JSON, the settings first."""
-    yield json.dumps({"settings": dict(scenario.settings)})
-    for action in scenario.actions:
-        yield str(action)

@@ -29,7 +29,7 @@ class WrongArguments(SystemExit):
 class Parser(argparse.ArgumentParser):
     """A parser that says what is wrong in its exception, too; so do those of its commands.
 
-    One that has commands, and is given nothing at all, prints its help.
+    One that has commands, and is given nothing at all, prints its help; it tells of options before the command.
     """
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -38,9 +38,14 @@ class Parser(argparse.ArgumentParser):
         Raises:
             SystemExit: They are wrong, or ask for help.
         """
-        if self._subparsers is not None and not list(sys.argv[1:] if args is None else args):
+        given = list(sys.argv[1:] if args is None else args)
+        if self._subparsers is not None and not given:
             self.print_help()
             self.exit()
+        if self._subparsers is not None and given[0].startswith("--") and len(given[0]) > 2:
+            option = given[0].partition("=")[0]
+            if not any(each.startswith(option) for each in self._option_string_actions):
+                self.error(f"options of a command stand behind it: {self.prog} COMMAND {option} ...")
         return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:

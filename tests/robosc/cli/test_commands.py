@@ -432,3 +432,19 @@ def test_silent_steps_that_never_end_are_an_error_unless_allowed(
     # The graph is of everything allowed, whatever an executor does.
     assert main(["explore", str(model)]) == 0
     assert main(["check", str(model), "--synthesize"]) == 1
+
+
+@pytest.mark.parametrize("words", [["--strict", "check", "x.rscd"], ["--library-path=x", "check"], ["--json"]])
+def test_options_before_a_command_are_told_their_place(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(words)
+    assert left.value.code == 2
+    option = words[0].partition("=")[0]
+    assert f"options of a command stand behind it: robosc COMMAND {option} ..." in capsys.readouterr().err
+
+
+def test_options_of_the_program_itself_may_be_shortened(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(["--vers"])
+    assert left.value.code == 0
+    assert capsys.readouterr().out.startswith("robosc ")

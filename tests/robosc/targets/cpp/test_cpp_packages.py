@@ -54,11 +54,11 @@ def test_a_package_is_complete_and_the_same_each_time(target: str, name: str) ->
     for path, text in files.items():
         if path.endswith((".cpp", ".hpp", ".c", ".h")):
             for included in re.findall(r"#include <(\w+)/", text):
-                optional = {"actionlib", "actionlib_msgs", "rclcpp_action", "sys"}
+                optional = {"actionlib", "actionlib_msgs", "gtest", "rclcpp_action", "sys"}
                 assert included in needed | client | optional, (path, included)
             for included in re.findall(r'#include "([^"]+)"', text):
-                there = (Path("/package") / path).parent / included
-                assert str(there.resolve().relative_to("/package")) in files, (path, included)
+                folder = Path("/package/src") if path.startswith("test/") else (Path("/package") / path).parent
+                assert str((folder / included).resolve().relative_to("/package")) in files, (path, included)
             # The runtime's own prefix is the robot's in generated files.
             assert not re.search(r"\brobot_[a-z]\w*_t\b", text), path
     dependencies = [name for name in needed if name]

@@ -41,7 +41,7 @@ def test_servers_answer_in_every_way() -> None:
     assert set(re.findall(r"supervisor_(call_failed|goal_accepted|goal_ended)", statements)) >= {"call_failed"}
     assert "run.last(" in statements
     assert "run.end(" in statements
-    assert "std::fill_n(message.sequence.begin()" in statements
+    assert "message.nested_field.float32_value = " in statements
 
 
 def test_the_package_tells_its_test() -> None:

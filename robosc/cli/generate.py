@@ -131,9 +131,9 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--state-message",
         choices=("json", "typed", "both"),
-        help="form of the state of a generated ROS 2 node: json, a text on the topic state; typed, a message of the "
-        "package robosc_msgs (--target ros2-msgs) on ~/state; both (default: stateMessage of controller-config.json; "
-        "json)",
+        help="form of the state of a generated ROS 2 node in Python: json, a text on the topic state; typed, a message "
+        "of the package robosc_msgs (--target ros2-msgs) on ~/state; both (default: stateMessage of "
+        "controller-config.json; json)",
     )
     parser.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")
 
@@ -155,12 +155,13 @@ def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
     """Return the options for the target; the folder to write to is set where it is not given.
 
     Raises:
-        UsageError: The package cannot be called so, or cannot have such a maintainer, licence or version, the file
-            beside the model cannot be used, or there is no folder to write to.
+        UsageError: The package cannot be called so, or cannot have such a maintainer, licence or version, an option is
+            for other targets, the file beside the model cannot be used, or there is no folder to write to.
     """
     from robosc.targets import CONFIG_FILE, ControllerConfigError, StateMessage, read_controller_config
     from robosc.targets.code.naming import require_package_name
 
+    _refuse_options_of_others(arguments)
     try:
         if arguments.package is not None:
             require_package_name(arguments.package)
@@ -182,6 +183,22 @@ def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
         metadata=_metadata(arguments, options.metadata),
         state_message=StateMessage(arguments.state_message or options.state_message),
     )
+
+
+def _refuse_options_of_others(arguments: argparse.Namespace) -> None:
+    """Refuse options that would do nothing for the target."""
+    from robosc.targets import ALL
+
+    target = arguments.target
+    about_packages = (arguments.maintainer, arguments.license, arguments.package_version)
+    for option, value in zip(("--maintainer", "--license", "--package-version"), about_packages, strict=True):
+        if value is not None and target != ALL and not target.startswith("ros"):
+            raise UsageError(f"{option} is for ROS packages, and --target {target} makes none: leave it out")
+    if arguments.state_message not in (None, "json") and target not in (ALL, "ros2"):
+        raise UsageError(
+            f"--state-message {arguments.state_message} is for --target ros2: of {target}, no node publishes a typed "
+            "state; leave it out"
+        )
 
 
 def _metadata(arguments: argparse.Namespace, found: "PackageMetadata") -> "PackageMetadata":

@@ -192,6 +192,23 @@ class TestCommand:
         assert main(["generate", str(model), "--target", "ros2", "-o", "x", "--maintainer", "Bo"]) == 2
         assert "must be written as 'Jane Doe <jane@example.org>'" in capsys.readouterr().err
 
+    @pytest.mark.parametrize(
+        ("target", "option", "value"),
+        [
+            ("c99", "--license", "MIT"),
+            ("python", "--package-version", "1.0.0"),
+            ("cif", "--maintainer", "Bo <bo@example.org>"),
+            ("ros2-cpp", "--state-message", "typed"),
+        ],
+    )
+    def test_an_option_for_other_targets_is_wrong_use(
+        self, model: Path, capsys: pytest.CaptureFixture[str], target: str, option: str, value: str
+    ) -> None:
+        assert main(["generate", str(model), "--target", target, "-o", "x", option, value]) == 2
+        error = capsys.readouterr().err
+        assert option in error
+        assert "leave it out" in error
+
     def test_without_any_folder_it_says_where_one_can_be_given(
         self, model: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:

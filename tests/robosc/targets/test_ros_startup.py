@@ -172,7 +172,9 @@ def test_a_node_that_waits_for_its_servers_loses_nothing_and_its_stop_reaches_lo
                 return tuple(missing)
 
             def subscribe(self, receive: Any) -> None:
-                callbacks.update((name, receive) for name in ("/beat", "/stop"))
+                for name in ("/beat", "/stop"):
+                    callbacks[name] = receive
+                    self.depths[name] = 1
 
             def cancel_abandoned(self) -> None:
                 cancelled.append("lost goals")

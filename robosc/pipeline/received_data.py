@@ -98,14 +98,30 @@ def _fields(model: Model, type_: Type, path: tuple[str, ...], read: set[tuple[st
             for item in model.object(name).properties:
                 yield from _fields(model, item.type, (*path, item.name), read)
             return
+    yield data_field(path, type_, is_read=any(other[: len(path)] == path for other in read))
+
+
+def data_field(path: tuple[str, ...], type_: Type, *, is_read: bool) -> DataField:
+    """Return the part of a datum at a path, of a type that has no parts."""
+    match type_:
         case EnumType(values=names):
             choices = tuple(names)
         case BooleanType():
             choices = ("false", "true")
         case _:
             choices = ()
-    is_read = any(other[: len(path)] == path for other in read)
-    yield DataField(path, type_text(type_), choices, isinstance(type_, IntegerType | DoubleType), is_read)
+    return DataField(path, type_text(type_), choices, isinstance(type_, IntegerType | DoubleType), is_read)
+
+
+def one_datum(event: str, data: object, fields: Mapping[str, object]) -> object:
+    """Return the data of an event that is given as one value or as keywords.
+
+    Raises:
+        DataError: It is given as both.
+    """
+    if fields and data is not NO_DATA:
+        raise DataError(f"the data of '{event}' is given either as one value or as keywords, not as both")
+    return fields or data
 
 
 class GivenData:

@@ -27,6 +27,7 @@ from robosc.pipeline.received_data import (
     GivenData,
     RandomData,
     data_fields,
+    one_datum,
     received_type,
 )
 from robosc.pipeline.saved_runs import ModelOfTest, pytest_module
@@ -148,9 +149,7 @@ class Run(LedRun):
             DataError: It does not carry such data.
         """
         self._known(event)
-        if fields and data is not NO_DATA:
-            raise DataError(f"the data of '{event}' is given either as one value or as keywords, not as both")
-        given = fields if fields else data
+        given = one_datum(event, data, fields)
         reading = self._reading(event, given)
         self._require_possible(event)
         unknown = reading.unknown if reading is not None else ()

@@ -17,13 +17,13 @@ from robosc.certification.supervisor_file import StateInWords, state_in_words
 from robosc.errors import RoboscError, UnknownNameError, UnsupportedModelError
 from robosc.explanation.disabled import Disabled
 from robosc.explanation.notation import value_text
-from robosc.expressions import BooleanType, EnumType, IntegerType, Received, Type, Value, type_text
+from robosc.expressions import EnumType, Received, Type, Value, type_text
 from robosc.expressions.inference import has_type
 from robosc.expressions.text import expression_text
 from robosc.model.findings import did_you_mean
 from robosc.pipeline.conditions import unknown_event
 from robosc.pipeline.led_run import LedRun, Step
-from robosc.pipeline.received_data import NO_DATA, DataError, DataField
+from robosc.pipeline.received_data import NO_DATA, DataError, DataField, data_field, one_datum
 from robosc.pipeline.systems import SystemSupervisor
 from robosc.pipeline.walking import Trouble, TroubleKind, Walker
 from robosc.supervisor.predicates import state_predicates
@@ -84,7 +84,8 @@ class SystemRun(LedRun):
         Raises:
             UnknownEventError: There is no such event; the message names the nearest one.
         """
-        return tuple(_field(item) for item in self._inputs.get(self._known(event), ()))
+        inputs = self._inputs.get(self._known(event), ())
+        return tuple(data_field(tuple(map(str, item.path)), item.type, is_read=True) for item in inputs)
 
     def choices(self, event: str, data: object = NO_DATA, /) -> tuple[StateInWords, ...]:
         """Return the states that an event can lead to now, in the order of their values; none if it cannot happen.
@@ -122,9 +123,7 @@ class SystemRun(LedRun):
             DataError: It does not carry such data.
         """
         self._known(event)
-        if fields and data is not NO_DATA:
-            raise DataError(f"the data of '{event}' is given either as one value or as keywords, not as both")
-        given = fields if fields else data
+        given = one_datum(event, data, fields)
         read = self._given(event, given)
         self._require_possible(event)
         target = self._only(self._targets(event, read), to or {}, f"'{event}'", "lead to", "to")
@@ -261,18 +260,6 @@ def _read(
 
 def _wanted(type_: Type) -> str:
     return f"one of {', '.join(type_.values)}" if isinstance(type_, EnumType) else type_text(type_)
-
-
-def _field(item: InputVariable) -> DataField:
-    match item.type:
-        case EnumType(values=names):
-            choices = tuple(names)
-        case BooleanType():
-            choices = ("false", "true")
-        case _:
-            choices = ()
-    is_number = isinstance(item.type, IntegerType)
-    return DataField(tuple(map(str, item.path)), type_text(item.type), choices, is_number, is_read=True)
 
 
 def _varying(states: Sequence[State]) -> list[int]:

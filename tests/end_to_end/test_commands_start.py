@@ -111,4 +111,4 @@ def test_a_bare_command_prints_its_help(program: str, words: str) -> None:
 def test_options_alone_are_wrong_use() -> None:
     done = started("robosc", "--json")
     assert done.returncode == 2
-    assert "the following arguments are required: COMMAND" in done.stderr
+    assert "options of a command stand behind it: robosc COMMAND --json ..." in done.stderr

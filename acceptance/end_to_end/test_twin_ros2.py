@@ -139,11 +139,12 @@ def test_transforms_say_where_the_robot_and_its_parts_are() -> None:
     assert camera.transform.rotation.y == pytest.approx(0.5)
 
 
-def test_stamped_velocities_and_other_names(serve: Callable[..., Served]) -> None:
+@pytest.mark.parametrize("asked", [("--stamped", "--ros-args"), ("--ros-args", "-p", "enable_stamped_cmd_vel:=true")])
+def test_stamped_velocities_and_other_names(serve: Callable[..., Served], asked: tuple[str, ...]) -> None:
     from geometry_msgs.msg import TwistStamped
     from nav_msgs.msg import Odometry as OdometryMessage
 
-    twin = serve("--stamped", "--ros-args", "-r", "/odom:=/wheels/odometry", "-r", "/cmd_vel:=/robot/cmd_vel")
+    twin = serve(*asked, "-r", "/odom:=/wheels/odometry", "-r", "/cmd_vel:=/robot/cmd_vel")
     odometry = twin.peer.receive(OdometryMessage, "/wheels/odometry")
     velocity = TwistStamped()
     velocity.twist.angular.z = 1.0
@@ -160,6 +161,7 @@ def test_stamped_velocities_and_other_names(serve: Callable[..., Served]) -> Non
         (["--scene", "nowhere"], "there is no scene and no file 'nowhere'"),
         (["--speed", "nan"], "the speed factor must be a positive number"),
         (["--wait", "-1"], "the patience must be a positive number"),
+        (["--ros-args", "-p", "enable_stamped_cmd_vel:=maybe"], "enable_stamped_cmd_vel must be true or false"),
         (["--motion", "/nowhere/motion.jsonl"], "/nowhere/motion.jsonl"),
     ],
 )

@@ -26,6 +26,12 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         metavar="DIR",
         help="folder to write to, made if it is not there (default: one named after the robot, e.g. line_follower)",
     )
+    parser.add_argument(
+        "--stamped",
+        action="store_true",
+        help="send velocities as geometry_msgs/TwistStamped and not as Twist, as a TurtleBot3 takes them from ROS 2 "
+        "Jazzy on",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     parser.set_defaults(run=run)
 
@@ -35,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc.starter import InvalidNameError, make_starter
 
     try:
-        starter = make_starter(arguments.robot)
+        starter = make_starter(arguments.robot, is_stamped=arguments.stamped)
     except InvalidNameError as error:
         raise UsageError(str(error)) from error
     folder: Path = arguments.folder if arguments.folder is not None else Path(starter.stem)

@@ -46,8 +46,33 @@ class Starter:
         return f"{self.stem}.rscd"
 
 
-def make_starter(robot: str) -> Starter:
+_PLAIN = {
+    "twist": "Twist",
+    "velocity": "Velocity",
+    "stamped": "",
+    "begin": "",
+    "end": "",
+    "long_begin": "",
+    "long_end": "",
+}
+_STAMPED = {
+    "twist": "TwistStamped",
+    "velocity": 'StampedVelocity, stamped: "base_link"',
+    "stamped": "    datatype object StampedVelocity { twist: Velocity }\n",
+    "begin": "{ twist: ",
+    "end": " }",
+    "long_begin": "{\n        twist: ",
+    "long_end": "\n    }",
+}
+"""Parts of the templates that depend on how velocities are sent."""
+
+
+def make_starter(robot: str, *, is_stamped: bool = False) -> Starter:
     """The starter of a robot called `robot`.
+
+    Args:
+        robot: Its name.
+        is_stamped: True if velocities are sent as TwistStamped, as a TurtleBot3 takes them from Jazzy on.
 
     Raises:
         InvalidNameError: The language has no such name, or it is too long for a file.
@@ -59,7 +84,7 @@ def make_starter(robot: str) -> Starter:
             f"the name of the robot is too long for a file: {_shown(robot)} becomes {len(stem)} characters, "
             f"and at most {MAXIMUM_STEM} fit"
         )
-    names = {"robot": robot, "library": f"{robot}Parts", "stem": stem}
+    names = {"robot": robot, "library": f"{robot}Parts", "stem": stem, **(_STAMPED if is_stamped else _PLAIN)}
     templates = {
         f"{stem}.rscd": "robot.rscd.tmpl",
         f"{stem}_parts.rscd": "library.rscd.tmpl",

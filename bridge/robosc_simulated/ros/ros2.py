@@ -26,7 +26,7 @@ from robosc_simulated.ros.readings import (
     Scan,
 )
 from robosc_simulated.ros.robot import RosRobot
-from robosc_simulated.ros.serving import MissingRosError, Pacer, parser, serve
+from robosc_simulated.ros.serving import MissingRosError, Pacer, ServingError, parser, serve
 
 NODE = "turtlebot3_twin"
 ROS_ARGUMENTS = "--ros-args"
@@ -38,11 +38,13 @@ class Ros2Node:
     Args:
         robot: Robot that it shows.
         pacer: Pacer that brings the world up to now before a velocity acts.
-        is_stamped: True if velocities come as `TwistStamped`.
+        is_stamped: True if velocities come as `TwistStamped`, unless the TurtleBot3's own parameter
+            `enable_stamped_cmd_vel` says otherwise.
         arguments: Arguments after `--ros-args`.
 
     Raises:
         MissingRosError: rclpy or its messages are not installed.
+        ServingError: A parameter has a wrong type.
     """
 
     def __init__(
@@ -69,6 +71,7 @@ class Ros2Node:
         given = [NODE, ROS_ARGUMENTS, *arguments] if arguments else [NODE]
         rclpy.init(args=given, context=self._context, signal_handler_options=SignalHandlerOptions.NO)
         self._node = node = Node(NODE, context=self._context)
+        has_header = self._is_stamped(is_stamped)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(node)
         self._types = (ClockMessage, LaserScan, OdometryMessage, Image, BatteryState)
@@ -91,7 +94,7 @@ class Ros2Node:
             self._to_static.publish(
                 TFMessage(transforms=[mounting(TransformStamped(), frame) for frame in robot.frames])
             )
-        if is_stamped:
+        if has_header:
             node.create_subscription(TwistStamped, "/cmd_vel", lambda message: self._obey(message.twist), 10)
         else:
             node.create_subscription(Twist, "/cmd_vel", self._obey, 10)
@@ -105,6 +108,19 @@ class Ros2Node:
         self._executor.shutdown()
         self._node.destroy_node()
         self._rclpy.try_shutdown(context=self._context)
+
+    def _is_stamped(self, default: bool) -> bool:
+        """Return True if velocities come with a header: the parameter of the TurtleBot3's bring-up."""
+        from rcl_interfaces.msg import ParameterDescriptor
+        from rclpy.exceptions import InvalidParameterTypeException
+
+        name = "enable_stamped_cmd_vel"
+        descriptor = ParameterDescriptor(description="Velocities come as TwistStamped.", read_only=True)
+        try:
+            given: bool = self._node.declare_parameter(name, default, descriptor).value
+        except InvalidParameterTypeException as error:
+            raise ServingError(f"the parameter {name} must be true or false") from error
+        return given
 
     def process_commands(self, longest_s: float) -> None:
         """Obey velocities, all that have come; comes back after some, or after so long at most."""
@@ -237,7 +253,10 @@ def _parser() -> argparse.ArgumentParser:
         "/clock, /tf and, where there is a line, /camera/image_raw, and obeys /cmd_vel.",
     )
     found.add_argument(
-        "--stamped", action="store_true", help="velocities come as geometry_msgs/TwistStamped, not as Twist"
+        "--stamped",
+        action="store_true",
+        help="velocities come as geometry_msgs/TwistStamped, not as Twist; the same as the "
+        "TurtleBot3's parameter enable_stamped_cmd_vel",
     )
     found.epilog = f"What stands after {ROS_ARGUMENTS} is ROS's, such as `{ROS_ARGUMENTS} -r /scan:=/lidar`."
     return found

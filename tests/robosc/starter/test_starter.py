@@ -39,9 +39,26 @@ def test_model_and_library_have_no_findings(name: str) -> None:
     assert check(bundle_of(starter, f"{starter.stem}_parts.rscd")).diagnostics == ()
 
 
+def test_velocities_with_a_stamp_say_what_those_without_one_say() -> None:
+    starter = make_starter("StampedVelocity", is_stamped=True)
+    made = make_supervisor(bundle_of(starter))
+    assert (made.status, made.diagnostics) == (OutcomeStatus.SUPERVISOR, ())
+    assert made.supervisor is not None
+    assert check(bundle_of(starter, f"{starter.stem}_parts.rscd")).diagnostics == ()
+    files = generate(made.supervisor, "ros2")
+    assert "TwistStamped" in starter.files["README.md"] and "geometry_msgs" in files["package.xml"]
+    for item in made.supervisor.model.communications:
+        if item.identifier == "/cmd_vel":
+            assert (item.interface and item.interface.type, item.frame) == ("TwistStamped", "base_link")
+    plain = make_starter("StampedVelocity").files
+    changed = [name for name, text in starter.files.items() if text != plain[name]]
+    assert changed == list(plain)
+
+
+@pytest.mark.parametrize("is_stamped", [False, True])
 @pytest.mark.parametrize("name", ["Courier", "_", "class"])
-def test_the_files_are_in_canonical_layout(name: str) -> None:
-    for file, text in make_starter(name).files.items():
+def test_the_files_are_in_canonical_layout(name: str, is_stamped: bool) -> None:
+    for file, text in make_starter(name, is_stamped=is_stamped).files.items():
         if file.endswith(".rscd"):
             assert format_text(text) == text
 

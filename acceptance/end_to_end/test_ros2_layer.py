@@ -162,7 +162,7 @@ def test_a_signal_stops_the_robot_first(porter: Porter, number: signal.Signals) 
     porter.layer.signal(number)
     porter.peer.spin_until(lambda: not porter.layer.is_running and porter.speed == 0.0, LIMIT_S, "a zero and the end")
     assert porter.layer.wait() == 0
-    assert all(line.startswith("[WARN]") for line in porter.layer.stderr.splitlines())
+    assert all(line.startswith(("[INFO]", "[WARN]")) for line in porter.layer.stderr.splitlines())
 
 
 @pytest.mark.parametrize(("place", "method"), [("caller.CallerSide", "pass_on"), ("robot.RobotSide", "check_servers")])

@@ -331,7 +331,7 @@ def test_a_fault_ends_a_node_that_started_itself(start: Callable[..., Stage]) ->
 
 
 def test_what_cannot_be_configured_stays_unconfigured(start: Callable[..., Stage]) -> None:
-    stage = start("autostart:=false", "policy:=best", "period:=-1.0")
+    stage = start("autostart:=false", "policy:=best")
     assert not stage.change("configure")
     assert stage.state == UNCONFIGURED
     assert "parameter 'policy'" in stage.node.stderr

@@ -84,7 +84,7 @@ def _keep(outcome: Outcome, folder: Path) -> list[Path]:
     trajectory, sequence = folder / "trajectory.png", folder / "events.png"
     motion = read_motion(outcome.motion)
     draw_map(outcome.scene, motion, trajectory)
-    # What says nothing new would be a wall of strokes.
+    # Marks that say nothing new would be a wall of strokes.
     draw_sequence(
         read_log(outcome.event_log), sequence, only_changes=True, motion=motion, title=f"{outcome.scene.name}: the run"
     )

@@ -99,5 +99,5 @@ def is_ended(stop: str, resumed: str) -> bool:
         stop: Text of the entry `stop`.
         resumed: Text of the entry `resume`.
     """
-    # Whoever stops by hand may give a reason that begins with a sensor's name.
+    # A person who stops it may give a reason that begins with a sensor's name.
     return stop.startswith(f"{resumed.removesuffix(' is back')} on ") and stop.endswith(" is stale")

@@ -284,7 +284,7 @@ def _is_done_anyway(node: Node) -> bool:
         return not any(child.family is Family.RUN_ONCE for child in node.children if isinstance(child, Node))
     if node.family is Family.PARALLEL:
         return all(isinstance(child, Leaf) for child in node.children)
-    # Where nothing can fail, the others would wait for ever.
+    # A node that cannot fail would leave the others waiting for ever.
     return node.family in FALLBACKS and not any(leaf.can_fail or leaf.is_condition for leaf in leaves[:-1])
 
 

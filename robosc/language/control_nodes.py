@@ -172,7 +172,7 @@ class Declared:
             elif word in ("service", "action") and texts[index + 2] == "with":
                 leaf = Leaf(name, is_requested=True, is_answered=True, can_fail=True)
             elif word in ("to", "from") and texts[index - 2] == "on":
-                # Of an imported component only the use is in the text.
+                # The text has only the use of an imported component.
                 is_incoming = texts[index - 1] == "request"
                 used.setdefault(name.casefold(), Leaf(name, is_requested=is_incoming, is_answered=not is_incoming))
             elif (

@@ -107,7 +107,7 @@ class LedRun(ABC):
     def _begin(self) -> None:
         """Back to the initial state."""
 
-    # What can happen
+    # Events that can happen
 
     @property
     def initial(self) -> StateInWords:
@@ -249,7 +249,7 @@ class LedRun(ABC):
         write_whole(path, event_log(self).encode())
         return path
 
-    # What it shows of itself
+    # Its forms for people
 
     def _allowed(self) -> str:
         enabled = self.enabled

@@ -275,7 +275,7 @@ class _SystemWalker(Walker):
         self._run: SystemRun = run
 
     def _in_state(self, count: int) -> Trouble | None:
-        # What the plants do by themselves is nothing to wait for.
+        # Steps that the plants do by themselves are nothing to wait for.
         return None if self._run.possible else super()._in_state(count)
 
     def _candidates(self) -> Iterable[str]:

@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 
 from robosc.event_logs import convert_log
 
-# What ROS 2 parses definitions with still loads a module that Python is to lose.
+# The parser of definitions in ROS 2 still loads a module that Python is to lose.
 pytestmark = [pytest.mark.ros2, pytest.mark.filterwarnings("ignore:module 'sre:DeprecationWarning")]
 
 BEGIN_S = 1767225600.25

@@ -74,7 +74,7 @@ class ReceivedReader(ABC):
         for rule in enum.rules:
             fires = scope.truth(rule.condition)
             all_false = scope.both(all_false, scope.falsity(rule.condition))
-            # What only a later rule needs is not read before that rule's turn.
+            # Data that only a later rule needs are not read before that rule's turn.
             found += self.take_used()
             words = f"{expression_text(rule.condition)} -> {rule.value}"
             found += [Comment(words), when(fires, self._result(scope.value(EnumValue(enum.name, rule.value))))]

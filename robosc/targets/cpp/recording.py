@@ -153,7 +153,7 @@ class _Recorder:
         allowed = sorted(event for event in self._issued if self._system.enabled(event))
         return tuple(map(string_literal, happened)), tuple(map(string_literal, allowed))
 
-    # What happens.
+    # Events.
 
     def _next(self) -> list[str]:
         chance = self._dice.random()

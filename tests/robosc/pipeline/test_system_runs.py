@@ -276,7 +276,7 @@ def test_data_and_edges_are_chosen_or_asked_for() -> None:
         "Camera.count = 2"
     )
     assert run.history[-1].data == {"value.colour": "green", "value.ranges[1]": 2}
-    # Of two edges each, and data that does not matter to one of them.
+    # Two edges each, and data that does not matter to one of them.
     assert len(run.choices("u_seen")) == 7
     assert run.step("u_seen", {"colour": "red"}, to={"Camera": "off"}).state.parts["Camera.colour"] == "green"
     assert run.enabled == ("go",)

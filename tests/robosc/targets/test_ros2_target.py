@@ -144,7 +144,7 @@ def test_the_launch_file_starts_the_node_with_its_parameters(folder: Path) -> No
 def test_the_parameter_file_holds_every_default(files: GeneratedFiles) -> None:
     content = yaml.safe_load(files["config/parameters.yaml"])["/**"]["ros__parameters"]
     expected = {item.name: item.default for item in (*declarations(("/cmd_vel",)), AUTOSTART, STATE_MESSAGE)}
-    # Whoever starts the node says whether time is simulated.
+    # The one who starts the node says whether time is simulated.
     assert {**content, USE_SIM_TIME: False} == expected
     assert USE_SIM_TIME not in content
     description = describe(example_supervisor(FOLLOWER))

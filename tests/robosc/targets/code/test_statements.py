@@ -63,6 +63,7 @@ def test_declarations_of_c_are_constant_unless_they_have_a_type_of_their_own() -
 
 def test_what_statements_read_write_and_call() -> None:
     assert words_of(codes(BLOCK)) == {"a", "b", "f", "m", "n"}
+    assert words_of(codes([If([(A, [Return(B)])], [Assign(N, M)])])) == {"a", "b", "m", "n"}
     old = Code(N.kind, "old.n", (variable("old"),))
     assert words_of([operation("+", old, integer(1))]) == {"old", "old.n"}
 

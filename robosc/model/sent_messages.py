@@ -60,6 +60,9 @@ class SentMessages:
         package, _, type_ = middleware_type(item, self._types).partition("/")
         definition = catalogue.definition(KINDS[item.kind], package, type_) if catalogue else None
         if catalogue is None or definition is None:
+            for provide, where in self._provides.get(item.name, ()):
+                if item.frame is None and _leaves_frame_empty(provide.value):
+                    self._report_empty(f"this leaves a frame of '{item.name}' empty", where)
             return
         if item.kind in _STAMPED:
             self._check_headers(item, tree, place, definition[0], catalogue)
@@ -103,6 +106,15 @@ class SentMessages:
 
     def _report_empty(self, message: str, place: Location) -> None:
         self._findings.warning("empty-frame", message, place, 'Name the frame, such as "map" or "base_link".')
+
+
+def _leaves_frame_empty(value: ProvidedValue) -> bool:
+    """True if a provided value holds an empty frame: by name, where no definition tells headers from other fields."""
+    if not isinstance(value, ObjectValue):
+        return False
+    return any(
+        part == Constant("") if name == "frame_id" else _leaves_frame_empty(part) for name, part in value.properties
+    )
 
 
 def _part(value: ProvidedValue, path: Sequence[str]) -> ProvidedValue | None:

@@ -57,6 +57,21 @@ def test_empty_frames(option: str, provide: str) -> None:
     assert (found.location.line, found.location.column) == (line, column)
 
 
+def test_an_empty_frame_of_an_unknown_package() -> None:
+    text, line, column = marked_place("""robot R {
+        interface travel use Travel from a_package_of_nobody
+        datatype object Header { frame_id: string }
+        datatype object Goal { header: Header }
+        component C { action go with request: Goal, response: none, feedback: none links travel }
+        provide go with { header: { frame_id: "map" } } if true
+        §provide go with { header: { frame_id: "" } }
+    }""")
+    (found,) = checked(text).diagnostics
+    assert found.code == "empty-frame"
+    assert found.location is not None
+    assert (found.location.line, found.location.column) == (line, column)
+
+
 def test_a_layer_passes_headers_on() -> None:
     text = STAMPED.replace("§", "").format("", "")
     for deployment, codes in ((Deployment.CONTROLLER, {"not-stamped"}), (Deployment.LAYER, set())):

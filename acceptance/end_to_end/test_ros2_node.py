@@ -151,6 +151,13 @@ def test_it_moves_only_while_everything_allows_it(start: StartNode, peer: Peer) 
         robot.until(lambda: robot.speed == 0.15, f"the robot to move again after {what}", resume)
 
 
+def test_a_misspelt_parameter_is_told_once(start: StartNode, peer: Peer) -> None:
+    node = start("perod:=0.02")
+    robot = Robot(peer, node)
+    robot.until(lambda: robot.speed is not None, "the first command")
+    assert node.stderr.count("there is no parameter 'perod'; did you mean 'period'?") == 1
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_stops_the_robot_first(start: StartNode, peer: Peer, number: signal.Signals, tmp_path: Path) -> None:
     from geometry_msgs.msg import Twist

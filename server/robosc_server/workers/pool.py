@@ -135,6 +135,7 @@ class WorkerPool:
 
     def terminate(self, worker: WorkerProcess) -> asyncio.Task[None]:
         """Kill a worker; the returned task ends when its process has ended."""
+        worker.task = None
         worker.kill()
         return self._begin(self._await_exit(worker))
 

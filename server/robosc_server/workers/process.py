@@ -28,7 +28,7 @@ class WorkerProcess:
 
     Attributes:
         pid: Its number.
-        task: Task that it is busy with, or was.
+        task: Task that it is busy with; None before it, and once its outcome is known.
         end: End of the process, as soon as that is known; None: the fork server that could have reported it is gone.
     """
 

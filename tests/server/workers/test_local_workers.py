@@ -165,6 +165,22 @@ class TestDeaths:
         assert [said(running.run(f"echo {number}")) for number in range(8)] == [str(number) for number in range(8)]
         assert lost == [3, 3, 3]
 
+    def test_a_task_that_is_over_is_not_under_way(self, running: Running, caplog: pytest.LogCaptureFixture) -> None:
+        restarts = running.local.restarts
+        future, pid = running.begun("stop\necho over")
+        assert eventually(lambda: is_stopped(pid))
+        # A fork server that is stopped does not tell that the worker has ended.
+        server = parent_of(pid)
+        os.kill(server, signal.SIGSTOP)
+        assert eventually(lambda: is_stopped(server))
+        os.kill(pid, signal.SIGCONT)
+        assert said(future.result(60)) == "over"
+        os.kill(server, signal.SIGKILL)
+        assert eventually(lambda: running.local.restarts == restarts + 1)
+        assert said(running.run("echo again")) == "again"
+        assert "restarting it" in caplog.text
+        assert "under way" not in caplog.text
+
     def test_a_task_whose_fork_server_dies_is_begun_again_once(
         self, running: Running, caplog: pytest.LogCaptureFixture
     ) -> None:

@@ -19,70 +19,31 @@ RUNS = 5
 LOOPS = 2_000_000
 
 _MAIN = """
-#define _POSIX_C_SOURCE 199309L
-#include "@p@.h"
-#include <stdio.h>
-#include <time.h>
-
-static double ranges[2][360];
-static volatile unsigned sink;
-
-static bool publish(void *context, const @p@_request_t *request)
-{
-    (void)context;
-    sink += (unsigned)request->communication;
-    return true;
-}
-
-static bool publish_default(void *context, @p@_topic_t topic)
-{
-    (void)context;
-    sink += (unsigned)topic;
-    return true;
-}
-
-static double now_ns(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec * 1e9 + (double)now.tv_nsec;
-}
-
 int main(void)
 {
-    static @p@_t r;
-    @p@_callbacks_t callbacks = {0};
-    uint64_t now_us = 0;
     double begin;
-    callbacks.publish = publish;
-    callbacks.publish_default = publish_default;
-    for (int k = 0; k < 360; k++) {
-        ranges[0][k] = 3.0;
-        ranges[1][k] = 0.2;
-    }
-    if (!@p@_init(&r, NULL, &callbacks)) {
+    if (!begin_run()) {
         return 1;
     }
-    @p@_start(&r, now_us);
-    begin = now_ns();
+    begin = now_s();
     for (int k = 0; k < @n@; k++) {
         sink += (unsigned)@p@_enabled(&r, (@p@_event_t)0) + (unsigned)@p@_enabled(&r, (@p@_event_t)1)
             + (unsigned)@p@_enabled(&r, (@p@_event_t)(@P@_EVENT_COUNT - 3))
             + (unsigned)@p@_enabled(&r, (@p@_event_t)(@P@_EVENT_COUNT - 2))
             + (unsigned)@p@_enabled(&r, (@p@_event_t)(@P@_EVENT_COUNT - 1));
     }
-    printf("%.3f ", (now_ns() - begin) / (5.0 * @n@));
-    begin = now_ns();
+    printf("%.3f ", 1e9 * (now_s() - begin) / (5.0 * @n@));
+    begin = now_s();
     for (int k = 0; k < @n@; k++) {
         const @p@_data_Scan_t scan = {{ranges[k & 1], 360}};
         @p@_receive_scan(&r, ++now_us, &scan);
     }
-    printf("%.3f ", (now_ns() - begin) / @n@);
-    begin = now_ns();
+    printf("%.3f ", 1e9 * (now_s() - begin) / @n@);
+    begin = now_s();
     for (int k = 0; k < @n@; k++) {
         @p@_tick(&r, ++now_us);
     }
-    printf("%.3f\\n", (now_ns() - begin) / @n@);
+    printf("%.3f\\n", 1e9 * (now_s() - begin) / @n@);
     return 0;
 }
 """

@@ -10,7 +10,7 @@ from figures import micro
 from robosc.targets import generate
 from robosc_experiments.cycles.times import CYCLES, RUNS
 
-_MAIN = """
+_COMMON = """
 #define _POSIX_C_SOURCE 199309L
 #include "@p@.h"
 #include <stdio.h>
@@ -40,11 +40,33 @@ static double now_s(void)
     return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 }
 
-static void receive(@p@_t *r, int number, uint64_t now_us)
+static @p@_t r;
+static uint64_t now_us;
+
+/* Start the controller; true if it could be made. */
+static bool begin_run(void)
+{
+    @p@_callbacks_t callbacks = {0};
+    callbacks.publish = publish;
+    callbacks.publish_default = publish_default;
+    for (int k = 0; k < 360; k++) {
+        ranges[0][k] = 3.0;
+        ranges[1][k] = 0.2;
+    }
+    if (!@p@_init(&r, NULL, &callbacks)) {
+        return false;
+    }
+    @p@_start(&r, now_us);
+    return true;
+}
+"""
+
+_MAIN = """
+static void receive(int number)
 {
     if (number % 2) {
         const @p@_data_Scan_t scan = {{ranges[number / 50 % 2], 360}};
-        @p@_receive_scan(r, now_us, &scan);
+        @p@_receive_scan(&r, ++now_us, &scan);
     } else {
         @other@;
     }
@@ -52,29 +74,19 @@ static void receive(@p@_t *r, int number, uint64_t now_us)
 
 int main(void)
 {
-    static @p@_t r;
-    @p@_callbacks_t callbacks = {0};
-    uint64_t now_us = 0;
-    callbacks.publish = publish;
-    callbacks.publish_default = publish_default;
-    for (int k = 0; k < 360; k++) {
-        ranges[0][k] = 3.0;
-        ranges[1][k] = 0.2;
-    }
     for (int run = 0; run < 2 * @runs@; run++) {
         const bool is_changing = run % 2 != 0;
-        if (!@p@_init(&r, NULL, &callbacks)) {
+        if (!begin_run()) {
             return 1;
         }
-        @p@_start(&r, now_us);
         for (int number = 0; number < 2; number++) {
-            receive(&r, number, ++now_us);
+            receive(number);
         }
         for (int number = 0; number < @cycles@; number++) {
             const double begin = now_s();
             double middle = begin;
             if (is_changing) {
-                receive(&r, number, ++now_us);
+                receive(number);
                 middle = now_s();
             }
             @p@_tick(&r, ++now_us);
@@ -87,8 +99,8 @@ int main(void)
 """
 
 _OTHER = {
-    "line_follower": "@p@_receive_line_correction(r, now_us, 0.1)",
-    "maze_solver": "@p@_receive_rotate_done(r, now_us)",
+    "line_follower": "@p@_receive_line_correction(&r, ++now_us, 0.1)",
+    "maze_solver": "@p@_receive_rotate_done(&r, ++now_us)",
 }
 
 
@@ -97,7 +109,9 @@ def built(name: str, main: str, folder: Path, gcc: str) -> Path:
     prefix = f"{name}_supervisor"
     for path, text in generate(supervisor(name), "c99").items():
         (folder / path).write_text(text, encoding="utf-8")
-    (folder / "bench.c").write_text(main.replace("@p@", prefix).replace("@P@", prefix.upper()), encoding="utf-8")
+    (folder / "bench.c").write_text(
+        (_COMMON + main).replace("@p@", prefix).replace("@P@", prefix.upper()), encoding="utf-8"
+    )
     command = [gcc, "-std=c99", "-O2", "-ffp-contract=off", f"{prefix}.c", "bench.c", "-lm", "-o", "bench"]
     subprocess.run(command, cwd=folder, check=True)
     return folder / "bench"

@@ -29,6 +29,9 @@ nothing is written: the model has errors, no supervisor exists, the target canno
      changed since they were generated, or are not of RoboSC, and would be overwritten (see --force)"""
 """Meaning of the exit statuses 0 and 1."""
 
+_WITH_TYPED_STATE = ("ros2", "ros2-cpp")
+"""Targets whose nodes can publish their state as a typed message."""
+
 _EPILOG = f"exit status:\n  0  {WRITTEN}\n  1  {NOT_WRITTEN}\n  2  wrong use\n"
 
 
@@ -131,9 +134,9 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--state-message",
         choices=("json", "typed", "both"),
-        help="form of the state of a generated ROS 2 node in Python: json, a text on the topic state; typed, a message "
-        "of the package robosc_msgs (--target ros2-msgs) on ~/state; both (default: stateMessage of "
-        "controller-config.json; json)",
+        help="form of the state of a generated ROS 2 node (ros2, ros2-cpp): json, a text on the topic state; typed, a "
+        "message of the package robosc_msgs (--target ros2-msgs) on ~/state; both (default: stateMessage of "
+        "controller-config.json; json). Nodes for ROS 1 have the text only",
     )
     parser.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")
 
@@ -194,10 +197,10 @@ def _refuse_options_of_others(arguments: argparse.Namespace) -> None:
     for option, value in zip(("--maintainer", "--license", "--package-version"), about_packages, strict=True):
         if value is not None and target != ALL and not target.startswith("ros"):
             raise UsageError(f"{option} is for ROS packages, and --target {target} makes none: leave it out")
-    if arguments.state_message not in (None, "json") and target not in (ALL, "ros2"):
+    if arguments.state_message not in (None, "json") and target not in (ALL, *_WITH_TYPED_STATE):
         raise UsageError(
-            f"--state-message {arguments.state_message} is for --target ros2: of {target}, no node publishes a typed "
-            "state; leave it out"
+            f"--state-message {arguments.state_message} is for --target {' and '.join(_WITH_TYPED_STATE)}: of "
+            f"{target}, no node publishes a typed state; leave it out"
         )
 
 

@@ -118,7 +118,7 @@ class GenerateOptions:
         supervised: The existing controller that a generated layer's launch file starts, or None to leave that to its
             arguments.
         metadata: Data of a generated ROS package about itself.
-        state_message: Form of the state of a generated ROS 2 node in Python, unless its parameters say otherwise.
+        state_message: Form of the state of a generated ROS 2 node, unless its parameters say otherwise.
     """
 
     package: str | None = None

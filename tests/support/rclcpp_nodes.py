@@ -12,7 +12,8 @@ import pytest
 
 from robosc.certification import make_supervisor
 from robosc.supervisor import Supervisor
-from robosc.targets import generate, write_files
+from robosc.targets import GenerateOptions, StateMessage, generate, write_files
+from support.message_headers import missing_generator, write_headers
 from support.models import bundle_of
 from support.shared import shared
 
@@ -24,6 +25,32 @@ LIMIT_S = 60.0
 PROGRAM = "controller"
 RECORDED_RUN = "test/test_recorded_run.cpp"
 
+_HOSTILE = r"""
+robot None {
+    datatype object int { x: double }
+    datatype enum goto_ from string to { value = "*/ \" ' \\ ??/ %d </name>" -> break default -> auto }
+    interface i use Vector3 from geometry_msgs
+    component namespace {
+        incoming message delete with identifier: "/a", type: string
+        incoming message new with identifier: "/b", type: int links i
+        outgoing message template with identifier: "/c", type: goto_
+        outgoing message LONG with identifier: "/d", type: boolean
+        behaviour {
+            variable class: goto_ = auto
+            variable robot_t: integer
+            variable this: string = "\"; system(\"x\"); // \\ ' ??/\n%s é"
+            on response from template do class := value
+            on response from LONG do robot_t := 7
+            initial marked state std { on request to delete on request to new }
+        }
+    }
+    requirement delete needs namespace.class = break
+    provide delete with "\"; import os; */ %s ??/ \\ é"
+    provide new with { x: -0.5 }
+}
+""".replace("LONG", "n" * 150)
+"""Names and texts chosen to break C and C++."""
+
 
 def missing(*packages: str) -> str | None:
     """Name the parts missing to compile such nodes with the messages of some packages, as a reason to skip."""
@@ -34,15 +61,24 @@ def missing(*packages: str) -> str | None:
         for name in ("rcl_interfaces", "action_msgs", "diagnostic_msgs", "std_msgs", *packages)
         if not (include / name).is_dir()
     ]
-    return f"not installed: {', '.join(lacking)}" if lacking else None
+    return f"not installed: {', '.join(lacking)}" if lacking else missing_generator()
 
 
-def compiled(supervisor: Supervisor, folder: Path, *options: str) -> Path:
-    """The program of a node, compiled without a warning."""
-    write_files(generate(supervisor, "ros2-cpp"), folder)
+def compiled(
+    supervisor: Supervisor, folder: Path, *options: str, state_message: StateMessage = StateMessage.BOTH
+) -> Path:
+    """The program of a node, compiled without a warning; it can tell its state in either form unless it is to be JSON.
+
+    The form is that of the parameter file, which such a program is not given: JSON if no parameter says otherwise.
+    """
+    write_files(generate(supervisor, "ros2-cpp", GenerateOptions(state_message=state_message)), folder)
     source = folder / "src"
     (engine,) = source.glob("*_supervisor.c")
     packages = sorted((Path(sys.prefix) / "include").iterdir())
+    if state_message != StateMessage.JSON:
+        packages.append(folder / "headers")
+        packages[-1].mkdir()
+        write_headers("robosc_msgs", generate(supervisor, "ros2-msgs"), packages[-1])
     includes = [word for path in packages if path.is_dir() for word in ("-isystem", str(path))]
     program = folder / PROGRAM
     sources = ("main.cpp", "node.cpp")
@@ -95,6 +131,13 @@ def courier() -> Supervisor:
     text = COURIER.read_text(encoding="utf-8")
     text = text.replace("variable text: string", "").replace("do text := value.^message ", "")
     made = make_supervisor(bundle_of(text))
+    assert made.supervisor is not None, made.reason
+    return made.supervisor
+
+
+def hostile() -> Supervisor:
+    """The robot with names and texts that were chosen to break C and C++."""
+    made = make_supervisor(bundle_of(_HOSTILE))
     assert made.supervisor is not None, made.reason
     return made.supervisor
 

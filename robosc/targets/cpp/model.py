@@ -56,7 +56,7 @@ class Writer:
         """The header without what stands at the top of every file."""
         layout = self.layout
         tables = self._tables()
-        states = [*self._put_state(), *self._put_communications(), *self._put_taken()]
+        states = [*self._visit_state(), *self._visit_communications(), *self._put_taken()]
         requests = self._put_request()
         received = [line for number, identifier in enumerate(received_topics(layout)) for line in
                     self._receive(number, identifier)]  # fmt: skip
@@ -119,63 +119,37 @@ class Writer:
 
     # State.
 
-    def _put_state(self) -> list[str]:
+    def _visit_state(self) -> list[str]:
         layout = self.layout
-        lines = ["[[maybe_unused]] const bool is_text = as_text;", "out += '{';"]
-        for place, (component, behaviour) in enumerate(layout.executable.behaviours):
-            names = ", ".join(string_literal(state.name) for state in behaviour.states)
-            start = ("," if place else "") + json.dumps(component) + ':{"state":'
-            lines += [
-                "{",
-                f"    static const char* const names[] = {{{names}}};",
-                f"    out += {string_literal(start)};",
-                f"    put_json(out, names[state.{layout.locations[component]}]);",
-                f"    out += {string_literal(',"variables":{')};",
-            ]
-            for position, variable in enumerate(behaviour.variables):
+        lines: list[str] = []
+        for component, behaviour in layout.executable.behaviours:
+            states = [state.name for state in behaviour.states]
+            lines += _told("component", component, states, f"state.{layout.locations[component]}")
+            for variable in behaviour.variables:
                 member, type_ = layout.variables[component, variable.name]
-                key = ("," if position else "") + json.dumps(variable.name) + ":"
-                lines.append(f"    out += {string_literal(key)};")
-                lines += indent(self._put_variable(f"state.{member}", type_))
-            lines += ['    out += "}}";', "}"]
+                if isinstance(type_, EnumType):
+                    lines += _told("variable", variable.name, type_.values, f"state.{member}")
+                else:
+                    lines.append(f"visitor.variable({string_literal(variable.name)}, state.{member});")
         return _function(
-            "inline void put_state("
-            f"std::string& out, [[maybe_unused]] const {layout.prefix}_state_t& state, bool as_text)",
-            [*lines, "out += '}';"],
-            comment("The state as JSON; with values as the model writes them, in quotes, for /state."),
+            f"template <class Visitor>\nvoid visit_state([[maybe_unused]] const {layout.prefix}_state_t& state, "
+            "[[maybe_unused]] Visitor& visitor)",
+            lines,
+            comment("Tell a visitor the state of each component, and after it the value of each of its variables."),
         )
 
-    def _put_variable(self, place: str, type_: Type) -> list[str]:
-        if isinstance(type_, EnumType):
-            names = ", ".join(string_literal(value) for value in type_.values)
-            return [
-                "{",
-                f"    static const char* const values[] = {{{names}}};",
-                f"    put_json(out, values[{place}]);",
-                "}",
-            ]
-        if isinstance(type_, StringType):
-            return [f"put_json(out, {place});"]
-        return [f"put_value(out, {place}, is_text);"]
-
-    def _put_communications(self) -> list[str]:
+    def _visit_communications(self) -> list[str]:
         layout = self.layout
-        called = [item for item in layout.model.communications if item.kind in CALLED_KINDS]
-        lines = ["out += '{';"]
-        for place, item in enumerate(called):
-            names = ", ".join(string_literal(location) for location in PLANT_LOCATIONS[item.kind])
-            key = ("," if place else "") + json.dumps(item.name) + ":"
-            lines += [
-                "{",
-                f"    static const char* const names[] = {{{names}}};",
-                f"    out += {string_literal(key)};",
-                f"    put_json(out, names[state.{layout.locations[communication_plant_name(item)]}]);",
-                "}",
-            ]
+        lines: list[str] = []
+        for item in layout.model.communications:
+            if item.kind in CALLED_KINDS:
+                place = f"state.{layout.locations[communication_plant_name(item)]}"
+                lines += _told("communication", item.name, PLANT_LOCATIONS[item.kind], place)
         return _function(
-            f"inline void put_communications(std::string& out, [[maybe_unused]] const {layout.prefix}_state_t& state)",
-            [*lines, "out += '}';"],
-            comment("Location of each service and action, as JSON, for /state."),
+            f"template <class Visitor>\nvoid visit_communications("
+            f"[[maybe_unused]] const {layout.prefix}_state_t& state, [[maybe_unused]] Visitor& visitor)",
+            lines,
+            comment("Tell a visitor the location of each service and action."),
         )
 
     def _put_taken(self) -> list[str]:
@@ -446,6 +420,17 @@ def take_name(layout: Layout, event: str) -> str:
 def _array(head: str, items: Iterable[str]) -> list[str]:
     rows = [f"{item}," for item in items] or ["{},"]
     return [f"inline {head}[] = {{", *indent(rows), "};", ""]
+
+
+def _told(what: str, name: str, texts: Iterable[str], place: str) -> list[str]:
+    """Statements that tell a visitor the text with the number that stands in a place."""
+    listed = ", ".join(map(string_literal, texts))
+    return [
+        "{",
+        f"    static const char* const texts[] = {{{listed}}};",
+        f"    visitor.{what}({string_literal(name)}, texts[{place}]);",
+        "}",
+    ]
 
 
 def _function(head: str, body: list[str], words: list[str]) -> list[str]:

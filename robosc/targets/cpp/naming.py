@@ -19,7 +19,7 @@ KEYWORDS = frozenset(
 _TAKEN = frozenset(
     """
     actionlib boost diagnostic_msgs lifecycle_msgs main rcl_interfaces rclcpp rclcpp_action rclcpp_components
-    rclcpp_lifecycle ros std std_msgs
+    rclcpp_lifecycle robosc_msgs ros std std_msgs
     """.split()
 )
 """Names that a program around the supervisor has anyway."""

@@ -21,7 +21,7 @@ from robosc.targets.cpp.model import Writer, fill_name, received_topics, take_na
 from robosc.targets.cpp.naming import require_namespace, require_package_name
 from robosc.targets.cpp.recording import PERIOD_S, record
 from robosc.targets.files import GeneratedFiles
-from robosc.targets.registry import GenerateOptions
+from robosc.targets.registry import GenerateOptions, StateMessage
 from robosc.targets.ros.package import chosen, error_context, packages, release_identifiers, require_own_names
 from robosc.targets.ros.runtime.parameters import Parameter, declarations
 from robosc.targets.ros.topics import Topic, servers, shapes_of, topics
@@ -36,6 +36,7 @@ _RUNTIME = (
     "run.hpp",
     "scans.hpp",
     "signals.hpp",
+    "state.hpp",
     "values.hpp",
 )
 _DIAGNOSTICS = Interface("DiagnosticArray", "diagnostic_msgs")
@@ -56,6 +57,7 @@ class Middleware:
         without: Parameters that nodes of this middleware have in another way, or not at all.
         parameters: Parameters that only nodes of this middleware have.
         packages: Packages of messages that its headers use, beside those of every node.
+        typed_state: Type of a typed state, or None where nodes of this middleware publish none.
     """
 
     target: str
@@ -67,6 +69,7 @@ class Middleware:
     without: frozenset[str]
     parameters: tuple[Parameter, ...] = ()
     packages: tuple[str, ...] = ()
+    typed_state: Interface | None = None
 
 
 def generate_package(middleware: Middleware, supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles:
@@ -135,6 +138,10 @@ def _context(
     released = release_identifiers(found)
     types = [("msg", topic.interface) for topic in found]
     types += [(_kind(item), item.interface) for item in asked if item.interface]
+    types += [("msg", type_) for type_ in _OWN_TYPES]
+    typed_state = None if options.state_message == StateMessage.JSON else middleware.typed_state
+    if typed_state is not None:
+        types.append(("msg", typed_state))
 
     declared = tuple(item for item in declarations(released) if item.name not in middleware.without)
     declared += middleware.parameters
@@ -147,12 +154,13 @@ def _context(
         **_recorded(supervisor, unit, middleware),
         "top": head(supervisor),
         "hash_top": head(supervisor, "# ", "# ", ""),
-        "includes": sorted({middleware.include(kind, type_) for kind, type_ in (*types, *_own_types())}),
-        "packages": sorted({*middleware.packages, *(type_.package for _, type_ in (*types, *_own_types()))}),
+        "includes": sorted({middleware.include(kind, type_) for kind, type_ in types}),
+        "packages": sorted({*middleware.packages, *(type_.package for _, type_ in types)}),
         "has_actions": any(item.kind is CommunicationKind.ACTION for item in asked),
         "has_services": any(item.kind is CommunicationKind.SERVICE for item in asked),
         "topics": [_topic(unit, topic, numbers, middleware) for topic in found],
         "servers": [_server(unit, number, item, middleware) for number, item in enumerate(asked)],
+        "typed_state": typed_state and middleware.type_name("msg", typed_state),
         "topic_table": found,
         "server_table": asked,
         "parameters": declared,
@@ -165,10 +173,6 @@ def _recorded(supervisor: Supervisor, unit: Unit, middleware: Middleware) -> dic
     if not any(path.startswith("test/") for path in middleware.templates):
         return {}
     return {"recording": record(supervisor, unit.layout), "period_us": int(PERIOD_S * 1e6)}
-
-
-def _own_types() -> list[tuple[str, Interface]]:
-    return [("msg", type_) for type_ in _OWN_TYPES]
 
 
 def _kind(item: Communication) -> str:

@@ -3,7 +3,7 @@
 from robosc.model.structure import Interface
 from robosc.targets.cpp.naming import file_name
 from robosc.targets.cpp.package import Middleware
-from robosc.targets.ros.runtime.parameters import AUTOSTART, USE_SIM_TIME
+from robosc.targets.ros.runtime.parameters import AUTOSTART, STATE_MESSAGE, USE_SIM_TIME
 
 _PARTS = {
     "goal": ("action", "::Goal"),
@@ -18,6 +18,12 @@ _PARTS = {
 def _type_name(kind: str, type_: Interface) -> str:
     folder, ending = _PARTS.get(kind, (kind, ""))
     return f"::{type_.package}::{folder}::{type_.type}{ending}"
+
+
+_STATE_MESSAGE = STATE_MESSAGE._replace(
+    description=f"{STATE_MESSAGE.description} All but json needs a package generated with --state-message."
+)
+"""The parameter in C++, where messages are compiled in."""
 
 
 MIDDLEWARE = Middleware(
@@ -39,6 +45,7 @@ MIDDLEWARE = Middleware(
     },
     # Every ROS 2 node has it by itself.
     without=frozenset({USE_SIM_TIME}),
-    parameters=(AUTOSTART,),
+    parameters=(AUTOSTART, _STATE_MESSAGE),
     packages=("lifecycle_msgs", "rcl_interfaces"),
+    typed_state=Interface("SupervisorState", "robosc_msgs"),
 )

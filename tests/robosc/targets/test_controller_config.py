@@ -186,6 +186,11 @@ class TestCommand:
         assert "<version>2.0.0</version>" in text
         assert "<exec_depend>robosc_msgs</exec_depend>" in text
 
+    def test_a_node_in_cpp_is_built_with_the_message_of_its_state(self, model: Path, tmp_path: Path) -> None:
+        written(tmp_path, {"stateMessage": "typed"})
+        assert main(["generate", str(model), "--target", "ros2-cpp", "-o", str(tmp_path / "here")]) == 0
+        assert "<depend>robosc_msgs</depend>" in (tmp_path / "here/package.xml").read_text()
+
     def test_a_maintainer_without_an_address_is_wrong_use(
         self, model: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
@@ -198,7 +203,8 @@ class TestCommand:
             ("c99", "--license", "MIT"),
             ("python", "--package-version", "1.0.0"),
             ("cif", "--maintainer", "Bo <bo@example.org>"),
-            ("ros2-cpp", "--state-message", "typed"),
+            ("ros1", "--state-message", "typed"),
+            ("ros1-cpp", "--state-message", "both"),
         ],
     )
     def test_an_option_for_other_targets_is_wrong_use(

@@ -1,21 +1,18 @@
 """The package of the typed state: what it holds, and that nodes fill in exactly that."""
 
 import re
-import sys
-import types
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
-from robosc.interfaces.definitions import parse_definition
 from robosc.model.structure import Deployment
 from robosc.targets import GeneratedFiles, GenerateOptions, StateMessage, generate
 from robosc.targets.ros.runtime.parameters import ParameterError
 from robosc.targets.ros2.runtime.state import STATE_MESSAGE, valid_state_message
 from support.generated import example_supervisor, imported
+from support.typed_state import Node, install_messages
 
 MAZE = "maze_solver/maze_solver"
 PACKAGE = "maze_solver_controller"
@@ -24,11 +21,6 @@ PACKAGE = "maze_solver_controller"
 @pytest.fixture(scope="module")
 def files() -> GeneratedFiles:
     return generate(example_supervisor(MAZE), "ros2-msgs")
-
-
-def fields(files: GeneratedFiles, name: str) -> list[str]:
-    (part,) = parse_definition(files[f"msg/{name}.msg"], "robosc_msgs")
-    return list(part.fields)
 
 
 def test_it_is_the_same_for_every_model_and_deployment(files: GeneratedFiles) -> None:
@@ -60,40 +52,13 @@ def test_another_form_is_one_clear_error(value: object) -> None:
         valid_state_message({STATE_MESSAGE.name: value})
 
 
-class Node:
-    """Makes publishers that keep what is published."""
-
-    def __init__(self) -> None:
-        self.published: dict[str, list[Any]] = {}
-
-    def create_publisher(self, type_: Any, topic: str, quality: Any) -> Any:
-        return SimpleNamespace(publish=self.published.setdefault(topic, []).append)
-
-    def get_clock(self) -> Any:
-        return SimpleNamespace(now=lambda: SimpleNamespace(to_msg=lambda: "now"))
-
-
-def strict(names: list[str]) -> type:
-    """A class of messages that takes what is in their definition, as those of ROS do."""
-
-    def make(self: Any, **given: Any) -> None:
-        assert set(given) <= set(names)
-        vars(self).update(header=SimpleNamespace(stamp=None), **given)
-
-    return type("Message", (), {"__init__": make})
-
-
 @pytest.mark.ros2
 @pytest.mark.parametrize("form", ["json", "typed", "both"])
 def test_a_node_publishes_its_state_in_the_form_that_is_asked_for(
     form: str, files: GeneratedFiles, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
-    module: Any = types.ModuleType("robosc_msgs.msg")
-    for name in ("SupervisorState", "ComponentState", "VariableValue"):
-        setattr(module, name, strict(fields(files, name)))
-    monkeypatch.setitem(sys.modules, "robosc_msgs", types.ModuleType("robosc_msgs"))
-    monkeypatch.setitem(sys.modules, "robosc_msgs.msg", module)
+    install_messages(files, monkeypatch)
     node = Node()
     look = {
         "current": {"Wheels": {"state": "driving", "variables": {"speed": "0.5"}}},

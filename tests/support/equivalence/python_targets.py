@@ -114,6 +114,11 @@ class PythonTarget:
         self._world = self._make_world()
         self._executor: Any = None
 
+    @property
+    def executor(self) -> Any:
+        """The executor, once it has begun."""
+        return self._executor
+
     def start(self, scenario: Scenario, awaited: Observation | None = None) -> Observation:
         """Begin."""
         settings = self._runtime.Settings(**scenario.all_settings()._asdict())
@@ -270,12 +275,13 @@ def observe(supervisor: Supervisor, scenario: Scenario) -> list[Observation]:
     return [target.start(scenario), *(target.do(action) for action in scenario.actions)]
 
 
-def generated_python(supervisor: Supervisor, module: Any, *, has_log: bool = True) -> PythonTarget:
+def generated_python(supervisor: Supervisor, module: Any, system: Any = None, *, has_log: bool = True) -> PythonTarget:
     """Return a generated module as a target.
 
     Args:
         supervisor: Supervisor that it was generated from.
         module: The module.
+        system: The controlled system, if it is not simply the module's.
         has_log: True if its executor writes a log.
     """
-    return _kind(supervisor)("python", supervisor.model, module.Supervisor(), module, has_log=has_log)
+    return _kind(supervisor)("python", supervisor.model, system or module.Supervisor(), module, has_log=has_log)

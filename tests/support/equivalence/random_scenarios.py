@@ -259,6 +259,33 @@ def node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario:
     return Scenario(tuple(actions), settings)
 
 
+def ticking_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario:
+    """A run for a node on simulated time: it begins with a period, and sensors may become stale."""
+    dice = Random(seed)
+    sensors = {i.identifier for i in supervisor.model.communications if i.kind is CommunicationKind.OUTGOING_MESSAGE}
+    settings = {
+        "every": dice.choice(("event", "period")),
+        "max_age_s": dict.fromkeys(sorted(sensors), 0.75),
+        "service_timeout_s": 3600.0,
+    }
+    scenario = Scenario((), settings)
+    target = reference(supervisor)
+    target.start(scenario)
+    drawn = Dice(supervisor.model, dice, is_hostile=False)
+    actions = [Action("tick")]
+    actions += follow(target.do(actions[0]), target)
+    while len(actions) < length:
+        replies = _replies(supervisor.model, target, dice, drawn, ("succeeded", "aborted"))
+        replies = [item for item in replies if item.do not in ("accept", "fail")]
+        chance = dice.random()
+        action = dice.choice(replies) if replies and chance < 0.25 else None
+        if action is None and chance < 0.6:
+            action = drawn.message()
+        actions.append(action or Action("tick"))
+        actions += follow(target.do(actions[-1]), target)
+    return Scenario(tuple(actions), settings)
+
+
 LAYER_KINDS = frozenset(
     {"publish", "call", "goal", "cancel", "pass", "blocked", "answer", "no answer", "accept", "reject", "told", "ended"}
 )

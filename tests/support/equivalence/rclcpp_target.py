@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -14,7 +15,7 @@ from robosc.supervisor import Supervisor
 from robosc.targets.ros.topics import servers, topics
 from support.equivalence.node_target import IN_CPP, LIMIT_S, NodeTarget, given, node_parameters, set_parts
 from support.equivalence.observation import Issued
-from support.equivalence.scenario import Action, Scenario
+from support.equivalence.scenario import PERIOD_S, Action, Scenario
 
 yaml: Any = pytest.importorskip("yaml", reason="PyYAML, which reads what the stand-in prints, is not installed")
 
@@ -31,15 +32,19 @@ class StandInSurroundings:
         supervisor: Supervisor that the node was generated from.
         program: Program of the node.
         folder: Folder for its output.
+        parameters: Parameters of the node beside those of a scenario.
     """
 
-    def __init__(self, supervisor: Supervisor, program: Path, folder: Path) -> None:
+    def __init__(
+        self, supervisor: Supervisor, program: Path, folder: Path, parameters: Mapping[str, Any] | None = None
+    ) -> None:
         self._topics = {topic.identifier: topic for topic in topics(supervisor.model)}
         self._servers = {item.identifier: item for item in servers(supervisor.model)}
         self._program = program
         self._output = folder / "output.txt"
         self._errors = folder / "errors.txt"
         self._read = 0
+        self._parameters = parameters or {}
 
     def start(self, scenario: Scenario, folder: Path) -> None:
         """Start the node; every server is there."""
@@ -47,7 +52,7 @@ class StandInSurroundings:
             name: value
             for name, value in node_parameters(scenario, folder, Deployment.CONTROLLER).items()
             if value != [""]
-        }
+        } | self._parameters
         words = [word for name, value in parameters.items() for word in ("-p", f"{name}:={_parameter(value)}")]
         with self._output.open("wb") as output, self._errors.open("wb") as errors:
             self._process = subprocess.Popen(
@@ -97,11 +102,14 @@ class StandInSurroundings:
 
     def take_issued(self) -> list[Issued]:
         """Return everything that the node issued since the last call."""
+        return [found for line in self._new_lines() if (found := self._issued(line))]
+
+    def _new_lines(self) -> list[str]:
         text = self._output.read_text(encoding="utf-8")
         end = text.rfind("\n") + 1
-        lines = text[self._read : end].splitlines()
+        lines = text[self._read : end].split("\n")[:-1]
         self._read = end
-        return [found for line in lines if (found := self._issued(line))]
+        return lines
 
     def _issued(self, line: str) -> Issued | None:
         kind, name, text = line.split(" ", 2)
@@ -129,6 +137,43 @@ class StandInSurroundings:
         self._process.kill()
         self._process.wait()
         self._input.close()
+
+
+class SteppedSurroundings(StandInSurroundings):
+    """A node on simulated time, which tells its state as a typed message each period.
+
+    Args:
+        supervisor: Supervisor that the node was generated from.
+        program: Program of the node, generated with the typed message.
+        folder: Folder for its output.
+        package: Name of the node.
+    """
+
+    def __init__(self, supervisor: Supervisor, program: Path, folder: Path, package: str) -> None:
+        parameters = {"use_sim_time": "true", "publish_state": "true", "state_message": "typed"}
+        super().__init__(supervisor, program, folder, parameters)
+        self._beginning = f"publish /{package}/state "
+        self._periods = 0
+
+    def next_state(self) -> dict[str, Any]:
+        """Let a period pass, and return the state that the node tells then."""
+        self._periods += 1
+        self._tell("clock", str(1.0 + self._periods * PERIOD_S))
+        began = time.monotonic()
+        while True:
+            told = [line for line in self._new_lines() if line.startswith(self._beginning)]
+            if told:
+                (line,) = told
+                return dict(yaml.safe_load(line.removeprefix(self._beginning)))
+            assert time.monotonic() < began + LIMIT_S, "the node tells no state"
+            self.spin()
+
+    def first_state(self) -> dict[str, Any]:
+        """Let periods pass until the node has begun, and return the first state after that."""
+        self._tell("clock", "1.0")
+        while (state := self.next_state())["status"] == "new":
+            pass
+        return state
 
 
 def _parameter(value: Any) -> str:

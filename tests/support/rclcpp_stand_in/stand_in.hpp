@@ -160,7 +160,7 @@ inline void read_input()
 }
 
 // Take the next line if it is there and for this executor; what a manager asks for stays in line until it is done.
-inline bool take_line(bool is_manager, std::string& line)
+inline bool take_line(bool is_manager, bool takes_clock, std::string& line)
 {
     World& here = world();
     const std::lock_guard<std::recursive_mutex> lock(here.mutex);
@@ -172,6 +172,9 @@ inline bool take_line(bool is_manager, std::string& line)
         return false;
     }
     line = here.input.substr(0, end);
+    if (!takes_clock && line.compare(0, 6, "clock ") == 0) {
+        return false;
+    }
     const bool is_of_manager = here.manager.count(line.substr(0, line.find(' '))) > 0;
     if (line.compare(0, 5, "wait ") == 0) {
         if (here.done[line.substr(5)]-- <= 0) {
@@ -188,11 +191,11 @@ inline bool take_line(bool is_manager, std::string& line)
 }
 
 // Handle one line, waiting for it for so long: whether there was one.
-inline bool step(int timeout_ms, bool is_manager = false)
+inline bool step(int timeout_ms, bool is_manager = false, bool takes_clock = true)
 {
     World& here = world();
     std::string line;
-    if (!take_line(is_manager, line)) {
+    if (!take_line(is_manager, takes_clock, line)) {
         bool is_quiet = false;
         {
             const std::lock_guard<std::recursive_mutex> lock(here.mutex);
@@ -205,7 +208,7 @@ inline bool step(int timeout_ms, bool is_manager = false)
             // The other executor may be done with its line at any time.
             poll(nullptr, 0, timeout_ms < 2 || here.is_over ? timeout_ms : 2);
         }
-        if (!take_line(is_manager, line)) {
+        if (!take_line(is_manager, takes_clock, line)) {
             return false;
         }
     }
@@ -225,7 +228,16 @@ inline void print(const std::string& what, const std::string& name, const std::s
 {
     const std::lock_guard<std::recursive_mutex> lock(world().mutex);
     world().done[what + " " + name]++;
-    std::cout << what << " " << name << " " << yaml << std::endl;
+    std::cout << what << " " << name << " ";
+    // Only texts hold ends of lines, and there YAML takes them so.
+    for (const char one : yaml) {
+        if (one == '\n') {
+            std::cout << "\\n";
+        } else {
+            std::cout << one;
+        }
+    }
+    std::cout << std::endl;
 }
 
 }  // namespace stand_in

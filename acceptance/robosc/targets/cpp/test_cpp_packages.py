@@ -9,7 +9,7 @@ from robosc.certification import make_supervisor
 from robosc.supervisor import Supervisor
 from support.models import bundle_of
 from support.node_logs import entries_of
-from support.rclcpp_nodes import compiled, missing, run, sent
+from support.rclcpp_nodes import compiled, compiled_once, hostile, missing, run, sent
 
 
 def supervisor_of(body: str) -> Supervisor:
@@ -36,35 +36,11 @@ def test_the_compiler_names_a_field_that_does_not_fit(tmp_path: Path) -> None:
     assert re.search(r"has no member named .w.", message)
 
 
-HOSTILE = r"""
-robot None {
-    datatype object int { x: double }
-    datatype enum goto_ from string to { value = "*/ \" ' \\ ??/ %d </name>" -> break default -> auto }
-    interface i use Vector3 from geometry_msgs
-    component namespace {
-        incoming message delete with identifier: "/a", type: string
-        incoming message new with identifier: "/b", type: int links i
-        outgoing message template with identifier: "/c", type: goto_
-        outgoing message LONG with identifier: "/d", type: boolean
-        behaviour {
-            variable class: goto_ = auto
-            variable robot_t: integer
-            variable this: string = "\"; system(\"x\"); // \\ ' ??/ %s é"
-            on response from template do class := value
-            on response from LONG do robot_t := 7
-            initial marked state std { on request to delete on request to new }
-        }
-    }
-    requirement delete needs namespace.class = break
-    provide delete with "\"; import os; */ %s ??/ \\ é"
-    provide new with { x: -0.5 }
-}
-""".replace("LONG", "n" * 150)
-
-
 @pytest.mark.skipif(missing("geometry_msgs") is not None, reason=str(missing("geometry_msgs")))
-def test_names_and_texts_of_a_hostile_model_stay_names_and_texts(tmp_path: Path) -> None:
-    program = compiled(supervisor_of(HOSTILE), tmp_path / "package")
+def test_names_and_texts_of_a_hostile_model_stay_names_and_texts(
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    program = compiled_once(hostile(), tmp_path_factory)
     lines = ["message /c nothing", "message /d 1", "message /c */ \" ' \\ ??/ %d </name>", "message /d 0", "signal 15"]
     done = run(program, lines, "every:=event", "period:=3600", f"log_folder:={tmp_path / 'log'}")
     assert (done.returncode, done.stderr) == (0, "")
@@ -73,6 +49,6 @@ def test_names_and_texts_of_a_hostile_model_stay_names_and_texts(tmp_path: Path)
     assert "x: -0.50000" in published["/b"]
     entries = entries_of(tmp_path / "log")
     variables = [entry["state"]["namespace"]["variables"] for entry in entries if entry["kind"] == "event"]
-    assert variables[0] == {"class": "auto", "robot_t": 0, "this": '"; system("x"); // \\ \' ??/ %s é'}
+    assert variables[0] == {"class": "auto", "robot_t": 0, "this": '"; system("x"); // \\ \' ??/\n%s é'}
     assert {item["class"] for item in variables} == {"auto", "break"}
     assert variables[-1]["robot_t"] == 7

@@ -263,6 +263,7 @@ def test_a_running_goal_whose_cancel_is_refused_is_a_fault(courier_node: Path, c
         ("topic_prefix:=robot1", "parameter 'topic_prefix' is 'robot1'; it must be empty or the beginning"),
         ("topic_prefix:=/1", "parameter 'topic_prefix' is '/1'; it must be empty or the beginning"),
         ("publish_state:=1", "parameter 'publish_state' is 1; it must be true or false"),
+        ("state_message:=xml", "parameter 'state_message' is 'xml'; it must be one of json, typed, both"),
         ("service_timeout:=-1", "parameter 'service_timeout' is -1; it must be a number of seconds, 0 or more"),
         ("log_folder:=/proc/none", "parameter 'log_folder': /proc/none: "),
     ],

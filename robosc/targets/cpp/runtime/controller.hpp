@@ -22,6 +22,7 @@
 #include "json.hpp"
 #include "notes.hpp"
 #include "parameters.hpp"
+#include "state.hpp"
 #include "values.hpp"
 
 namespace robosc {
@@ -117,7 +118,7 @@ public:
     /* Time, on the steady clock, after which it is to be asked again. */
     virtual std::uint64_t longest_wait_us() const { return WATCH_US; }
 
-    virtual void tell_state(const std::string& json) = 0;
+    virtual void tell_state(const StateReport& report) = 0;
     virtual void tell_health(const Health& health) = 0;
     virtual void info(const std::string& text) = 0;
     virtual void warn(const std::string& text) = 0;
@@ -497,14 +498,19 @@ private:
         guarded("no diagnostics", [this] { middleware_.tell_health(health()); });
     }
 
+    const char* status_text() const
+    {
+        static const char* const TEXTS[] = {"new", "waiting", "running", "stopping", "stopped"};
+        return TEXTS[robot_status(&robot_, now())];
+    }
+
     Health health() const
     {
-        static const char* const STATUSES[] = {"new", "waiting", "running", "stopping", "stopped"};
         Health result;
         const robot_status_t status = robot_status(&robot_, now());
         const std::uint64_t dropped = log_.dropped();
         result.values = {
-            {"status", STATUSES[status]},
+            {"status", status_text()},
             {"reason", reasons_text()},
             {"unknown", std::to_string(robot_.counters.unknown)},
             {"unexpected", std::to_string(robot_.counters.unexpected)},
@@ -539,19 +545,18 @@ private:
         return result;
     }
 
-    /* The text for /state; the transitions are those since the last report. */
-    std::string state_report()
+    /* The transitions are those since the last report. */
+    StateReport state_report()
     {
-        std::string text = "{\"current\": ";
-        model::put_state(text, robot_.state, true);
-        text += ", \"communications\": ";
-        model::put_communications(text, robot_.state);
-        text += ", \"transitions\": [";
-        for (std::size_t k = 0; k < transitions_.size(); k++) {
-            text += (k > 0 ? ", " : "") + std::to_string(transitions_[k]);
+        StateReport report;
+        report.status = status_text();
+        for (const auto& [key, reason] : reasons_) {
+            report.reasons.push_back(reason);
         }
-        transitions_.clear();
-        return text + "], \"definition\": " + model::DEFINITION + "}";
+        model::visit_state(robot_.state, report);
+        model::visit_communications(robot_.state, report);
+        report.transitions = std::exchange(transitions_, {});
+        return report;
     }
 
     /* Operations that the engine asks for. */
@@ -714,7 +719,9 @@ private:
         line += ",\"data\":";
         line += notes_.of(event).empty() ? "null" : notes_.of(event);
         line += ",\"state\":";
-        model::put_state(line, robot_.state, false);
+        StateJson state(line);
+        model::visit_state(robot_.state, state);
+        state.finish();
         line += ",\"decision_us\":" + number_text(static_cast<double>(now_us() - began_steady_us_)) + "}";
         log_.write(std::move(line));
     }

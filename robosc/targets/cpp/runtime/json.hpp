@@ -151,21 +151,4 @@ inline void put_json(std::string& out, std::int64_t value)
 /* A received boolean. */
 inline void put_json(std::string& out, std::int8_t value) { out += value < 0 ? "null" : value > 0 ? "true" : "false"; }
 
-/* A variable's value; in quotes where it is to be as the model writes it. */
-template <class T>
-void put_value(std::string& out, T value, bool is_text)
-{
-    if (!is_text) {
-        put_json(out, value);
-        return;
-    }
-    out += '"';
-    if constexpr (std::is_floating_point<T>::value) {
-        out += number_text(value);
-    } else {
-        put_json(out, value);
-    }
-    out += '"';
-}
-
 }  // namespace robosc

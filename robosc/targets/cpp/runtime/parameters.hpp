@@ -48,6 +48,9 @@ struct Declaration {
 
 using Given = std::map<std::string, Value>;
 
+/* Form of the state on its topics; only ROS 2 has another than JSON. */
+enum class StateMessage { JSON, TYPED, BOTH };
+
 /* Valid values of what the engine does not know itself. */
 struct Parameters {
     robot_settings_t settings{};
@@ -56,6 +59,7 @@ struct Parameters {
     std::string topic_prefix;
     std::string log_folder;
     bool publish_state = false;
+    StateMessage state_message = StateMessage::JSON;
     bool resample_scans = false;
     /* True if the process ends by a fault, and tells it then. */
     bool ends_by_fault = true;
@@ -296,6 +300,10 @@ inline Parameters validated(const Given& given, const std::vector<Nameable>& req
     result.topic_prefix = detail::prefix(given);
     result.log_folder = detail::text(given, "log_folder");
     result.publish_state = detail::boolean(given, "publish_state");
+    if (given.count("state_message") > 0) {
+        result.state_message
+            = static_cast<StateMessage>(detail::choice(given, "state_message", {"json", "typed", "both"}));
+    }
     return result;
 }
 

@@ -86,6 +86,14 @@ AUTOSTART = Parameter(
 )
 """Parameter of ROS 2, where nodes can be managed."""
 
+STATE_MESSAGE = Parameter(
+    "state_message",
+    "json",
+    "Form of the state (publish_state): json, a text on the topic state; typed, robosc_msgs/msg/SupervisorState on the "
+    "topic ~/state; or both.",
+)
+"""Parameter of ROS 2, where the state can be a typed message."""
+
 
 class Parameters(NamedTuple):
     """Valid values.

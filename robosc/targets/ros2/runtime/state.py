@@ -8,16 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from robosc.targets.ros.runtime.parameters import Parameter, ParameterError
+from robosc.targets.ros.runtime.parameters import STATE_MESSAGE, ParameterError
 
 JSON, TYPED, BOTH = "json", "typed", "both"
 
-STATE_MESSAGE = Parameter(
-    "state_message",
-    JSON,
-    "Form of the state (publish_state): json, a text on the topic state; typed, robosc_msgs/msg/SupervisorState on the "
-    "topic ~/state; or both.",
-)
+__all__ = ["BOTH", "JSON", "STATE_MESSAGE", "TYPED", "valid_state_message"]
 
 
 def valid_state_message(given: Mapping[str, Any]) -> str:

@@ -12,7 +12,7 @@ from robosc.certification import make_supervisor
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
-from robosc.targets import GenerateOptions, PackageMetadata, generate, write_files
+from robosc.targets import GenerateOptions, PackageMetadata, StateMessage, generate, write_files
 from robosc.targets.cpp.naming import file_name
 from robosc.targets.ros.runtime.parameters import declarations
 from support.generated import example_supervisor
@@ -80,7 +80,7 @@ def test_parameters_stand_in_file_code_and_readme(target: str) -> None:
     values = given if target == "ros1-cpp" else given["/**"]["ros__parameters"]
     expected = {item.name: item.default for item in declarations(("/cmd_vel",)) if item.name != "use_sim_time"}
     if target == "ros2-cpp":
-        expected["autostart"] = True
+        expected |= {"autostart": True, "state_message": "json"}
     assert values == expected
     for name, default in expected.items():
         assert f"| `{name}` | `{json.dumps(default)}` |" in files["README.md"]
@@ -132,6 +132,28 @@ def test_the_launch_files_start_the_node_with_its_parameters(tmp_path: Path) -> 
     conditions = [item.named["condition"].positional[0] for item in (started, loaded)]
     assert [type(item).__name__ for item in conditions] == ["EqualsSubstitution", "NotEqualsSubstitution"]
     assert all((item.positional[0].positional, item.positional[1]) == (("container",), "") for item in conditions)
+
+
+@pytest.mark.parametrize("form", StateMessage)
+@pytest.mark.parametrize("target", TARGETS)
+def test_only_a_package_whose_state_is_typed_is_built_with_its_message(target: str, form: StateMessage) -> None:
+    files = generate(example_supervisor(FOLLOWER), target, GenerateOptions(state_message=form))
+    is_typed = target == "ros2-cpp" and form is not StateMessage.JSON
+    assert ("<depend>robosc_msgs</depend>" in files["package.xml"]) is is_typed
+    assert ("find_package(robosc_msgs REQUIRED)" in files["CMakeLists.txt"]) is is_typed
+    assert ("#include <robosc_msgs/msg/supervisor_state.hpp>" in files["src/node.cpp"]) is is_typed
+    assert ("| `~/state` | `robosc_msgs/msg/SupervisorState` |" in files["README.md"]) is is_typed
+    assert ("with `--state-message typed` or" in files["README.md"]) is (target == "ros2-cpp" and not is_typed)
+    given = yaml.safe_load(files["config/parameters.yaml"])
+    if target == "ros2-cpp":
+        assert given["/**"]["ros__parameters"]["state_message"] == form
+    else:
+        assert "state_message" not in given
+
+
+def test_a_package_cannot_be_called_like_that_of_the_typed_state() -> None:
+    with pytest.raises(UnsupportedModelError, match="would be called robosc_msgs"):
+        generate(example_supervisor(FOLLOWER), "ros2-cpp", GenerateOptions(package="robosc_msgs"))
 
 
 def test_a_parameter_tells_its_range() -> None:

@@ -52,7 +52,7 @@ class StandInSurroundings:
             name: value
             for name, value in node_parameters(scenario, folder, Deployment.CONTROLLER).items()
             if value != [""]
-        } | self._parameters
+        } | dict(self._parameters)
         words = [word for name, value in parameters.items() for word in ("-p", f"{name}:={_parameter(value)}")]
         with self._output.open("wb") as output, self._errors.open("wb") as errors:
             self._process = subprocess.Popen(

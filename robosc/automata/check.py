@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from robosc.automata.structure import Automaton, Edge, System
 from robosc.errors import InvalidExpressionError, InvalidSystemError
-from robosc.expressions import BooleanType, EnumType, Expression, PathStep, is_finite, type_text
+from robosc.expressions import BooleanType, EnumType, Expression, IntegerType, PathStep, Type, is_finite, type_text
 from robosc.expressions.inference import Scope, has_type, is_assignable
 
 
@@ -38,6 +38,7 @@ class _Checker:
             for problem in (*_shape(automaton, events), *_variables(automaton)):
                 yield f"{automaton.name}: {problem}"
         yield from self._inputs(events)
+        yield from self._types()
         scope = self._scope()
         for automaton in system.automata:
             for edge in automaton.edges:
@@ -60,14 +61,30 @@ class _Checker:
             if not is_finite(item.type):
                 yield f"{item.event} {_path(item.path)}: {type_text(item.type)} has infinitely many values"
 
+    def _types(self) -> Iterator[str]:
+        named: dict[str, EnumType] = {}
+        for type_ in self._all_types():
+            match type_:
+                case IntegerType(low=int(low), high=int(high)) if low > high:
+                    yield f"{type_text(type_)} has no value"
+                case EnumType(name=name, values=values):
+                    yield from _doubles(f"enum {name} value", values)
+                    if not values:
+                        yield f"enum {name} has no value"
+                    if named.setdefault(name, type_) != type_:
+                        yield f"there are two of enum {name}, with other values"
+
+    def _all_types(self) -> tuple[Type, ...]:
+        variables = (variable.type for automaton in self.system.automata for variable in automaton.variables)
+        return (*variables, *(item.type for item in self.system.inputs))
+
     def _scope(self) -> Scope:
         variables = {
             (automaton.name, variable.name): variable.type
             for automaton in self.system.automata
             for variable in automaton.variables
         }
-        types = (*variables.values(), *(item.type for item in self.system.inputs))
-        enums = {type_.name: type_ for type_ in types if isinstance(type_, EnumType)}
+        enums = {type_.name: type_ for type_ in self._all_types() if isinstance(type_, EnumType)}
         return Scope(
             variables=variables,
             states=frozenset((item.name, location) for item in self.system.automata for location in item.locations),

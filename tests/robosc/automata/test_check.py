@@ -29,6 +29,7 @@ from robosc.expressions import (
     Received,
     StateTest,
     StringType,
+    Type,
     VariableRead,
 )
 from robosc.model.structure import Deployment
@@ -66,6 +67,11 @@ def with_variable(item: DiscreteVariable) -> System:
     return with_automaton(variables=(*SOUND.automata[0].variables, item))
 
 
+def with_input(type_: Type) -> System:
+    """The sound system with one more received datum."""
+    return replace(SOUND, inputs=(*SOUND.inputs, InputVariable("u_seen", ("x",), type_)))
+
+
 FAULTY = [
     (replace(SOUND, events=(*SOUND.events, Event("go", True))), "there are two of event go"),
     (replace(SOUND, automata=SOUND.automata * 2), "there are two of automaton A"),
@@ -97,6 +103,10 @@ FAULTY = [
     (with_variable(DiscreteVariable("x", IntegerType(0, 3), ())), "A: x: it has no value to begin with"),
     (with_variable(DiscreteVariable("x", IntegerType(0, 3), (4,))), "A: x: 4 is no integer(0..3)"),
     (with_variable(DiscreteVariable("x", COLOUR, ("blue",))), "A: x: 'blue' is no Colour"),
+    (with_input(IntegerType(3, 0)), "integer(3..0) has no value"),
+    (with_input(EnumType("None", ())), "enum None has no value"),
+    (with_input(EnumType("E", ("a", "a"))), "there are two of enum E value a"),
+    (with_input(EnumType("Colour", ("red",))), "there are two of enum Colour, with other values"),
     (replace(SOUND, conditions=(EventCondition("fly", Constant(True)),)), "the event fly, which there is not"),
     (replace(SOUND, conditions=(EventCondition("go", Constant(1)),)), "a condition on go: integer is no condition"),
     (replace(SOUND, invariants=(StateTest("A", "gone"),)), "an invariant: there is no state A.gone"),
@@ -107,10 +117,7 @@ FAULTY = [
         replace(SOUND, inputs=(InputVariable("fly", (), BooleanType()), *SOUND.inputs)),
         "data is received with the event fly",
     ),
-    (
-        replace(SOUND, inputs=(*SOUND.inputs, InputVariable("u_seen", ("x",), DoubleType()))),
-        "double has infinitely many values",
-    ),
+    (with_input(DoubleType()), "double has infinitely many values"),
 ]
 
 

@@ -3,7 +3,10 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any
+
+import msgspec
 
 from robosc.automata import System, check_system
 from robosc.automata.compile import State
@@ -11,13 +14,18 @@ from robosc.automata.decision import Decision
 from robosc.automata.state import subjects, whole_names
 from robosc.certification import Progress
 from robosc.conditions.rendering import Formulas
-from robosc.errors import UnsupportedModelError
+from robosc.errors import InvalidSupervisorError, InvalidSystemError, UnsupportedModelError
 from robosc.pipeline.conditions import Condition, Conditions, condition_of, conditions_of
+from robosc.pipeline.files import given_path, read_bounded, write_whole
+from robosc.pipeline.loading import FileName
 from robosc.pipeline.options import SynthesisOptions
 from robosc.pipeline.results import Outcome, SynthesisStatus, Verification, VerificationStatus
 from robosc.supervisor import AddedCondition, DecisionDiagram
+from robosc.supervisor.codec import MAXIMUM_BYTES, decode_document, encode_document, one_line
 from robosc.supervisor.diagram import diagram_domains
 from robosc.supervisor.predicates import state_predicate, state_predicates
+from robosc.supervisor.structure import FORMAT, FORMAT_VERSION
+from robosc.supervisor.validation import validate_added, validate_condition
 from robosc.synthesis import Statistics, SynthesisProgress, synthesize
 from robosc.synthesis import SynthesisStatus as CoreStatus
 from robosc.tables import html_table
@@ -70,6 +78,37 @@ class SystemSupervisor:
         """Reachable states of the controlled system."""
         return self.statistics.states
 
+    @classmethod
+    def read(cls, file: FileName) -> "SystemSupervisor":
+        """Read a supervisor's file (`.rsup`) that `write` has written; it is validated, but not verified.
+
+        Raises:
+            FileAccessError: The file cannot be read.
+            InvalidSupervisorError: It is no supervisor of automata.
+        """
+        return decode_system(read_bounded(given_path(file), MAXIMUM_BYTES))
+
+    def write(self, file: FileName) -> Path:
+        """Write the supervisor's file (`.rsup`) with the automata, whole or not at all, and return its path.
+
+        Raises:
+            FileAccessError: The place cannot be written.
+            UnsupportedModelError: The file would become too large, an expression is nested too deeply, or an automaton
+                or a variable has a name that is no identifier.
+        """
+        path = given_path(file)
+        write_whole(path, self.encode())
+        return path
+
+    def encode(self) -> bytes:
+        """Return the content of the supervisor's file; raises UnsupportedModelError as `write`."""
+        content = encode_document(_Document(FORMAT, FORMAT_VERSION, self))
+        try:
+            decode_system(content)
+        except InvalidSupervisorError as error:
+            raise UnsupportedModelError(f"no file can hold the supervisor of {self.system.name}: {error}") from error
+        return content
+
     def __repr__(self) -> str:
         events = f"{len(self.added)} event{'s' if len(self.added) != 1 else ''}"
         return f"<supervisor of {self.system.name}: {self.states} states, conditions added to {events}>"
@@ -81,6 +120,37 @@ class SystemSupervisor:
         return html_table(("figure", "value"), [("states", self.states)], caption=repr(self).strip("<>")) + (
             self.conditions._repr_html_()
         )
+
+
+class _Document(msgspec.Struct, frozen=True):
+    """The outermost object of such a supervisor's file."""
+
+    format: str
+    version: int
+    system_supervisor: SystemSupervisor
+
+
+_DECODER = msgspec.json.Decoder(_Document, strict=True)
+
+
+def decode_system(data: bytes) -> SystemSupervisor:
+    """The supervisor of automata in a file's bytes, consistent in itself; it is not verified here.
+
+    Raises:
+        InvalidSupervisorError: The bytes are no supervisor of automata; says where in one sentence.
+    """
+    supervisor = decode_document(data, _DECODER).system_supervisor
+    try:
+        check_system(supervisor.system)
+        validate_added(supervisor.added, supervisor.system)
+        if supervisor.initial is not None:
+            validate_condition(supervisor.initial, diagram_domains(supervisor.system))
+    except (InvalidSystemError, InvalidSupervisorError) as error:
+        raise InvalidSupervisorError(f"the supervisor file is inconsistent: {one_line(error)}") from None
+    figures = supervisor.statistics
+    if min(figures.state_bits, figures.iterations, figures.peak_nodes) < 0 or figures.states < 1:
+        raise InvalidSupervisorError("the supervisor file is inconsistent: a figure of the synthesis is too small")
+    return supervisor
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -5,6 +5,7 @@ so a digest or signature of the file is one of the value. Reading accepts any la
 """
 
 import json
+from dataclasses import fields, is_dataclass
 from typing import NoReturn
 
 import msgspec
@@ -36,13 +37,24 @@ _ENCODER = msgspec.json.Encoder(order="sorted")
 _DECODER = msgspec.json.Decoder(_Document, strict=True)
 
 
+_KINDS = {
+    "supervisor": "the supervisor of a model, which robosc.Supervisor.read reads",
+    "system_supervisor": "the supervisor of automata without a model, which robosc.SystemSupervisor.read reads",
+}
+"""The contents that such files have, by the field that holds them."""
+
+
 def encode(supervisor: Supervisor) -> bytes:
     """The canonical bytes of a supervisor; `decode` reads whatever this writes.
 
     Raises:
         UnsupportedModelError: An expression is nested too deeply, or the file would become too large.
     """
-    document = _Document(FORMAT, FORMAT_VERSION, supervisor)
+    return encode_document(_Document(FORMAT, FORMAT_VERSION, supervisor))
+
+
+def encode_document(document: msgspec.Struct) -> bytes:
+    """The canonical bytes of a document: the format, its version, and one of the contents; errors as of `encode`."""
     try:
         content = _ENCODER.encode(document) + b"\n"
         # A nested value is a row of openings somewhere, so few of them settle it without a walk.
@@ -66,17 +78,31 @@ def decode(data: bytes) -> Supervisor:
     Raises:
         InvalidSupervisorError: The bytes are no supervisor of a known version; says where in one sentence.
     """
+    supervisor = decode_document(data, _DECODER).supervisor
+    validate(supervisor)
+    return supervisor
+
+
+def decode_document[D: msgspec.Struct](data: bytes, decoder: msgspec.json.Decoder[D]) -> D:
+    """The document in a file's bytes, of which only the form was looked at.
+
+    Args:
+        data: The bytes.
+        decoder: Decoder of documents whose last field is the content.
+
+    Raises:
+        InvalidSupervisorError: It has not that form; says where in one sentence.
+    """
     if len(data) > MAXIMUM_BYTES:
         raise InvalidSupervisorError(f"a supervisor file has at most {MAXIMUM_BYTES} bytes, this one {len(data)}")
     raw = _raw(data)
-    _require_known_version(raw)
+    _require_known_version(raw, decoder.type.__struct_fields__[-1])
     try:
-        document = _DECODER.decode(data)
+        document = decoder.decode(data)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise InvalidSupervisorError(f"the supervisor file is malformed: {_one_line(error)}") from error
+        raise InvalidSupervisorError(f"the supervisor file is malformed: {one_line(error)}") from error
     _require_known_fields(raw, document, "$")
-    validate(document.supervisor)
-    return document.supervisor
+    return document
 
 
 def _raw(data: bytes) -> object:
@@ -86,7 +112,7 @@ def _raw(data: bytes) -> object:
     except RecursionError:
         raise _too_deep() from None
     except ValueError as error:
-        raise InvalidSupervisorError(f"the supervisor file is no UTF-8 JSON: {_one_line(error)}") from error
+        raise InvalidSupervisorError(f"the supervisor file is no UTF-8 JSON: {one_line(error)}") from error
     if _nesting(raw) > _MAXIMUM_NESTING:
         raise _too_deep()
     return raw
@@ -121,7 +147,7 @@ def _too_deep() -> InvalidSupervisorError:
     )
 
 
-def _require_known_version(raw: object) -> None:
+def _require_known_version(raw: object, wanted: str) -> None:
     if not isinstance(raw, dict) or raw.get("format") != FORMAT:
         raise InvalidSupervisorError(f"this is no supervisor file: its field 'format' is not {FORMAT!r}")
     version = raw.get("version")
@@ -129,12 +155,15 @@ def _require_known_version(raw: object) -> None:
         raise InvalidSupervisorError(
             f"this RoboSC reads supervisor files of version {FORMAT_VERSION}, this one has version {str(version)[:40]}"
         )
+    for content, meaning in _KINDS.items():
+        if content in raw and content != wanted:
+            raise InvalidSupervisorError(f"the supervisor file holds {meaning}")
 
 
 def _require_known_fields(raw: object, value: object, place: str) -> None:
     """Refuse fields that decoding passed over; `raw` and `value` have one shape, no deeper than `_nesting` allows."""
-    if isinstance(raw, dict) and isinstance(value, msgspec.Struct):
-        known = {*value.__struct_encode_fields__, value.__struct_config__.tag_field}
+    known = _fields(value)
+    if isinstance(raw, dict) and known:
         for key, inner in raw.items():
             if key not in known:
                 raise InvalidSupervisorError(f"the supervisor file is malformed: unknown field {key!r} at {place}")
@@ -146,5 +175,13 @@ def _require_known_fields(raw: object, value: object, place: str) -> None:
                 _require_known_fields(inner, part, f"{place}[{index}]")
 
 
-def _one_line(error: Exception) -> str:
+def _fields(value: object) -> set[str | None]:
+    """Return the names that the fields of a value have in a file."""
+    if isinstance(value, msgspec.Struct):
+        return {*value.__struct_encode_fields__, value.__struct_config__.tag_field}
+    return {field.name for field in fields(value)} if is_dataclass(value) else set()
+
+
+def one_line(error: Exception) -> str:
+    """Return an error's text as one line that is not long."""
     return " ".join(str(error).split())[:300]

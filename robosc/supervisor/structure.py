@@ -11,7 +11,7 @@ import msgspec
 
 from robosc.automata.executable import ExecutableSystem
 from robosc.expressions import Name
-from robosc.model.structure import Deployment, EventName, Model
+from robosc.model.structure import Deployment, Model
 
 FORMAT = "robosc-supervisor"
 FORMAT_VERSION = 1
@@ -58,7 +58,7 @@ class AddedCondition(msgspec.Struct, frozen=True):
     It is simplified against plant, requirements and reachability. Events that are not listed get nothing added.
     """
 
-    event: EventName
+    event: Annotated[str, msgspec.Meta(max_length=511)]
     condition: DecisionDiagram
 
 

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
+from robosc.automata.structure import System
 from robosc.errors import InvalidExpressionError, InvalidSupervisorError
 from robosc.expressions import (
     ArrayType,
@@ -45,9 +46,9 @@ from robosc.model.structure import (
     Variable,
     is_tau,
 )
-from robosc.supervisor.diagram import diagram_domains
+from robosc.supervisor.diagram import Domains, diagram_domains
 from robosc.supervisor.diagram import validate as validate_diagram
-from robosc.supervisor.structure import Certificate, Supervisor
+from robosc.supervisor.structure import AddedCondition, Certificate, DecisionDiagram, Supervisor
 
 _TAU = re.compile(r"tau_[1-9][0-9]{0,8}\Z")
 _COUNT = re.compile(r"[1-9][0-9]{0,3999}\Z|0\Z")
@@ -105,7 +106,8 @@ def validate(supervisor: Supervisor) -> None:
         _validate_certificate(supervisor.certificate)
         if supervisor.certificate.deployment is not supervisor.deployment:
             raise InvalidSupervisorError("the certificate is for another deployment than the supervisor")
-        _validate_added(supervisor)
+        if supervisor.added:
+            validate_added(supervisor.added, supervisor.executable.automata)
 
 
 @contextmanager
@@ -472,22 +474,29 @@ def _validate_certificate(certificate: Certificate) -> None:
         raise InvalidSupervisorError("certificate: the number of transitions is no decimal number")
 
 
-def _validate_added(supervisor: Supervisor) -> None:
-    """Conditions are added to controllable events, each once, by diagrams over what there is."""
-    if not supervisor.added:
-        return
-    system = supervisor.executable.automata
+def validate_added(added: Iterable[AddedCondition], system: System) -> None:
+    """Do nothing if conditions are added to controllable events, each once, by diagrams over what there is.
+
+    Raises:
+        InvalidSupervisorError: They are not.
+    """
     controllable = {event.name for event in system.events if event.is_controllable}
     domains = diagram_domains(system)
     seen: set[str] = set()
-    for item in supervisor.added:
-        with _at(f"condition added to {item.event}"):
+    for item in added:
+        # An event that there is not may have any text as its name.
+        with _at(f"condition added to {item.event if item.event in controllable else ascii(item.event[:80])}"):
             if item.event not in controllable:
                 raise InvalidSupervisorError("there is no such controllable event")
             if item.event in seen:
                 raise InvalidSupervisorError("it stands twice")
             seen.add(item.event)
-            try:
-                validate_diagram(item.condition, domains)
-            except ValueError as error:
-                raise InvalidSupervisorError(str(error)) from None
+            validate_condition(item.condition, domains)
+
+
+def validate_condition(condition: DecisionDiagram, domains: Domains) -> None:
+    """Do nothing if a diagram is one over what there is; raises InvalidSupervisorError."""
+    try:
+        validate_diagram(condition, domains)
+    except ValueError as error:
+        raise InvalidSupervisorError(str(error)) from None

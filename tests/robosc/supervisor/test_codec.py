@@ -1,4 +1,3 @@
-import copy
 import json
 import random
 import re
@@ -17,6 +16,7 @@ from robosc.expressions import TRUE, Constant, Unary
 from robosc.model.structure import Deployment, Requirement, RequirementForm
 from robosc.supervisor import Supervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES, MAXIMUM_EXPRESSION_DEPTH, decode, encode
+from support.damaged_json import change_value
 from support.effort import examples
 from support.models import EXAMPLE_DEPLOYMENTS, example_bundle
 from support.supervisors import supervisor
@@ -365,27 +365,9 @@ def test_mutated_bytes(seed: Any) -> None:
 def test_mutated_values(seed: Any) -> None:
     chance = random.Random(seed)
     value = document()
-    slots = list(all_slots(value))
     for _ in range(chance.randint(1, 2)):
-        holder, key = chance.choice(slots)
-        holder[key] = copy.deepcopy(_other_value(chance, slots, holder[key]))
+        change_value(value, chance)
     survives(as_bytes(value))
-
-
-def _other_value(chance: Any, slots: Any, old: Any) -> Any:
-    """A value of a kind that may just fit."""
-    if chance.random() < 0.7:
-        same_kind = [value for holder, key in slots if type(value := holder[key]) is type(old)]
-        return chance.choice(same_kind)
-    return chance.choice([None, True, False, 0, 1, -1, 2**31, 2**70, 0.5, 1e308, "", "x", "Base", "a.b", [], {}, [[]]])
-
-
-def all_slots(value: Any) -> Any:
-    """Every place of a JSON value, as container and key."""
-    for key, inner in list(value.items()) if isinstance(value, dict) else list(enumerate(value)):
-        yield value, key
-        if isinstance(inner, dict | list):
-            yield from all_slots(inner)
 
 
 def test_mutations_reach_both_outcomes() -> None:
@@ -393,9 +375,7 @@ def test_mutations_reach_both_outcomes() -> None:
     for seed in range(400):
         chance = random.Random(seed)
         value = document()
-        slots = list(all_slots(value))
-        holder, key = chance.choice(slots)
-        holder[key] = copy.deepcopy(_other_value(chance, slots, holder[key]))
+        change_value(value, chance)
         accepted += survives(as_bytes(value)) and value != document()
     assert 5 <= accepted <= 300
     print(f"accepted {accepted} of 400 changed supervisors")

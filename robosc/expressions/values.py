@@ -196,27 +196,22 @@ def _extreme(elements: Any, choose: Any) -> Any:
 
 def any_of(elements: Any, condition: Any) -> Any:
     """Kleene disjunction of a condition over elements, up to the first that is true; unknown if there are none."""
-    if not elements:
-        return None
-    result: Any = False
-    for element in elements:
-        outcome = condition(element)
-        if outcome is True:
-            return True
-        if outcome is None:
-            result = None
-    return result
+    return _quantified(elements, condition, True)
 
 
 def all_of(elements: Any, condition: Any) -> Any:
     """Kleene conjunction of a condition over elements, up to the first that is false; unknown if there are none."""
+    return _quantified(elements, condition, False)
+
+
+def _quantified(elements: Any, condition: Any, decisive: Any) -> Any:
     if not elements:
         return None
-    result: Any = True
+    result = not decisive
     for element in elements:
         outcome = condition(element)
-        if outcome is False:
-            return False
+        if outcome is decisive:
+            return decisive
         if outcome is None:
             result = None
     return result

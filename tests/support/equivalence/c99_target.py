@@ -21,8 +21,8 @@ from support.c99 import SANITIZERS, compiled, data_words, microseconds, settings
 from support.c99_layer import REFUSALS, caller_place, compiled_layer, layer_settings_words
 from support.c99_layer_main import TOKENS
 from support.c99_main import batch_types, events_back
-from support.equivalence.observation import Entry, Issued, Observation, Sight, flat
-from support.equivalence.python_targets import Callers, Ids
+from support.equivalence.observation import Entry, Issued, Observation, Sight
+from support.equivalence.portable import Callers, Ids, flat
 from support.equivalence.scenario import PERIOD_S, Action, Scenario
 
 _ENDS = ("succeeded", "aborted", "cancelled")

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from robosc.model.structure import CommunicationKind, Deployment, Interface, Model
-from support.equivalence.observation import FULL, Entry, Issued, Observation, Sight, entry, flat
+from support.equivalence.observation import FULL, Entry, Issued, Observation, Sight, entry
+from support.equivalence.portable import flat
 from support.equivalence.scenario import Action, Scenario
 
 LIMIT_S = 15.0

@@ -1,7 +1,6 @@
 """Observation of a controller after each action, and the one message about the difference from the reference."""
 
 import json
-import math
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -74,25 +73,6 @@ class Sight:
 
 FULL = Sight()
 NO_LOG = Sight(has_log=False)
-
-
-def flat(data: Any, path: str = "") -> dict[str, Any]:
-    """Data by path; numbers and truth values as floats, since not every target has all of them."""
-    if isinstance(data, list):
-        return {
-            name: part for place, value in enumerate(data) for name, part in flat(value, f"{path}[{place}]").items()
-        }
-    if isinstance(data, dict):
-        return {
-            name: part
-            for key, value in data.items()
-            for name, part in flat(value, f"{path}.{key}" if path else key).items()
-        }
-    if data is None:
-        return {}
-    if isinstance(data, float) and math.isnan(data):
-        return {path: "NaN"}  # Which equals itself.
-    return {path: data if isinstance(data, str) else float(data)}
 
 
 def entry(found: Mapping[str, Any]) -> Entry:

@@ -22,7 +22,7 @@ from robosc.expressions import (
 from robosc.model.structure import CommunicationKind, Deployment, Model
 from robosc.supervisor import Supervisor
 from support.equivalence.observation import Issued, Observation
-from support.equivalence.python_targets import PythonLayer, PythonTarget, reference
+from support.equivalence.python_targets import PythonTarget, reference
 from support.equivalence.scenario import Action, Scenario
 
 # Numbers that a float of 32 bits holds, too, but for the hostile ones.
@@ -187,7 +187,6 @@ def _next(model: Model, target: PythonTarget, dice: Random, drawn: Dice) -> Acti
 
 
 def _next_of_layer(model: Model, target: PythonTarget, dice: Random, drawn: Dice) -> Action:
-    assert isinstance(target, PythonLayer)
     if target.is_faulty and dice.random() < 0.4:
         return Action("restart")
     if dice.random() < 0.55:
@@ -197,7 +196,7 @@ def _next_of_layer(model: Model, target: PythonTarget, dice: Random, drawn: Dice
     return drawn.asked() or Action("tick")
 
 
-def cancels_of(model: Model, target: PythonLayer) -> list[Action]:
+def cancels_of(model: Model, target: PythonTarget) -> list[Action]:
     """The cancels of goals that an existing controller has sent."""
     actions = [item.name for item in model.communications if item.kind is CommunicationKind.ACTION]
     return [Action("ask_cancel", name) for name in actions if target.callers.count(name)]
@@ -298,7 +297,6 @@ def layer_node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scena
     model = supervisor.model
     settings = layer_node_settings(model)
     target = reference(supervisor)
-    assert isinstance(target, PythonLayer)
     target.start(Scenario((), settings))
     drawn = Dice(model, dice, is_hostile=False)
     actions: list[Action] = []

@@ -6,7 +6,7 @@ from robosc.targets.ros.runtime.supervised import BLOCKED, callers_name
 from robosc.targets.ros.topics import Topic
 from support.equivalence.node_target import given, set_parts
 from support.equivalence.observation import Issued
-from support.equivalence.python_targets import Callers
+from support.equivalence.portable import Callers
 from support.equivalence.scenario import Action
 from support.ros1 import Peer
 

@@ -7,7 +7,7 @@ from robosc.targets.ros.runtime.messages import load_message
 from robosc.targets.ros.runtime.supervised import BLOCKED, callers_name
 from robosc.targets.ros.topics import Topic
 from support.equivalence.observation import Issued
-from support.equivalence.python_targets import Callers
+from support.equivalence.portable import Callers
 from support.equivalence.scenario import Action
 from support.ros2 import Peer
 

@@ -15,7 +15,8 @@ from robosc.targets import generate, write_files
 from robosc.targets.ros.runtime.messages import basic_field, load_message, load_server, message_name
 from robosc.targets.ros.topics import servers, topics
 from support.equivalence.node_target import LIMIT_S, NodeTarget
-from support.equivalence.observation import Issued, Sight, flat
+from support.equivalence.observation import Issued, Sight
+from support.equivalence.portable import flat
 from support.equivalence.ros2_caller import Ros2Caller
 from support.equivalence.scenario import Action, Scenario
 from support.ros2 import Peer, RosProcess, environment, own_domain

@@ -9,8 +9,7 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from typing import Any, Callable, Optional
 
 from robosc.targets.ros.runtime.presence import Presence
 from robosc.targets.ros.runtime.reports import Reports
@@ -47,7 +46,7 @@ DONE = 7
 _SILENT = (WAITING_FOR_GOAL_ACK, WAITING_FOR_RESULT)
 _CANCEL_HEARD = (WAITING_FOR_RESULT, RECALLING, PREEMPTING, DONE)
 
-Put = Callable[[Action, str | None], None]
+Put = Callable[[Action, Optional[str]], None]
 
 
 def feedback_kind(name: str) -> str:

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
-from typing import Optional
+from collections.abc import Mapping
+from typing import Callable
 
 Action = Callable[[], None]
 
@@ -28,7 +28,7 @@ class Inbox:
         self._arrived = threading.Condition()
         self._count = 0
         self._dropped = 0
-        self._waiting: dict[Optional[str], deque[tuple[int, Action]]] = {  # noqa: UP045 - evaluated by Python 3.8
+        self._waiting: dict[str | None, deque[tuple[int, Action]]] = {
             kind: deque(maxlen=depth) for kind, depth in depths.items()
         }
         self._waiting[None] = deque()

@@ -5,7 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -70,10 +70,12 @@ class Workspace:
 
     Args:
         folder: Its folder, with packages below `src`.
+        variables: Environment of colcon on top of this process's.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, variables: Mapping[str, str] | None = None) -> None:
         self.folder = folder
+        self._variables = {**os.environ, **(variables or {})}
         self._colcon = colcon_program()
 
     def colcon(self, *arguments: str) -> str:
@@ -82,17 +84,22 @@ class Workspace:
         Raises:
             AssertionError: It failed.
         """
-        result = subprocess.run(
+        result = self.run(*arguments)
+        assert result.returncode == 0, result.stdout + result.stderr
+        return result.stdout
+
+    def run(self, *arguments: str) -> "subprocess.CompletedProcess[str]":
+        """Run colcon, whatever comes of it."""
+        return subprocess.run(
             [str(self._colcon), *arguments],
             cwd=self.folder,
+            env=self._variables,
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
             timeout=BUILD_LIMIT_S,
             check=False,
         )
-        assert result.returncode == 0, result.stdout + result.stderr
-        return result.stdout
 
     def command(self, package: str, executable: str, arguments: Sequence[str] = ()) -> list[str]:
         """Arguments of bash that run an installed program with the workspace sourced."""

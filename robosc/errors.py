@@ -159,10 +159,6 @@ class InvalidSystemError(RoboscError):
     """Automata that do not fit together: see `robosc.automata.check_system`."""
 
 
-class NondeterministicEventError(InvalidSystemError):
-    """A controllable event that one automaton could take by several edges in one state."""
-
-
 class NodeLimitError(RoboscError):
     """The decision diagrams exceeded the limit of nodes."""
 

@@ -1,8 +1,4 @@
-"""Check whether the parts of a system fit together, which a front end may run before it hands a system on.
-
-Faults that only values can show, such as two edges of a controllable event that can be taken at once, are found where
-the values are: by `Semantics` and by synthesis.
-"""
+"""Check whether the parts of a system fit together, which a front end may run before it hands a system on."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -44,11 +40,11 @@ class _Checker:
             for edge in automaton.edges:
                 for problem in self._edge(scope, automaton, edge):
                     yield f"{automaton.name}: {edge.source} -{edge.event}-> {edge.target}: {problem}"
-        for condition in system.conditions:
+        for condition in (*system.conditions, *system.plant_conditions):
             if condition.event not in events:
                 yield f"a condition is on the event {condition.event}, which there is not"
             yield from _condition(scope, condition.condition, f"a condition on {condition.event}")
-        for invariant in system.invariants:
+        for invariant in (*system.invariants, *system.plant_invariants):
             yield from _condition(scope, invariant, "an invariant")
         yield from _condition(scope, system.initial, "the initial condition")
         yield from _condition(scope, system.marker, "the marker condition")
@@ -122,14 +118,14 @@ def _shape(automaton: Automaton, events: set[str]) -> Iterator[str]:
     """Yield the faults in locations and alphabet."""
     yield from _doubles("location", automaton.locations)
     locations = set(automaton.locations)
-    if not automaton.initial:
-        yield "it has no location to begin in"
     for what, names in (("initial", automaton.initial), ("marked", sorted(automaton.marked))):
         for name in names:
             if name not in locations:
                 yield f"there is no location {name}, which is to be {what}"
     for event in sorted(automaton.alphabet - events):
         yield f"there is no event {event}, which is in the alphabet"
+    for event in sorted(automaton.monitors - automaton.alphabet):
+        yield f"{event} is monitored but is not in the alphabet"
 
 
 def _variables(automaton: Automaton) -> Iterator[str]:

@@ -76,7 +76,10 @@ def controlled_graph(
         SynthesisCancelled: `should_stop` became true.
     """
     events = sorted(semantics.system.events, key=lambda event: event.name)
-    states = [state for state in semantics.initial_states if initial(state)]
+    try:
+        states = [state for state in semantics.initial_states if initial(state)]
+    except TooManyChoicesError:
+        return None
     numbers = {state: number for number, state in enumerate(states)}
     parents: list[tuple[int, str] | None] = [None] * len(states)
     steps: list[tuple[tuple[str, tuple[int, ...]], ...]] = []

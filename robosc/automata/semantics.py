@@ -1,7 +1,8 @@
 """The explicit meaning of a system: the slow and obvious one by which every other is judged.
 
 A transition is one synchronous step: every automaton with the event in its alphabet takes an edge whose
-guard is true; all updates read the old state and the same received data and happen together. What one
+guard is true, unless it monitors the event and has none; all updates read the old state and the same received
+data and happen together. A step into a state in which a plant invariant is not true does not happen. What one
 event can do depends on few locations and variables only, so it is worked out once for each of their
 values and remembered.
 
@@ -30,8 +31,8 @@ from robosc.automata.compile import (
 from robosc.automata.inputs import connected_inputs, valuations
 from robosc.automata.state import Subject, initial_values, subject_type, subjects
 from robosc.automata.structure import Assignment, Automaton, Edge, Event, InputVariable, Role, System
-from robosc.errors import NondeterministicEventError, RoboscError
-from robosc.expressions import TRUE, IntegerType, Type, Value, domain
+from robosc.errors import RoboscError
+from robosc.expressions import TRUE, Expression, IntegerType, Type, Value, domain
 from robosc.expressions.text import expression_text
 
 MAXIMUM_CHOICES = 500_000
@@ -76,10 +77,12 @@ class _Outcome:
     """Effect of one event in a state.
 
     Attributes:
-        is_possible: True if every plant has an edge for it whose guard is true.
+        is_possible: True if every plant that does not monitor it has an edge for it whose guard is true, every plant
+            condition is true, and plant invariants leave it a step.
         may_leave_range: True if some data or edge would take a variable out of its range.
-        meets_condition: True if every event condition is true and every requirement automaton has such an edge, too.
-        writes: Changes by each choice of data and edges that stays in range.
+        meets_condition: True if every event condition is true and every requirement automaton that does not monitor
+            it has such an edge, too.
+        writes: Changes by each choice of data and edges that stays in range and keeps the plant invariants.
     """
 
     is_possible: bool
@@ -99,9 +102,12 @@ class _Rule:
     Attributes:
         event: The event.
         reads: The part of a state that determines the outcome.
-        participants: Place of the location and arcs by location, for each plant that takes part.
-        observers: The same for each requirement automaton.
+        participants: Place of the location and arcs by location, for each plant that takes part and can block it.
+        observers: The same for each requirement automaton that can forbid it.
+        monitors: The same for each automaton that monitors it.
         conditions: Its event conditions.
+        plant_conditions: Its plant conditions.
+        plant_invariants: The plant invariants that read what it may change.
         outcomes: Outcomes worked out already, by the values of `reads`.
         carried: The same for certain data.
     """
@@ -110,7 +116,10 @@ class _Rule:
     reads: Callable[[State], object]
     participants: tuple[_Participant, ...]
     observers: tuple[_Participant, ...]
+    monitors: tuple[_Participant, ...]
     conditions: tuple[Function, ...]
+    plant_conditions: tuple[Function, ...]
+    plant_invariants: tuple[Function, ...]
     outcomes: dict[object, _Outcome] = field(default_factory=dict)
     carried: dict[object, _Writes | None] = field(default_factory=dict)
 
@@ -126,22 +135,34 @@ class _Rule:
         return self._work_out(state, given)
 
     def _work_out(self, state: State, given: Data = NO_DATA) -> _Outcome:
-        meets_condition = all(condition(state, NO_DATA) is True for condition in self.conditions)
-        choices = [self._taken(participant, state) for participant in self.participants]
-        watched = [self._taken(observer, state) for observer in self.observers]
+        watched = [_taken(observer, state) for observer in self.observers]
         # A requirement that has no edge forbids the event and stays where it is.
-        meets_condition = meets_condition and all(watched)
-        # An event in no plant's alphabet cannot happen.
-        if not choices or not all(choices):
+        meets_condition = _all_hold(self.conditions, state) and all(watched)
+        choices = self._choices(state)
+        if choices is None:
             return _Outcome(False, False, meets_condition, ())
-        choices += [arcs for arcs in watched if arcs]
         leaves_range = False
         writes: dict[_Writes, None] = {}
-        for arcs in product(*choices):
+        for arcs in product(*choices, *(arcs for arcs in watched if arcs)):
             leaves, results = _joint_step(arcs, state, given)
             leaves_range = leaves_range or leaves
             writes.update(dict.fromkeys(results))
-        return _Outcome(True, leaves_range, meets_condition, tuple(writes))
+        if not self.plant_invariants:
+            return _Outcome(True, leaves_range, meets_condition, tuple(writes))
+        kept = tuple(item for item in writes if _all_hold(self.plant_invariants, _written(state, item)))
+        return _Outcome(bool(kept) or leaves_range, leaves_range, meets_condition, kept)
+
+    def _choices(self, state: State) -> list[list[_Arc]] | None:
+        """The arcs of each plant and each monitor that moves; None where the plants cannot do the event."""
+        # An event in no alphabet belongs to nobody, so it cannot happen.
+        if not (self.participants or self.observers or self.monitors):
+            return None
+        if not _all_hold(self.plant_conditions, state):
+            return None
+        taken = [_taken(participant, state) for participant in self.participants]
+        if not all(taken):
+            return None
+        return [*taken, *(arcs for monitor in self.monitors if (arcs := _taken(monitor, state)))]
 
     def writes_with(self, state: State, data: Carried) -> _Writes | None:
         """Return what the first arcs change with some data; None if there are no arcs, or if that leaves a range."""
@@ -151,8 +172,8 @@ class _Rule:
         return self.carried[key]
 
     def _work_out_with(self, state: State, data: Data) -> _Writes | None:
-        choices = [self._taken(participant, state) for participant in self.participants]
-        if not choices or not all(choices):
+        choices = self._choices(state)
+        if choices is None:
             return None
         writes: list[tuple[int, Value]] = []
         for arc, *_ in choices:
@@ -163,17 +184,25 @@ class _Rule:
                     return None
                 if value is not None:
                     writes.append((update.place, value))
-        return tuple(writes)
+        return tuple(writes) if _all_hold(self.plant_invariants, _written(state, writes)) else None
 
-    def _taken(self, participant: _Participant, state: State) -> list[_Arc]:
-        """The arcs that an automaton may take."""
-        place, arcs = participant
-        taken = [arc for arc in arcs.get(state[place], ()) if arc.guard(state, NO_DATA) is True]
-        if self.event.is_controllable and len(taken) > 1:
-            raise NondeterministicEventError(
-                f"the controllable event {self.event.name} has {len(taken)} edges that can be taken in {state[place]}"
-            )
-        return taken
+
+def _taken(participant: _Participant, state: State) -> list[_Arc]:
+    """The arcs that an automaton may take."""
+    place, arcs = participant
+    return [arc for arc in arcs.get(state[place], ()) if arc.guard(state, NO_DATA) is True]
+
+
+def _all_hold(conditions: Iterable[Function], state: State) -> bool:
+    return all(condition(state, NO_DATA) is True for condition in conditions)
+
+
+def _written(state: State, writes: Iterable[tuple[int, Value]]) -> State:
+    """The state after some writes."""
+    target = list(state)
+    for place, value in writes:
+        target[place] = value
+    return tuple(target)
 
 
 def _joint_step(arcs: tuple[_Arc, ...], state: State, given: Data) -> tuple[bool, list[_Writes]]:
@@ -238,8 +267,7 @@ class Semantics:
     """The uncontrolled system, state by state.
 
     States are tuples in the order of `subjects(system)`. What asks for the steps of a state raises
-    `TooManyChoicesError` where received data has more than `MAXIMUM_CHOICES` values that matter together, and
-    `NondeterministicEventError` where a controllable event has several edges to take.
+    `TooManyChoicesError` where received data has more than `MAXIMUM_CHOICES` values that matter together.
 
     Attributes:
         system: The system.
@@ -251,7 +279,9 @@ class Semantics:
         self._marked = tuple((self._places[Subject(item.name)], item.marked) for item in system.automata)
         self._rules = {event.name: self._rule(event) for event in system.events}
         self._invariants = tuple(compile_expression(item, self._places) for item in system.invariants)
-        self._initial = compile_expression(system.initial, self._places)
+        self._initial = tuple(
+            compile_expression(item, self._places) for item in (system.initial, *system.plant_invariants)
+        )
         self._marker = compile_expression(system.marker, self._places)
         self._uncontrollable = tuple(rule for rule in self._rules.values() if not rule.event.is_controllable)
 
@@ -278,7 +308,7 @@ class Semantics:
         """
         values = initial_values(self.system)
         _require_few(len(places) for places in values)
-        return tuple(state for state in product(*values) if self._initial(state, NO_DATA) is True)
+        return tuple(state for state in product(*values) if _all_hold(self._initial, state))
 
     @property
     def initial(self) -> State:
@@ -313,13 +343,7 @@ class Semantics:
             return frozenset()
         if given:
             outcome = rule.outcome_given(state, given)
-        results = set[State]()
-        for writes in outcome.writes:
-            target = list(state)
-            for place, value in writes:
-                target[place] = value
-            results.add(tuple(target))
-        return frozenset(results)
+        return frozenset(_written(state, writes) for writes in outcome.writes)
 
     def target_with(self, state: State, event: str, data: Carried) -> State | None:
         """The state that an event with certain data leads to where each automaton takes its first edge.
@@ -333,12 +357,7 @@ class Semantics:
             The state, or None if the plant does not enable the event or a variable would leave its range.
         """
         writes = self._rules[event].writes_with(state, data)
-        if writes is None:
-            return None
-        target = list(state)
-        for place, value in writes:
-            target[place] = value
-        return tuple(target)
+        return None if writes is None else _written(state, writes)
 
     def bad(self, state: State) -> bool:
         """Return True if a state violates an invariant, or an uncontrollable event of it a condition or range."""
@@ -363,24 +382,26 @@ class Semantics:
 
     def _rule(self, event: Event) -> _Rule:
         automata = [item for item in self.system.automata if event.name in item.alphabet]
-        edges = [edge for item in automata for edge in item.edges if edge.event == event.name]
         conditions = [item.condition for item in self.system.conditions if item.event == event.name]
-        expressions = [
-            *conditions,
-            *(edge.guard for edge in edges),
-            *(update.expression for edge in edges for update in edge.updates),
-        ]
-        read = {Subject(item.name) for item in automata}.union(*(subjects_read(item) for item in expressions))
+        plant_conditions = [item.condition for item in self.system.plant_conditions if item.event == event.name]
         return _Rule(
             event=event,
-            reads=_reader(sorted(self._places[subject] for subject in read)),
+            reads=_reader(sorted(self._places[subject] for subject in subjects_deciding(self.system, event.name))),
             participants=self._participants(automata, event.name, Role.PLANT),
             observers=self._participants(automata, event.name, Role.REQUIREMENT),
-            conditions=tuple(compile_expression(item, self._places) for item in conditions if item != TRUE),
+            monitors=tuple(self._participant(item, event.name) for item in automata if event.name in item.monitors),
+            conditions=self._compiled(item for item in conditions if item != TRUE),
+            plant_conditions=self._compiled(plant_conditions),
+            plant_invariants=self._compiled(plant_invariants_on(self.system, event.name)),
         )
 
+    def _compiled(self, conditions: Iterable[Expression]) -> tuple[Function, ...]:
+        return tuple(compile_expression(item, self._places) for item in conditions)
+
     def _participants(self, automata: Iterable[Automaton], event: str, role: Role) -> tuple[_Participant, ...]:
-        return tuple(self._participant(item, event) for item in automata if item.role is role)
+        return tuple(
+            self._participant(item, event) for item in automata if item.role is role and event not in item.monitors
+        )
 
     def _participant(self, automaton: Automaton, event: str) -> _Participant:
         place = self._places[Subject(automaton.name)]
@@ -403,6 +424,41 @@ class Semantics:
             type=subject_type(self.system, subject),
             inputs=_inputs_of(self.system.inputs, edge.event, paths),
         )
+
+
+def subjects_deciding(system: System, event: str) -> frozenset[Subject]:
+    """The places of a state that decide what an event does."""
+    automata = [item for item in system.automata if event in item.alphabet]
+    edges = [edge for item in automata for edge in item.edges if edge.event == event]
+    expressions = [
+        *(item.condition for item in (*system.conditions, *system.plant_conditions) if item.event == event),
+        *plant_invariants_on(system, event),
+        *(edge.guard for edge in edges),
+        *(update.expression for edge in edges for update in edge.updates),
+    ]
+    return frozenset({Subject(item.name) for item in automata}.union(*map(subjects_read, expressions)))
+
+
+def subjects_changed(system: System, event: str) -> frozenset[Subject]:
+    """The places of a state that an event may change."""
+    return frozenset(
+        subject
+        for automaton in system.automata
+        for edge in automaton.edges
+        if edge.event == event
+        for subject in (
+            *([Subject(automaton.name)] if edge.source != edge.target else []),
+            *(Subject(automaton.name, update.variable) for update in edge.updates),
+        )
+    )
+
+
+def plant_invariants_on(system: System, event: str) -> tuple[Expression, ...]:
+    """The plant invariants that read what an event may change; the others stay as true as they are."""
+    if not system.plant_invariants:
+        return ()
+    changed = subjects_changed(system, event)
+    return tuple(item for item in system.plant_invariants if subjects_read(item) & changed)
 
 
 def _reader(places: list[int]) -> Callable[[State], object]:

@@ -87,7 +87,10 @@ class Role(StrEnum):
     PLANT = "plant"
     """Automaton that says what can happen."""
     REQUIREMENT = "requirement"
-    """Automaton that says what may happen: it watches the plants, and an event without an edge in it violates it."""
+    """Automaton that says what may happen: it watches the plants, and an event without an edge in it violates it.
+
+    An event of which only requirements know is always possible in the plants.
+    """
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,13 +100,15 @@ class Automaton:
     Attributes:
         name: Unique; a component's name, or e.g. `service calibrate`, which no identifier can be.
         locations: Names, at least one.
-        initial: The locations it may begin in, at least one.
+        initial: The locations it may begin in; without any the system has no initial state.
         marked: Marked locations.
-        alphabet: Events it takes part in. Where it has no edge for one, a plant cannot do it, and a requirement
+        alphabet: Events it takes part in. Where no edge for one takes part, a plant cannot do it, and a requirement
             forbids it.
+        edges: Its arcs. Where several for one event take part, it takes one of them, and nobody controls which.
         variables: Its variables.
-        edges: Its arcs. Two edges of one location may both take part only for an uncontrollable event.
         role: Its role, plant or requirement.
+        monitors: Events of the alphabet that it neither blocks nor forbids: where no edge for one takes part, it stays
+            as it is.
     """
 
     name: str
@@ -114,6 +119,7 @@ class Automaton:
     edges: tuple[Edge, ...]
     variables: tuple[DiscreteVariable, ...] = ()
     role: Role = Role.PLANT
+    monitors: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,9 +146,12 @@ class System:
             system.
         inputs: Received data that updates read.
         conditions: Requirements on events; several on one event must all be true.
-        invariants: Conditions that must be true in every state.
+        invariants: Requirements on states: conditions that must be true in every one.
         initial: A condition that is true in every initial state, beside what automata and variables say.
         marker: A condition that is true in every marked state, beside what the automata say.
+        plant_conditions: Conditions without which the plants cannot do an event, controllable or not.
+        plant_invariants: Conditions that are true in every state that there is: what would lead to another one cannot
+            happen, and the system does not begin in one. No supervisor has to see to them.
     """
 
     name: str
@@ -153,6 +162,8 @@ class System:
     invariants: tuple[Expression, ...] = ()
     initial: Expression = TRUE
     marker: Expression = TRUE
+    plant_conditions: tuple[EventCondition, ...] = ()
+    plant_invariants: tuple[Expression, ...] = ()
 
     def automaton(self, name: str) -> Automaton:
         """The automaton called `name` (KeyError if there is none)."""

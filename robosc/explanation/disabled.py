@@ -1,13 +1,15 @@
 """Reasons why an event of automata cannot happen in a state, one sentence for each cause.
 
 They follow the definition of the controlled system (`robosc.automata.controlled`): a plant has no edge whose guard is
-true, a requirement automaton has none, an event condition does not hold, an update would leave a variable's range, or
-the supervisor forbids it. The last is told where nothing else is: what it adds means nothing elsewhere.
+true, a requirement automaton has none, a condition on the event does not hold, an update would leave a variable's
+range, every step is against a plant invariant, or the supervisor forbids it. The last is told where nothing else is:
+what it adds means nothing elsewhere.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
-from robosc.automata import Automaton, Edge, Role, System
+from robosc.automata import Automaton, Edge, EventCondition, Role, Semantics, System
 from robosc.automata.compile import NO_DATA, State, compile_expression, paths_read, subjects_read
 from robosc.automata.controlled import Added
 from robosc.automata.decision import Decision
@@ -32,6 +34,8 @@ class Disabled:
         self._subjects = subjects(system)
         self._places = {subject: place for place, subject in enumerate(self._subjects)}
         self._names = whole_names(system)
+        # The plants as if they could be anything.
+        self._free = Semantics(replace(system, plant_invariants=()))
 
     def reasons(self, state: State, event: str) -> tuple[str, ...]:
         """Return the reasons why an event cannot happen in a state, which it cannot; at least one.
@@ -46,13 +50,21 @@ class Disabled:
             for item in self._system.automata
             if event in item.alphabet and (is_controllable or item.role is Role.PLANT)
         ]
-        if not any(item.role is Role.PLANT for item in automata):
-            return ("no plant has it in its alphabet",)
-        found = [reason for item in automata for reason in self._without_edge(item, state, event)]
+        found = [
+            reason
+            for item in automata
+            if event not in item.monitors
+            for reason in self._without_edge(item, state, event)
+        ]
+        if not any(event in item.alphabet for item in self._system.automata):
+            found.append("no automaton has it in its alphabet")
+        found += self._conditions(self._system.plant_conditions, state, event)
         if is_controllable:
-            found += self._conditions(state, event)
+            found += self._conditions(self._system.conditions, state, event)
         if not found:
             found += self._out_of_range(automata, state, event)
+        if not found:
+            found += self._against_invariants(state, event)
         if not found:
             found.append(f"the supervisor forbids it, because of what can follow{self._decided(state, event)}")
         return tuple(found[:MAXIMUM_NAMES])
@@ -73,8 +85,8 @@ class Disabled:
     def _from(self, edges: list[Edge], automaton: Automaton, state: State) -> list[Edge]:
         return [edge for edge in edges if edge.source == state[self._places[Subject(automaton.name)]]]
 
-    def _conditions(self, state: State, event: str) -> Iterator[str]:
-        for item in self._system.conditions:
+    def _conditions(self, conditions: Iterable[EventCondition], state: State, event: str) -> Iterator[str]:
+        for item in conditions:
             if item.event != event or self._holds(item.condition, state):
                 continue
             match item.condition:
@@ -95,6 +107,15 @@ class Disabled:
                             if not self._stays(update.expression, state, event, low, high):
                                 now = value_text(state[self._places[subject]])
                                 yield f"it could take {subject}, which is {now}, out of its range {low}..{high}"
+
+    def _against_invariants(self, state: State, event: str) -> Iterator[str]:
+        """Yield the plant invariants that its steps would break, if each of them breaks one."""
+        invariants = self._system.plant_invariants
+        targets = self._free.targets(state, event) if invariants else ()
+        broken = [[item for item in invariants if not self._holds(item, target)] for target in targets]
+        if all(broken):
+            for item in dict.fromkeys(item for items in broken for item in items):
+                yield f"it leads only to what the plants cannot be: there {self._text(item)} does not hold"
 
     def _stays(self, expression: Expression, state: State, event: str, low: int, high: int) -> bool:
         paths = set(paths_read(expression))

@@ -29,7 +29,7 @@ from robosc.supervisor.validation import validate_added, validate_condition
 from robosc.synthesis import Statistics, SynthesisProgress, synthesize
 from robosc.synthesis import SynthesisStatus as CoreStatus
 from robosc.tables import html_table
-from robosc.verification import CheckOutcome, Limits, VerificationReport, verify, verify_explicitly
+from robosc.verification import CheckOutcome, Limits, VerificationReport, verify
 
 _CHECKS = ("safe", "controllable", "nonblocking", "maximally_permissive")
 INITIALLY = "the initial state"
@@ -265,27 +265,13 @@ def _verified(
     def report(message: str) -> None:
         on_progress(Progress("verification", message))
 
-    if supervisor.initial is None:
-        return verify(
-            system,
-            added,
-            limits,
-            expected_states=supervisor.states,
-            engine=options.engine_options().name,
-            should_stop=should_stop,
-            on_progress=report,
-        )
-    # The symbolic search begins in every initial state: a supervisor that leaves some out is searched one by one.
-    found = verify_explicitly(
+    return verify(
         system,
         added,
-        initial=supervisor.may_begin,
-        limit=limits.states,
-        permissive_limit=limits.recomputed,
+        limits,
+        initial=None if supervisor.initial is None else state_predicate(system, supervisor.initial),
+        expected_states=supervisor.states,
+        engine=options.engine_options().name,
         should_stop=should_stop,
         on_progress=report,
-    )
-    is_done = found.states is not None
-    return VerificationReport(
-        found, "explicit forward search" if is_done else f"not checked: more than {limits.states} states"
     )

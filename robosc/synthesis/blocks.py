@@ -103,9 +103,9 @@ def _groups(system: System) -> Iterator[list[Subject | Datum]]:
             for update in edge.updates:
                 yield from _together(update.expression, edge.event)
                 yield [Subject(automaton.name, update.variable), *_operands(update.expression, edge.event)]
-    for condition in system.conditions:
+    for condition in (*system.conditions, *system.plant_conditions):
         yield from _together(condition.condition, condition.event)
-    for state_condition in (*system.invariants, system.initial, system.marker):
+    for state_condition in (*system.invariants, *system.plant_invariants, system.initial, system.marker):
         yield from _together(state_condition, "")
 
 

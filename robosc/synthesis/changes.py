@@ -36,9 +36,9 @@ def _computed(automaton: Automaton) -> Iterable[Subject]:
     by_event = defaultdict[str, list[Edge]](list)
     for edge in automaton.edges:
         by_event[edge.event].append(edge)
-    for edges in by_event.values():
-        # A requirement that has no edge for an event stays as it is, so nothing that it writes is one constant.
-        stays = automaton.role is Role.REQUIREMENT
+    for event, edges in by_event.items():
+        # A requirement or monitor without an edge for an event stays as it is: nothing that it writes is one constant.
+        stays = automaton.role is Role.REQUIREMENT or event in automaton.monitors
         leads = leads_of(edges)
         if leads is Leads.AWAY or (stays and leads is Leads.TO_ONE_PLACE):
             yield Subject(automaton.name)

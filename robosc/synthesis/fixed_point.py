@@ -58,7 +58,9 @@ def safe_states(encoding: Encoding, invariants: Iterable[Expression]) -> Any:
 
 def initial_states(encoding: Encoding) -> Any:
     """Return the states in which the uncontrolled system may begin."""
-    return encoding.initial_places() & ExpressionEncoder(encoding).holds(encoding.system.initial)
+    system = encoding.system
+    begins = map(ExpressionEncoder(encoding).holds, (system.initial, *system.plant_invariants))
+    return encoding.all_of([encoding.initial_places(), *begins])
 
 
 def marked_states(encoding: Encoding) -> Any:
@@ -86,7 +88,8 @@ class FixedPoint:
         """The states from which a supervisor can solve a problem; `known` ones are told beforehand to be such."""
         good, rounds = problem.safe, 0
         if self.initial == self._encoding.manager.false:
-            return GoodStates(good, rounds, "there is no initial state")
+            where = " in which the plant invariants are true" if self._encoding.system.plant_invariants else ""
+            return GoodStates(good, rounds, f"there is no initial state{where}")
         if self._is_lost(good):
             return GoodStates(good, rounds, "the initial state is against a state invariant")
         for steps in problem.steps:

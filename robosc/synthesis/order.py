@@ -55,7 +55,8 @@ def hyperedges(system: System) -> tuple[frozenset[Subject], ...]:
                         touched.add(Subject(automaton.name, update.variable))
                         touched |= subjects_read(update.expression)
         found[frozenset(touched)] = None
-    for condition in (*(item.condition for item in system.conditions), *system.invariants):
+    on_events = (item.condition for item in (*system.conditions, *system.plant_conditions))
+    for condition in (*on_events, *system.invariants, *system.plant_invariants):
         found[subjects_read(condition)] = None
         # What is compared belongs closer together than what a long condition merely lists.
         for part in simple_parts(condition):

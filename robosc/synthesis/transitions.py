@@ -6,14 +6,14 @@ predicate are then found by substitution, and no next-state variable is needed b
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Any, Self
 
+from robosc.automata.semantics import plant_invariants_on
 from robosc.automata.state import Subject
-from robosc.automata.structure import Automaton, Edge, Event, Role, System
-from robosc.errors import NondeterministicEventError
+from robosc.automata.structure import Automaton, Edge, Event, EventCondition, Role
 from robosc.synthesis.changes import Leads, leads_of
 from robosc.synthesis.encoding import Bits, Encoding, next_name
 from robosc.synthesis.expression_encoder import ExpressionEncoder
@@ -26,10 +26,14 @@ class Transition:
 
     Attributes:
         event: The event.
-        possible: Predicate that every automaton takes an edge, for data that can come.
+        possible: Predicate that every automaton takes an edge or may stay without one, and the plant conditions are
+            true, for data that can come.
         out_of_range: Predicate that an update leaves its variable's range when the event is taken.
         condition: Predicate that its event conditions are true (current-state variables only).
-        watched: Predicate that every requirement automaton has an edge for it (current-state variables only).
+        watched: Predicate that every requirement automaton that does not monitor it has an edge for it (current-state
+            variables only).
+        lasting: Predicate that those plant invariants are true that read what it may change (current-state variables
+            only).
         functions: Value of each changed bit after it, right where the event is possible.
         hidden: Variables of received data and of choices between edges.
     """
@@ -39,6 +43,7 @@ class Transition:
     out_of_range: Any
     condition: Any
     watched: Any
+    lasting: Any
     functions: dict[str, Any]
     hidden: tuple[str, ...]
 
@@ -57,9 +62,9 @@ def transition_of(encoding: Encoding, event: Event) -> Transition:
     manager, system = encoding.manager, encoding.system
     encoder = ExpressionEncoder(encoding, encoding.inputs_of(event.name))
     participants = [automaton for automaton in system.automata if event.name in automaton.alphabet]
-    # An event in no alphabet belongs to no plant, so it cannot happen.
-    plants = [automaton for automaton in participants if automaton.role is Role.PLANT]
-    possible = encoding.possible_inputs(event.name) if plants else manager.false
+    # An event in no alphabet belongs to nobody, so it cannot happen.
+    possible = encoding.possible_inputs(event.name) if participants else manager.false
+    possible = possible & _condition(encoding, encoder, system.plant_conditions, event.name)
     watched = manager.true
     hidden = list(encoding.input_names(event.name))
     functions: dict[str, Any] = {}
@@ -69,10 +74,12 @@ def transition_of(encoding: Encoding, event: Event) -> Transition:
         if choice is not None:
             hidden += choice.names
             possible = possible & encoding.valid(choice)
-        if automaton.role is Role.PLANT:
+        is_monitor = event.name in automaton.monitors
+        if automaton.role is Role.PLANT and not is_monitor:
             possible = possible & encoding.any_of(arc.taken for arc in arcs)
         else:
-            watched = watched & is_taken
+            if not is_monitor:
+                watched = watched & is_taken
             possible = possible & (~is_taken | encoding.any_of(arc.taken for arc in arcs))
             # Where it has no edge it stays as it is.
             arcs = [*arcs, _Arc(~is_taken, {}, manager.false)]
@@ -82,47 +89,72 @@ def transition_of(encoding: Encoding, event: Event) -> Transition:
         event=event,
         possible=possible,
         out_of_range=out_of_range,
-        condition=_condition(encoding, encoder, system, event.name),
+        condition=_condition(encoding, encoder, system.conditions, event.name),
         watched=watched,
+        lasting=encoding.all_of(map(encoder.holds, plant_invariants_on(system, event.name))),
         functions=functions,
         hidden=tuple(hidden),
     )
 
 
-def _condition(encoding: Encoding, encoder: ExpressionEncoder, system: System, event: str) -> Any:
-    return encoding.all_of(encoder.holds(item.condition) for item in system.conditions if item.event == event)
+def _condition(encoding: Encoding, encoder: ExpressionEncoder, conditions: Iterable[EventCondition], event: str) -> Any:
+    return encoding.all_of(encoder.holds(item.condition) for item in conditions if item.event == event)
 
 
 def _arcs(
     encoding: Encoding, encoder: ExpressionEncoder, automaton: Automaton, event: Event
 ) -> tuple[list[_Arc], Bits | None, Any]:
-    """The edges of an automaton for an event; where several may be taken, a choice decides; and where one may be.
-
-    Raises:
-        NondeterministicEventError: The event is controllable, and in some state several may be taken.
-    """
-    guards = [
-        (edge, encoding.in_location(automaton.name, edge.source) & encoder.holds(edge.guard))
-        for edge in automaton.edges
-        if edge.event == event.name
-    ]
+    """The edges of an automaton for an event; where several may be taken, a choice decides; and where one may be."""
+    guards = _guards(encoding, encoder, automaton, event)
     is_taken = encoding.any_of(guard for _, guard in guards)
     leads = leads_of([edge for edge, _ in guards])
     rivals = _rivals(encoding, guards)
     if not rivals:
         return [_arc(encoding, encoder, automaton, edge, guard, leads) for edge, guard in guards], None, is_taken
-    if event.is_controllable:
-        location = guards[min(rivals)][0].source
-        raise NondeterministicEventError(
-            f"{automaton.name}: the controllable event {event.name} has several edges that can be taken in one state "
-            f"of {location}"
-        )
     choice = encoding.choice(max(index for index in rivals.values()) + 1)
     arcs = []
     for number, (edge, guard) in enumerate(guards):
         taken = guard & encoding.code(choice, rivals[number]) if number in rivals else guard
         arcs.append(_arc(encoding, encoder, automaton, edge, taken, leads))
     return arcs, choice, is_taken
+
+
+def choices(encoding: Encoding, event: Event) -> Iterator[tuple[str, str]]:
+    """Each automaton, with each of its locations, in which it has several edges to take for an event of the system.
+
+    Edges count by which no variable leaves its range, in states in which the other automata allow the event; whether a
+    state can be reached, and conditions and invariants, do not count.
+    """
+    encoder = ExpressionEncoder(encoding, encoding.inputs_of(event.name))
+    arcs: list[tuple[Automaton, list[tuple[Edge, Any]]]] = []
+    for automaton in encoding.system.automata:
+        if event.name in automaton.alphabet:
+            guards = _guards(encoding, encoder, automaton, event)
+            leads = leads_of([edge for edge, _ in guards])
+            taken = [
+                (edge, guard & ~_arc(encoding, encoder, automaton, edge, guard, leads).out_of_range)
+                for edge, guard in guards
+            ]
+            arcs.append((automaton, taken))
+    for automaton, taken in arcs:
+        others = encoding.all_of(
+            encoding.any_of(guard for _, guard in theirs)
+            for other, theirs in arcs
+            if other is not automaton and other.role is Role.PLANT and event.name not in other.monitors
+        )
+        able = [(edge, guard & others) for edge, guard in taken]
+        yield from dict.fromkeys((automaton.name, able[number][0].source) for number in sorted(_rivals(encoding, able)))
+
+
+def _guards(
+    encoding: Encoding, encoder: ExpressionEncoder, automaton: Automaton, event: Event
+) -> list[tuple[Edge, Any]]:
+    """The edges of an automaton for an event, each with the states in which it can be taken."""
+    return [
+        (edge, encoding.in_location(automaton.name, edge.source) & encoder.holds(edge.guard))
+        for edge in automaton.edges
+        if edge.event == event.name
+    ]
 
 
 def _rivals(encoding: Encoding, guards: Sequence[tuple[Edge, Any]]) -> dict[int, int]:
@@ -197,7 +229,13 @@ def _next_value(encoding: Encoding, arcs: Sequence[_Arc], name: str) -> Any:
 def _names(encoding: Encoding, transition: Transition) -> frozenset[str]:
     """The current-state variables that a transition reads or changes."""
     conditions = transition.condition & transition.watched
-    predicates = (transition.possible, transition.out_of_range, conditions, *transition.functions.values())
+    predicates = (
+        transition.possible,
+        transition.out_of_range,
+        conditions,
+        transition.lasting,
+        *transition.functions.values(),
+    )
     read = set().union(*(support(encoding.manager, predicate) for predicate in predicates))
     return frozenset(encoding.state_names) & (read | transition.functions.keys())
 
@@ -217,10 +255,17 @@ class Steps:
         self._constants = {name: f == true for name, f in transition.functions.items() if f in (true, false)}
         self._composed = {name: f for name, f in transition.functions.items() if name not in self._constants}
         self._leaving = self._without_hidden(transition.possible & transition.out_of_range)
+        self._in_range = transition.possible & ~transition.out_of_range
         enabled = self._without_hidden(transition.possible)
+        if transition.lasting != true:
+            self._in_range = self._in_range & self._after(transition.lasting)
+            enabled = self._without_hidden(self._in_range) | self._leaving
         self.event = transition.event
         self.plant = enabled & ~self._leaving if self.event.is_controllable else enabled
-        """States in which the plant enables the event; a controllable one must stay in every range."""
+        """States in which the plant enables the event; a controllable one must stay in every range.
+
+        States in which a plant invariant is not true do not count: there are none.
+        """
         self.condition = transition.condition & transition.watched
         """States in which its event conditions are true, and no requirement automaton is against it."""
         self.is_deterministic = not transition.hidden
@@ -228,7 +273,6 @@ class Steps:
         self.names = _names(encoding, transition)
         """The current-state variables that it reads or changes."""
         self._state_names = encoding.state_names
-        self._in_range = transition.possible & ~transition.out_of_range
         self._changed = tuple(transition.functions)
         self._arrival = encoding.all_of(
             self._manager.var(name) if value else ~self._manager.var(name) for name, value in self._constants.items()

@@ -11,7 +11,7 @@ from dataclasses import replace
 from robosc.automata.compile import State, subjects_read
 from robosc.automata.controlled import Added
 from robosc.automata.decision import Decision, index_in
-from robosc.automata.semantics import Semantics
+from robosc.automata.semantics import Semantics, subjects_changed, subjects_deciding
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.automata.structure import Event, System
 
@@ -155,7 +155,8 @@ class EventTable:
         self.event = event
         self._packing = packing
         self._semantics = self._fresh()
-        self._places = sorted(packing.places[subject] for subject in _touched(packing.system, event.name))
+        touched = subjects_deciding(packing.system, event.name) | subjects_changed(packing.system, event.name)
+        self._places = sorted(packing.places[subject] for subject in touched)
         self.field = packing.field(self._places)
         self.known: dict[int, tuple[int, ...]] = {}
         self.bad: set[int] = set()
@@ -204,20 +205,3 @@ class EventTable:
     def is_bad(self, code: int) -> bool:
         """Return True if the event makes a state bad whose changes have been asked for."""
         return code & self.field in self.bad
-
-
-def _touched(system: System, event: str) -> set[Subject]:
-    """The places that tell what an event does, and those that it changes."""
-    found = set[Subject]()
-    for item in system.conditions:
-        if item.event == event:
-            found |= subjects_read(item.condition)
-    for automaton in system.automata:
-        if event in automaton.alphabet:
-            found.add(Subject(automaton.name))
-        for edge in automaton.edges:
-            if edge.event == event:
-                found |= subjects_read(edge.guard)
-                for update in edge.updates:
-                    found |= {Subject(automaton.name, update.variable), *subjects_read(update.expression)}
-    return found

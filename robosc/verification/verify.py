@@ -57,6 +57,7 @@ def verify(
     added: Mapping[str, Decision],
     limits: Limits,
     *,
+    initial: Decision | None = None,
     expected_states: int = 0,
     engine: str = "auto",
     semantics: Semantics | None = None,
@@ -69,6 +70,7 @@ def verify(
         system: Plants and event conditions.
         added: For each event to which the supervisor adds a condition, that condition.
         limits: Limits of the check.
+        initial: Condition on the initial states in which the supervisor lets the system begin; None: in all of them.
         expected_states: States that the controlled system is said to have: where these are too many, the search one
             by one is not even begun.
         engine: Engine of the symbolic search: see `verify_symbolically`.
@@ -84,6 +86,7 @@ def verify(
         found = verify_explicitly(
             system,
             added,
+            initial=initial,
             limit=limits.states,
             permissive_limit=limits.recomputed,
             semantics=semantics,
@@ -99,7 +102,13 @@ def verify(
     from robosc.verification.symbolic import verify_symbolically
 
     found = verify_symbolically(
-        system, added, limit=limits.work, engine=engine, should_stop=should_stop, on_progress=on_progress
+        system,
+        added,
+        initial=initial,
+        limit=limits.work,
+        engine=engine,
+        should_stop=should_stop,
+        on_progress=on_progress,
     )
     if found.states is None:
         method = f"not checked: {reason}, and the symbolic search takes more than {limits.work} nodes"

@@ -44,27 +44,34 @@ class NaiveSystem:
         values = [[*domain(item.type), *([None] if item.may_be_unknown else [])] for item in inputs]
         for choice in product(*values):
             known = dict(zip((item.path for item in inputs), choice, strict=True))
-            elements = sorted((path for path in known if path[0] == "scan"), key=lambda path: path[1])
+            elements = sorted((path for path in known if path[:1] == ("scan",)), key=lambda path: path[1])
             unknown = [known[path] is None for path in elements]
             if unknown == sorted(unknown):
                 yield known
 
+    def true(self, conditions: Iterable[Expression], at: State) -> bool:
+        """Return True if every one of some conditions is."""
+        return all(self.evaluate(item, at, {}) is True for item in conditions)
+
     def edges(self, at: State, event: str) -> list[tuple[tuple[str, Edge], ...]]:
-        """Edges that plants and requirement automata can take together; a requirement without one stays."""
+        """Edges that automata can take together; requirements and monitors without one stay."""
         taking_part = [item for item in self.system.automata if event in item.alphabet]
-        choices = [self._taken(item, at, event) for item in taking_part]
-        if not any(item.role is Role.PLANT for item in taking_part):
+        able = (item.condition for item in self.system.plant_conditions if item.event == event)
+        if not taking_part or not self.true(able, at):
             return []
-        return list(
-            product(*(arcs for item, arcs in zip(taking_part, choices, strict=True) if arcs or item.role is Role.PLANT))
-        )
+        choices = [
+            self._taken(item, at, event)
+            for item in taking_part
+            if (item.role is Role.PLANT and event not in item.monitors) or self._taken(item, at, event)
+        ]
+        return list(product(*choices))
 
     def meets(self, at: State, event: str) -> bool:
         """Return True if event conditions and requirement automata allow an event."""
-        conditions = [item.condition for item in self.system.conditions if item.event == event]
-        watching = [item for item in self.system.automata if item.role is Role.REQUIREMENT and event in item.alphabet]
-        return all(self.evaluate(item, at, {}) is True for item in conditions) and all(
-            self._taken(item, at, event) for item in watching
+        return self.true((item.condition for item in self.system.conditions if item.event == event), at) and all(
+            self._taken(item, at, event)
+            for item in self.system.automata
+            if item.role is Role.REQUIREMENT and event in item.alphabet - item.monitors
         )
 
     def _taken(self, automaton: Automaton, at: State, event: str) -> list[tuple[str, Edge]]:
@@ -94,7 +101,7 @@ class NaiveSystem:
                             in_range = in_range and value in subject_domain(self.system, place)
                             values[place] = value  # type: ignore[assignment]
                 leaves_range = leaves_range or not in_range
-                if in_range:
+                if in_range and self.true(self.system.plant_invariants, tuple(values.values())):
                     targets.add(tuple(values.values()))
         return frozenset(targets), leaves_range
 
@@ -102,12 +109,11 @@ class NaiveSystem:
 
     def beginnings(self, condition: DecisionDiagram | None) -> set[State]:
         """The initial states in which a supervisor lets the system begin."""
-        states = product(*initial_values(self.system))
+        conditions = (self.system.initial, *self.system.plant_invariants)
         return {
             state
-            for state in states
-            if self.evaluate(self.system.initial, state, {}) is True
-            and (condition is None or self.decides(condition, state))
+            for state in product(*initial_values(self.system))
+            if self.true(conditions, state) and (condition is None or self.decides(condition, state))
         }
 
     def controlled(self, at: State, event: str, added: Iterable[AddedCondition]) -> frozenset[State]:

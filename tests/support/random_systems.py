@@ -22,12 +22,14 @@ from robosc.automata import (
     Automaton,
     DiscreteVariable,
     Edge,
+    EnvironmentVariable,
     Event,
     EventCondition,
     InputVariable,
     Role,
     Semantics,
     System,
+    environment_variable,
 )
 from robosc.expressions import (
     TRUE,
@@ -65,7 +67,9 @@ ATTEMPTS = 30
 def wide_system(seed: int) -> System:
     """As `random_system`, with all that automata offer beyond RoboSC.
 
-    Several ways to begin, requirement automata, conditions on initial and marked states, whole division.
+    Several ways to begin, requirement automata, monitors, events of requirements alone, conditions on initial and
+    marked states and on what plants can do and be, choices between edges of controllable events, an input variable,
+    whole division.
     """
     return _told("wide_system", seed, _of_seed(seed, is_wide=True))
 
@@ -95,6 +99,16 @@ def any_system(seed: int) -> System:
     Takes a thirtieth of the time of `random_system`.
     """
     return _told("any_system", seed, _Builder(Random(seed), is_wide=False).system())
+
+
+def any_wide_systems() -> st.SearchStrategy[System]:
+    """Return the systems of `any_wide_system`."""
+    return st.integers(0, 2**32 - 1).map(any_wide_system)
+
+
+def any_wide_system(seed: int) -> System:
+    """As `any_system`, with all that `wide_system` has."""
+    return _told("any_wide_system", seed, _Builder(Random(seed), is_wide=True).system())
 
 
 def random_system(seed: int) -> System:
@@ -175,6 +189,10 @@ class _Builder:
         # Data of a controllable event is the environment's choice, too: wherever it leads must be good.
         carrying = [event for event in self.events if not event.is_controllable or (is_wide and self._chance(0.25))]
         self.inputs = tuple(item for event in carrying for item in self._inputs(event))
+        self.sensors: list[EnvironmentVariable] = []
+        if is_wide and self._chance(0.2):
+            self.variables["S", "value"] = self._type()
+            self.sensors.append(environment_variable("S", self.variables["S", "value"]))
 
     def _chance(self, share: float) -> bool:
         return self.random.random() < share
@@ -193,9 +211,9 @@ class _Builder:
 
     def system(self) -> System:
         """The drawn system; each event belongs to one or two automata."""
-        owners = {
-            event: self.random.sample(tuple(self.locations), self.random.choice((1, 1, 2))) for event in self.events
-        }
+        # An event of nobody's is one of requirements alone, or one that cannot happen.
+        counts = (1, 1, 2, 1, 1, 2, 1, 1, 2, 0) if self.is_wide else (1, 1, 2)
+        owners = {event: self.random.sample(tuple(self.locations), self.random.choice(counts)) for event in self.events}
         automata = tuple(
             self._automaton(name, [event for event in self.events if name in owners[event]]) for name in self.locations
         )
@@ -209,13 +227,19 @@ class _Builder:
             return System("random", self.events, automata, inputs, conditions, invariants)
         return System(
             "random",
-            self.events,
-            automata,
-            inputs,
+            (*self.events, *(sensor.event for sensor in self.sensors)),
+            (*automata, *(sensor.automaton for sensor in self.sensors)),
+            (*inputs, *(sensor.received for sensor in self.sensors)),
             conditions,
             invariants,
             initial=self._condition() if self._chance(0.3) else TRUE,
             marker=Binary("or", self._condition(), self._condition()) if self._chance(0.3) else TRUE,
+            plant_conditions=tuple(
+                EventCondition(event.name, self._condition()) for event in self.events if self._chance(0.15)
+            ),
+            plant_invariants=tuple(
+                Binary("or", self._condition(), self._condition()) for _ in range(self.random.choice((0, 0, 1, 2)))
+            ),
         )
 
     def _requirements(self) -> list[Automaton]:
@@ -235,6 +259,10 @@ class _Builder:
         ]
         return [replace(made, edges=(*made.edges, *loops), role=Role.REQUIREMENT)]
 
+    def _monitors(self, alphabet: list[Event]) -> frozenset[str]:
+        """Events of an alphabet that are only monitored, now and then."""
+        return frozenset(event.name for event in alphabet if self.is_wide and self._chance(0.1))
+
     def _automaton(self, name: str, alphabet: list[Event]) -> Automaton:
         locations = self.locations[name]
         edges = [edge for event in alphabet for where in locations for edge in self._edges(name, where, event)]
@@ -252,6 +280,7 @@ class _Builder:
             frozenset(e.name for e in alphabet),
             tuple(edges),
             variables,
+            monitors=self._monitors(alphabet),
         )
 
     def _initial[T: Value](self, values: tuple[T, ...]) -> tuple[T, ...]:
@@ -260,7 +289,7 @@ class _Builder:
         return tuple(self.random.sample(values, count))
 
     def _edges(self, name: str, source: str, event: Event) -> list[Edge]:
-        """No edge, one, or two; the two of a controllable event have guards that exclude each other."""
+        """No edge, one, or two; the two of a controllable event mostly have guards that exclude each other."""
         count = self.random.choice((0, 1, 1, 1, 2) if event.is_controllable else (0, 0, 0, 1, 2))
         guards: list[Expression] = []
         if count >= 1:
@@ -268,7 +297,8 @@ class _Builder:
         if count == 2:
             opposite = Unary("not", Unary("holds", guards[0]))
             free = self._condition() if self._chance(0.5) else TRUE
-            guards.append(opposite if event.is_controllable else free)
+            is_choice = not event.is_controllable or (self.is_wide and self._chance(0.3))
+            guards.append(free if is_choice else opposite)
         targets = self.locations[name]
         return [
             Edge(source, event.name, self.random.choice(targets), guard, self._updates(name, event)) for guard in guards

@@ -62,7 +62,7 @@ class _Check:
         self._invariant = relations.holds(system.invariants)
         self._relations = [relations.relation(event) for event in system.events]
         self._reachability = Reachability(self._variables, self._relations)
-        self._initial = self._variables.initial() & relations.holds([system.initial])
+        self._initial = self._variables.initial() & relations.holds([system.initial, *system.plant_invariants])
         if initial is not None:
             self._initial = self._initial & self._variables.decision(initial)
         self._marked = self._variables.marked() & relations.holds([system.marker])

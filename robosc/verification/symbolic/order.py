@@ -71,10 +71,10 @@ def _groups(system: System) -> Iterable[set[Subject]]:
             group |= subjects_read(edge.guard)
             for update in edge.updates:
                 group |= {Subject(automaton.name, update.variable), *subjects_read(update.expression)}
-    for condition in system.conditions:
+    for condition in (*system.conditions, *system.plant_conditions):
         touched[condition.event] |= subjects_read(condition.condition)
     yield from touched.values()
-    for invariant in system.invariants:
+    for invariant in (*system.invariants, *system.plant_invariants):
         yield set(subjects_read(invariant))
 
 
@@ -114,7 +114,8 @@ def _computed(system: System) -> Iterator[tuple[Expression, str, Subject | None]
                 yield part, edge.event, None
             for update in edge.updates:
                 yield update.expression, edge.event, Subject(automaton.name, update.variable)
-    conditions = [*system.invariants, system.initial, system.marker, *(item.condition for item in system.conditions)]
+    conditions = [*system.invariants, *system.plant_invariants, system.initial, system.marker]
+    conditions += [item.condition for item in (*system.conditions, *system.plant_conditions)]
     for condition in conditions:
         for part in simple_parts(condition):
             yield part, "", None

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from robosc.automata.decision import Decision
+from robosc.automata.semantics import plant_invariants_on
 from robosc.automata.state import Subject, subject_type
-from robosc.automata.structure import Assignment, Automaton, Edge, Event, Role
+from robosc.automata.structure import Assignment, Automaton, Edge, Event, EventCondition, Role
 from robosc.expressions import BooleanType, Expression, IntegerType, Value
 from robosc.verification.symbolic.expressions import Expressions
 from robosc.verification.symbolic.linear import Cases
@@ -19,7 +20,8 @@ class Relation:
 
     Attributes:
         event: The event.
-        enabled: States in which the plants enable it and, for a controllable one, every range is kept.
+        enabled: States in which the plants enable it, with a step that keeps the plant invariants, and, for a
+            controllable one, every range is kept.
         allowed: States in which the supervisor lets it happen; all states where nothing is added.
         guard: States in which it can happen in the controlled system: enabled, allowed and, for a controllable event,
             its conditions true.
@@ -61,7 +63,10 @@ class Relation:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """Effect of one automaton at an event; predicates over the state before, the data and the state after."""
+    """Effect of one automaton at an event; predicates over the state before, the data and the state after.
+
+    A monitor has nothing against any event.
+    """
 
     possible: Any
     leaves_range: Any
@@ -93,7 +98,8 @@ class Relations:
         plants = [self._part(item, event.name, set(places)) for item in automata if item.role is Role.PLANT]
         watching = [self._part(item, event.name, set(places)) for item in automata if item.role is Role.REQUIREMENT]
         parts = [*plants, *watching]
-        possible = variables.all_of(part.possible for part in plants) if plants else manager.false
+        able = self._conditions(event, variables.system.plant_conditions) if automata else manager.false
+        possible = variables.all_of([able, *(part.possible for part in plants)])
         data = variables.possible_data(event.name)
         names_of_data = [
             name
@@ -102,15 +108,21 @@ class Relations:
             for name in (*digits.names, *([] if digits.known is None else [digits.known]))
         ]
         leaving = variables.any_of(part.leaves_range for part in parts) & data
-        steps = data if plants else manager.false
+        steps = data & able
         for part in parts:
             steps = variables.work.count(steps & part.steps)
         if names_of_data:
             leaving, steps = manager.exist(names_of_data, leaving), manager.exist(names_of_data, steps)
         leaving = possible & leaving
-        conditions = self.holds(item.condition for item in variables.system.conditions if item.event == event.name)
+        names = tuple(name for place in places for name in variables.places[place].names)
+        if lasting := plant_invariants_on(variables.system, event.name):
+            kept = manager.let({name: after(name) for name in names}, self.holds(lasting))
+            steps = variables.work.count(steps & kept)
+            possible = possible & (leaving | manager.exist([after(name) for name in names], steps))
         # A requirement that has no edge for the event is against it, and stays as it is.
-        conditions = variables.all_of([conditions, *(part.possible for part in watching)])
+        conditions = variables.all_of(
+            [self._conditions(event, variables.system.conditions), *(part.possible for part in watching)]
+        )
         added = self._added.get(event.name)
         allowed = manager.true if added is None else variables.work.count(variables.decision(added))
         enabled = possible & ~leaving if event.is_controllable else possible
@@ -122,9 +134,13 @@ class Relations:
             guard=variables.work.count(guard),
             bad=manager.false if event.is_controllable else (possible & ~conditions) | leaving,
             steps=variables.work.count(steps),
-            names=tuple(name for place in places for name in variables.places[place].names),
+            names=names,
             touched=_support(manager, guard, steps),
         )
+
+    def _conditions(self, event: Event, conditions: Iterable[EventCondition]) -> Any:
+        """Return the predicate that those of some conditions that are on an event are true."""
+        return self.holds(item.condition for item in conditions if item.event == event.name)
 
     def _changed(self, automaton: Automaton, event: str) -> set[int]:
         """The places that an automaton may change at an event."""
@@ -147,10 +163,11 @@ class Relations:
                 leaving, updated = self._edge(automaton, edge, own)
                 leaves_range = leaves_range | (taken & leaving)
                 steps = variables.work.count(steps | (taken & updated))
-        if automaton.role is Role.REQUIREMENT:
+        is_monitor = event in automaton.monitors
+        if is_monitor or automaton.role is Role.REQUIREMENT:
             stays = variables.all_of(variables.unchanged(place) for place in sorted(own))
             steps = variables.work.count(steps | (~possible & stays))
-        return _Part(possible, leaves_range, steps)
+        return _Part(variables.manager.true if is_monitor else possible, leaves_range, steps)
 
     def _edge(self, automaton: Automaton, edge: Edge, changed: set[int]) -> tuple[Any, Any]:
         """Return the predicate that the updates of an edge leave a range, and the effect of the edge.

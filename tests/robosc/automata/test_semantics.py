@@ -5,11 +5,12 @@ from itertools import product
 
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from robosc.automata import DiscreteVariable, InputVariable, Semantics, System
 from robosc.automata.compile import State, compile_expression
 from robosc.automata.inputs import valuations
-from robosc.automata.state import subjects
+from robosc.automata.state import initial_values, subjects
 from robosc.expressions import (
     FALSE,
     TRUE,
@@ -25,7 +26,7 @@ from robosc.expressions import (
 )
 from support.effort import examples
 from support.naive_system import NaiveSystem
-from support.random_systems import any_systems
+from support.random_systems import any_systems, any_wide_systems
 from support.systems import automaton, edge, operation, read, received, state, system
 
 DIGIT = IntegerType(0, 2)
@@ -256,7 +257,8 @@ def test_a_comparison_with_an_infinity_is_an_ordinary_one() -> None:
 
 
 def _some_states(subject: Semantics, count: int) -> list[State]:
-    found, frontier = {subject.initial: None}, [subject.initial]
+    frontier = list(subject.initial_states)
+    found = dict.fromkeys(frontier)
     while frontier and len(found) < count:
         at = frontier.pop(0)
         for event in subject.system.events:
@@ -266,21 +268,22 @@ def _some_states(subject: Semantics, count: int) -> list[State]:
     return list(found)[:count]
 
 
-@settings(max_examples=examples(100))
-@given(any_systems())
+@settings(max_examples=examples(150))
+@given(st.one_of(any_systems(), any_wide_systems()))
 def test_agrees_with_the_naive_reading_of_the_definition(drawn: System) -> None:
     subject, naive = Semantics(drawn), NaiveSystem(drawn)
+    beginnings = naive.beginnings(None)
+    assert subject.initial_states == tuple(at for at in product(*initial_values(drawn)) if at in beginnings)
     for at in _some_states(subject, 12):
-        is_bad = not all(naive.evaluate(item, at, {}) is True for item in drawn.invariants)
+        is_bad = not naive.true(drawn.invariants, at)
         for event in drawn.events:
             targets, leaves_range = naive.step(at, event.name)
-            conditions = [item.condition for item in drawn.conditions if item.event == event.name]
-            meets = all(naive.evaluate(item, at, {}) is True for item in conditions)
-            possible = bool(naive.edges(at, event.name))
+            meets = naive.meets(at, event.name)
+            possible = bool(targets) or leaves_range
             if event.is_controllable:
                 possible = possible and not leaves_range
                 targets = frozenset() if leaves_range else targets
-            elif possible and (leaves_range or not meets):
+            elif (possible and not meets) or leaves_range:
                 is_bad = True
             assert subject.enabled(at, event.name) is possible
             assert subject.targets(at, event.name) == targets

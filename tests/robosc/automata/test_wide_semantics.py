@@ -1,4 +1,4 @@
-"""Tests of automata beyond RoboSC, state by state: ways to begin, requirement automata, input variables."""
+"""Tests of automata beyond RoboSC: ways to begin, requirement automata, monitors, plant conditions, input variables."""
 
 from dataclasses import replace
 
@@ -7,9 +7,8 @@ import pytest
 from robosc.automata import Role, Semantics, System, check_system, disables, environment_variable
 from robosc.automata.semantics import MAXIMUM_CHOICES, TooManyChoicesError
 from robosc.automata.structure import DiscreteVariable, Edge, Event, EventCondition
-from robosc.errors import NondeterministicEventError
-from robosc.expressions import TRUE, Binary, Constant, Expression, IntegerType, StateTest, Unary, VariableRead
-from robosc.synthesis import SynthesisStatus, synthesize
+from robosc.expressions import FALSE, TRUE, Binary, Constant, Expression, IntegerType, StateTest, Unary, VariableRead
+from robosc.synthesis import SynthesisStatus, controllable_choices, synthesize
 from robosc.verification import synthesize_explicit
 from support.systems import automaton, edge, system
 
@@ -77,22 +76,138 @@ def test_an_uncontrollable_event_against_a_requirement_automaton_is_bad() -> Non
     assert synthesize(requirement("R", "calm -u_seen-> alert")).status is SynthesisStatus.EMPTY
 
 
-def test_an_event_of_requirements_alone_cannot_happen() -> None:
-    made = system(automaton("P", ["here -go-> here"]), replace(automaton("R", ["l -other-> l"]), role=Role.REQUIREMENT))
-    assert not Semantics(made).enabled(("here", "l"), "other")
+def test_an_event_of_requirements_alone_happens_where_they_allow_it() -> None:
+    watcher = replace(automaton("R", ["l -other-> m"], marked=["m"]), role=Role.REQUIREMENT)
+    made = system(automaton("P", ["here -go-> here"]), watcher)
+    semantics = Semantics(made)
+    assert semantics.enabled(("here", "l"), "other")
+    assert semantics.targets(("here", "l"), "other") == {("here", "m")}
+    assert semantics.condition(("here", "l"), "other")
+    # They are against it, but the plants could do it: uncontrollable, it would make the state bad.
+    assert semantics.enabled(("here", "m"), "other")
+    assert not semantics.condition(("here", "m"), "other")
     result = synthesize(made)
-    assert (result.status, result.statistics.states) == (SynthesisStatus.SUPERVISOR, 1)
+    assert (result.status, result.statistics.states) == (SynthesisStatus.SUPERVISOR, 2)
+
+
+def test_an_event_of_nobody_cannot_happen() -> None:
+    made = system(automaton("P", ["here -go-> here"]))
+    made = replace(made, events=(*made.events, Event("u_other", False)))
+    made = replace(made, conditions=(EventCondition("u_other", FALSE),))
+    assert not Semantics(made).enabled(("here",), "u_other")
+    assert synthesize(made).statistics.states == 1
+
+
+def test_a_monitor_blocks_nothing_and_follows_where_it_can() -> None:
+    plant = automaton("P", ["here -go-> here"])
+    watcher = replace(automaton("M", ["a -go-> b"]), monitors=frozenset({"go"}))
+    for role in Role:
+        semantics = Semantics(system(plant, replace(watcher, role=role)))
+        assert semantics.targets(("here", "a"), "go") == {("here", "b")}
+        assert semantics.targets(("here", "b"), "go") == {("here", "b")}
+        assert semantics.condition(("here", "b"), "go")
+    # An event that is only monitored always can happen.
+    assert Semantics(system(watcher)).targets(("b",), "go") == {("b",)}
+
+
+def test_a_requirement_without_an_edge_for_a_monitored_uncontrollable_event_has_nothing_against_it() -> None:
+    plant = automaton("P", ["here -u_seen-> here"])
+    watcher = replace(automaton("R", ["a -u_seen-> b"]), role=Role.REQUIREMENT)
+    assert synthesize(system(plant, watcher)).status is SynthesisStatus.EMPTY
+    monitor = replace(watcher, monitors=frozenset({"u_seen"}))
+    assert synthesize(system(plant, monitor)).statistics.states == 2
+
+
+def counting(event: str) -> System:
+    """A counter that cannot say itself where it ends."""
+    up = edge(f"l -{event}-> l", n=Binary("+", VariableRead("A", "n"), Constant(1)))
+    return system(automaton("A", [up], variables=[DiscreteVariable("n", DIGIT, (0,))]))
+
+
+def below(bound: int) -> Binary:
+    """The count is below a bound."""
+    return Binary("<", VariableRead("A", "n"), Constant(bound))
+
+
+@pytest.mark.parametrize(("event", "states"), [("count", 3), ("u_count", 3)])
+def test_a_plant_condition_bars_an_event_whoever_controls_it(event: str, states: int) -> None:
+    made = replace(counting(event), plant_conditions=(EventCondition(event, below(2)),))
+    semantics = Semantics(made)
+    assert [semantics.enabled(("l", n), event) for n in range(4)] == [True, True, False, False]
+    # What does not happen is against no requirement and leaves no range.
+    strict = replace(made, conditions=(EventCondition(event, below(2)),))
+    assert not any(Semantics(strict).bad(("l", n)) for n in (2, 3))
+    result = synthesize(strict)
+    assert (result.statistics.states, result.added) == (states, ())
+    # As a requirement it is a duty, which nobody can fulfil here.
+    only_required = replace(counting("u_count"), conditions=(EventCondition("u_count", below(2)),))
+    assert synthesize(only_required).status is SynthesisStatus.EMPTY
+
+
+@pytest.mark.parametrize("event", ["count", "u_count"])
+def test_what_would_break_a_plant_invariant_does_not_happen(event: str) -> None:
+    made = replace(counting(event), plant_invariants=(below(2),))
+    semantics = Semantics(made)
+    assert semantics.targets(("l", 0), event) == {("l", 1)}
+    assert not semantics.enabled(("l", 1), event)
+    assert not semantics.bad(("l", 1))
+    result = synthesize(made)
+    assert (result.statistics.states, result.added) == (2, ())
+
+
+def test_of_several_steps_those_are_left_that_keep_the_plant_invariants() -> None:
+    made = system(automaton("A", ["a -u_go-> b", "a -u_go-> c"]))
+    made = replace(made, plant_invariants=(Unary("not", StateTest("A", "c")),))
+    assert Semantics(made).targets(("a",), "u_go") == {("b",)}
+    assert synthesize(made).statistics.states == 2
+
+
+def test_the_system_does_not_begin_against_a_plant_invariant() -> None:
+    made = system(automaton("A", ["a -go-> a", "b -go-> b"], initial=["a", "b"]))
+    assert Semantics(replace(made, plant_invariants=(StateTest("A", "b"),))).initial_states == (("b",),)
+    nowhere = synthesize(replace(made, plant_invariants=(StateTest("A", "b"), StateTest("A", "a"))))
+    assert nowhere.status is SynthesisStatus.EMPTY
+    assert nowhere.reason == "there is no initial state in which the plant invariants are true"
+
+
+def test_without_a_location_to_begin_in_there_is_no_initial_state() -> None:
+    made = system(automaton("A", ["a -go-> a"], initial=[]))
+    check_system(made)
+    assert Semantics(made).initial_states == ()
+    assert synthesize(made).reason == "there is no initial state"
 
 
 @pytest.mark.parametrize("engine", ["cudd", "autoref"])
-def test_a_controllable_event_with_two_edges_is_an_error(engine: str) -> None:
+def test_a_controllable_event_is_allowed_only_where_each_of_its_edges_is_good(engine: str) -> None:
     if engine == "cudd":
         pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
     made = system(automaton("A", ["a -go-> b", "a -go-> a", "b -u_back-> a"]))
-    with pytest.raises(NondeterministicEventError, match="go has 2 edges that can be taken in a"):
-        Semantics(made).targets(("a",), "go")
-    with pytest.raises(NondeterministicEventError, match="A: the controllable event go has several edges"):
-        synthesize(made, engine=engine)
+    assert Semantics(made).targets(("a",), "go") == {("a",), ("b",)}
+    result = synthesize(made, engine=engine)
+    assert (result.statistics.states, result.added) == (2, ())
+    assert synthesize(replace(made, invariants=(StateTest("A", "a"),)), engine=engine).statistics.states == 1
+
+
+def test_choices_between_edges_are_told() -> None:
+    n = VariableRead("B", "n")
+    up = Binary("+", n, Constant(2))
+    made = system(
+        automaton("A", ["a -go-> b", "a -go-> a", "b -go-> a", "b -u_back-> a", "b -u_back-> b"]),
+        automaton(
+            "B",
+            [edge("l -go-> l", below_two := Binary("<", n, Constant(2))), edge("l -go-> m", below_two, n=up)],
+            variables=[DiscreteVariable("n", DIGIT, (0,))],
+        ),
+    )
+    found = [("go", "A", "a"), ("go", "B", "l")]
+    assert [(item.event, item.automaton, item.location) for item in controllable_choices(made)] == found
+    assert str(controllable_choices(made)[0]) == "A: go has several edges that can be taken in one state of a"
+    # Where the other automaton blocks the event, or an edge leaves a range, there is no choice.
+    blocking = replace(made, automata=(made.automata[0], automaton("B", ["m -x-> m"], blocks=["go"])))
+    assert controllable_choices(replace(blocking, events=(*made.events, Event("x", True)))) == ()
+    narrow = DiscreteVariable("n", IntegerType(0, 1), (0,))
+    leaving = replace(made, automata=(made.automata[0], replace(made.automata[1], variables=(narrow,))))
+    assert [item.automaton for item in controllable_choices(leaving)] == ["A"]
 
 
 def test_guards_that_meet_only_where_there_is_no_value_do_not_meet() -> None:

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 import robosc
 from robosc.automata import DiscreteVariable, EventCondition, InputVariable, Role, System, disables
 from robosc.automata.compile import State
-from robosc.expressions import Binary, Constant, EnumType, IntegerType, StateTest
+from robosc.expressions import Binary, Constant, EnumType, IntegerType, StateTest, Unary
 from robosc.pipeline.walking import TroubleKind
 from support.effort import examples
 from support.naive_system import NaiveSystem
@@ -148,16 +148,16 @@ def _lead(
             told: dict[Any, Any] = {}
             for path, value in known:
                 inside = told
-                for step in path[:-1]:
+                for step in ("all", *path)[:-1]:
                     inside = inside.setdefault(step, {})
-                inside[path[-1]] = value
+                inside[("all", *path)[-1]] = value
             narrowed = naive.step(now, event, known)[0]
-            assert by_name(item.parts for item in run.choices(event, told)) == by_name(
+            assert by_name(item.parts for item in run.choices(event, *told.values())) == by_name(
                 parts(drawn, item) for item in narrowed
             )
             if narrowed:
                 target = dice.choice(sorted(narrowed))
-                taken = run.step(event, told, to=parts(drawn, target))
+                taken = run.step(event, *told.values(), to=parts(drawn, target))
                 assert len(taken.data) == len(known)
                 assert run.undo() == taken
         assert run.step(event, to=parts(drawn, target)).state.parts == parts(drawn, target)
@@ -237,25 +237,38 @@ def test_every_cause_is_a_sentence() -> None:
                     edge("l -guarded-> l", StateTest("A", "m")),
                     edge("l -count-> l", n=Binary("+", read("A.n"), Constant(1))),
                     *("l -needed-> l", "l -disabled-> l", "l -watched-> l", "m -elsewhere-> l", "l -u_free-> l"),
+                    *("l -barred-> l", "l -u_barred-> l", "l -broken-> k", "l -broken-> m", "l -u_broken-> k"),
+                    *("l -partly-> k", "l -partly-> l"),
                 ],
                 variables=[DiscreteVariable("n", IntegerType(0, 2), (2,))],
                 blocks=["never"],
             ),
-            automaton("left R", ["r -elsewhere-> r"], blocks=["watched", "u_free", "nowhere"]),
+            automaton("left R", ["r -elsewhere-> r"], blocks=["watched", "u_free", "alone"]),
+            automaton("Monitor", ["y -partly-> x"], initial="x", blocks=["nowhere"]),
         ),
         conditions=(EventCondition("needed", StateTest("A", "m")), disables(StateTest("A", "l"), "disabled")),
+        plant_conditions=(EventCondition("barred", StateTest("A", "m")), disables(StateTest("A", "l"), "u_barred")),
+        plant_invariants=(Unary("not", StateTest("A", "k")), Unary("not", StateTest("A", "m"))),
     )
-    requirement = replace(made.automata[1], role=Role.REQUIREMENT, alphabet=frozenset({"watched", "nowhere"}), edges=())
-    made = replace(made, automata=(made.automata[0], requirement))
+    requirement = replace(made.automata[1], role=Role.REQUIREMENT, alphabet=frozenset({"watched", "alone"}), edges=())
+    monitor = replace(made.automata[2], alphabet=frozenset({"partly"}), monitors=frozenset({"partly"}))
+    made = replace(made, automata=(made.automata[0], requirement, monitor))
     run = robosc.simulate(supervised(made))
+    cannot_be = "it leads only to what the plants cannot be: there !A.{} does not hold"
+    assert run.possible == ("partly", "u_free")
     assert run.hindrances() == {
+        "alone": ("requirement left R has no edge for it",),
+        "barred": ("it needs A.m, which does not hold (A is l)",),
+        "broken": (cannot_be.format("k"), cannot_be.format("m")),
         "count": ("it could take A.n, which is 2, out of its range 0..2",),
         "disabled": ("A.l disables it, and that holds (A is l)",),
         "elsewhere": ("A is in l, not in m",),
         "guarded": ("A: A.m does not hold (A is l)",),
         "needed": ("it needs A.m, which does not hold (A is l)",),
         "never": ("A has no edge for it",),
-        "nowhere": ("no plant has it in its alphabet",),
+        "nowhere": ("no automaton has it in its alphabet",),
+        "u_barred": ("A.l disables it, and that holds (A is l)",),
+        "u_broken": (cannot_be.format("k"),),
         "watched": ("requirement left R has no edge for it",),
     }
 

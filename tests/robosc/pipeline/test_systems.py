@@ -8,7 +8,9 @@ from hypothesis import given, settings
 import robosc
 from robosc.automata import Automaton, Edge, Event, System
 from robosc.expressions import Constant, StateTest
+from robosc.supervisor.predicates import state_predicate
 from robosc.synthesis import synthesize
+from robosc.verification import Limits, verify
 from support.effort import examples
 from support.random_systems import any_system, explicit_supervisor, system_seeds
 from support.systems import automaton, system
@@ -89,8 +91,12 @@ def test_ways_to_begin_are_part_of_the_answer() -> None:
     assert str(supervisor.initial_condition) == "A.a"
     assert repr(supervisor.initial_condition) == "<the initial state needs A.a>"
     assert robosc.verify(supervisor).passed
-    # Searched one by one alone, it is not checked beyond the limit.
     assert robosc.verify(supervisor, maximum_states=0).status is robosc.VerificationStatus.NOT_CHECKED
+    # Too large to be searched one by one, it is searched on sets of states.
+    found = verify(two, {}, Limits(0, 0, 1000), initial=state_predicate(two, supervisor.initial), expected_states=1)
+    assert (found.is_complete, found.verification.states, found.verification.failures) == (True, 1, ())
+    everywhere = verify(two, {}, Limits(0, 0, 1000), expected_states=1)
+    assert everywhere.verification.failures[0].property == "nonblocking"
 
 
 def test_other_doors_are_closed() -> None:

@@ -17,7 +17,7 @@ from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.transitions import Steps, transition_of
 from support.effort import examples
-from support.random_systems import any_system
+from support.random_systems import any_systems, any_wide_systems
 from support.systems import automaton, edge, operation, read, system
 
 
@@ -37,16 +37,15 @@ def states_of(encoding: Encoding, states: Iterable[State]) -> Any:
     )
 
 
-@settings(max_examples=examples(25))
-@given(seed=st.integers(0, 2**32 - 1))
-def test_steps_of_random_systems(engine: str, seed: int) -> None:
+@settings(max_examples=examples(50))
+@given(source=st.one_of(any_systems(), any_wide_systems()))
+def test_steps_of_random_systems(engine: str, source: System) -> None:
     """From single states and into single states, reachable or not."""
-    source = any_system(seed)
     semantics = Semantics(source)
     encoding = Encoding(source, make_manager(engine))
     false = encoding.manager.false
     every = product(*(subject_domain(source, subject) for subject in subjects(source)))
-    sample = [*islice(every, 0, 2000, 97), semantics.initial]
+    sample = [*islice(every, 0, 2000, 97), *semantics.initial_states[:1]]
     for event in source.events:
         steps = Steps(encoding, transition_of(encoding, event))
         for state in sample:
@@ -67,11 +66,11 @@ def test_steps_of_random_systems(engine: str, seed: int) -> None:
             ), where
 
 
-@settings(max_examples=examples(40))
-@given(seed=st.integers(0, 2**32 - 1))
-def test_bad_states_of_random_systems(engine: str, seed: int) -> None:
+@settings(max_examples=examples(60))
+@given(drawn=st.one_of(any_systems(), any_wide_systems()))
+def test_bad_states_of_random_systems(engine: str, drawn: System) -> None:
     # Invariants are no event's business.
-    source = replace(any_system(seed), invariants=())
+    source = replace(drawn, invariants=())
     semantics = Semantics(source)
     encoding = Encoding(source, make_manager(engine))
     bad = encoding.any_of(Steps(encoding, transition_of(encoding, event)).bad for event in source.events)

@@ -78,7 +78,7 @@ class Chaining:
 
     def _grown(self, step: Step, states: Any) -> Any:
         self._monitor.check_stop()
-        return states | (self._within & step.add(states))
+        return step.grown(states, self._within, states)
 
 
 class _Work:

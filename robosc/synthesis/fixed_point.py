@@ -126,12 +126,16 @@ class FixedPoint:
 
     def _towards(self, steps: Steps, good: Any) -> Step:
         source, names = self._source(steps, good)
-        return Step(lambda states: source & steps.some(states), names)
+        return Step(lambda states: source & steps.some(states), names, source & steps.sources)
 
     def _controllable(self, problem: Problem, good: Any) -> Any:
         """The states of `good` that no run of uncontrollable events leaves."""
         closure = self._closure(
-            (Step(steps.some, steps.names) for steps in self._each(problem) if not steps.event.is_controllable),
+            (
+                Step(steps.some, steps.names, steps.sources)
+                for steps in self._each(problem)
+                if not steps.event.is_controllable
+            ),
             self._encoding.manager.true,
         )
         # Once the initial state is among them there is nothing left to find out.
@@ -148,7 +152,7 @@ class FixedPoint:
 
     def _onwards(self, steps: Steps, good: Any) -> Step:
         source, names = self._source(steps, good)
-        return Step(lambda states: steps.image(states & source), names)
+        return Step(lambda states: steps.image(states & source), names, steps.arrival)
 
     def _source(self, steps: Steps, good: Any) -> tuple[Any, frozenset[str]]:
         """Return the predicate of where an event may happen, and the variables that decide that.

@@ -18,7 +18,7 @@ from typing import Any
 
 from robosc.synthesis.engines import Manager
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.nodes import cofactors, is_constant
+from robosc.synthesis.nodes import cofactors
 from robosc.synthesis.step import Step, never_done
 
 
@@ -37,6 +37,8 @@ class Saturation:
         self, manager: Manager, levels: Mapping[str, int], steps: Sequence[Step], within: Any, monitor: ProgressMonitor
     ) -> None:
         self._manager = manager
+        self._false = manager.false
+        self._variables = {level: manager.var(name) for name, level in levels.items()}
         self._within = within
         self._monitor = monitor
         groups: defaultdict[int, list[Step]] = defaultdict(list)
@@ -75,14 +77,14 @@ class Saturation:
             for step in topmost:
                 if is_done(states):
                     return states
-                states = self._grown(states, self._within, step)
+                states = self._grown(states, self._within, step, states)
             if states == before:
                 break
         return states
 
     def _saturated(self, states: Any, within: Any, group: int) -> Any:
         """Part of a set closed under the groups of steps from one on; `within` is the part that belongs to it."""
-        if group == len(self._groups) or states == within or states == self._manager.false:
+        if group == len(self._groups) or states == within or states == self._false:
             return states
         key = (int(states), int(within), group)
         found = self._known.get(key)
@@ -93,19 +95,19 @@ class Saturation:
 
     def _worked_out(self, states: Any, within: Any, group: int) -> Any:
         top, steps = self._groups[group]
-        # No set is constant here: nothing lies between all and nothing, and those are not worked out.
-        node = states if is_constant(self._manager, within) or states.level <= within.level else within
-        if node.level < top:
-            low, high = (
-                self._saturated(part, inside, group)
-                for part, inside in zip(self._split(states, node), self._split(within, node), strict=True)
-            )
-            return self._manager.ite(self._manager.var(node.var), high, low)
+        level = min(states.level, within.level)
+        if level < top:
+            parts = zip(_split(states, level), _split(within, level), strict=True)
+            low, high = (self._saturated(part, inside, group) for part, inside in parts)
+            return self._manager.ite(self._variables[level], high, low)
         states = self._saturated(states, within, group + 1)
+        # What came of states that a step has seen is there already, so it is asked about new ones only.
+        seen = [self._false] * len(steps)
         # Once nothing has come of any step since the last time that something has, nothing ever will.
         vain, number = 0, 0
         while vain < len(steps):
-            grown = self._grown(states, within, steps[number])
+            grown = self._grown(states, within, steps[number], states & ~seen[number])
+            seen[number] = states
             number = (number + 1) % len(steps)
             vain += 1
             if grown != states:
@@ -113,22 +115,21 @@ class Saturation:
                 vain = 0
         return states
 
-    def _split(self, predicate: Any, node: Any) -> tuple[Any, Any]:
-        """Return the cofactors of a predicate where the variable of a node is false and where it is true.
-
-        None of the predicate's own variables stands above that variable.
-        """
-        if is_constant(self._manager, predicate) or predicate.level > node.level:
-            return predicate, predicate
-        return cofactors(predicate)
-
-    def _grown(self, states: Any, within: Any, step: Step) -> Any:
+    def _grown(self, states: Any, within: Any, step: Step, new: Any) -> Any:
         self._monitor.check_stop()
         self._taken += 1
         if self._taken >= (self._told + 1) * self._count:
             self._tell(states)
-        return states | (within & step.add(states))
+        return states if new == self._false else step.grown(states, within, new)
 
     def _tell(self, states: Any) -> None:
         self._told += 1
         self._monitor.tell(self._phase, self._told, states)
+
+
+def _split(predicate: Any, level: int) -> tuple[Any, Any]:
+    """Return the cofactors of a predicate where the variable of a level is false and where it is true.
+
+    None of the predicate's own variables stands above that level.
+    """
+    return cofactors(predicate) if predicate.level == level else (predicate, predicate)

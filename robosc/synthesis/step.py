@@ -10,12 +10,21 @@ class Step:
     """Contribution of one event to a set of states.
 
     Attributes:
-        add: The states that it leads to from a set of states.
+        add: The states that it leads to from a set of states; from two sets, what it leads to from each of them.
         names: The current-state variables that it reads or changes: all of them.
+        room: Predicate over these variables that is true of all that it ever leads to; None if there is none.
     """
 
     add: Callable[[Any], Any]
     names: frozenset[str]
+    room: Any = None
+
+    def grown(self, states: Any, within: Any, new: Any) -> Any:
+        """Return some states and what the event adds to them of those within a predicate, led from new ones."""
+        # What it leads to is expensive; mostly all that it could is there already.
+        if self.room is not None and states | (within & self.room) == states:
+            return states
+        return states | (within & self.add(new))
 
 
 def never_done(states: Any) -> bool:

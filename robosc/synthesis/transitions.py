@@ -250,6 +250,7 @@ class Steps:
 
     def __init__(self, encoding: Encoding, transition: Transition) -> None:
         self._manager = encoding.manager
+        self._false = encoding.manager.false
         self._transition = transition
         true, false = self._manager.true, self._manager.false
         self._constants = {name: f == true for name, f in transition.functions.items() if f in (true, false)}
@@ -266,6 +267,8 @@ class Steps:
 
         States in which a plant invariant is not true do not count: there are none.
         """
+        self.sources = self._without_hidden(self._in_range)
+        """States from which the event leads anywhere."""
         self.condition = transition.condition & transition.watched
         """States in which its event conditions are true, and no requirement automaton is against it."""
         self.is_deterministic = not transition.hidden
@@ -274,9 +277,10 @@ class Steps:
         """The current-state variables that it reads or changes."""
         self._state_names = encoding.state_names
         self._changed = tuple(transition.functions)
-        self._arrival = encoding.all_of(
+        self.arrival = encoding.all_of(
             self._manager.var(name) if value else ~self._manager.var(name) for name, value in self._constants.items()
         )
+        """States that have all that the event writes as a constant: it leads to no other ones."""
         self._relation: Any = None
 
     @property
@@ -304,6 +308,8 @@ class Steps:
 
     def some(self, predicate: Any) -> Any:
         """Return the states from which the event can lead into a predicate."""
+        if predicate & self.arrival == self._false:
+            return self._false
         return self._without_hidden(self._in_range & self._after(predicate))
 
     def only(self, predicate: Any) -> Any:
@@ -323,7 +329,7 @@ class Steps:
         if self._composed:
             moved = renamed(manager, {next_name(name): name for name in self._composed}, moved)
         # What is written as a constant needs no next-state variable: it is forgotten, and then known.
-        return moved & self._arrival
+        return moved & self.arrival
 
     def _after(self, predicate: Any) -> Any:
         """Return the predicate that another will be true after the event, by substituting next-state functions."""

@@ -76,7 +76,8 @@ class Sets:
             # Of a part every variable above is free, and so it is in what comes of it.
             return self.predicate({target for state in self.states(predicate) for target in move(state)})
 
-        return Step(add, names)
+        # All that it leads to, where every other variable is free.
+        return Step(add, names, add(self.manager.true) if len(names) > 1 else None)
 
 
 def swept(moves: Sequence[Move], begin: set[State], within: set[State]) -> set[State]:

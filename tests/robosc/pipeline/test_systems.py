@@ -88,6 +88,7 @@ def test_ways_to_begin_are_part_of_the_answer() -> None:
     ))  # fmt: skip
     supervisor = robosc.synthesize(two).supervisor
     assert supervisor is not None
+    assert supervisor.initial is not None
     assert str(supervisor.initial_condition) == "A.a"
     assert repr(supervisor.initial_condition) == "<the initial state needs A.a>"
     assert robosc.verify(supervisor).passed

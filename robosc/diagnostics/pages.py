@@ -13,8 +13,9 @@ There is one Markdown file a code in the folder `pages`, of one shape:
     ## See also
     - `another-code`
 
-A fence says what it holds: `robosc` (the model), `robosc library=NAME` (a library that the model imports), or
-`console` (a session at a shell, where no text could show the fault: a NUL, a file of 16 MiB).
+A fence says what it holds: `robosc` (the model), `robosc library=NAME` (a library that the model imports), `cif` (a
+CIF model), `cif library=NAME` (a file that it imports), or `console` (a session at a shell, where no text could show
+the fault: a NUL, a file of 16 MiB).
 """
 
 import re
@@ -59,7 +60,7 @@ class Block:
     """A fenced text of a page.
 
     Attributes:
-        kind: `robosc` or `console`.
+        kind: `robosc`, `cif` or `console`.
         library: Name of the library that it holds, or None where it holds the robot or a session.
         text: Text between the fences.
     """

@@ -11,6 +11,7 @@ import pytest
 
 from robosc.automata import to_automata
 from robosc.certification import OutcomeStatus, make_supervisor
+from robosc.cif.parser import parse as parse_cif
 from robosc.diagnostics import Block, Page, Stage, codes, document, page, pages, parse_page
 from robosc.editing.findings import no_supervisor
 from robosc.errors import Diagnostic, InternalError, LanguageError, Severity
@@ -37,6 +38,8 @@ def bundle_of(blocks: tuple[Block, ...]) -> Bundle:
 def findings(item: Page, blocks: tuple[Block, ...]) -> tuple[Diagnostic, ...]:
     """Return the findings of a page's stage about its blocks."""
     bundle = bundle_of(blocks)
+    if blocks[0].kind == "cif":
+        return cif_findings(bundle)
     # The definitions of ROS's own types come with what the tests are installed with.
     texts = (file.text for file in bundle.files)
     # Some packages of other pages are made up, and nobody looked for them.
@@ -60,6 +63,15 @@ def findings(item: Page, blocks: tuple[Block, ...]) -> tuple[Diagnostic, ...]:
     return (*made.diagnostics, no_supervisor(made.reason, robot.name.location))
 
 
+def cif_findings(bundle: Bundle) -> tuple[Diagnostic, ...]:
+    """Return the findings about a CIF model."""
+    try:
+        parse_cif(bundle.main)
+    except LanguageError as error:
+        return error.diagnostics
+    return ()
+
+
 def remarks(bundle: Bundle) -> tuple[Diagnostic, ...]:
     """Return the warnings of an explanation as findings."""
     checked = check(bundle)
@@ -81,7 +93,7 @@ def marked(blocks: tuple[Block, ...]) -> list[tuple[str, int]]:
 
 
 PAGES = pages()
-SHOWN = [item for item in PAGES if item.example[0].kind == "robosc"]
+SHOWN = [item for item in PAGES if item.example[0].kind in ("robosc", "cif")]
 TYPED = [item for item in PAGES if item.example[0].kind == "console"]
 
 
@@ -101,7 +113,7 @@ def test_a_page_has_its_shape(item: Page) -> None:
     assert not item.markdown.endswith("\n\n")
     assert max(map(len, item.markdown.splitlines())) <= 120
     assert item.fixed
-    assert {block.kind for block in (*item.example, *item.fixed)} <= {"robosc", "console"}
+    assert {block.kind for block in (*item.example, *item.fixed)} <= {"robosc", "cif", "console"}
     assert set(item.see_also) <= set(codes()) - {item.code}
     assert len(set(item.see_also)) == len(item.see_also)
     assert not any(block.marked_lines for block in item.fixed)
@@ -123,7 +135,7 @@ def test_all_examples_bear_a_mark_where_there_is_a_place() -> None:
 
 @pytest.mark.parametrize("item", PAGES, ids=lambda item: item.code)
 def test_what_is_fixed_is_sound(item: Page) -> None:
-    if item.fixed[0].kind == "robosc":
+    if item.fixed[0].kind in ("robosc", "cif"):
         found = findings(item, item.fixed)
         # A note tells no fault, and what is fixed may well be worth one.
         assert [one for one in found if one.severity is not Severity.NOTE or one.code == item.code] == []

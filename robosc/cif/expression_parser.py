@@ -4,6 +4,7 @@ from robosc.cif import syntax
 from robosc.cif.cursor import Cursor
 from robosc.cif.tokens import Kind
 from robosc.cif.words import FUNCTIONS
+from robosc.source import Location
 
 _LEVELS: tuple[frozenset[str], ...] = (
     frozenset({"or"}),
@@ -62,7 +63,8 @@ class ExpressionParser(Cursor):
 
     def _chain(self, left: syntax.Expression, level: int) -> syntax.Expression:
         """Read on behind the first operand of operators of one level."""
-        operators, operands = [], [left]
+        operators: list[int] = []
+        operands = [left]
         while _LEVEL_OF.get(self.texts[self.place], -1) == level:
             if level > 1 and len(operators) == _LONGEST_CHAIN:
                 raise self.fault("brackets or fewer operators", "Split this long expression.")
@@ -115,7 +117,7 @@ class ExpressionParser(Cursor):
         self.take("(")
         return self.expressions_up_to(")")
 
-    def _bracket(self, base: syntax.Expression, at: syntax.Location) -> syntax.Expression:
+    def _bracket(self, base: syntax.Expression, at: Location) -> syntax.Expression:
         """Read an index or a slice."""
         self.take("[")
         low = None if self.sees(":") else self.expression()
@@ -166,7 +168,7 @@ class ExpressionParser(Cursor):
                 return self._switch(at)
         raise self.fault("an expression")
 
-    def _braces(self, at: syntax.Location) -> syntax.Expression:
+    def _braces(self, at: Location) -> syntax.Expression:
         """Read a set or a dictionary behind its brace."""
         if self.takes("}"):
             return syntax.Group("set", (), at)
@@ -183,7 +185,7 @@ class ExpressionParser(Cursor):
         self.take("}")
         return syntax.Group("dict" if is_dictionary else "set", tuple(items), at)
 
-    def _cast(self, at: syntax.Location) -> syntax.Expression:
+    def _cast(self, at: Location) -> syntax.Expression:
         self.take("<")
         type_ = self.type()
         self.take(">")
@@ -192,7 +194,7 @@ class ExpressionParser(Cursor):
         self.shallower()
         return syntax.Cast(type_, operand, at)
 
-    def _if(self, at: syntax.Location) -> syntax.Expression:
+    def _if(self, at: Location) -> syntax.Expression:
         self.take("if")
         branches = [self._branch()]
         while self.takes("elif"):
@@ -209,7 +211,7 @@ class ExpressionParser(Cursor):
         self.take(":")
         return guards, self.expression()
 
-    def _switch(self, at: syntax.Location) -> syntax.Expression:
+    def _switch(self, at: Location) -> syntax.Expression:
         self.take("switch")
         subject = self.expression()
         self.take(":")
@@ -278,7 +280,7 @@ class ExpressionParser(Cursor):
         self.take("]")
         return tuple(bounds)
 
-    def _tuple(self, at: syntax.Location) -> syntax.Type:
+    def _tuple(self, at: Location) -> syntax.Type:
         self.take("(")
         parts: list[syntax.Type] = []
         fields: list[syntax.Identifier] = []

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from robosc.cli import synth
+from robosc.cli import cif, synth
 from robosc.cli.arguments import add_deployment_argument, add_engine_options, add_model_arguments, read_bundle
 from robosc.cli.output import ExitCode, UsageError, has_errors, print_diagnostics, print_json
 from robosc.errors import Diagnostic, LanguageError, UnsupportedModelError
@@ -25,7 +25,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser = commands.add_parser(
         "check",
         help="find everything that is wrong with a model",
-        description="Check a model or library and print every finding with its place and how to fix it.",
+        description="Check a model, library or CIF model (FILE.cif) and print every finding with its place and how to "
+        "fix it.",
     )
     add_model_arguments(parser)
     parser.add_argument("--strict", action="store_true", help="exit with 1 for warnings too")
@@ -43,6 +44,9 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def run(arguments: argparse.Namespace) -> int:
     """Check the model; 0 without errors (and, where it was asked for, with a supervisor), else 1."""
+    _require_synthesis(arguments)
+    if cif.is_cif(arguments):
+        return cif.check(arguments)
     return run_with(arguments, _checked, lambda bundle: synth.make(arguments, bundle, allow_livelock=False))
 
 
@@ -61,11 +65,7 @@ def run_with(
     Raises:
         UsageError: The arguments say how to synthesize, and not to; or a file is not there.
     """
-    engine = arguments.engine or arguments.reorder or arguments.max_nodes
-    if not arguments.synthesize and (arguments.deployment or engine):
-        raise UsageError(
-            "--deployment, --engine, --reorder and --max-nodes say how to synthesize: they need --synthesize"
-        )
+    _require_synthesis(arguments)
     try:
         bundle = read_bundle(arguments)
     except LanguageError as error:
@@ -78,6 +78,19 @@ def run_with(
     except UnsupportedModelError as error:
         found = _Synthesized(check(bundle), "unsupported model", str(error), has_failed=True)
     return _report_synthesized(arguments, found, bundle)
+
+
+def _require_synthesis(arguments: argparse.Namespace) -> None:
+    """Do nothing unless the arguments say how to synthesize, and not to.
+
+    Raises:
+        UsageError: They do.
+    """
+    engine = arguments.engine or arguments.reorder or arguments.max_nodes
+    if not arguments.synthesize and (arguments.deployment or engine):
+        raise UsageError(
+            "--deployment, --engine, --reorder and --max-nodes say how to synthesize: they need --synthesize"
+        )
 
 
 def _checked(bundle: Bundle) -> tuple[Diagnostic, ...]:

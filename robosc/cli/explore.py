@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from robosc.cli import synth
+from robosc.cli import cif, synth
 from robosc.cli.arguments import add_deployment_argument, add_engine_options, add_model_arguments, read_bundle
 from robosc.cli.output import ExitCode, print_json
 from robosc.json_documents import diagnostics_json
@@ -26,7 +26,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser = commands.add_parser(
         "explore",
         help="print the controlled system's states and transitions",
-        description="Print every state that the robot under its supervisor can be in, and every transition.",
+        description="Print every state that the robot, or a CIF model (FILE.cif), can be in under its supervisor, and "
+        "every transition.",
     )
     add_model_arguments(parser)
     parser.add_argument("--dot", action="store_true", help="print a graph for Graphviz instead of a table")
@@ -47,6 +48,8 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc.exploration import graph_dot, graph_json, graph_text
     from robosc.pipeline.exploring import graph_of
 
+    if cif.is_cif(arguments):
+        return cif.explore(arguments)
     bundle = read_bundle(arguments)
     # The graph is of everything allowed, whatever an executor would choose.
     outcome = synth.make(arguments, bundle, allow_livelock=True)

@@ -133,6 +133,10 @@ def read_model(
     from robosc.language import decode_source, load_bundle
     from robosc.language.interfaces import interface_folders
 
+    if model.suffix == ".cif":
+        raise FileAccessError(
+            f"{model} is a CIF model, which check, synth, explore and verify of robosc take; this is for RoboSC's own"
+        )
     try:
         if text is None:
             if model.is_dir():

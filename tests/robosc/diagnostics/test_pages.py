@@ -11,7 +11,7 @@ import pytest
 
 from robosc.automata import to_automata
 from robosc.certification import OutcomeStatus, make_supervisor
-from robosc.cif.parser import parse as parse_cif
+from robosc.cif import check_cif
 from robosc.diagnostics import Block, Page, Stage, codes, document, page, pages, parse_page
 from robosc.editing.findings import no_supervisor
 from robosc.errors import Diagnostic, InternalError, LanguageError, Severity
@@ -65,11 +65,7 @@ def findings(item: Page, blocks: tuple[Block, ...]) -> tuple[Diagnostic, ...]:
 
 def cif_findings(bundle: Bundle) -> tuple[Diagnostic, ...]:
     """Return the findings about a CIF model."""
-    try:
-        parse_cif(bundle.main)
-    except LanguageError as error:
-        return error.diagnostics
-    return ()
+    return check_cif(bundle).diagnostics
 
 
 def remarks(bundle: Bundle) -> tuple[Diagnostic, ...]:

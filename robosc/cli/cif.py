@@ -1,0 +1,213 @@
+"""CIF models in `check`, `synth`, `explore` and `verify`: automata without a text of RoboSC."""
+
+import argparse
+import sys
+from typing import TYPE_CHECKING
+
+from robosc.cli.output import ExitCode, ProgressLine, UsageError, has_errors, print_diagnostics, print_json
+from robosc.errors import Diagnostic
+from robosc.json_documents import counts_text, diagnostics_json
+from robosc.model.structure import Deployment
+from robosc.source import Bundle
+
+if TYPE_CHECKING:
+    from robosc.cif import CheckedCif
+    from robosc.pipeline.options import SynthesisOptions
+    from robosc.pipeline.systems import SystemSynthesis
+
+SUFFIX = ".cif"
+
+
+def is_cif(arguments: argparse.Namespace) -> bool:
+    """Return True if the model of a command is one of CIF: the ending of its name tells."""
+    return bool(arguments.model.suffix == SUFFIX)
+
+
+def check(arguments: argparse.Namespace) -> ExitCode:
+    """Check a CIF model, and synthesize if that is asked for; 0 without errors, else 1.
+
+    Raises:
+        UsageError: An argument means nothing for it, or it cannot be read.
+    """
+    bundle, found = _checked(arguments)
+    told: dict[str, object] = {}
+    synthesis = None
+    if arguments.synthesize and found.system is not None:
+        synthesis = _synthesis(arguments, found)
+        told = {"status": str(synthesis.status), "reason": synthesis.reason}
+    if arguments.json:
+        print_json({"file": str(arguments.model), **told, **diagnostics_json(found.diagnostics)})
+    elif found.diagnostics:
+        print_diagnostics(found.diagnostics, bundle)
+    else:
+        sys.stdout.write(f"{arguments.model}: {counts_text(found.diagnostics)}\n")
+    if synthesis is not None and synthesis.supervisor is None:
+        if not arguments.json:
+            sys.stderr.write(f"{arguments.model}: {synthesis.reason}\n")
+        return ExitCode.FAILED
+    return ExitCode.FAILED if has_errors(found.diagnostics, strict=arguments.strict) else ExitCode.OK
+
+
+def synth(arguments: argparse.Namespace) -> ExitCode:
+    """Synthesize, and print what the supervisor adds to each event; 0 with a supervisor, 1 without.
+
+    Raises:
+        UsageError: An argument means nothing for it, or it cannot be read.
+    """
+    _refuse(arguments.output is not None, "-o: there is no supervisor file of a CIF model")
+    _refuse(arguments.allow_livelock, "--allow-livelock: a CIF model has no silent steps of a controller")
+    bundle, found = _checked(arguments)
+    if found.system is None:
+        return _without(arguments, bundle, found.diagnostics, "model errors", "")
+    made = _synthesis(arguments, found)
+    if made.supervisor is None:
+        return _without(arguments, bundle, found.diagnostics, str(made.status), made.reason)
+    initial = made.supervisor.initial_condition
+    if arguments.json:
+        print_json(
+            {
+                "status": str(made.status),
+                "reason": "",
+                "system": found.system.name,
+                "states": made.supervisor.states,
+                "conditions": {name: str(item) for name, item in made.supervisor.conditions.items()},
+                "initial": None if initial is None else str(initial),
+                **diagnostics_json(found.diagnostics),
+            }
+        )
+        return ExitCode.OK
+    print_diagnostics(found.diagnostics, bundle)
+    sys.stdout.write(f"{made.supervisor}\n")
+    if initial is not None:
+        sys.stdout.write(f"it begins only where {initial}\n")
+    return ExitCode.OK
+
+
+def explore(arguments: argparse.Namespace) -> ExitCode:
+    """Print the graph of the controlled system; 0 with one, 1 without.
+
+    Raises:
+        UsageError: An argument means nothing for it, or it cannot be read.
+    """
+    from robosc.exploration import graph_dot, graph_json, graph_text
+    from robosc.pipeline.exploring import graph_of
+
+    bundle, found = _checked(arguments)
+    if found.system is None:
+        return _without(arguments, bundle, found.diagnostics, "model errors", "")
+    made = _synthesis(arguments, found)
+    if made.supervisor is None:
+        return _without(arguments, bundle, found.diagnostics, str(made.status), made.reason)
+    graph = graph_of(made.supervisor, limit=arguments.limit)
+    if arguments.json:
+        print_json(graph_json(graph))
+    else:
+        print_diagnostics(found.diagnostics, bundle)
+        sys.stdout.write(graph_dot(graph) if arguments.dot else graph_text(graph))
+    return ExitCode.OK
+
+
+def verify(arguments: argparse.Namespace) -> ExitCode:
+    """Synthesize, and verify the supervisor by other means; 0 if it passed, else 1.
+
+    Raises:
+        UsageError: An argument means nothing for it, or it cannot be read.
+    """
+    from robosc.pipeline.results import VerificationStatus
+    from robosc.pipeline.systems import verify_system
+    from robosc.verification import Limits
+
+    _refuse(arguments.supervisor is not None, "FILE.rsup: there is no supervisor file of a CIF model")
+    _refuse(
+        bool(arguments.property or arguments.properties), "--property: properties are of RoboSC's models, not of CIF's"
+    )
+    _refuse(bool(arguments.signed_by), "--signed-by: there is no supervisor file of a CIF model")
+    bundle, found = _checked(arguments)
+    if found.system is None:
+        return _without(arguments, bundle, found.diagnostics, "model errors", "")
+    made = _synthesis(arguments, found)
+    if made.supervisor is None:
+        return _without(arguments, bundle, found.diagnostics, str(made.status), made.reason)
+    progress = ProgressLine()
+    try:
+        result = verify_system(
+            made.supervisor,
+            _options(arguments),
+            Limits.of(arguments.limit),
+            lambda step: progress.show(f"{step.stage}: {step.message}"),
+            lambda: False,
+            is_strict=arguments.strict,
+        )
+    finally:
+        progress.clear()
+    has_passed = result.status is VerificationStatus.PASSED
+    if arguments.json:
+        print_json({**result.report, **diagnostics_json(found.diagnostics)})
+    else:
+        print_diagnostics(found.diagnostics, bundle)
+        if not (has_passed and arguments.quiet):
+            sys.stdout.write(str(result) if str(result).endswith("\n") else f"{result}\n")
+    return ExitCode.OK if has_passed else ExitCode.FAILED
+
+
+def _checked(arguments: argparse.Namespace) -> "tuple[Bundle, CheckedCif]":
+    from robosc.cif import check_cif
+    from robosc.pipeline.cif_models import load_cif_model
+
+    _refuse(bool(arguments.library_path), "-L: a CIF model imports files by their places")
+    _refuse(bool(arguments.interface_path), "-I: a CIF model has no types of ROS")
+    _refuse(arguments.deployment == str(Deployment.LAYER), "--deployment: a CIF model is no node of a robot")
+    from robosc.pipeline.files import FileAccessError
+
+    try:
+        bundle = load_cif_model(arguments.model)
+    except FileAccessError as error:
+        raise UsageError(str(error)) from error
+    return bundle, check_cif(bundle)
+
+
+def _refuse(is_given: bool, message: str) -> None:
+    """Do nothing if an argument that means nothing for a CIF model is not given.
+
+    Raises:
+        UsageError: It is.
+    """
+    if is_given:
+        raise UsageError(message)
+
+
+def _options(arguments: argparse.Namespace) -> "SynthesisOptions":
+    from robosc.pipeline.options import SynthesisOptions
+
+    return SynthesisOptions(
+        engine=arguments.engine or "auto", allow_reordering=arguments.reorder, maximum_nodes=arguments.max_nodes
+    )
+
+
+def _synthesis(arguments: argparse.Namespace, found: "CheckedCif") -> "SystemSynthesis":
+    from robosc.pipeline.systems import synthesize_system
+
+    assert found.system is not None  # noqa: S101 - asked only of models without errors
+    progress = ProgressLine()
+    try:
+        return synthesize_system(
+            found.system,
+            _options(arguments),
+            lambda step: progress.show(f"{step.stage}: {step.message}"),
+            lambda: False,
+        )
+    finally:
+        progress.clear()
+
+
+def _without(
+    arguments: argparse.Namespace, bundle: Bundle, diagnostics: tuple[Diagnostic, ...], status: str, reason: str
+) -> ExitCode:
+    """Report that there is no supervisor."""
+    if arguments.json:
+        print_json({"status": status, "reason": reason, **diagnostics_json(diagnostics)})
+    else:
+        print_diagnostics(diagnostics, bundle)
+        if reason:
+            sys.stderr.write(f"{arguments.model}: {reason}\n")
+    return ExitCode.FAILED

@@ -1,0 +1,236 @@
+"""CIF models, checked and lowered: every construct, and every finding with its place."""
+
+from pathlib import Path
+
+import pytest
+
+from robosc.automata import System, check_system
+from robosc.cif import check_cif, load_cif
+from robosc.errors import Diagnostic
+from robosc.source import Bundle, SourceFile
+from robosc.synthesis import SynthesisStatus, synthesize
+
+TANK = """
+plant tank:
+  controllable c_fill; uncontrollable u_drain;
+  disc int[0..3] level = 1;
+  location:
+    initial; marked;
+    edge c_fill do level := level + 1;
+    edge u_drain when level > 1 do level := level - 1;
+end
+"""
+
+
+def checked(text: str, **others: str) -> tuple[System | None, tuple[Diagnostic, ...]]:
+    """The system of a text, and the findings about it."""
+    libraries = tuple(SourceFile(f"{name}.cif", other) for name, other in others.items())
+    found = check_cif(Bundle(SourceFile("m.cif", text), libraries))
+    return found.system, found.diagnostics
+
+
+def states(text: str, **others: str) -> int:
+    """Number of states of the controlled system; 0 where there is none."""
+    system, diagnostics = checked(text, **others)
+    assert system is not None, [str(item) for item in diagnostics]
+    check_system(system)
+    result = synthesize(system)
+    if result.status is SynthesisStatus.EMPTY:
+        return 0
+    assert result.statistics is not None
+    return result.statistics.states
+
+
+def counter(declarations: str, edge: str, location: str = "") -> str:
+    """A plant with one location, one controllable event `e` and one variable `x` of 0 to 3."""
+    return (
+        f"plant p: controllable e; disc int[0..3] x; {declarations} "
+        f"location: initial; marked; {location} edge e {edge}; end"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (TANK + "requirement tank.u_drain needs tank.level != 3;", 2),
+        (TANK + "plant tank.u_drain needs tank.level != 3;", 3),
+        (TANK + "requirement invariant tank.level < 3;", 2),
+        (TANK + "plant invariant tank.level < 3;", 2),
+        (TANK + "requirement tank.level = 2 disables tank.c_fill;", 2),
+        (TANK + "requirement {tank.c_fill} needs false;", 1),
+        (TANK + "initial tank.level = 0;", 0),
+        (TANK + "marked tank.level = 3;", 3),
+        (TANK + "marked false;", 0),
+        (counter("", "do x := x + 1"), 4),
+        (counter("", "do if x = 0: x := 2 elif x = 2: x := 3 else x := 0 end"), 3),
+        (counter("", "do if x = 0: x := 2 end"), 2),
+        (counter("disc int[0..3] y = 1;", "do (x, y) := (y, x)"), 2),
+        (counter("disc int[0..3] y = 1;", "do x := y, y := x"), 2),
+        (counter("disc int[0..3] y = 1;", "do (x, y) := if x = 0: (1, 2) else (3, 0) end"), 3),
+        (counter("const tuple(int a, b) t = (2, 3);", "do x := t[a]"), 2),
+        (counter("const list int l = [1, 3]; const int n = size(l);", "when x < n do x := l[1]"), 2),
+        (counter("alg int y = x + 1;", "when y <= 3 do x := y"), 4),
+        (counter("alg int y; equation y = 2;", "do x := y"), 2),
+        (counter("", "do x := switch x: case 0: 1 case 1: 2 else 0 end"), 3),
+        (counter("", "do x := (x + 1) mod 3"), 3),
+        (counter("", "do x := 3 - (x + 3) div 2"), 3),
+        (counter("enum E = A, B, C; disc E z;", "do z := switch z: case A: B case B: C case C: A end"), 3),
+        (counter("enum E = A, B, C; disc E z in {A, C};", "do z := B"), 3),
+        (counter("disc bool b in any;", "when b do b := not b"), 2),
+        (counter("disc int[1..4] y = x + 1;", "do y := 2"), 2),
+        (counter("disc int[2..3] y;", ""), 1),
+        (counter("input bool i;", "when i do x := 1"), 4),
+        (counter("type t = int[0..1]; disc t y = 1;", "do y := 0"), 2),
+        (counter("", "", "requirement x = 0;"), 1),
+        (counter("", "do x := 1", "initial x = 1;"), 0),
+        (counter("", "do x := floor(2.5) + max(0, 1)"), 2),
+        (counter("", "when 1 in {1, 2} do x := <int>\"3\""), 2),
+        (counter("print 1; svgout id \"a\" attr \"b\" value x; @doc(\"y\") const int k = 1;", "do x := k"), 2),
+        # A listed event without an edge is blocked, an event that is in no plant is always possible.
+        ("plant p: controllable e, f; alphabet e, f; location a: initial; marked; edge e goto b; location b: marked; end", 2),
+        ("controllable e; plant p: location: initial; marked; end requirement r: location a: initial; marked; edge e goto b;"
+         " location b: marked; end", 2),
+        ("uncontrollable e; plant p: location: initial; marked; edge e; end"
+         " requirement r: location a: initial; marked; edge e goto b; location b: marked; end", 0),
+        ("uncontrollable e; plant p: location: initial; marked; edge e; end"
+         " requirement r: monitor e; location a: initial; marked; edge e goto b; location b: marked; end", 2),
+        ("uncontrollable e; plant p: location: initial; marked; edge e; end"
+         " plant r: monitor; location a: initial; marked; edge e goto b; location b: marked; end", 2),
+        ("controllable e; plant p: location a: initial; edge e goto b; location b: marked; end", 2),
+        ("controllable e; plant p: location a: initial; edge e goto b; location b; end", 0),
+        ("controllable e; plant p: location a: initial; marked; location b: initial; marked; edge e goto a; end", 2),
+        ("controllable e; plant p: disc bool x in any; location a: initial x; marked; location b: initial not x; marked;"
+         " edge e when not x do x := true goto a; end", 2),
+        ("controllable e; plant p: alg int y; disc int[0..3] x; location a: initial; marked; equation y = 1; edge e do x := y"
+         " goto b; location b: marked; equation y = 3; edge e when y = 3 do x := y; end", 3),
+        ("controllable e; plant p: location a: initial; marked; edge e goto b; location b: marked; end"
+         " requirement invariant switch p: case a: true else false end;", 1),
+        ("controllable e; plant p: location a: initial; marked; requirement e needs false; edge e goto b; location b: marked;"
+         " end", 1),
+        ("controllable e; plant p: location a: initial; marked; edge e goto b; location b: marked;"
+         " requirement true disables e; edge e goto a; end", 2),
+        # Definitions: events, locations, expressions and components as arguments; groups, and names from roots.
+        ("group def D(controllable e; location l; alg int n; P q): plant a: disc int[0..3] x; location: initial; marked;"
+         " edge e when l and q.z < n do x := n; end end plant def P(): controllable e; disc int[0..3] z; location m: initial;"
+         " marked; edge e do z := 2; end p: P(); d: D(p.e, p.m, 2, p);", 2),
+        ("group g: controllable e; group h: plant p: location: initial; marked; edge .g.e; end end end"
+         " group g: plant q: location: initial; marked; edge ^g.e; end end", 1),
+        ("plant p: controllable $plant; location $end: initial; marked; edge p.plant; end", 1),
+        (counter("", "do x := 1") + " requirement r: p.e needs p.x = 0;", 2),
+    ],
+)  # fmt: skip
+def test_number_of_states(text: str, expected: int) -> None:
+    assert states(text) == expected
+
+
+def test_imports_are_merged() -> None:
+    main = 'import "a.cif", "b.cif"; requirement x.p.e needs false;'
+    a = 'namespace x; import "b.cif"; plant p: controllable e; location a: initial; marked; edge e goto b; location b: marked; end'
+    b = 'import "m.cif"; group x: const int n = 3; end'
+    assert states(main, a=a, b=b) == 1
+
+
+def test_files_are_read_from_their_folders(tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "main.cif").write_text('import "sub/a.cif", "nothing.cif";')
+    (tmp_path / "sub" / "a.cif").write_text('import "../main.cif", "b.cif";')
+    (tmp_path / "sub" / "b.cif").write_text("controllable e;")
+    bundle = load_cif(tmp_path / "main.cif")
+    assert [Path(file.name).name for file in bundle.files] == ["main.cif", "a.cif", "b.cif"]
+    (finding,) = check_cif(bundle).diagnostics
+    assert (finding.code, finding.location and finding.location.column) == ("cif-import", 21)
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "column"),
+    [
+        ("invariant x;", "cif-unknown-name", 11),
+        ("const int n = a.b;", "cif-unknown-name", 15),
+        ("group g: end const int n = g.b;", "cif-unknown-name", 28),
+        (counter("", "goto z"), "cif-unknown-name", 85),
+        ("const bool b = 3;", "cif-type", 16),
+        ("const bool b = not 3;", "cif-type", 16),
+        ("const bool b = 1 <= 2 <= 3;", "cif-type", 23),
+        ("const int n = 2147483647 + 1;", "cif-type", 26),
+        ("const int n = 1 div 0;", "cif-type", 17),
+        ("const int[0..2] n = 3;", "cif-type", 21),
+        ("type t = int[3..2];", "cif-type", 10),
+        ("const int n = if true: 1 else false end;", "cif-type", 15),
+        ("const int n = switch 3: case 3: 1 case 4: 2 end;", None, 0),
+        ("const int n = switch true: case true: 1 end;", "cif-type", 15),
+        ("const list int l = [1, true];", "cif-type", 20),
+        ("const int n = [1][3];", "cif-type", 15),
+        ("const int n = size(3);", "cif-type", 15),
+        ("const int n = <int>\"x\";", "cif-type", 15),
+        ("const int n = m; const int m = n;", "cif-cycle", 11),
+        ("type t = list t;", "cif-cycle", 6),
+        (counter("disc int[0..3] y = z; disc int[0..3] z = y;", ""), "cif-cycle", 85),
+        ("group def D(): d: D(); end d: D();", "cif-cycle", 19),
+        ("group def D(): end d: D(3);", "cif-arguments", 20),
+        ("group def D(event e): end d: D(3); event f;", "cif-arguments", 32),
+        ("const int n = 3; type n = int;", "cif-duplicate-name", 23),
+        ("enum E = A, A;", "cif-duplicate-name", 13),
+        ("const int n = 3; k: n();", "cif-wrong-kind", 21),
+        (counter("", "when e"), "cif-wrong-kind", 85),
+        (counter("", "do x := 1, x := 2"), "cif-assignment", 91),
+        (counter("", "do (x, x) := (1, 2)"), "cif-assignment", 87),
+        (counter("", "do if x = 1: x := 2 end, if x = 2: x := 1 end"), "cif-assignment", 115),
+        (counter("alg int y;", ""), "cif-structure", 52),
+        (counter("alphabet; monitor e;", ""), "cif-structure", 44),
+        ("plant p: location: initial; location a; end", "cif-structure", 10),
+        ("event e;", "cif-unsupported", 7),
+        ("controllable int c;", "cif-unsupported", 18),
+        ("cont c;", "cif-unsupported", 6),
+        ("invariant true;", "cif-unsupported", 11),
+        ("supervisor invariant true;", "cif-unsupported", 22),
+        ("automaton a: location; end", "cif-unsupported", 11),
+        (counter("disc real r;", ""), "cif-unsupported", 54),
+        (counter("disc int n;", ""), "cif-unsupported", 53),
+        (counter("", "when time > 1.0"), "cif-unsupported", 85),
+        (counter("", "when [1, x] = [1, 2]"), "cif-unsupported", 85),
+        (counter("disc int[1..2] y;", "do x := x div y"), "cif-unsupported", 107),
+        (counter("", "").replace("edge e", "edge tau"), "cif-unsupported", 78),
+        (counter("", "").replace("edge e", "edge when true"), "cif-unsupported", 73),
+        (counter("disc int[0..2000000] y;", ""), "cif-too-large", 65),
+    ],
+)  # fmt: skip
+def test_findings(text: str, code: str | None, column: int) -> None:
+    _, found = checked(text)
+    told = [(item.code, item.location.column) for item in found if item.location]
+    assert ((code, column) in told) if code else (told == [("cif-unsupported", 1)]), told
+
+
+def test_everything_that_synthesis_does_not_take_is_told_in_one_run() -> None:
+    text = """event e; cont c; func int f(int x): return x; end
+invariant true;
+plant p:
+  controllable a; disc real r; disc int n; controllable int ch;
+  location:
+    edge a, tau, ch! when f(1) = 2;
+end
+"""
+    _, found = checked(text)
+    assert {item.code for item in found} == {"cif-unsupported"}
+    assert [item.location.line for item in found if item.location] == [1, 1, 2, 4, 4, 4, 6, 6, 6]
+    assert all(item.fix for item in found)
+
+
+def test_a_definition_that_nobody_instantiates_is_checked_for_types_alone() -> None:
+    system, found = checked(TANK + "automaton def D(alg int n; event e): cont c; location: edge e when n > 1; end")
+    assert system is not None
+    assert found == ()
+    _, found = checked(TANK + "automaton def D(alg int n): location: edge when n; end")
+    assert [item.code for item in found] == ["cif-type"]
+
+
+def test_chains_of_algebraic_variables_do_not_explode() -> None:
+    chain = "".join(f"alg bool y{n} = y{n - 1} = (y{n - 1} and x{n}); input bool x{n};" for n in range(1, 60))
+    _, found = checked(f"{TANK} input bool y0; {chain} requirement invariant y59;")
+    assert [item.code for item in found] == ["cif-too-large"]
+
+
+def test_exclusions_of_events_that_nobody_has_are_dropped_with_a_warning() -> None:
+    system, found = checked(TANK + "controllable z; requirement z needs false;")
+    assert [item.code for item in found] == ["cif-no-effect"]
+    assert system is not None
+    assert system.conditions == ()

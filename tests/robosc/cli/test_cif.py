@@ -1,0 +1,109 @@
+"""CIF models on the command line."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from robosc.cli.main import main
+
+TANK = """plant tank:
+  controllable c_fill; uncontrollable u_drain;
+  disc int[0..3] level in any;
+  location:
+    initial; marked;
+    edge c_fill do level := level + 1;
+    edge u_drain when level > 1 do level := level - 1;
+end
+requirement tank.u_drain needs tank.level != 3;
+"""
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> str:
+    path = tmp_path / "tank.cif"
+    path.write_text(TANK)
+    return str(path)
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    status = main(list(arguments))
+    captured = capsys.readouterr()
+    return status, captured.out, captured.err
+
+
+def test_check(model: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(capsys, "check", model) == (0, f"{model}: no findings\n", "")
+    assert run(capsys, "check", model, "--synthesize")[0] == 0
+    Path(model).write_text(f"{TANK}requirement x needs y;\nmarked false;\n")
+    status, out, err = run(capsys, "check", model, "--json")
+    assert (status, err) == (1, "")
+    assert [item["code"] for item in json.loads(out)["diagnostics"]] == ["cif-unknown-name", "cif-unknown-name"]
+    assert "  | requirement x needs y;\n  |             ^" in run(capsys, "check", model)[2]
+
+
+def test_a_model_without_a_supervisor(model: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path(model).write_text(f"{TANK}marked false;\n")
+    assert run(capsys, "check", model)[0] == 0
+    for command in (["check", "--synthesize"], ["synth"], ["explore"], ["verify"]):
+        status, out, err = run(capsys, *command, model)
+        assert status == 1
+        assert "no supervisor exists" in err
+        status, out, _ = run(capsys, *command, model, "--json")
+        assert (status, json.loads(out)["status"]) == (1, "empty")
+
+
+def test_synth(model: str, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, err = run(capsys, "synth", model)
+    assert (status, err) == (0, "")
+    assert out.splitlines()[0] == "tank: a supervisor exists (3 states)"
+    assert "c_fill needs" in out
+    assert "begins only where" in out
+    document = json.loads(run(capsys, "synth", model, "--json")[1])
+    assert (document["states"], list(document["conditions"])) == (3, ["tank.c_fill"])
+
+
+def test_explore(model: str, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = run(capsys, "explore", model)
+    assert (status, out.splitlines()[0]) == (0, "tank: 3 states, 3 transitions; it starts in state 0 or 1 or 2")
+    document = json.loads(run(capsys, "explore", model, "--json")[1])
+    assert (document["initial"], document["initial_states"], len(document["states"])) == (0, [0, 1, 2], 3)
+    assert document["states"][0]["variables"] == {"tank.level": 0}
+    assert run(capsys, "explore", model, "--dot")[1].count("start ->") == 3
+    status, _, err = run(capsys, "explore", model, "--limit", "1")
+    assert (status, "raise the limit" in err) == (1, True)
+
+
+def test_verify(model: str, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = run(capsys, "verify", model, "--strict")
+    assert (status, out.splitlines()[0]) == (0, "tank: passed")
+    assert json.loads(run(capsys, "verify", model, "--json")[1])["status"] == "passed"
+    assert run(capsys, "verify", model, "--quiet") == (0, "", "")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["synth", "-o", "x.rsup"],
+        ["synth", "--allow-livelock"],
+        ["synth", "--deployment", "layer"],
+        ["check", "-L", "."],
+        ["check", "-I", "."],
+        ["verify", "--property", "never deadlock"],
+        ["generate", "--target", "c99", "-o", "out"],
+        ["simulate"],
+        ["doc"],
+        ["explain-synthesis"],
+    ],
+)
+def test_what_means_nothing_for_cif_is_refused(
+    arguments: list[str], model: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, out, err = run(capsys, *arguments, model)
+    assert (status, out) == (2, "")
+    assert "CIF" in err
+    assert err.count("\n") == 1
+
+
+def test_a_file_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(capsys, "check", "none.cif") == (2, "", "robosc: there is no file none.cif\n")

@@ -1,14 +1,17 @@
 """CIF models, checked and lowered: every construct, and every finding with its place."""
 
 from pathlib import Path
+from random import Random
 
 import pytest
 
 from robosc.automata import System, check_system
 from robosc.cif import check_cif, load_cif
+from robosc.cif.tokens import tokenize
 from robosc.errors import Diagnostic
 from robosc.source import Bundle, SourceFile
 from robosc.synthesis import SynthesisStatus, synthesize
+from support.effort import examples
 
 TANK = """
 plant tank:
@@ -234,3 +237,39 @@ def test_exclusions_of_events_that_nobody_has_are_dropped_with_a_warning() -> No
     assert [item.code for item in found] == ["cif-no-effect"]
     assert system is not None
     assert system.conditions == ()
+
+
+WHOLE = """
+import "a.cif"; type t = int[0..3]; enum E = A, B; controllable c, d; uncontrollable u; input bool i;
+const int n = 3, m = 2 * n; const list int l = [1, 2]; const tuple(int a; bool b) p2 = (1, true);
+alg bool y = g.p.x = 1; group g: plant p: disc t x in any, z = 1; disc E e; monitor u; alg int w;
+location a: initial x = 1; marked; equation w = x + 1; requirement x < 3; edge c when w < n, y do (x, z) := (z, 1) goto b;
+location b: marked y; equation w = l[0]; edge d, u do if x = 1: x := 2 elif i: z := p2[a] else e := B end goto a; end end
+group def D(controllable k; location q; alg int v; R o): requirement r: location: initial; marked; edge k when q and v < 2; end
+plant o.s needs q; end plant def R(): controllable s; location: initial; marked; edge s; end
+ri: R(); di: D(c, g.p.a, g.p.x + 1, ri); requirement {c, d} needs switch g.p: case a: true else y end; marked i or y;
+plant invariant g.p.e = switch g.p.e: case A: A case B: B end; requirement y disables c; initial g.p.z = 1;
+"""
+
+
+def test_whole_model_is_sound() -> None:
+    system, found = checked(WHOLE, a="const bool k = true;")
+    assert system is not None, [str(item) for item in found]
+    check_system(system)
+
+
+@pytest.mark.random
+@pytest.mark.parametrize("seed", range(examples(30)))
+def test_damaged_models_end_in_findings(seed: int) -> None:
+    random = Random(seed)
+    whole = tokenize(WHOLE).texts[:-3]
+    words = sorted({word for word in whole if word.replace(".", "").isalnum()})
+    for _ in range(20):
+        tokens = list(whole)
+        for _ in range(random.randint(1, 3)):
+            place = random.randrange(len(tokens))
+            tokens[place] = random.choice(words if tokens[place] in words else whole)
+        system, found = checked(" ".join(tokens), a="const bool k = true;")
+        assert all(item.location is not None and item.fix for item in found)
+        if system is not None:
+            check_system(system)

@@ -1,6 +1,6 @@
 """Types of CIF."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from robosc.expressions import MAXIMUM_INTEGER, MINIMUM_INTEGER
 
@@ -17,6 +17,7 @@ class CifType:
         parts: Types that it is made of.
         names: Literals of an enum, in order, or fields of a tuple.
         name: Name of an enum.
+        size: Number of types that it is made of, itself included.
     """
 
     kind: str
@@ -25,6 +26,10 @@ class CifType:
     parts: tuple["CifType", ...] = ()
     names: tuple[str, ...] = ()
     name: str = ""
+    size: int = field(init=False, compare=False, default=1)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "size", 1 + sum(part.size for part in self.parts))
 
     @property
     def is_number(self) -> bool:

@@ -43,6 +43,12 @@ from robosc.cif.types import (
 from robosc.expressions import MAXIMUM_INTEGER, MINIMUM_INTEGER, Binary, StateTest, Unary, VariableRead
 from robosc.source import Location
 
+MAXIMUM_ELEMENTS = 100_000
+"""Elements of a list or dictionary, or characters of a text, beyond which a constant is refused."""
+
+MAXIMUM_PARTS = 1000
+"""Types that a type may be made of."""
+
 NAMELESS = "*"
 """Name of a location that has none; no identifier can be it."""
 
@@ -78,7 +84,14 @@ class Typing:
                     return UNKNOWN
                 return CifType(written.kind, low, high, parts)
         fields = tuple(item.text for item in written.fields)
-        return CifType(written.kind, parts=parts, names=fields)
+        return self._sized(CifType(written.kind, parts=parts, names=fields), written.at)
+
+    def _sized(self, type_: CifType, at: Location) -> CifType:
+        """Return a type unless it is too large to work with, which is reported."""
+        if type_.size <= MAXIMUM_PARTS:
+            return type_
+        self.error("cif-too-large", f"this type has more than {MAXIMUM_PARTS} parts", at, "Use a smaller type.")
+        return UNKNOWN
 
     def _named(self, name: syntax.Name, scope: Scope) -> CifType:
         found = self.scopes.resolve(name, scope)
@@ -459,6 +472,10 @@ class Typing:
             return broken(type_, left, right, problem=Problem(f"this computes with values of type {type_}", node.at))
         if node.operator == "-":
             return static(type_, left.value - right.value)
+        if len(left.value) + len(right.value) > MAXIMUM_ELEMENTS:
+            message = f"this has more than {MAXIMUM_ELEMENTS} elements"
+            self.error("cif-too-large", message, node.at, "Use fewer elements.")
+            return ERROR
         if kind == "dict":
             return static(type_, frozenset((dict(left.value) | dict(right.value)).items()))
         value = left.value + right.value
@@ -545,7 +562,8 @@ class Typing:
         if any(item.type.kind == "unknown" for item in items):
             return ERROR
         if node.kind == "tuple":
-            return tuple_term(CifType("tuple", parts=tuple(item.type for item in items)), tuple(items))
+            whole = self._sized(CifType("tuple", parts=tuple(item.type for item in items)), node.at)
+            return ERROR if whole.kind == "unknown" else tuple_term(whole, tuple(items))
         groups = [items[::2], items[1::2]] if node.kind == "dict" else [items]
         parts = []
         for group in groups:

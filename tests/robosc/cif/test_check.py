@@ -273,3 +273,31 @@ def test_damaged_models_end_in_findings(seed: int) -> None:
         assert all(item.location is not None and item.fix for item in found)
         if system is not None:
             check_system(system)
+
+
+PLANT = "plant p: controllable e; location: initial; marked; edge e when {}; end "
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        (PLANT.format("y2000") + "input bool y0;" + "".join(f"alg bool y{i} = not y{i - 1};" for i in range(1, 2001)),
+         "cif-too-large"),
+        (PLANT.format("n5000 = 1") + "const int n0 = 1;" + "".join(f"const int n{i} = n{i - 1};" for i in range(1, 5001)),
+         None),
+        ("const list int n0 = [1];" + "".join(f"const list int n{i} = n{i - 1} + n{i - 1};" for i in range(1, 45)),
+         "cif-too-large"),
+        ('const string n0 = "a";' + "".join(f"const string n{i} = n{i - 1} + n{i - 1};" for i in range(1, 45)),
+         "cif-too-large"),
+        ("group def D0(): end " + "".join(f"group def D{i}(): a: D{i - 1}(); b: D{i - 1}(); end " for i in range(1, 30))
+         + "d: D29();", "cif-too-large"),
+        ("type t0 = int;" + "".join(f"type t{i} = tuple(t{i - 1} a; t{i - 1} b);" for i in range(1, 40)),
+         "cif-too-large"),
+        ("const int n = pow(2, 2147483647);", "cif-type"),
+    ],
+    ids=["algebraic", "constants", "lists", "texts", "definitions", "types", "powers"],
+)  # fmt: skip
+def test_what_would_grow_without_bounds_is_refused(text: str, code: str | None) -> None:
+    system, found = checked(text + TANK)
+    assert {item.code for item in found} == ({code} if code else set())
+    assert (system is None) is (code is not None)

@@ -215,6 +215,10 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc_view.sources import ViewError, require_view
 
     _take_played(arguments)
+    if arguments.model is not None and arguments.model.suffix == ".cif":
+        raise UsageError(
+            f"{arguments.model} is a CIF model: 'robosc explore --dot' draws one; a view needs RoboSC's own"
+        )
     if not (arguments.bridge or arguments.ros2 or arguments.log or arguments.model):
         raise UsageError("what is shown? MODEL, --bridge HOST, --ros2, or --log FILE --model FILE")
     if arguments.log is not None and arguments.model is None:

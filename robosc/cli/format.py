@@ -141,6 +141,8 @@ def _files(path: Path) -> Sequence[Path]:
         return below
     if not path.exists():
         raise UsageError(f"there is no file {_shown(path)}")
+    if path.suffix == ".cif":
+        raise UsageError(f"{_shown(path)} is a CIF model: only RoboSC's own can be formatted")
     if not path.is_file():
         raise UsageError(f"{_shown(path)} is no plain file")
     return [path]

@@ -94,6 +94,8 @@ def test_verify(model: str, capsys: pytest.CaptureFixture[str]) -> None:
         ["simulate"],
         ["doc"],
         ["explain-synthesis"],
+        ["format"],
+        ["view"],
     ],
 )
 def test_what_means_nothing_for_cif_is_refused(

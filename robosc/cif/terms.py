@@ -200,6 +200,27 @@ def remainder(a: int, b: int) -> int:
     return a - b * quotient(a, b)
 
 
+def result_range(operator: str, left: tuple[int, int], right: tuple[int, int]) -> tuple[int, int]:
+    """Least and greatest result of an operator on integers."""
+    (a, b), (c, d) = left, right
+    match operator:
+        case "+":
+            return a + c, b + d
+        case "-":
+            return a - d, b - c
+        case "*":
+            corners = (a * c, a * d, b * c, b * d)
+            return min(corners), max(corners)
+    divisors = {item for item in (c, d, -1 if c <= -1 <= d else 0, 1 if c <= 1 <= d else 0) if item}
+    if operator == "div":
+        results = {quotient(item, divisor) for item in (a, b) for divisor in divisors}
+        if a <= 0 <= b or not results:
+            results.add(0)
+        return min(results), max(results)
+    largest = max(abs(item) for item in (c, d)) - 1
+    return (max(a, -largest) if a < 0 else 0), (min(b, largest) if b > 0 else 0)
+
+
 def rounded(a: float) -> int:
     """The nearest integer, halves upwards."""
     return math.floor(a + 0.5)

@@ -23,6 +23,7 @@ from robosc.cif.terms import (
     number,
     quotient,
     remainder,
+    result_range,
     static,
     truth,
     tuple_parts,
@@ -426,7 +427,7 @@ class Typing:
             return self._unfit(node, left, right)
         if operator in ("div", "mod") and right.is_static and right.value == 0:
             return self.mismatch("this divides by zero", node.at)
-        low, high = _result_range(operator, left.type, right.type)
+        low, high = result_range(operator, left.type.range, right.type.range)
         is_ranged = left.type.low is not None and right.type.low is not None
         if low < MINIMUM_INTEGER or high > MAXIMUM_INTEGER:
             if is_ranged:
@@ -717,27 +718,6 @@ def _cast_value(term: Term, type_: CifType) -> Term:
     if not MINIMUM_INTEGER <= found <= MAXIMUM_INTEGER:
         raise ValueError(value)
     return number(found)
-
-
-def _result_range(operator: str, left: CifType, right: CifType) -> tuple[int, int]:
-    """Least and greatest result of an operator on integers."""
-    (a, b), (c, d) = left.range, right.range
-    match operator:
-        case "+":
-            return a + c, b + d
-        case "-":
-            return a - d, b - c
-        case "*":
-            corners = (a * c, a * d, b * c, b * d)
-            return min(corners), max(corners)
-    divisors = {item for item in (c, d, -1 if c <= -1 <= d else 0, 1 if c <= 1 <= d else 0) if item}
-    if operator == "div":
-        results = {quotient(item, divisor) for item in (a, b) for divisor in divisors}
-        if a <= 0 <= b or not results:
-            results.add(0)
-        return min(results), max(results)
-    largest = max(abs(item) for item in (c, d)) - 1
-    return (max(a, -largest) if a < 0 else 0), (min(b, largest) if b > 0 else 0)
 
 
 __all__ = ["NAMELESS", "Typing"]

@@ -2,9 +2,20 @@
 
 import argparse
 import sys
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robosc.cli.output import ExitCode, ProgressLine, UsageError, has_errors, print_diagnostics, print_json
+from robosc.cli.output import (
+    ExitCode,
+    ProgressLine,
+    UsageError,
+    has_errors,
+    print_diagnostics,
+    print_json,
+    require_other_file,
+    write_bytes,
+)
 from robosc.errors import Diagnostic
 from robosc.json_documents import counts_text, diagnostics_json
 from robosc.model.structure import Deployment
@@ -13,7 +24,8 @@ from robosc.source import Bundle
 if TYPE_CHECKING:
     from robosc.cif import CheckedCif
     from robosc.pipeline.options import SynthesisOptions
-    from robosc.pipeline.systems import SystemSynthesis
+    from robosc.pipeline.results import SynthesisStatus
+    from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
 
 SUFFIX = ".cif"
 
@@ -21,6 +33,49 @@ SUFFIX = ".cif"
 def is_cif(arguments: argparse.Namespace) -> bool:
     """Return True if the model of a command is one of CIF: the ending of its name tells."""
     return bool(arguments.model.suffix == SUFFIX)
+
+
+@dataclass(frozen=True, slots=True)
+class Synthesized:
+    """Result of checking and synthesis.
+
+    Attributes:
+        bundle: The model, with the files that it imports.
+        status: Outcome of the synthesis.
+        diagnostics: Every finding.
+        reason: Reason why there is no supervisor; empty if there is one, or the findings tell.
+        supervisor: The supervisor, or None.
+        explanation: Always None: what is to blame is told of RoboSC's models alone.
+    """
+
+    bundle: Bundle
+    status: "SynthesisStatus"
+    diagnostics: tuple[Diagnostic, ...]
+    reason: str
+    supervisor: "SystemSupervisor | None"
+    explanation: None = None
+
+
+def synthesized(arguments: argparse.Namespace) -> Synthesized:
+    """Check the model of a command, and synthesize if it has no errors.
+
+    Raises:
+        UsageError: An argument means nothing for it, or it cannot be read.
+    """
+    from robosc.pipeline.results import SynthesisStatus
+
+    bundle, found = _checked(arguments)
+    if found.system is None:
+        return Synthesized(bundle, SynthesisStatus.MODEL_ERRORS, found.diagnostics, "", None)
+    made = _synthesis(arguments, found)
+    return Synthesized(bundle, made.status, found.diagnostics, made.reason, made.supervisor)
+
+
+def controlled_system(supervisor: "SystemSupervisor") -> str:
+    """The controlled system as a CIF model."""
+    from robosc.targets.cif import automata
+
+    return automata.controlled_system(supervisor.system, supervisor.added, supervisor.initial)
 
 
 def check(arguments: argparse.Namespace) -> ExitCode:
@@ -54,32 +109,40 @@ def synth(arguments: argparse.Namespace) -> ExitCode:
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
     """
-    _refuse(arguments.output is not None, "-o: there is no supervisor file of a CIF model")
-    _refuse(arguments.allow_livelock, "--allow-livelock: a CIF model has no silent steps of a controller")
-    bundle, found = _checked(arguments)
-    if found.system is None:
-        return _without(arguments, bundle, found.diagnostics, "model errors", "")
-    made = _synthesis(arguments, found)
+    output = arguments.output
+    refuse(
+        output is not None and output.suffix != SUFFIX,
+        f"-o: the controlled system of a CIF model is a CIF model, too: write it to a file that ends in {SUFFIX}",
+    )
+    refuse(arguments.allow_livelock, "--allow-livelock: a CIF model has no silent steps of a controller")
+    made = synthesized(arguments)
     if made.supervisor is None:
-        return _without(arguments, bundle, found.diagnostics, str(made.status), made.reason)
+        return _without(arguments, made)
+    if output is not None:
+        for file in (made.bundle.main, *made.bundle.libraries):
+            require_other_file(output, Path(file.name))
+        write_bytes(output, controlled_system(made.supervisor).encode())
     initial = made.supervisor.initial_condition
     if arguments.json:
         print_json(
             {
                 "status": str(made.status),
                 "reason": "",
-                "system": found.system.name,
+                "file": None if output is None else str(output),
+                "system": made.supervisor.system.name,
                 "states": made.supervisor.states,
                 "conditions": {name: str(item) for name, item in made.supervisor.conditions.items()},
                 "initial": None if initial is None else str(initial),
-                **diagnostics_json(found.diagnostics),
+                **diagnostics_json(made.diagnostics),
             }
         )
         return ExitCode.OK
-    print_diagnostics(found.diagnostics, bundle)
+    print_diagnostics(made.diagnostics, made.bundle)
     sys.stdout.write(f"{made.supervisor}\n")
     if initial is not None:
         sys.stdout.write(f"it begins only where {initial}\n")
+    if output is not None:
+        sys.stdout.write(f"written to {output}\n")
     return ExitCode.OK
 
 
@@ -92,17 +155,14 @@ def explore(arguments: argparse.Namespace) -> ExitCode:
     from robosc.exploration import graph_dot, graph_json, graph_text
     from robosc.pipeline.exploring import graph_of
 
-    bundle, found = _checked(arguments)
-    if found.system is None:
-        return _without(arguments, bundle, found.diagnostics, "model errors", "")
-    made = _synthesis(arguments, found)
+    made = synthesized(arguments)
     if made.supervisor is None:
-        return _without(arguments, bundle, found.diagnostics, str(made.status), made.reason)
+        return _without(arguments, made)
     graph = graph_of(made.supervisor, limit=arguments.limit)
     if arguments.json:
         print_json(graph_json(graph))
     else:
-        print_diagnostics(found.diagnostics, bundle)
+        print_diagnostics(made.diagnostics, made.bundle)
         sys.stdout.write(graph_dot(graph) if arguments.dot else graph_text(graph))
     return ExitCode.OK
 
@@ -117,17 +177,14 @@ def verify(arguments: argparse.Namespace) -> ExitCode:
     from robosc.pipeline.systems import verify_system
     from robosc.verification import Limits
 
-    _refuse(arguments.supervisor is not None, "FILE.rsup: there is no supervisor file of a CIF model")
-    _refuse(
+    refuse(arguments.supervisor is not None, "FILE.rsup: there is no supervisor file of a CIF model")
+    refuse(
         bool(arguments.property or arguments.properties), "--property: properties are of RoboSC's models, not of CIF's"
     )
-    _refuse(bool(arguments.signed_by), "--signed-by: there is no supervisor file of a CIF model")
-    bundle, found = _checked(arguments)
-    if found.system is None:
-        return _without(arguments, bundle, found.diagnostics, "model errors", "")
-    made = _synthesis(arguments, found)
+    refuse(bool(arguments.signed_by), "--signed-by: there is no supervisor file of a CIF model")
+    made = synthesized(arguments)
     if made.supervisor is None:
-        return _without(arguments, bundle, found.diagnostics, str(made.status), made.reason)
+        return _without(arguments, made)
     progress = ProgressLine()
     try:
         result = verify_system(
@@ -142,9 +199,9 @@ def verify(arguments: argparse.Namespace) -> ExitCode:
         progress.clear()
     has_passed = result.status is VerificationStatus.PASSED
     if arguments.json:
-        print_json({**result.report, **diagnostics_json(found.diagnostics)})
+        print_json({**result.report, **diagnostics_json(made.diagnostics)})
     else:
-        print_diagnostics(found.diagnostics, bundle)
+        print_diagnostics(made.diagnostics, made.bundle)
         if not (has_passed and arguments.quiet):
             sys.stdout.write(str(result) if str(result).endswith("\n") else f"{result}\n")
     return ExitCode.OK if has_passed else ExitCode.FAILED
@@ -154,9 +211,9 @@ def _checked(arguments: argparse.Namespace) -> "tuple[Bundle, CheckedCif]":
     from robosc.cif import check_cif
     from robosc.pipeline.cif_models import load_cif_model
 
-    _refuse(bool(arguments.library_path), "-L: a CIF model imports files by their places")
-    _refuse(bool(arguments.interface_path), "-I: a CIF model has no types of ROS")
-    _refuse(arguments.deployment == str(Deployment.LAYER), "--deployment: a CIF model is no node of a robot")
+    refuse(bool(arguments.library_path), "-L: a CIF model imports files by their places")
+    refuse(bool(arguments.interface_path), "-I: a CIF model has no types of ROS")
+    refuse(arguments.deployment == str(Deployment.LAYER), "--deployment: a CIF model is no node of a robot")
     from robosc.pipeline.files import FileAccessError
 
     try:
@@ -166,7 +223,7 @@ def _checked(arguments: argparse.Namespace) -> "tuple[Bundle, CheckedCif]":
     return bundle, check_cif(bundle)
 
 
-def _refuse(is_given: bool, message: str) -> None:
+def refuse(is_given: bool, message: str) -> None:
     """Do nothing if an argument that means nothing for a CIF model is not given.
 
     Raises:
@@ -200,14 +257,12 @@ def _synthesis(arguments: argparse.Namespace, found: "CheckedCif") -> "SystemSyn
         progress.clear()
 
 
-def _without(
-    arguments: argparse.Namespace, bundle: Bundle, diagnostics: tuple[Diagnostic, ...], status: str, reason: str
-) -> ExitCode:
+def _without(arguments: argparse.Namespace, made: Synthesized) -> ExitCode:
     """Report that there is no supervisor."""
     if arguments.json:
-        print_json({"status": status, "reason": reason, **diagnostics_json(diagnostics)})
+        print_json({"status": str(made.status), "reason": made.reason, **diagnostics_json(made.diagnostics)})
     else:
-        print_diagnostics(diagnostics, bundle)
-        if reason:
-            sys.stderr.write(f"{arguments.model}: {reason}\n")
+        print_diagnostics(made.diagnostics, made.bundle)
+        if made.reason:
+            sys.stderr.write(f"{arguments.model}: {made.reason}\n")
     return ExitCode.FAILED

@@ -5,7 +5,7 @@ import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from robosc.cli import synth
+from robosc.cli import cif, synth
 from robosc.cli.arguments import (
     add_deployment_argument,
     add_engine_options,
@@ -79,7 +79,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser = commands.add_parser(
         "generate",
         help="generate a package that runs the supervisor",
-        description="Synthesize the supervisor of a model and write a complete package that runs it.",
+        description="Synthesize the supervisor of a model and write a complete package that runs it. Of a CIF model "
+        "(FILE.cif), --target cif writes the controlled system.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -147,11 +148,36 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc.targets import require_generatable
 
     require_generatable(arguments.target)
+    if cif.is_cif(arguments):
+        return _generate_cif(arguments)
     options = generate_options(arguments)
     bundle = read_bundle(arguments)
     outcome = synth.make(arguments, bundle, allow_livelock=arguments.allow_livelock)
     generation = generation_of(outcome, arguments.target, options)
     return report_generated(arguments, generation, generation.files, bundle)
+
+
+def _generate_cif(arguments: argparse.Namespace) -> ExitCode:
+    """Write the controlled system of a CIF model; its problem is in CIF already.
+
+    Raises:
+        UsageError: An argument means nothing for it, or it cannot be read.
+    """
+    from robosc.targets import GeneratedFiles
+    from robosc.targets.cif.generate import SUPERVISED
+
+    cif.refuse(
+        arguments.target != "cif",
+        f"--target {arguments.target}: a CIF model has no messages to generate code for, so only --target cif takes it",
+    )
+    cif.refuse(arguments.package is not None, "--package: of a CIF model one file is made and no package")
+    cif.refuse(arguments.allow_livelock, "--allow-livelock: a CIF model has no silent steps of a controller")
+    generate_options(arguments)
+    made = cif.synthesized(arguments)
+    files = None
+    if made.supervisor is not None:
+        files = GeneratedFiles({SUPERVISED: cif.controlled_system(made.supervisor)})
+    return report_generated(arguments, made, files, made.bundle)
 
 
 def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":

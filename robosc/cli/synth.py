@@ -58,7 +58,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "synth",
         help="synthesize a supervisor",
         description="Synthesize the supervisor of a model: safe, controllable, nonblocking, maximally permissive. Of a "
-        "CIF model (FILE.cif), the conditions of its supervisor are printed.",
+        "CIF model (FILE.cif), its conditions are printed, and -o FILE.cif writes the controlled system as another.",
     )
     add_model_arguments(parser)
     add_output_argument(parser)

@@ -135,7 +135,8 @@ def read_model(
 
     if model.suffix == ".cif":
         raise FileAccessError(
-            f"{model} is a CIF model, which check, synth, explore and verify of robosc take; this is for RoboSC's own"
+            f"{model} is a CIF model, which check, synth, explore, verify and generate --target cif of robosc take; "
+            "this is for RoboSC's own"
         )
     try:
         if text is None:

@@ -63,6 +63,35 @@ def test_synth(model: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert (document["states"], list(document["conditions"])) == (3, ["tank.c_fill"])
 
 
+def test_the_controlled_system_is_written(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "controlled.cif"
+    assert run(capsys, "synth", model, "-o", str(output))[1].splitlines()[-1] == f"written to {output}"
+    text = output.read_text()
+    assert "supervisor tank.u_drain needs tank.level != 3;" in text.splitlines()
+    assert json.loads(run(capsys, "synth", model, "-o", str(output), "--json")[1])["file"] == str(output)
+    folder = tmp_path / "out"
+    assert run(capsys, "generate", model, "--target", "cif", "-o", str(folder))[:2] == (0, f"{folder}/supervisor.cif\n")
+    assert (folder / "supervisor.cif").read_text() == text
+
+
+def test_no_file_of_the_model_is_written_over(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "other.cif").write_text(TANK)
+    Path(model).write_text('import "other.cif";\n')
+    for name in ("tank.cif", "other.cif"):
+        status, _, err = run(capsys, "synth", model, "-o", str(tmp_path / name))
+        assert (status, "is the model itself" in err) == (2, True)
+    assert (tmp_path / "other.cif").read_text() == TANK
+
+
+def test_generate_without_a_supervisor(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for addition, status in (("marked false;", "empty"), ("marked x;", "model errors")):
+        Path(model).write_text(f"{TANK}{addition}\n")
+        code, out, _ = run(capsys, "generate", model, "--target", "cif", "-o", str(tmp_path / "out"), "--json")
+        document = json.loads(out)
+        assert (code, document["status"], document["files"]) == (1, status, [])
+    assert not (tmp_path / "out").exists()
+
+
 def test_explore(model: str, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = run(capsys, "explore", model)
     assert (status, out.splitlines()[0]) == (0, "tank: 3 states, 3 transitions; it starts in state 0 or 1 or 2")
@@ -91,6 +120,9 @@ def test_verify(model: str, capsys: pytest.CaptureFixture[str]) -> None:
         ["check", "-I", "."],
         ["verify", "--property", "never deadlock"],
         ["generate", "--target", "c99", "-o", "out"],
+        ["generate", "--target", "all", "-o", "out"],
+        ["generate", "--target", "cif", "--package", "tank", "-o", "out"],
+        ["generate", "--target", "cif", "--allow-livelock", "-o", "out"],
         ["simulate"],
         ["doc"],
         ["explain-synthesis"],

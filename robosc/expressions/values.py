@@ -207,7 +207,7 @@ def all_of(elements: Any, condition: Any) -> Any:
 def _quantified(elements: Any, condition: Any, decisive: Any) -> Any:
     if not elements:
         return None
-    result = not decisive
+    result: Any = not decisive
     for element in elements:
         outcome = condition(element)
         if outcome is decisive:

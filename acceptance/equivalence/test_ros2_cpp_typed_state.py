@@ -9,6 +9,7 @@ from robosc.supervisor import Supervisor
 from robosc.targets import StateMessage
 from robosc.targets.code.naming import package_name
 from robosc.targets.registry import GenerateOptions
+from support.equivalence.python_targets import observe
 from support.equivalence.random_scenarios import ticking_scenario
 from support.equivalence.rclcpp_target import SteppedSurroundings
 from support.equivalence.scenario import Scenario
@@ -38,14 +39,16 @@ def states_in_cpp(supervisor: Supervisor, scenario: Scenario, program: Path, fol
     node.start(scenario, folder / "events")
     try:
         states = [node.first_state()]
-        for action in scenario.actions[1:]:
-            match action.do:
-                case "tick":
-                    states.append(node.next_state())
-                case "message":
-                    node.send(action.subject, action.data)
-                case _:
-                    node.answer(action)
+        issued = 0
+        for number, (action, seen) in enumerate(zip(scenario.actions, observe(supervisor, scenario)[1:], strict=True)):
+            if action.do == "message":
+                node.send(action.subject, action.data)
+            elif action.do != "tick":
+                node.answer(action)
+            elif number > 0:
+                states.append(node.next_state())
+            issued += len(seen.issued)
+            node.wait_for_issued(issued)
         node.stop()
     finally:
         node.close()

@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -154,18 +154,31 @@ class SteppedSurroundings(StandInSurroundings):
         super().__init__(supervisor, program, folder, parameters)
         self._beginning = f"publish /{package}/state "
         self._periods = 0
+        self._states: list[dict[str, Any]] = []
+        self._count = 0
+
+    def wait_for_issued(self, count: int) -> None:
+        """Wait until the node has issued so much since its start: answers are to what it has asked for."""
+        self._wait(lambda: self._count >= count, f"the node does not issue {count} requests")
 
     def next_state(self) -> dict[str, Any]:
         """Let a period pass, and return the state that the node tells then."""
         self._periods += 1
         self._tell("clock", str(1.0 + self._periods * PERIOD_S))
+        self._wait(lambda: bool(self._states), "the node tells no state")
+        return self._states.pop()
+
+    def _wait(self, is_done: Callable[[], bool], problem: str) -> None:
         began = time.monotonic()
         while True:
-            told = [line for line in self._new_lines() if line.startswith(self._beginning)]
-            if told:
-                (line,) = told
-                return dict(yaml.safe_load(line.removeprefix(self._beginning)))
-            assert time.monotonic() < began + LIMIT_S, "the node tells no state"
+            for line in self._new_lines():
+                if line.startswith(self._beginning):
+                    self._states.append(dict(yaml.safe_load(line.removeprefix(self._beginning))))
+                elif self._issued(line) is not None:
+                    self._count += 1
+            if is_done():
+                break
+            assert time.monotonic() < began + LIMIT_S, problem
             self.spin()
 
     def first_state(self) -> dict[str, Any]:

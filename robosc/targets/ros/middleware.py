@@ -8,6 +8,7 @@ from importlib import resources
 
 import jinja2
 
+from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets.code import templates
@@ -109,6 +110,8 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
     with error_context(middleware.target):
         found, asked = topics(supervisor.model), servers(supervisor.model)
         require_own_names(name, found, asked)
+        if name in (*middleware.dependencies, *middleware.typed_state):
+            raise UnsupportedModelError(f"the generated package would be called {name}, like a package that it needs")
         middleware.require_names(found, asked)
         if deployment is Deployment.LAYER:
             require_names_of_a_layer(found, asked)

@@ -331,6 +331,13 @@ def test_what_it_cannot_do_is_refused_with_its_name(body: str, problem: str) -> 
     assert "\n" not in message
 
 
+@pytest.mark.parametrize(("target", "package"), [("ros2", "rclpy"), ("ros2", "robosc_msgs"), ("ros1", "rospy")])
+def test_a_package_cannot_be_called_like_one_that_it_needs(target: str, package: str) -> None:
+    body = "component C { incoming message m with type: none }"
+    with pytest.raises(UnsupportedModelError, match=f"would be called {package}, like a package that it needs"):
+        generate(robot(body), target, GenerateOptions(package=package))
+
+
 # Hostile texts.
 
 HOSTILE = r"""

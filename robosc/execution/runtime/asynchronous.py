@@ -1,7 +1,7 @@
 """A controller for programs on asyncio: service calls and goals of the robot are coroutines.
 
-Everything happens in the thread of one event loop. A reply is what a coroutine returns, a failure what it raises, and
-a cancel ends it as asyncio ends tasks.
+Everything happens in the thread of one event loop. A reply is what a coroutine returns, a failure
+what it raises, and a cancel ends it as asyncio ends tasks.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ class GoalRejected(Exception):
 class AsyncRobot(Protocol):
     """The robot, as a program on asyncio reaches it.
 
-    Data is the model's: a dict of properties (nested dicts), a plain value, or None for the default of everything.
+    Data is the model's: a dict of properties (nested dicts), a plain value, or None for the
+    default of everything.
     """
 
     def publish(self, message: str, data: Any) -> None:
@@ -67,8 +68,8 @@ class AsyncController:
         controller.stop("done")
         await running
 
-    All methods are to be called in the event loop's thread, from another one by `loop.call_soon_threadsafe`, and not
-    from within `AsyncRobot.publish`.
+    All methods are to be called in the event loop's thread, from another one by
+    `loop.call_soon_threadsafe`, and not from within `AsyncRobot.publish`.
 
     Args:
         system: Plants, requirements and supervisor with their state.
@@ -79,7 +80,8 @@ class AsyncController:
         sleep: Function that waits for some seconds of that clock.
 
     Attributes:
-        executor: Executor that decides; its `status`, `reasons`, `counters` and `is_faulty` report its condition.
+        executor: Executor that decides; its `status`, `reasons`, `counters` and `is_faulty` report
+            its condition.
 
     Raises:
         DeploymentError: The model has actions and the supervisor was made for a supervision layer.
@@ -122,16 +124,17 @@ class AsyncController:
         """Start, decide once a period, and end with the robot at rest: after `stop`, a fault, or this task's cancel.
 
         Raises:
-            RuntimeError: It runs already or ran before, or ends because of a fault, which it tells.
+            RuntimeError: It runs already or ran before, or ends because of a fault, which it
+                tells.
         """
         if self._news is not None:
-            raise RuntimeError("a controller runs once")
+            raise RuntimeError('a controller runs once')
         news = self._news = asyncio.Event()
-        reason = "cancelled"
+        reason = 'cancelled'
         try:
             self._start()
             await self._decide(news)
-            reason = "stop"
+            reason = 'stop'
         except asyncio.CancelledError:
             raise
         except Exception as error:
@@ -141,7 +144,7 @@ class AsyncController:
                 self.executor.stop(reason)
             await self._come_to_rest(news)
         if self.executor.is_faulty:
-            raise RuntimeError("; ".join(self.executor.reasons))
+            raise RuntimeError('; '.join(self.executor.reasons))
 
     def _start(self) -> None:
         """Begin in the initial state, and take in what came before."""
@@ -172,7 +175,10 @@ class AsyncController:
     async def _wait(self, news: asyncio.Event, seconds: float) -> None:
         """Until the time is over or there is news; others have their turn in any case."""
         news.clear()
-        waiting = [asyncio.ensure_future(self._sleep(max(seconds, 0.0))), asyncio.ensure_future(news.wait())]
+        waiting = [
+            asyncio.ensure_future(self._sleep(max(seconds, 0.0))),
+            asyncio.ensure_future(news.wait()),
+        ]
         try:
             await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -209,7 +215,9 @@ class _Work:
         told: Called, never from within the executor, with what it is to be told.
     """
 
-    def __init__(self, robot: AsyncRobot, told: Callable[[Callable[[Executor], None]], None]) -> None:
+    def __init__(
+        self, robot: AsyncRobot, told: Callable[[Callable[[Executor], None]], None]
+    ) -> None:
         self._robot = robot
         self._told = told
         self._goals: Dict[int, asyncio.Future[None]] = {}
@@ -264,7 +272,7 @@ class _Work:
         try:
             reply = await self._robot.call(service, data)
         except asyncio.CancelledError:
-            self._told(lambda executor: executor.on_call_failed(request_id, "cancelled"))
+            self._told(lambda executor: executor.on_call_failed(request_id, 'cancelled'))
         except Exception as error:
             why = describe_error(error)
             self._told(lambda executor: executor.on_call_failed(request_id, why))
@@ -272,19 +280,21 @@ class _Work:
             self._told(lambda executor: executor.on_reply(request_id, reply))
 
     async def _execute(self, action: str, goal_id: int, data: Any) -> None:
-        outcome, result = "aborted", None
+        outcome, result = 'aborted', None
         try:
             work = self._robot.execute(
-                action, data, lambda news: self._told(lambda executor: executor.on_feedback(goal_id, news))
+                action,
+                data,
+                lambda news: self._told(lambda executor: executor.on_feedback(goal_id, news)),
             )
             self._told(lambda executor: executor.on_goal_accepted(goal_id))
-            outcome, result = "succeeded", await work
+            outcome, result = 'succeeded', await work
         except asyncio.CancelledError:
-            outcome = "cancelled"
+            outcome = 'cancelled'
         except GoalRejected:
-            outcome = "rejected"
+            outcome = 'rejected'
         except Exception:
-            outcome = "aborted"
+            outcome = 'aborted'
         self._goals.pop(goal_id, None)
         self._told(lambda executor: executor.on_goal_ended(goal_id, outcome, result))
 
@@ -295,4 +305,4 @@ def _is_default(data: Any) -> bool:
         return all(_is_default(part) for part in data.values())
     if isinstance(data, (list, tuple)):
         return len(data) == 0
-    return data is None or data in (0, "")
+    return data is None or data in (0, '')

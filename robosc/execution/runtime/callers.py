@@ -29,7 +29,7 @@ class CallerGoal:
         is_cancelled: True if its caller asked to cancel it: it then ends as its server ends it.
     """
 
-    __slots__ = ("action", "goal_id", "is_cancelled", "number")
+    __slots__ = ('action', 'goal_id', 'is_cancelled', 'number')
 
     def __init__(self, number: int, action: str, goal_id: Any) -> None:
         self.number = number
@@ -43,9 +43,9 @@ class CallerGoal:
         Args:
             outcome: Outcome from its server, or `rejected` or `lost`.
         """
-        if outcome == "succeeded" or (self.is_cancelled and outcome == "cancelled"):
+        if outcome == 'succeeded' or (self.is_cancelled and outcome == 'cancelled'):
             return outcome
-        return "aborted"
+        return 'aborted'
 
 
 class Callers:
@@ -58,7 +58,7 @@ class Callers:
         goals: Goals under way there.
     """
 
-    __slots__ = ("_calls", "_goals", "_waiting_calls", "_waiting_goals")
+    __slots__ = ('_calls', '_goals', '_waiting_calls', '_waiting_goals')
 
     def __init__(self, calls: Calls, goals: Goals) -> None:
         self._calls = calls

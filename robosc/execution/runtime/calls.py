@@ -7,9 +7,9 @@ from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 from robosc.execution.runtime.falling_conditions import have_fallen, held_ever
 from robosc.execution.runtime.protocol import ControlledSystem, RobotSide
 
-FOREVER = float("inf")
+FOREVER = float('inf')
 
-OUTCOMES = ("succeeded", "rejected", "aborted", "cancelled", "lost")
+OUTCOMES = ('succeeded', 'rejected', 'aborted', 'cancelled', 'lost')
 """Outcomes of a goal: with a result, refused by its server, given up by it, cancelled, or its server is gone."""
 
 
@@ -28,7 +28,7 @@ class Call(NamedTuple):
 class Calls:
     """Service calls under way, by id."""
 
-    __slots__ = ("_calls", "_next_id", "_timeout_s")
+    __slots__ = ('_calls', '_next_id', '_timeout_s')
 
     def __init__(self, timeout_s: Optional[float]) -> None:
         self._timeout_s = FOREVER if timeout_s is None else timeout_s
@@ -80,21 +80,24 @@ class Goal:
         is_cancel_wanted: True if it is to be cancelled.
         is_cancel_sent: True if its server was asked to cancel it.
         deadline_s: Reading of the clock at which it counts as failed.
-        held: Values for the requirements of the action: True if one held in a stable state since the request.
+        held: Values for the requirements of the action: True if one held in a stable state since
+            the request.
     """
 
     __slots__ = (
-        "action",
-        "deadline_s",
-        "held",
-        "is_accepted",
-        "is_cancel_sent",
-        "is_cancel_wanted",
-        "is_running",
-        "number",
+        'action',
+        'deadline_s',
+        'held',
+        'is_accepted',
+        'is_cancel_sent',
+        'is_cancel_wanted',
+        'is_running',
+        'number',
     )
 
-    def __init__(self, number: int, action: str, deadline_s: float, held: Tuple[bool, ...]) -> None:
+    def __init__(
+        self, number: int, action: str, deadline_s: float, held: Tuple[bool, ...]
+    ) -> None:
         self.number = number
         self.action = action
         self.is_running = True
@@ -114,9 +117,11 @@ class Goals:
         timeout_s: Seconds until a goal counts as failed, or None.
     """
 
-    __slots__ = ("_actions", "_goals", "_next_id", "_system", "_timeout_s")
+    __slots__ = ('_actions', '_goals', '_next_id', '_system', '_timeout_s')
 
-    def __init__(self, system: ControlledSystem, actions: Sequence[str], timeout_s: Optional[float]) -> None:
+    def __init__(
+        self, system: ControlledSystem, actions: Sequence[str], timeout_s: Optional[float]
+    ) -> None:
         self._system = system
         self._actions = tuple(actions)
         self._timeout_s = FOREVER if timeout_s is None else timeout_s
@@ -131,10 +136,15 @@ class Goals:
 
         Nothing is awaited from a goal that could not be sent.
         """
-        goal = Goal(self._next_id, action, now_s + self._timeout_s, self._system.requirements(action))
+        goal = Goal(
+            self._next_id, action, now_s + self._timeout_s, self._system.requirements(action)
+        )
         self._next_id += 1
         goals = [*self._goals.values(), goal]
-        self._goals = {item.number: item for item in sorted(goals, key=lambda g: self._actions.index(g.action))}
+        self._goals = {
+            item.number: item
+            for item in sorted(goals, key=lambda g: self._actions.index(g.action))
+        }
         try:
             robot.send_goal(action, goal.number, message)
         except Exception:
@@ -160,21 +170,26 @@ class Goals:
 
     def expired(self, now_s: float) -> List[Goal]:
         """Running goals whose time is over."""
-        return [goal for goal in self._goals.values() if goal.is_running and now_s >= goal.deadline_s]
+        return [
+            goal for goal in self._goals.values() if goal.is_running and now_s >= goal.deadline_s
+        ]
 
     def deadline_s(self) -> float:
         """Return the reading of the clock, in seconds, at which the time of the next running goal is over."""
-        return min((goal.deadline_s for goal in self._goals.values() if goal.is_running), default=FOREVER)
+        return min(
+            (goal.deadline_s for goal in self._goals.values() if goal.is_running), default=FOREVER
+        )
 
     def to_cancel(self) -> Optional[Goal]:
         """A goal to be cancelled now: a requirement that held since its request no longer does, and cancel is allowed.
 
-        Only a change cancels: what the request itself made false never held since. Without requirements, never.
+        Only a change cancels: what the request itself made false never held since. Without
+        requirements, never.
         """
         for goal in self._goals.values():
             if goal.is_running and any(goal.held):
                 has_turned = have_fallen(goal.held, self._system.requirements(goal.action))
-                if has_turned and self._system.enabled(goal.action + ".cancel"):
+                if has_turned and self._system.enabled(goal.action + '.cancel'):
                     return goal
         return None
 

@@ -31,7 +31,7 @@ class ManualClock:
         epoch_s: Number of seconds added to a reading for the wall clock.
     """
 
-    __slots__ = ("epoch_s", "now_s")
+    __slots__ = ('epoch_s', 'now_s')
 
     def __init__(self, now_s: float = 0.0, epoch_s: float = 0.0) -> None:
         self.now_s = now_s
@@ -52,5 +52,5 @@ class ManualClock:
             ValueError: Time would go back.
         """
         if seconds < 0:
-            raise ValueError("time does not go back")
+            raise ValueError('time does not go back')
         self.now_s += seconds

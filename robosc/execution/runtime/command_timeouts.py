@@ -16,7 +16,7 @@ class CommandTimeouts:
         timeout_s: Seconds after which it counts as silent; 0: never.
     """
 
-    __slots__ = ("_arrived_s", "_releases", "_timeout_s")
+    __slots__ = ('_arrived_s', '_releases', '_timeout_s')
 
     def __init__(self, releases: Releases, timeout_s: float) -> None:
         self._releases = releases
@@ -29,8 +29,15 @@ class CommandTimeouts:
 
     def silent(self, now_s: float) -> List[str]:
         """Identifiers whose last message acts although nothing has come there for the time."""
-        return [item for item in self._releases.acting() if now_s >= self._arrived_s[item] + self._timeout_s]
+        return [
+            item
+            for item in self._releases.acting()
+            if now_s >= self._arrived_s[item] + self._timeout_s
+        ]
 
     def deadline_s(self) -> float:
         """Return the reading of the clock, in seconds, at which the next of the identifiers is over its time."""
-        return min((self._arrived_s[item] + self._timeout_s for item in self._releases.acting()), default=FOREVER)
+        return min(
+            (self._arrived_s[item] + self._timeout_s for item in self._releases.acting()),
+            default=FOREVER,
+        )

@@ -1,7 +1,8 @@
 """Choice of the enabled request that is issued: the policies of semantics 3.5.
 
-Requests are known by number, 0 up to N - 1 in source order. A decision is: `choose` among candidates,
-again without those that could not be issued, `issued` for the one that was, then `close`.
+Requests are known by number, 0 up to N - 1 in source order. A decision is: `choose` among
+candidates, again without those that could not be issued, `issued` for the one that was, then
+`close`.
 """
 
 from __future__ import annotations
@@ -28,20 +29,22 @@ class Policy(Protocol):
 class FairPolicy:
     """Newly enabled requests first, then the longest-ago issued, never-issued first, source order.
 
-    A request profits from being new at most once in N decisions. So of any N decisions at which a request
-    waits, N - 1 others take at most N - 1 by being new; the rest go to the longest-ago issued, and none starves.
+    A request profits from being new at most once in N decisions. So of any N decisions at which a
+    request waits, N - 1 others take at most N - 1 by being new; the rest go to the longest-ago
+    issued, and none starves.
 
     Args:
         count: Number of requests, N.
     """
 
-    __slots__ = ("_count", "_decision", "_favoured", "_issued", "_new", "_previous")
+    __slots__ = ('_count', '_decision', '_favoured', '_issued', '_new', '_previous')
 
     def __init__(self, count: int) -> None:
         self._count = count
         self._decision = 0
         self._previous: Tuple[int, ...] = ()
-        # Number of the decision at which each request was last issued, or last issued for being new.
+        # Number of the decision at which each request was last issued, or last issued for being
+        # new.
         self._issued: List[int] = [_NEVER] * count
         self._favoured: List[int] = [-count] * count
         self._new = False
@@ -52,7 +55,9 @@ class FairPolicy:
         if candidates is previous:
             # The very same tuple as at the last decision, so nothing is new.
             self._new = False
-            return candidates[0] if len(candidates) == 1 else min(candidates, key=issued.__getitem__)
+            return (
+                candidates[0] if len(candidates) == 1 else min(candidates, key=issued.__getitem__)
+            )
         latest_favour = self._decision - self._count
         best, best_is_new = _NEVER, False
         for request in candidates:
@@ -84,7 +89,7 @@ class PriorityPolicy:
         order: Requests, most urgent first.
     """
 
-    __slots__ = ("_fair", "_listed", "_order")
+    __slots__ = ('_fair', '_listed', '_order')
 
     def __init__(self, count: int, order: Sequence[int]) -> None:
         self._fair = FairPolicy(count)
@@ -115,7 +120,7 @@ class RandomPolicy:
         seed: Start of the sequence.
     """
 
-    __slots__ = ("_random",)
+    __slots__ = ('_random',)
 
     def __init__(self, seed: int) -> None:
         self._random = random.Random(seed)  # noqa: S311  # a choice between safe requests, no secret
@@ -140,8 +145,8 @@ def make_policy(policy: str, names: Sequence[str], priority: Sequence[str], seed
         priority: Names, most urgent first, for `priority`.
         seed: For `random`.
     """
-    if policy == "random":
+    if policy == 'random':
         return RandomPolicy(seed)
-    if policy == "priority":
+    if policy == 'priority':
         return PriorityPolicy(len(names), [names.index(name) for name in priority])
     return FairPolicy(len(names))

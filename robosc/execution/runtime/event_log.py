@@ -18,10 +18,10 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 import queue
 import threading
 import time
-from pathlib import Path
 from typing import Any, Dict, List, Protocol, TextIO
 
 from robosc.execution.runtime.middleware_messages import fields_of
@@ -104,7 +104,7 @@ class JsonLinesLog:
         self._waiting: Any = queue.SimpleQueue()
         self._is_open = True
         # A daemon: a disk that hangs must not keep the process from ending.
-        self._thread = threading.Thread(target=self._run, name="event log", daemon=True)
+        self._thread = threading.Thread(target=self._run, name='event log', daemon=True)
         self._thread.start()
 
     @property
@@ -135,18 +135,19 @@ class JsonLinesLog:
             if self._waiting.empty():
                 self._try(self._stream.flush)
         if self.dropped:
-            self._write_line({"time": time.time(), "kind": "dropped", "count": self.dropped})
+            self._write_line({'time': time.time(), 'kind': 'dropped', 'count': self.dropped})
         self._try(self._stream.close)
 
     def _write_line(self, entry: Entry) -> None:
         try:
             line = json_line(entry)
         except Exception:
-            # An entry may hold a message of any class, which may do anything when it is asked for its parts.
+            # An entry may hold a message of any class, which may do anything when it is asked for
+            # its parts.
             self._lost += 1
             return
         # After a failure the last line may be cut off: the next one must not become part of it.
-        if self._try(lambda: self._stream.write("\n" + line if self._is_torn else line)):
+        if self._try(lambda: self._stream.write('\n' + line if self._is_torn else line)):
             self._is_torn = False
         else:
             self._lost += 1
@@ -173,12 +174,12 @@ def open_event_log(folder: str, name: str, wall_s: float) -> JsonLinesLog:
     """
     directory = Path(folder)
     directory.mkdir(parents=True, exist_ok=True)
-    base = "{}-{}".format(name, time.strftime("%Y%m%d-%H%M%S", time.gmtime(wall_s)))
+    base = '{}-{}'.format(name, time.strftime('%Y%m%d-%H%M%S', time.gmtime(wall_s)))
     number = 1
     while True:
-        suffix = "" if number == 1 else "-{}".format(number)
+        suffix = '' if number == 1 else '-{}'.format(number)
         try:
-            stream = (directory / (base + suffix + ".jsonl")).open("x", encoding="utf-8")
+            stream = (directory / (base + suffix + '.jsonl')).open('x', encoding='utf-8')
         except FileExistsError:
             number += 1
             continue
@@ -188,9 +189,9 @@ def open_event_log(folder: str, name: str, wall_s: float) -> JsonLinesLog:
 def json_line(entry: Entry) -> str:
     """An entry as one line of strictly valid JSON, whatever its values are."""
     try:
-        return json.dumps(entry, allow_nan=False, separators=(",", ":")) + "\n"
+        return json.dumps(entry, allow_nan=False, separators=(',', ':')) + '\n'
     except (TypeError, ValueError, RecursionError):
-        return json.dumps(plain(entry), allow_nan=False, separators=(",", ":")) + "\n"
+        return json.dumps(plain(entry), allow_nan=False, separators=(',', ':')) + '\n'
 
 
 def plain(value: Any, depth: int = 0) -> Any:

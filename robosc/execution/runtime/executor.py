@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Optional
 
 from robosc.execution.runtime.clock import Clock
-from robosc.execution.runtime.decision import Policy, make_policy
+from robosc.execution.runtime.decision import make_policy, Policy
 from robosc.execution.runtime.event_log import EventLog
 from robosc.execution.runtime.protocol import ControlledSystem, Middleware
 from robosc.execution.runtime.requests import Decisions
@@ -37,7 +37,7 @@ class Executor(Runner):
         clock: Optional[Clock] = None,
         log: Optional[EventLog] = None,
     ) -> None:
-        super().__init__(system, middleware, "controller", settings, clock, log)
+        super().__init__(system, middleware, 'controller', settings, clock, log)
         self._request_names = [request.name for request in self._requests]
         self._decisions = Decisions(
             system,
@@ -50,7 +50,7 @@ class Executor(Runner):
             self._goals,
             self._new_policy(),
         )
-        self._decides_after_batch = self.settings.every == "event"
+        self._decides_after_batch = self.settings.every == 'event'
 
     def tick(self) -> None:
         """A period has passed: one decision."""
@@ -80,4 +80,6 @@ class Executor(Runner):
             self._deadline_s = self._next_deadline(self._now_s)
 
     def _new_policy(self) -> Policy:
-        return make_policy(self.settings.policy, self._request_names, self.settings.priority, self.settings.seed)
+        return make_policy(
+            self.settings.policy, self._request_names, self.settings.priority, self.settings.seed
+        )

@@ -10,10 +10,10 @@ Conditions = Tuple[bool, ...]
 
 def have_fallen(held: Conditions, holds: Conditions) -> bool:
     """Return True if a condition that held earlier does not hold now."""
-    pairs = zip(held, holds)  # noqa: B905  # Python 3.8
+    pairs = zip(held, holds)  # Python 3.8
     return held != holds and any(before and not now for before, now in pairs)
 
 
 def held_ever(held: Conditions, holds: Conditions) -> Conditions:
     """Return for each condition whether it held earlier or holds now."""
-    return tuple([before or now for before, now in zip(held, holds)])  # noqa: B905  # Python 3.8
+    return tuple([before or now for before, now in zip(held, holds)])  # Python 3.8

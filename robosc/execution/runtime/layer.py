@@ -1,8 +1,9 @@
 """The executor of a supervision layer: it lets an existing controller's requests through or not (semantics 3.7).
 
-The existing controller, the caller, speaks to the layer instead of the robot. What it sends comes in through
-`on_request`, `on_call`, `on_goal` and `on_cancel`; what it receives goes out through a `LayerMiddleware`.
-Everything else is as in a controller, but nothing is decided here: a period only lets time pass.
+The existing controller, the caller, speaks to the layer instead of the robot. What it sends comes
+in through `on_request`, `on_call`, `on_goal` and `on_cancel`; what it receives goes out through a
+`LayerMiddleware`. Everything else is as in a controller, but nothing is decided here: a period
+only lets time pass.
 """
 
 from __future__ import annotations
@@ -14,25 +15,30 @@ from robosc.execution.runtime.clock import Clock
 from robosc.execution.runtime.command_timeouts import CommandTimeouts
 from robosc.execution.runtime.event_log import EventLog
 from robosc.execution.runtime.middleware_messages import is_finite
-from robosc.execution.runtime.protocol import CommunicationInfo, ControlledSystem, LayerMiddleware, RobotSide
+from robosc.execution.runtime.protocol import (
+    CommunicationInfo,
+    ControlledSystem,
+    LayerMiddleware,
+    RobotSide,
+)
 from robosc.execution.runtime.requests import Request
-from robosc.execution.runtime.runner import DeploymentError, Runner, Status, guarded
+from robosc.execution.runtime.runner import DeploymentError, guarded, Runner, Status
 from robosc.execution.runtime.safe_stop import describe_error, request_cancel
 from robosc.execution.runtime.settings import Settings
 from robosc.execution.runtime.steps import ExecutionError
 
-_INCOMING_MESSAGE = "incoming message"
+_INCOMING_MESSAGE = 'incoming message'
 
-_A_FAULT = "a fault"
-_NOT_ALLOWED = "not allowed now"
-_NOT_FINITE = "a NaN or an infinity"
-_NOT_KNOWN = "no message of the model"
-_STILL_RUNNING = "its last goal may still be under way"
+_A_FAULT = 'a fault'
+_NOT_ALLOWED = 'not allowed now'
+_NOT_FINITE = 'a NaN or an infinity'
+_NOT_KNOWN = 'no message of the model'
+_STILL_RUNNING = 'its last goal may still be under way'
 _AT_REST = {
-    Status.NEW: "not started",
-    Status.WAITING: "waiting for sensors",
-    Status.STOPPING: "stopped",
-    Status.STOPPED: "stopped",
+    Status.NEW: 'not started',
+    Status.WAITING: 'waiting for sensors',
+    Status.STOPPING: 'stopped',
+    Status.STOPPED: 'stopped',
 }
 
 
@@ -48,8 +54,8 @@ class Layer(Runner):
         log: The event log; none if None.
 
     Raises:
-        DeploymentError: The model has actions and the supervisor was made for a controller, or the model does not
-            tell its incoming messages on one identifier apart.
+        DeploymentError: The model has actions and the supervisor was made for a controller, or the
+            model does not tell its incoming messages on one identifier apart.
         SettingsError: A setting is wrong, or names what the model does not have.
     """
 
@@ -62,7 +68,7 @@ class Layer(Runner):
         clock: Optional[Clock] = None,
         log: Optional[EventLog] = None,
     ) -> None:
-        super().__init__(system, robot, "layer", settings, clock, log)
+        super().__init__(system, robot, 'layer', settings, clock, log)
         self._caller = caller
         self._named = {request.name: request for request in self._requests}
         self._messages = _messages(system.description.communications)
@@ -77,11 +83,12 @@ class Layer(Runner):
 
         Args:
             identifier: Identifier that it is meant for.
-            message: Mapping or object with the properties, or the plain value of a basic type; None for no data.
+            message: Mapping or object with the properties, or the plain value of a basic type;
+                None for no data.
         """
         names = self._messages.get(identifier)
         if names is None:
-            self._recorder.unexpected({"what": "a request on {}".format(identifier)})
+            self._recorder.unexpected({'what': 'a request on {}'.format(identifier)})
             return
         why: Optional[str] = _A_FAULT
         try:
@@ -101,7 +108,7 @@ class Layer(Runner):
             call_id: Id by which its answer is to be addressed; the executor only hands it back.
             message: The request.
         """
-        request = self._request_of(service, "service")
+        request = self._request_of(service, 'service')
         if request is None:
             return
         why: Optional[str] = _A_FAULT
@@ -122,7 +129,7 @@ class Layer(Runner):
             goal_id: Id of the goal on the caller's side.
             message: The goal.
         """
-        request = self._request_of(action, "action")
+        request = self._request_of(action, 'action')
         if request is None:
             return
         why: Optional[str] = _A_FAULT
@@ -146,14 +153,14 @@ class Layer(Runner):
         waiting = self._callers.find_goal(action, goal_id)
         goal = None if waiting is None else self._goals.find(waiting.number)
         if waiting is None or goal is None:
-            self._recorder.unexpected({"what": "a cancel of no goal of {}".format(action)})
+            self._recorder.unexpected({'what': 'a cancel of no goal of {}'.format(action)})
             return
         if waiting.is_cancelled:
             return
         waiting.is_cancelled = True
         goal.is_running = False
         try:
-            self._steps.happen(action + ".cancel", None, None)
+            self._steps.happen(action + '.cancel', None, None)
             self._end_batch()
         finally:
             request_cancel(self._robot, goal)
@@ -163,7 +170,8 @@ class Layer(Runner):
         """Release the last message on an identifier now: the existing controller is known to be gone from it.
 
         Args:
-            identifier: Identifier on which it sent messages; where none of them acts, nothing happens.
+            identifier: Identifier on which it sent messages; where none of them acts, nothing
+                happens.
         """
         self._look_at_clock()
         if self._releases.is_acting(identifier):
@@ -228,7 +236,7 @@ class Layer(Runner):
         for call in self._callers.close_failed_calls():
             self._tell(self._caller.answer_default, call.service, call.call_id)
         for goal in self._callers.close_failed_goals():
-            self._tell(self._caller.end_goal, goal.action, goal.goal_id, "aborted", None)
+            self._tell(self._caller.end_goal, goal.action, goal.goal_id, 'aborted', None)
 
     # Requests: why each is held back, or None if it went through.
 
@@ -283,7 +291,8 @@ class Layer(Runner):
         """The request happens, with all that follows from it, before its message goes out."""
         self._steps.take(request.event, message)
         self._steps.settle(request.name)
-        # What goes out now may wait for time to pass: looked up as soon as the clock is read again.
+        # What goes out now may wait for time to pass: looked up as soon as the clock is read
+        # again.
         self._deadline_s = self._now_s
 
     def _recognized(self, names: Sequence[str], message: Any) -> Optional[Request]:
@@ -295,10 +304,12 @@ class Layer(Runner):
         for name in names:
             match = self._system.matches(name, message)
             if match.unknown:
-                self._recorder.unknown(name + ".request", match.unknown)
-            if match.enum_unknown and self.settings.on_unknown == "fault":
-                raise ExecutionError("unknown at {}: {}".format(name + ".request", ", ".join(match.unknown)))
-            if match.enum_unknown and self.settings.on_unknown == "keep":
+                self._recorder.unknown(name + '.request', match.unknown)
+            if match.enum_unknown and self.settings.on_unknown == 'fault':
+                raise ExecutionError(
+                    'unknown at {}: {}'.format(name + '.request', ', '.join(match.unknown))
+                )
+            if match.enum_unknown and self.settings.on_unknown == 'keep':
                 return None
             if match.holds:
                 return self._named[name]
@@ -308,7 +319,7 @@ class Layer(Runner):
         request = self._named.get(name)
         if request is not None and request.kind == kind:
             return request
-        self._recorder.unexpected({"what": "a request of the {} {}".format(kind, name)})
+        self._recorder.unexpected({'what': 'a request of the {} {}'.format(kind, name)})
         return None
 
     def _hold_back(self, identifier: str, why: str) -> None:
@@ -340,4 +351,6 @@ def _messages(infos: Sequence[CommunicationInfo]) -> Dict[str, Tuple[str, ...]]:
                     "a message on '{}' may be '{}' or '{}': a supervision layer needs 'when: CONDITION' in the list of "
                     "'{}'".format(identifier, info.name, sharing[-1].name, info.name)
                 )
-    return {identifier: tuple(info.name for info in sharing) for identifier, sharing in found.items()}
+    return {
+        identifier: tuple(info.name for info in sharing) for identifier, sharing in found.items()
+    }

@@ -1,8 +1,8 @@
 """Runs of silent steps that do not end (semantics 3.3).
 
-A run is deterministic: equal states are followed by equal steps. It ends if and only if no state comes
-twice, which R. P. Brent's algorithm finds with one remembered state ("An improved Monte Carlo
-factorization algorithm", BIT 20, 1980, pp. 176-184, section 7).
+A run is deterministic: equal states are followed by equal steps. It ends if and only if no state
+comes twice, which R. P. Brent's algorithm finds with one remembered state ("An improved Monte
+Carlo factorization algorithm", BIT 20, 1980, pp. 176-184, section 7).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class LivelockDetector:
         bound: More steps than this can only be a run that does not end.
     """
 
-    __slots__ = ("_bound", "_distance", "_power", "_remembered", "_steps")
+    __slots__ = ('_bound', '_distance', '_power', '_remembered', '_steps')
 
     def __init__(self, bound: int) -> None:
         self._bound = bound
@@ -46,13 +46,17 @@ class LivelockDetector:
         self._steps += 1
         if self._steps > self._bound:
             raise LivelockError(
-                "silent steps do not end: more than {} in a row, the last {}".format(self._bound, event)
+                'silent steps do not end: more than {} in a row, the last {}'.format(
+                    self._bound, event
+                )
             )
         if self._steps <= PATIENCE:
             return
         now = signature()
         if now == self._remembered:
-            raise LivelockError("silent steps do not end: a state came twice, the last step was {}".format(event))
+            raise LivelockError(
+                'silent steps do not end: a state came twice, the last step was {}'.format(event)
+            )
         self._distance += 1
         if self._distance == self._power:
             self._remembered = now

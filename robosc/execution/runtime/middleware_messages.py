@@ -13,7 +13,7 @@ MAXIMUM_PARTS = 1000000
 """A message with more parts than this is not looked through to its end: it counts as not finite."""
 
 _HARMLESS = (bool, int, str, bytes, bytearray)
-_INTEGER_FORMATS = "?cbBhHiIlLqQnN"
+_INTEGER_FORMATS = '?cbBhHiIlLqQnN'
 
 
 def fields_of(message: Any) -> Dict[str, Any]:
@@ -66,9 +66,9 @@ def _parts(value: Any) -> Iterable[Any]:
     try:
         view = memoryview(value)
     except TypeError:
-        return list(value) if hasattr(type(value), "__iter__") else _required_fields(value)
+        return list(value) if hasattr(type(value), '__iter__') else _required_fields(value)
     # Long arrays of whole numbers, such as pictures, need not be looked through.
-    return () if view.format.lstrip("@=<>!") in _INTEGER_FORMATS else value.tolist()
+    return () if view.format.lstrip('@=<>!') in _INTEGER_FORMATS else value.tolist()
 
 
 def _required_fields(message: Any) -> Iterable[Any]:
@@ -78,13 +78,15 @@ def _required_fields(message: Any) -> Iterable[Any]:
 def _field_names(message: Any) -> Iterable[str]:
     """Names of the fields of a message: as ROS tells them, else its attributes."""
     kind = type(message)
-    if hasattr(kind, "get_fields_and_field_types"):
+    if hasattr(kind, 'get_fields_and_field_types'):
         return tuple(kind.get_fields_and_field_types())
     slots = [name for base in kind.__mro__ for name in _slots(base)]
-    return tuple(name for name in (*getattr(message, "__dict__", ()), *slots) if hasattr(message, name))
+    return tuple(
+        name for name in (*getattr(message, '__dict__', ()), *slots) if hasattr(message, name)
+    )
 
 
 def _slots(kind: Any) -> Iterable[str]:
-    slots = kind.__dict__.get("__slots__", ())
+    slots = kind.__dict__.get('__slots__', ())
     names = (slots,) if isinstance(slots, str) else tuple(slots)
-    return tuple(name for name in names if not name.startswith("__"))
+    return tuple(name for name in names if not name.startswith('__'))

@@ -2,9 +2,10 @@
 
 A `ControlledSystem` is the supervisor as code: `robosc.execution.interpreter` interprets a
 `Supervisor`, a target generates a class with the same methods. The `Executor` adds what semantics
-part 3 says about time: batches, silent steps, decisions, release, safe stop, log. `Middleware` is what
-it needs of ROS, a bridge or a test. The `Layer` does the same for requests of an existing controller: its
-`RobotSide` is what it needs of the robot, its `LayerMiddleware` what it needs of that controller.
+part 3 says about time: batches, silent steps, decisions, release, safe stop, log. `Middleware` is
+what it needs of ROS, a bridge or a test. The `Layer` does the same for requests of an existing
+controller: its `RobotSide` is what it needs of the robot, its `LayerMiddleware` what it needs of
+that controller.
 
 This package's modules other than `interpreter` import nothing of RoboSC but each other and run on
 Python 3.8 and later: generated packages carry copies of them.
@@ -14,7 +15,7 @@ from __future__ import annotations
 
 from typing import Any, Dict, NamedTuple, Optional, Protocol, Sequence, Tuple
 
-OUTGOING = "outgoing message"
+OUTGOING = 'outgoing message'
 """The only kind of communication that has no request."""
 
 
@@ -31,7 +32,8 @@ class CommunicationInfo(NamedTuple):
         requirement_count: Number of requirements on its request.
         conjunct_count: Number of top-level conjuncts of those requirements, all counted on.
         max_age_s: Seconds after which an outgoing message is stale, if the model says so.
-        has_condition: True if an incoming message says with `when` which messages it is, in a supervision layer.
+        has_condition: True if an incoming message says with `when` which messages it is, in a
+            supervision layer.
     """
 
     name: str
@@ -78,7 +80,10 @@ def batches(infos: Sequence[CommunicationInfo]) -> Dict[str, Tuple[Tuple[str, st
     found: Dict[str, Tuple[Tuple[str, str], ...]] = {}
     for info in infos:
         if info.kind == OUTGOING:
-            found[info.identifier] = (*found.get(info.identifier, ()), (info.name, info.name + ".response"))
+            found[info.identifier] = (
+                *found.get(info.identifier, ()),
+                (info.name, info.name + '.response'),
+            )
     return found
 
 
@@ -86,10 +91,11 @@ class Reading(NamedTuple):
     """Received data after conversion (enum rules, ranges), before anything changes.
 
     Attributes:
-        values: One value (None: unknown) for each datum that updates on the event read, as the system wants them.
+        values: One value (None: unknown) for each datum that updates on the event read, as the
+            system wants them.
         data: The same by name (`value.front`), for the log.
-        unknown: Descriptions of what was unknown: an enum that fell to its default past an unknown rule, an
-            integer that was clamped. Empty: nothing was.
+        unknown: Descriptions of what was unknown: an enum that fell to its default past an unknown
+            rule, an integer that was clamped. Empty: nothing was.
         enum_unknown: True if an enum fell to its default although an earlier rule was unknown.
     """
 
@@ -122,7 +128,8 @@ class ControlledSystem(Protocol):
 
     Attributes:
         description: Its static part.
-        changes: Grows whenever the state may have become another: while it stays the same, so does the state.
+        changes: Grows whenever the state may have become another: while it stays the same, so does
+            the state.
     """
 
     description: Description
@@ -143,14 +150,18 @@ class ControlledSystem(Protocol):
     def enabled_silent(self) -> Optional[str]:
         """The first of the description's resets, then its taus, that is allowed now; None if none is."""
 
-    def receive(self, identifier: str, data: Any) -> Optional[Tuple[Tuple[str, Tuple[str, ...]], ...]]:
+    def receive(
+        self, identifier: str, data: Any
+    ) -> Optional[Tuple[Tuple[str, Tuple[str, ...]], ...]]:
         """Convert what came on an identifier, and take the events of all its outgoing messages, in source order.
 
-        For the common case, in which no `Reading` need be looked at. The state accepts these events whatever it is.
+        For the common case, in which no `Reading` need be looked at. The state accepts these
+        events whatever it is.
 
         Returns:
-            The events at which updates were skipped, with these (mostly empty), or None if something of the data
-            is unknown; then nothing has changed, and each event is to be read and taken by itself.
+            The events at which updates were skipped, with these (mostly empty), or None if
+            something of the data is unknown; then nothing has changed, and each event is to be
+            read and taken by itself.
         """
 
     def read(self, event: str, data: Any) -> Reading:
@@ -160,14 +171,15 @@ class ControlledSystem(Protocol):
         """Take an event: move and update, all at once.
 
         Returns:
-            The updates that were skipped because their value is unknown, in words (mostly empty), or None if
-            the state cannot accept the event; then nothing has changed.
+            The updates that were skipped because their value is unknown, in words (mostly empty),
+            or None if the state cannot accept the event; then nothing has changed.
         """
 
     def provide(self, communication: str) -> Tuple[bool, Any]:
         """Data for a request in the current state: (is known, data).
 
-        Data is a dict of properties (nested dicts), a plain value, or None for the middleware's default.
+        Data is a dict of properties (nested dicts), a plain value, or None for the middleware's
+        default.
         """
 
     def matches(self, communication: str, data: Any) -> Match:

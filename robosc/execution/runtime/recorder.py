@@ -13,8 +13,9 @@ class Counters(NamedTuple):
     """Counts of what went wrong so far.
 
     Attributes:
-        unknown: Enums that fell to their default past an unknown rule, received integers that were moved into
-            their range, updates that were skipped, requests whose data was unknown or did not fit.
+        unknown: Enums that fell to their default past an unknown rule, received integers that were
+            moved into their range, updates that were skipped, requests whose data was unknown or
+            did not fit.
         unexpected: Events that the state could not accept, replies that match no request.
         faults: Faults.
         dropped: Entries that the event log lost.
@@ -35,18 +36,19 @@ class Recorder:
         log: Log for the entries.
 
     Attributes:
-        began_s: Reading of the clock when the handling of what came last began: decision times count from here.
+        began_s: Reading of the clock when the handling of what came last began: decision times
+            count from here.
     """
 
     __slots__ = (
-        "_clock",
-        "_log",
-        "_lost",
-        "_system",
-        "began_s",
-        "faults",
-        "unexpected_count",
-        "unknown_count",
+        '_clock',
+        '_log',
+        '_lost',
+        '_system',
+        'began_s',
+        'faults',
+        'unexpected_count',
+        'unknown_count',
     )
 
     def __init__(self, system: ControlledSystem, clock: Clock, log: EventLog) -> None:
@@ -66,53 +68,56 @@ class Recorder:
 
     def counters(self) -> Counters:
         """The counters now."""
-        return Counters(self.unknown_count, self.unexpected_count, self.faults, self._lost + self._log.dropped)
+        return Counters(
+            self.unknown_count, self.unexpected_count, self.faults, self._lost + self._log.dropped
+        )
 
     def event(self, event: str, is_controllable: bool, data: Any) -> None:
         """An event was taken. Worth calling only while the log is active."""
         took_us = (self._clock.monotonic() - self.began_s) * 1e6
         self._write(
             {
-                "kind": "event",
-                "event": event,
-                "controllable": is_controllable,
-                "data": data,
-                "state": self._system.state(),
-                "decision_us": round(took_us, 1),
+                'kind': 'event',
+                'event': event,
+                'controllable': is_controllable,
+                'data': data,
+                'state': self._system.state(),
+                'decision_us': round(took_us, 1),
             }
         )
 
     def unexpected(self, entry: Dict[str, Any]) -> None:
         """Something came that the state, or nobody, waits for."""
         self.unexpected_count += 1
-        self._write({"kind": "unexpected", **entry})
+        self._write({'kind': 'unexpected', **entry})
 
     def unknown(self, event: str, what: Sequence[str]) -> None:
         """Something was unknown at an event."""
         self.unknown_count += len(what)
-        self._write({"kind": "unknown", "event": event, "unknown": list(what)})
+        self._write({'kind': 'unknown', 'event': event, 'unknown': list(what)})
 
     def fault(self, what: str) -> None:
         """A fault."""
         self.faults += 1
-        self._write({"kind": "fault", "what": what})
+        self._write({'kind': 'fault', 'what': what})
 
     def release(self, identifier: str) -> None:
         """The default message goes out on an identifier."""
-        self._write({"kind": "release", "identifier": identifier})
+        self._write({'kind': 'release', 'identifier': identifier})
 
     def blocked(self, identifier: str, why: str) -> None:
         """A supervision layer held a request back."""
-        self._write({"kind": "blocked", "identifier": identifier, "why": why})
+        self._write({'kind': 'blocked', 'identifier': identifier, 'why': why})
 
     def note(self, kind: str, what: str) -> None:
         """A stop, its end, or a restart."""
-        self._write({"kind": kind, "what": what})
+        self._write({'kind': kind, 'what': what})
 
     def _write(self, entry: Dict[str, Any]) -> None:
         if self.is_active:
             try:
-                self._log.write({"time": self._clock.wall(), **entry})
+                self._log.write({'time': self._clock.wall(), **entry})
             except Exception:
-                # Whatever a log does, it must not stop the robot's controller: counted, and the loop goes on.
+                # Whatever a log does, it must not stop the robot's controller: counted, and the
+                # loop goes on.
                 self._lost += 1

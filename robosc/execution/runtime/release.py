@@ -16,15 +16,16 @@ class _Acting:
         event: Event of that request.
         was_enabled: True if the request was enabled in the last stable state since.
         held: Values for the conjuncts of its requirements: True if one held in that state.
-        is_due: True if it is to be released: something was so and is no longer. Once due it stays so until
-            something is sent there; that is why the last stable state is enough to remember.
+        is_due: True if it is to be released: something was so and is no longer. Once due it stays
+            so until something is sent there; that is why the last stable state is enough to
+            remember.
     """
 
-    __slots__ = ("event", "held", "is_due", "request", "was_enabled")
+    __slots__ = ('event', 'held', 'is_due', 'request', 'was_enabled')
 
     def __init__(self, request: str, was_enabled: bool, held: Tuple[bool, ...]) -> None:
         self.request = request
-        self.event = request + ".request"
+        self.event = request + '.request'
         self.was_enabled = was_enabled
         self.held = held
         self.is_due = False
@@ -37,10 +38,11 @@ class Releases:
         system: System that shows what is enabled and what holds.
         identifiers: The release identifiers.
         requests: Communications of each of them, in source order.
-        may_wait: True if a due release waits while another request there is enabled: only a controller's does.
+        may_wait: True if a due release waits while another request there is enabled: only a
+            controller's does.
     """
 
-    __slots__ = ("_acting", "_events", "_may_wait", "_system", "identifiers", "waiting")
+    __slots__ = ('_acting', '_events', '_may_wait', '_system', 'identifiers', 'waiting')
 
     def __init__(
         self,
@@ -53,7 +55,8 @@ class Releases:
         self._may_wait = may_wait
         self.identifiers = tuple(identifiers)
         self._events = {
-            identifier: tuple((name, name + ".request") for name in requests[identifier]) for identifier in identifiers
+            identifier: tuple((name, name + '.request') for name in requests[identifier])
+            for identifier in identifiers
         }
         self._acting: Dict[str, _Acting] = {}
         self.waiting: Tuple[str, ...] = ()
@@ -62,8 +65,8 @@ class Releases:
         """The identifiers to release now, in this stable state; the caller does it and tells `released`.
 
         Args:
-            issuing: Communication whose request brought the system here and whose message is about to go out:
-                what it makes false does not release its own earlier message.
+            issuing: Communication whose request brought the system here and whose message is about
+                to go out: what it makes false does not release its own earlier message.
         """
         if not self._acting:
             return []
@@ -90,7 +93,9 @@ class Releases:
 
     def _another_is_enabled(self, identifier: str, acting: _Acting) -> bool:
         enabled = self._system.enabled
-        return any(name != acting.request and enabled(event) for name, event in self._events[identifier])
+        return any(
+            name != acting.request and enabled(event) for name, event in self._events[identifier]
+        )
 
     def alternatives(self, identifier: str) -> Tuple[str, ...]:
         """Communications of an identifier whose message would end a waiting release."""
@@ -106,8 +111,10 @@ class Releases:
         """A message went out on a release identifier; the system is in the stable state after its request."""
         self.released(identifier)
         if not is_default:
-            is_enabled = self._system.enabled(request + ".request")
-            self._acting[identifier] = _Acting(request, is_enabled, self._system.conjuncts(request))
+            is_enabled = self._system.enabled(request + '.request')
+            self._acting[identifier] = _Acting(
+                request, is_enabled, self._system.conjuncts(request)
+            )
 
     def sent_unchanged(self, request: str, identifier: str, is_default: bool) -> None:
         """The same, where the request changed nothing: what was enabled still is, with all that it takes."""

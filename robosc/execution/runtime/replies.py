@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Optional
 
-from robosc.execution.runtime.calls import OUTCOMES, Calls, Goal, Goals
+from robosc.execution.runtime.calls import Calls, Goal, Goals, OUTCOMES
 from robosc.execution.runtime.protocol import RobotSide
 from robosc.execution.runtime.recorder import Recorder
 from robosc.execution.runtime.safe_stop import request_cancel
@@ -22,9 +22,11 @@ class Replies:
         goals: Goals under way.
     """
 
-    __slots__ = ("_calls", "_goals", "_middleware", "_recorder", "_steps")
+    __slots__ = ('_calls', '_goals', '_middleware', '_recorder', '_steps')
 
-    def __init__(self, steps: Steps, middleware: RobotSide, recorder: Recorder, calls: Calls, goals: Goals) -> None:
+    def __init__(
+        self, steps: Steps, middleware: RobotSide, recorder: Recorder, calls: Calls, goals: Goals
+    ) -> None:
         self._steps = steps
         self._middleware = middleware
         self._recorder = recorder
@@ -44,14 +46,14 @@ class Replies:
         """Fail the calls and goals that are over their time; also cancel such goals."""
         for number in self._calls.expired(now_s):
             service = self._calls.close(number)
-            self._steps.happen("{}.error".format(service), None, "timeout")
+            self._steps.happen('{}.error'.format(service), None, 'timeout')
             self._steps.settle()
         for goal in self._goals.expired(now_s):
             if not goal.is_running:
                 # What another one's end led to has cancelled it.
                 continue
             goal.is_running = False
-            self._steps.happen(goal.action + ".error", None, "timeout")
+            self._steps.happen(goal.action + '.error', None, 'timeout')
             self._steps.settle()
             request_cancel(self._middleware, goal)
 
@@ -60,7 +62,7 @@ class Replies:
         service = self._close_call(request_id)
         if service is None:
             return False
-        self._steps.happen_with_data(service + ".response", data)
+        self._steps.happen_with_data(service + '.response', data)
         return True
 
     def call_failed(self, request_id: int, reason: str) -> bool:
@@ -68,12 +70,12 @@ class Replies:
         service = self._close_call(request_id)
         if service is None:
             return False
-        self._steps.happen(service + ".error", None, reason)
+        self._steps.happen(service + '.error', None, reason)
         return True
 
     def goal_accepted(self, goal_id: int) -> None:
         """A goal was accepted: a cancel that was decided before is sent now."""
-        goal = self._find_goal(goal_id, "an acceptance")
+        goal = self._find_goal(goal_id, 'an acceptance')
         if goal is not None:
             goal.is_accepted = True
             if goal.is_cancel_wanted:
@@ -81,13 +83,13 @@ class Replies:
 
     def feedback(self, goal_id: int, data: Any) -> bool:
         """A goal's server told how far it is."""
-        goal = self._find_goal(goal_id, "feedback")
+        goal = self._find_goal(goal_id, 'feedback')
         if goal is None:
             return False
         if not goal.is_running:
-            self._recorder.unexpected({"event": goal.action + ".feedback"})
+            self._recorder.unexpected({'event': goal.action + '.feedback'})
             return False
-        self._steps.happen_with_data(goal.action + ".feedback", data)
+        self._steps.happen_with_data(goal.action + '.feedback', data)
         return True
 
     def goal_ended(self, goal_id: int, outcome: str, data: Any) -> bool:
@@ -98,18 +100,18 @@ class Replies:
         """
         if outcome not in OUTCOMES:
             raise ExecutionError("a goal cannot end as '{}'".format(outcome))
-        goal = self._find_goal(goal_id, "a result")
+        goal = self._find_goal(goal_id, 'a result')
         if goal is None:
             return False
         self._goals.close(goal_id)
         # Its action may be requested again.
         self._steps.enabled = None
-        if goal.is_running and outcome == "succeeded":
-            self._steps.happen_with_data(goal.action + ".response", data)
+        if goal.is_running and outcome == 'succeeded':
+            self._steps.happen_with_data(goal.action + '.response', data)
         elif goal.is_running:
-            self._steps.happen(goal.action + ".error", None, outcome)
-        elif outcome == "succeeded":
-            self._recorder.unexpected({"event": goal.action + ".response"})
+            self._steps.happen(goal.action + '.error', None, outcome)
+        elif outcome == 'succeeded':
+            self._recorder.unexpected({'event': goal.action + '.response'})
         return goal.is_running
 
     def cancel_refused(self, goal_id: int, ended: bool) -> None:
@@ -118,18 +120,20 @@ class Replies:
         Raises:
             ExecutionError: The goal is running.
         """
-        goal = None if ended else self._find_goal(goal_id, "a refused cancel")
+        goal = None if ended else self._find_goal(goal_id, 'a refused cancel')
         if goal is not None:
-            raise ExecutionError("the cancel of a running goal of {} was refused".format(goal.action))
+            raise ExecutionError(
+                'the cancel of a running goal of {} was refused'.format(goal.action)
+            )
 
     def _close_call(self, request_id: int) -> Optional[str]:
         service = self._calls.close(request_id)
         if service is None:
-            self._recorder.unexpected({"what": "a reply to no call"})
+            self._recorder.unexpected({'what': 'a reply to no call'})
         return service
 
     def _find_goal(self, goal_id: int, what: str) -> Optional[Goal]:
         goal = self._goals.find(goal_id)
         if goal is None:
-            self._recorder.unexpected({"what": "{} of no goal".format(what)})
+            self._recorder.unexpected({'what': '{} of no goal'.format(what)})
         return goal

@@ -17,7 +17,7 @@ from robosc.execution.runtime.recorder import Recorder
 from robosc.execution.runtime.release import Releases
 from robosc.execution.runtime.steps import Steps
 
-_MESSAGE = "incoming message"
+_MESSAGE = 'incoming message'
 
 
 class Request(NamedTuple):
@@ -38,7 +38,9 @@ class Request(NamedTuple):
     keeps_acting: bool
 
 
-def requests_of(infos: Sequence[CommunicationInfo], released: Sequence[str]) -> Tuple[Request, ...]:
+def requests_of(
+    infos: Sequence[CommunicationInfo], released: Sequence[str]
+) -> Tuple[Request, ...]:
     """The requests of a model, in source order.
 
     Args:
@@ -48,7 +50,7 @@ def requests_of(infos: Sequence[CommunicationInfo], released: Sequence[str]) -> 
     return tuple(
         Request(
             name=info.name,
-            event=info.name + ".request",
+            event=info.name + '.request',
             identifier=info.identifier,
             kind=info.kind,
             keeps_acting=info.kind == _MESSAGE and info.identifier in released,
@@ -82,15 +84,15 @@ class Decisions:
     """
 
     __slots__ = (
-        "_calls",
-        "_goals",
-        "_middleware",
-        "_recorder",
-        "_releases",
-        "_requests",
-        "_steps",
-        "_system",
-        "policy",
+        '_calls',
+        '_goals',
+        '_middleware',
+        '_recorder',
+        '_releases',
+        '_requests',
+        '_steps',
+        '_system',
+        'policy',
     )
 
     def __init__(
@@ -119,7 +121,8 @@ class Decisions:
         """Issue one of the enabled requests of this stable state, if there is any.
 
         Returns:
-            Whether a service was called or a goal was sent, so that something new waits for time to pass.
+            Whether a service was called or a goal was sent, so that something new waits for time
+            to pass.
         """
         enabled = self._steps.enabled
         if enabled is None:
@@ -139,11 +142,17 @@ class Decisions:
         enabled, goals = self._system.enabled_requests(), self._goals
         if not goals:
             return enabled
-        return tuple([number for number in enabled if not goals.is_open(self._requests[number].name)])
+        return tuple(
+            [number for number in enabled if not goals.is_open(self._requests[number].name)]
+        )
 
     def _split(self, enabled: Tuple[int, ...]) -> Tuple[Tuple[int, ...], Tuple[int, ...]]:
         """The requests whose message would end a release that waits, and the others."""
-        names = {name for identifier in self._releases.waiting for name in self._releases.alternatives(identifier)}
+        names = {
+            name
+            for identifier in self._releases.waiting
+            for name in self._releases.alternatives(identifier)
+        }
         ending = tuple([number for number in enabled if self._requests[number].name in names])
         return ending, tuple([number for number in enabled if number not in ending])
 
@@ -167,14 +176,14 @@ class Decisions:
         if known is None:
             is_known, data = self._system.provide(name)
             if not is_known:
-                return self._withhold(request, "its data")
+                return self._withhold(request, 'its data')
         else:
             data, is_default = known
         middleware = self._middleware
         try:
             message = middleware.prepare(name, data)
         except DataDoesNotFit as error:
-            return self._withhold(request, "its data does not fit: {}".format(error))
+            return self._withhold(request, 'its data does not fit: {}'.format(error))
         releases = self._releases
         if known is None:
             is_default = keeps_acting and middleware.is_default(name, message)
@@ -192,7 +201,7 @@ class Decisions:
                 if keeps_acting:
                     releases.sent_unchanged(name, identifier, is_default)
             middleware.publish(name, message)
-        elif kind == "service":
+        elif kind == 'service':
             self._calls.call(middleware, name, message, now_s)
         else:
             self._goals.send(middleware, name, message, now_s)

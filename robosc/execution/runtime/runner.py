@@ -2,55 +2,62 @@
 
 It covers semantics part 3, points 1 to 4 and 8.
 
-An adapter drives an executor from one thread: `tick` once a period, the other methods when something comes. Its
-middleware must not call it back from within. No method raises: an exception of the system or of the
-middleware becomes a fault, and the robot comes to rest.
+An adapter drives an executor from one thread: `tick` once a period, the other methods when
+something comes. Its middleware must not call it back from within. No method raises: an exception
+of the system or of the middleware becomes a fault, and the robot comes to rest.
 
-A request is always taken in this order: have its message ready, take the event, silent steps to the end,
-releases that it made due, send the message. So no request is decided on a state that lags behind.
+A request is always taken in this order: have its message ready, take the event, silent steps to
+the end, releases that it made due, send the message. So no request is decided on a state that lags
+behind.
 """
 
 from __future__ import annotations
 
 from enum import Enum
 from functools import wraps
-from typing import Any, Callable, Optional, Tuple, TypeVar, cast
+from typing import Any, Callable, cast, Optional, Tuple, TypeVar
 
 from robosc.execution.runtime.calls import Calls, Goals
 from robosc.execution.runtime.clock import Clock, SystemClock
 from robosc.execution.runtime.event_log import EventLog, NullLog
-from robosc.execution.runtime.protocol import OUTGOING, ControlledSystem, Description, RobotSide, batches
+from robosc.execution.runtime.protocol import (
+    batches,
+    ControlledSystem,
+    Description,
+    OUTGOING,
+    RobotSide,
+)
 from robosc.execution.runtime.recorder import Counters, Recorder
 from robosc.execution.runtime.release import Releases
 from robosc.execution.runtime.replies import Replies
 from robosc.execution.runtime.requests import by_identifier, requests_of
-from robosc.execution.runtime.safe_stop import SafeStop, describe_error
+from robosc.execution.runtime.safe_stop import describe_error, SafeStop
 from robosc.execution.runtime.sensors import Sensors
-from robosc.execution.runtime.settings import Settings, require_settings_of, settings_for
+from robosc.execution.runtime.settings import require_settings_of, Settings, settings_for
 from robosc.execution.runtime.steps import ExecutionError, Steps
 
-_FAULT = "fault"
-_STOPPED_BY_HAND = "stop"
+_FAULT = 'fault'
+_STOPPED_BY_HAND = 'stop'
 
 
 class Status(str, Enum):
     """Status of an executor."""
 
-    NEW = "new"
+    NEW = 'new'
     """Not started."""
-    WAITING = "waiting"
+    WAITING = 'waiting'
     """Requests nothing before the first message of every sensor with a maximum age."""
-    RUNNING = "running"
-    STOPPING = "stopping"
+    RUNNING = 'running'
+    STOPPING = 'stopping'
     """At rest; the ends of cancelled goals are awaited."""
-    STOPPED = "stopped"
+    STOPPED = 'stopped'
 
 
 class DeploymentError(ValueError):
     """The supervisor was made for another deployment, or its model cannot be deployed like this."""
 
 
-_Method = TypeVar("_Method", bound=Callable[..., None])
+_Method = TypeVar('_Method', bound=Callable[..., None])
 
 
 def guarded(method: _Method) -> _Method:
@@ -105,17 +112,25 @@ class Runner:
         self._recorder = Recorder(system, self._clock, NullLog() if log is None else log)
         released = self.settings.release_identifiers or ()
         self._requests = requests_of(infos, released)
-        self._releases = Releases(system, released, by_identifier(self._requests), deployment == "controller")
+        self._releases = Releases(
+            system, released, by_identifier(self._requests), deployment == 'controller'
+        )
         self._calls = Calls(self.settings.service_timeout_s)
-        actions = [info.name for info in infos if info.kind == "action"]
+        actions = [info.name for info in infos if info.kind == 'action']
         self._goals = Goals(system, actions, self.settings.action_timeout_s)
         self._sensors = Sensors(
-            [(info.name, info.identifier, info.max_age_s) for info in infos if info.kind == OUTGOING],
+            [
+                (info.name, info.identifier, info.max_age_s)
+                for info in infos
+                if info.kind == OUTGOING
+            ],
             self.settings.max_age_s,
         )
         self._has_watched_sensors = bool(self._sensors)
         self._safe_stop = SafeStop(robot, self._releases, self._goals)
-        self._steps = Steps(system, robot, self._recorder, self._releases, self._goals, self.settings.on_unknown)
+        self._steps = Steps(
+            system, robot, self._recorder, self._releases, self._goals, self.settings.on_unknown
+        )
         self._replies = Replies(self._steps, robot, self._recorder, self._calls, self._goals)
         self._batches = batches(infos)
         self._is_started = False
@@ -130,7 +145,11 @@ class Runner:
     def status(self) -> Status:
         """Current status of the executor."""
         if self._safe_stop.reasons:
-            return Status.STOPPING if self._safe_stop.is_awaiting(self._clock.monotonic()) else Status.STOPPED
+            return (
+                Status.STOPPING
+                if self._safe_stop.is_awaiting(self._clock.monotonic())
+                else Status.STOPPED
+            )
         if not self._is_started:
             return Status.NEW
         return Status.RUNNING if self._may_request else Status.WAITING
@@ -166,7 +185,8 @@ class Runner:
     def watch(self) -> None:
         """Time has passed, but no period: stale sensors, replies that did not come, messages and cancels still owed.
 
-        An adapter with a long period calls this in between: none of these may wait for the next decision.
+        An adapter with a long period calls this in between: none of these may wait for the next
+        decision.
         """
         if not self._is_started:
             return
@@ -182,7 +202,8 @@ class Runner:
 
         Args:
             identifier: Identifier on which it came.
-            data: Mapping or object with the properties, or the plain value of a basic type; None for no data.
+            data: Mapping or object with the properties, or the plain value of a basic type; None
+                for no data.
         """
         # This is written out for speed: the cycle time of the controller.
         if not self._is_started:
@@ -193,7 +214,7 @@ class Runner:
                 self._check_time(now)
             batch = self._batches.get(identifier)
             if batch is None:
-                self._recorder.unexpected({"what": "a message on {}".format(identifier)})
+                self._recorder.unexpected({'what': 'a message on {}'.format(identifier)})
                 return
             if self._steps.happen_at_once(identifier, data):
                 if self._has_watched_sensors:
@@ -250,7 +271,8 @@ class Runner:
 
         Args:
             goal_id: Id of the goal.
-            ended: True if the reason is that the goal had ended already; its result follows or came already.
+            ended: True if the reason is that the goal had ended already; its result follows or
+                came already.
         """
         self._look_at_clock()
         self._replies.cancel_refused(goal_id, ended)
@@ -258,7 +280,8 @@ class Runner:
     def stop(self, reason: str, is_fault: bool = False) -> None:
         """Come to rest until `restart`: on a signal, or, if `is_fault`, on a fault that the adapter found.
 
-        Goals that are running are cancelled: the status is `stopping` until they have ended, 0.5 s at most.
+        Goals that are running are cancelled: the status is `stopping` until they have ended, 0.5 s
+        at most.
         """
         self._now_s = self._clock.monotonic()
         if is_fault:
@@ -273,9 +296,9 @@ class Runner:
         if not self._safe_stop.reasons or self._safe_stop.unsent:
             self._come_to_rest()
         if self._safe_stop.unsent:
-            raise ExecutionError("no restart: the robot could not be brought to rest")
+            raise ExecutionError('no restart: the robot could not be brought to rest')
         self._safe_stop.reasons.clear()
-        self._recorder.note("restart", "")
+        self._recorder.note('restart', '')
         self._begin()
 
     # Time.
@@ -303,7 +326,8 @@ class Runner:
     def _check_time(self, now: float) -> None:
         """Handle what is over by now.
 
-        Never raises: after a fault, too, what comes is handled; a goal whose end were lost would never have ended.
+        Never raises: after a fault, too, what comes is handled; a goal whose end were lost would
+        never have ended.
         """
         try:
             self._end_what_is_over(now)
@@ -315,14 +339,14 @@ class Runner:
         self._replies.expire(now)
         for name, identifier in self._sensors.stale(now):
             if _stale_key(name) not in self._safe_stop.reasons:
-                self._stop(_stale_key(name), "{} on {} is stale".format(name, identifier))
+                self._stop(_stale_key(name), '{} on {} is stale'.format(name, identifier))
         self._deadline_s = self._next_deadline(now)
 
     def _see(self, name: str) -> None:
         """A message came: its sensor is fresh, and a stop because it was not is over."""
         if self._sensors.see(name, self._now_s):
             if self._safe_stop.reasons.pop(_stale_key(name), None) is not None:
-                self._recorder.note("resume", "{} is back".format(name))
+                self._recorder.note('resume', '{} is back'.format(name))
                 self._deadline_s = self._next_deadline(self._now_s)
             self._update_may_request()
 
@@ -348,7 +372,9 @@ class Runner:
         """Something was handled, whether it went well or not. Never raises."""
 
     def _update_may_request(self) -> None:
-        self._may_request = self._is_started and not self._safe_stop.reasons and self._sensors.are_all_seen()
+        self._may_request = (
+            self._is_started and not self._safe_stop.reasons and self._sensors.are_all_seen()
+        )
 
     # Safe stop.
 
@@ -360,7 +386,7 @@ class Runner:
 
     def _stop(self, key: str, reason: str) -> None:
         """A safe stop that is no fault. Never raises."""
-        self._recorder.note("stop", reason)
+        self._recorder.note('stop', reason)
         self._safe_stop.reasons.setdefault(key, reason)
         self._come_to_rest()
 
@@ -373,7 +399,9 @@ class Runner:
 
 
 def _require_deployment(description: Description, deployment: str) -> None:
-    if description.deployment != deployment and any(info.kind == "action" for info in description.communications):
+    if description.deployment != deployment and any(
+        info.kind == 'action' for info in description.communications
+    ):
         raise DeploymentError(
             "this supervisor was made for the deployment '{}', and its model has actions; "
             "make one for the deployment '{}'".format(description.deployment, deployment)
@@ -381,4 +409,4 @@ def _require_deployment(description: Description, deployment: str) -> None:
 
 
 def _stale_key(name: str) -> str:
-    return "stale " + name
+    return 'stale ' + name

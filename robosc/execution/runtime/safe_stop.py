@@ -16,8 +16,8 @@ def describe_error(error: BaseException) -> str:
     try:
         text = str(error)
     except Exception:
-        text = ""
-    return "{}: {}".format(type(error).__name__, text) if text else type(error).__name__
+        text = ''
+    return '{}: {}'.format(type(error).__name__, text) if text else type(error).__name__
 
 
 def request_cancel(middleware: RobotSide, goal: Goal) -> None:
@@ -42,7 +42,7 @@ class SafeStop:
         unsent: Release identifiers whose default message could not be sent so far.
     """
 
-    __slots__ = ("_goals", "_middleware", "_releases", "awaited_until_s", "reasons", "unsent")
+    __slots__ = ('_goals', '_middleware', '_releases', 'awaited_until_s', 'reasons', 'unsent')
 
     def __init__(self, middleware: RobotSide, releases: Releases, goals: Goals) -> None:
         self._middleware = middleware
@@ -71,14 +71,20 @@ class SafeStop:
                 self._middleware.publish_default(identifier)
             except Exception as error:
                 owed.append(identifier)
-                failures.append("the default message on {} failed: {}".format(identifier, describe_error(error)))
+                failures.append(
+                    'the default message on {} failed: {}'.format(
+                        identifier, describe_error(error)
+                    )
+                )
         self.unsent = tuple(owed)
         for goal in self._goals.all():
             if goal.is_cancel_wanted:
                 try:
                     request_cancel(self._middleware, goal)
                 except Exception as error:
-                    failures.append("cancel of {} failed: {}".format(goal.action, describe_error(error)))
+                    failures.append(
+                        'cancel of {} failed: {}'.format(goal.action, describe_error(error))
+                    )
         return failures
 
     def is_awaiting(self, now_s: float) -> bool:

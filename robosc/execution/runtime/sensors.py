@@ -13,11 +13,12 @@ class _Sensor:
     Attributes:
         identifier: Identifier on which it comes.
         max_age_s: Seconds after which it is stale.
-        seen_s: Time when it came last, in seconds; before the first time, when the executor started.
+        seen_s: Time when it came last, in seconds; before the first time, when the executor
+            started.
         was_seen: True if it came since the start.
     """
 
-    __slots__ = ("identifier", "max_age_s", "name", "seen_s", "was_seen")
+    __slots__ = ('identifier', 'max_age_s', 'name', 'seen_s', 'was_seen')
 
     def __init__(self, name: str, identifier: str, max_age_s: float) -> None:
         self.name = name
@@ -31,17 +32,24 @@ class Sensors:
     """Tells which sensors are stale. Several messages of the model may come on one identifier.
 
     Args:
-        messages: Name and identifier of every outgoing message, in source order, and its maximum age in seconds as
-            the model has it, or None.
+        messages: Name and identifier of every outgoing message, in source order, and its maximum
+            age in seconds as the model has it, or None.
         max_age_s: Maximum age by identifier, as the deployment has it: it stands above the model.
     """
 
-    __slots__ = ("_sensors",)
+    __slots__ = ('_sensors',)
 
-    def __init__(self, messages: Sequence[Tuple[str, str, Optional[float]]], max_age_s: Mapping[str, float]) -> None:
-        ages = [(name, identifier, max_age_s.get(identifier, age)) for name, identifier, age in messages]
+    def __init__(
+        self, messages: Sequence[Tuple[str, str, Optional[float]]], max_age_s: Mapping[str, float]
+    ) -> None:
+        ages = [
+            (name, identifier, max_age_s.get(identifier, age))
+            for name, identifier, age in messages
+        ]
         self._sensors: Dict[str, _Sensor] = {
-            name: _Sensor(name, identifier, age) for name, identifier, age in ages if age is not None
+            name: _Sensor(name, identifier, age)
+            for name, identifier, age in ages
+            if age is not None
         }
 
     def __bool__(self) -> bool:
@@ -68,7 +76,9 @@ class Sensors:
 
     def unseen(self) -> Tuple[str, ...]:
         """Identifiers of the sensors that have not come since the start, each once."""
-        return tuple(dict.fromkeys(item.identifier for item in self._sensors.values() if not item.was_seen))
+        return tuple(
+            dict.fromkeys(item.identifier for item in self._sensors.values() if not item.was_seen)
+        )
 
     def stale(self, now_s: float) -> List[Tuple[str, str]]:
         """Name and identifier of the messages whose maximum age has passed."""

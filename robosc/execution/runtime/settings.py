@@ -8,13 +8,13 @@ from typing import Any, Dict, Iterable, Mapping, NamedTuple, Optional, Tuple
 
 from robosc.execution.runtime.protocol import Description
 
-POLICIES = ("fair", "priority", "random")
-EVERY = ("period", "event")
-ON_UNKNOWN = ("default", "keep", "fault")
+POLICIES = ('fair', 'priority', 'random')
+EVERY = ('period', 'event')
+ON_UNKNOWN = ('default', 'keep', 'fault')
 
 MINIMUM_PERIOD_S = 0.0001
-_REQUEST_KINDS = ("incoming message", "service", "action")
-_ACTING_TYPES = ("Twist", "TwistStamped")
+_REQUEST_KINDS = ('incoming message', 'service', 'action')
+_ACTING_TYPES = ('Twist', 'TwistStamped')
 
 
 class SettingsError(ValueError):
@@ -30,32 +30,35 @@ class Settings(NamedTuple):
         priority: Names of communications, most urgent first, for the policy `priority`.
         seed: Seed of the policy `random`.
         every: Times of decisions: each `period`, or after each batch as well (`event`).
-        release_identifiers: Identifiers whose last message keeps acting; None: every incoming message
-            that is linked to geometry_msgs Twist or TwistStamped.
-        max_age_s: Seconds without a message after which an outgoing message is stale, by its identifier.
-        service_timeout_s: Seconds until a service call without a reply counts as failed; None: never.
+        release_identifiers: Identifiers whose last message keeps acting; None: every incoming
+            message that is linked to geometry_msgs Twist or TwistStamped.
+        max_age_s: Seconds without a message after which an outgoing message is stale, by its
+            identifier.
+        service_timeout_s: Seconds until a service call without a reply counts as failed; None:
+            never.
         action_timeout_s: Seconds until a goal without a result counts as failed; None: never.
-        on_unknown: Reaction when an enum falls to its default past an unknown rule: `default`, `keep`, `fault`.
-        command_timeout_s: Seconds without a message from the existing controller on a release identifier after
-            which its last one is released, in a supervision layer; 0: never.
+        on_unknown: Reaction when an enum falls to its default past an unknown rule: `default`,
+            `keep`, `fault`.
+        command_timeout_s: Seconds without a message from the existing controller on a release
+            identifier after which its last one is released, in a supervision layer; 0: never.
     """
 
     period_s: float = 0.1
-    policy: str = "fair"
+    policy: str = 'fair'
     priority: Tuple[str, ...] = ()
     seed: int = 0
-    every: str = "period"
+    every: str = 'period'
     release_identifiers: Optional[Tuple[str, ...]] = None
     max_age_s: Mapping[str, float] = {}
     service_timeout_s: Optional[float] = 10.0
     action_timeout_s: Optional[float] = None
-    on_unknown: str = "default"
+    on_unknown: str = 'default'
     command_timeout_s: float = 1.0
 
 
 OTHER_DEPLOYMENT = {
-    "controller": ("command_timeout_s",),
-    "layer": ("policy", "priority", "seed", "every"),
+    'controller': ('command_timeout_s',),
+    'layer': ('policy', 'priority', 'seed', 'every'),
 }
 """For each deployment the settings that mean something in the other one only: a layer decides nothing."""
 
@@ -68,7 +71,9 @@ def settings_from(given: Mapping[str, Any]) -> Settings:
     """
     for name in given:
         if name not in Settings._fields:
-            raise SettingsError("there is no setting '{}'; {}".format(name, _hint(name, Settings._fields)))
+            raise SettingsError(
+                "there is no setting '{}'; {}".format(name, _hint(name, Settings._fields))
+            )
     return validated(Settings(**given))
 
 
@@ -80,17 +85,17 @@ def validated(settings: Settings) -> Settings:
     """
     release = settings.release_identifiers
     return Settings(
-        period_s=_seconds("period_s", settings.period_s, MINIMUM_PERIOD_S),
-        policy=_choice("policy", settings.policy, POLICIES),
-        priority=_names("priority", settings.priority),
-        seed=_integer("seed", settings.seed),
-        every=_choice("every", settings.every, EVERY),
-        release_identifiers=None if release is None else _names("release_identifiers", release),
+        period_s=_seconds('period_s', settings.period_s, MINIMUM_PERIOD_S),
+        policy=_choice('policy', settings.policy, POLICIES),
+        priority=_names('priority', settings.priority),
+        seed=_integer('seed', settings.seed),
+        every=_choice('every', settings.every, EVERY),
+        release_identifiers=None if release is None else _names('release_identifiers', release),
         max_age_s=_ages(settings.max_age_s),
-        service_timeout_s=_optional_seconds("service_timeout_s", settings.service_timeout_s),
-        action_timeout_s=_optional_seconds("action_timeout_s", settings.action_timeout_s),
-        on_unknown=_choice("on_unknown", settings.on_unknown, ON_UNKNOWN),
-        command_timeout_s=_seconds_or_zero("command_timeout_s", settings.command_timeout_s),
+        service_timeout_s=_optional_seconds('service_timeout_s', settings.service_timeout_s),
+        action_timeout_s=_optional_seconds('action_timeout_s', settings.action_timeout_s),
+        on_unknown=_choice('on_unknown', settings.on_unknown, ON_UNKNOWN),
+        command_timeout_s=_seconds_or_zero('command_timeout_s', settings.command_timeout_s),
     )
 
 
@@ -102,14 +107,23 @@ def settings_for(settings: Settings, description: Description) -> Settings:
     """
     checked = validated(settings)
     infos = description.communications
-    _require_known("priority", checked.priority, [i.name for i in infos if i.kind in _REQUEST_KINDS], "a request")
-    received = [info.identifier for info in infos if info.kind == "outgoing message"]
-    _require_known("max_age_s", checked.max_age_s, received, "the identifier of an outgoing message")
-    published = [info.identifier for info in infos if info.kind == "incoming message"]
+    _require_known(
+        'priority',
+        checked.priority,
+        [i.name for i in infos if i.kind in _REQUEST_KINDS],
+        'a request',
+    )
+    received = [info.identifier for info in infos if info.kind == 'outgoing message']
+    _require_known(
+        'max_age_s', checked.max_age_s, received, 'the identifier of an outgoing message'
+    )
+    published = [info.identifier for info in infos if info.kind == 'incoming message']
     release = checked.release_identifiers
     if release is None:
         return checked._replace(release_identifiers=default_release_identifiers(description))
-    _require_known("release_identifiers", release, published, "the identifier of an incoming message")
+    _require_known(
+        'release_identifiers', release, published, 'the identifier of an incoming message'
+    )
     return checked
 
 
@@ -126,7 +140,9 @@ def require_settings_of(settings: Settings, deployment: str) -> None:
     defaults = Settings()._asdict()
     for name in OTHER_DEPLOYMENT[deployment]:
         if getattr(settings, name) != defaults[name]:
-            raise SettingsError("setting '{}' means nothing in the deployment '{}'".format(name, deployment))
+            raise SettingsError(
+                "setting '{}' means nothing in the deployment '{}'".format(name, deployment)
+            )
 
 
 def default_release_identifiers(description: Description) -> Tuple[str, ...]:
@@ -134,7 +150,9 @@ def default_release_identifiers(description: Description) -> Tuple[str, ...]:
     found = (
         info.identifier
         for info in description.communications
-        if info.kind == "incoming message" and info.package == "geometry_msgs" and info.interface in _ACTING_TYPES
+        if info.kind == 'incoming message'
+        and info.package == 'geometry_msgs'
+        and info.interface in _ACTING_TYPES
     )
     return tuple(dict.fromkeys(found))
 
@@ -148,20 +166,24 @@ def _hint(name: Any, known: Iterable[str]) -> str:
     close = difflib.get_close_matches(str(name), there, 1)
     if close:
         return "did you mean '{}'?".format(close[0])
-    return "there is " + ", ".join(there) if there else "there is none"
+    return 'there is ' + ', '.join(there) if there else 'there is none'
 
 
 def _require_known(setting: str, names: Iterable[str], known: Iterable[str], what: str) -> None:
     there = list(known)
     for name in names:
         if name not in there:
-            raise SettingsError("setting '{}': '{}' is not {}; {}".format(setting, name, what, _hint(name, there)))
+            raise SettingsError(
+                "setting '{}': '{}' is not {}; {}".format(setting, name, what, _hint(name, there))
+            )
 
 
 def _seconds(name: str, value: Any, least: float = 0.0) -> float:
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not is_number or not 0 < value < math.inf or value < least:
-        expected = "a number of seconds above 0" if least == 0.0 else "{:g} seconds or more".format(least)
+        expected = (
+            'a number of seconds above 0' if least == 0.0 else '{:g} seconds or more'.format(least)
+        )
         raise _wrong(name, value, expected)
     return float(value)
 
@@ -173,28 +195,31 @@ def _optional_seconds(name: str, value: Any) -> Optional[float]:
 def _seconds_or_zero(name: str, value: Any) -> float:
     if isinstance(value, (int, float)) and not isinstance(value, bool) and 0 <= value < math.inf:
         return float(value)
-    raise _wrong(name, value, "a number of seconds, or 0 for never")
+    raise _wrong(name, value, 'a number of seconds, or 0 for never')
 
 
 def _integer(name: str, value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
-        raise _wrong(name, value, "an integer")
+        raise _wrong(name, value, 'an integer')
     return value
 
 
 def _choice(name: str, value: Any, choices: Tuple[str, ...]) -> str:
     if value not in choices:
-        raise _wrong(name, value, "one of " + ", ".join(choices))
+        raise _wrong(name, value, 'one of ' + ', '.join(choices))
     return str(value)
 
 
 def _names(name: str, value: Any) -> Tuple[str, ...]:
     if not isinstance(value, (list, tuple)) or not all(isinstance(item, str) for item in value):
-        raise _wrong(name, value, "a list of names")
+        raise _wrong(name, value, 'a list of names')
     return tuple(dict.fromkeys(value))
 
 
 def _ages(value: Any) -> Dict[str, float]:
     if not isinstance(value, Mapping):
-        raise _wrong("max_age_s", value, "seconds by identifier")
-    return {identifier: _seconds("max_age_s of {}".format(identifier), age) for identifier, age in value.items()}
+        raise _wrong('max_age_s', value, 'seconds by identifier')
+    return {
+        identifier: _seconds('max_age_s of {}'.format(identifier), age)
+        for identifier, age in value.items()
+    }

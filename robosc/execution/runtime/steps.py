@@ -1,8 +1,9 @@
 """Events of the environment, and the silent steps that follow them (semantics 3.1 and 3.3).
 
-A state is *stable* when no silent step is enabled in it. What must be judged there, releases and the
-requirements of running goals, is judged once for each stable state that is new. One that was left and reached again
-within a batch counts as new: judging a state a second time finds what the first time found.
+A state is *stable* when no silent step is enabled in it. What must be judged there, releases and
+the requirements of running goals, is judged once for each stable state that is new. One that was
+left and reached again within a batch counts as new: judging a state a second time finds what the
+first time found.
 """
 
 from __future__ import annotations
@@ -33,22 +34,24 @@ class Steps:
         on_unknown: Meaning of an unknown enum: `default`, `keep` or `fault`.
 
     Attributes:
-        enabled: Requests that the stable state enables, by number, once somebody worked it out, else None.
-        unchanging: Messages whose request was issued in this stable state and changed nothing: their data, and
-            whether that is the default. A request's data and its step depend on nothing but the state.
+        enabled: Requests that the stable state enables, by number, once somebody worked it out,
+            else None.
+        unchanging: Messages whose request was issued in this stable state and changed nothing:
+            their data, and whether that is the default. A request's data and its step depend on
+            nothing but the state.
     """
 
     __slots__ = (
-        "_goals",
-        "_middleware",
-        "_on_unknown",
-        "_pending",
-        "_recorder",
-        "_releases",
-        "_stable",
-        "_system",
-        "enabled",
-        "unchanging",
+        '_goals',
+        '_middleware',
+        '_on_unknown',
+        '_pending',
+        '_recorder',
+        '_releases',
+        '_stable',
+        '_system',
+        'enabled',
+        'unchanging',
     )
 
     def __init__(
@@ -68,7 +71,8 @@ class Steps:
         self._on_unknown = on_unknown
         self.enabled: Optional[Tuple[int, ...]] = None
         self.unchanging: Dict[str, Tuple[Any, bool]] = {}
-        # What the system's `changes` were in the last stable state, or None if the state may not be stable.
+        # What the system's `changes` were in the last stable state, or None if the state may not
+        # be stable.
         self._stable: Optional[int] = None
         # A fault that waits for the end of its batch, because on_unknown is `fault`.
         self._pending: Optional[str] = None
@@ -90,7 +94,8 @@ class Steps:
             may_keep: True if the setting `keep` applies: it does to messages.
 
         Returns:
-            True if anything counts as having come; False if the data is unknown and `keep` applies.
+            True if anything counts as having come; False if the data is unknown and `keep`
+            applies.
         """
         reading = self._system.read(event, data)
         if reading.unknown:
@@ -98,7 +103,7 @@ class Steps:
             unknown = tuple(dict.fromkeys(reading.unknown))
             self._recorder.unknown(event, unknown)
             if reading.enum_unknown:
-                if may_keep and self._on_unknown == "keep":
+                if may_keep and self._on_unknown == 'keep':
                     return False
                 self._handle_unknown(event, unknown)
         self.happen(event, reading, reading.data)
@@ -127,7 +132,7 @@ class Steps:
         """
         skipped = self._system.step(event, reading)
         if skipped is None:
-            self._recorder.unexpected({"event": event, "data": data})
+            self._recorder.unexpected({'event': event, 'data': data})
             return
         if self._recorder.is_active:
             self._recorder.event(event, False, data)
@@ -142,7 +147,7 @@ class Steps:
         """
         skipped = self._system.step(event)
         if skipped is None:
-            raise ExecutionError("{} is enabled, but the state does not accept it".format(event))
+            raise ExecutionError('{} is enabled, but the state does not accept it'.format(event))
         if self._recorder.is_active:
             self._recorder.event(event, True, data)
         if skipped:
@@ -152,7 +157,8 @@ class Steps:
         """Silent steps to the end; then releases and running goals are judged, if the stable state is another one.
 
         Args:
-            issuing: Communication whose request was just taken and whose message is about to go out, if any.
+            issuing: Communication whose request was just taken and whose message is about to go
+                out, if any.
 
         Returns:
             Whether the stable state may be another one.
@@ -198,7 +204,7 @@ class Steps:
         if self._goals:
             goal = self._goals.to_cancel()
             if goal is not None:
-                event = goal.action + ".cancel"
+                event = goal.action + '.cancel'
                 self.take(event, None)
                 goal.is_running = False
                 request_cancel(self._middleware, goal)
@@ -214,5 +220,5 @@ class Steps:
         self._handle_unknown(event, skipped)
 
     def _handle_unknown(self, event: str, what: Tuple[str, ...]) -> None:
-        if self._on_unknown == "fault":
-            self._pending = "unknown at {}: {}".format(event, ", ".join(what))
+        if self._on_unknown == 'fault':
+            self._pending = 'unknown at {}: {}'.format(event, ', '.join(what))

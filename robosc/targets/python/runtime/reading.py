@@ -10,7 +10,7 @@ from typing import Any
 
 from robosc.expressions.values import array_part, read_double, read_integer, read_whole
 
-NAN = float("nan")
+NAN = float('nan')
 
 
 def array(value: Any) -> Any:
@@ -33,7 +33,7 @@ def elements(value: Any, path: str, notes: Any, convert: Any) -> Any:
     found = array(value)
     if found is None:
         return None
-    return [convert(item, f"{path}[{index}]", notes) for index, item in enumerate(found)]
+    return [convert(item, f'{path}[{index}]', notes) for index, item in enumerate(found)]
 
 
 def plain_elements(value: Any, convert: Any) -> Any:
@@ -107,7 +107,7 @@ def clamped(value: Any, low: int, high: int) -> Any:
 def moved(path: str, value: Any, low: int, high: int) -> Any:
     """In words, that a received integer was moved into its declared range; no words if it was not."""
     if value < low or value > high:
-        return (f"{path} is {value}, outside {low}..{high}",)
+        return (f'{path} is {value}, outside {low}..{high}',)
     return ()
 
 

@@ -5,12 +5,12 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 import ctypes
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 # The robot is brought to rest in less than this.
@@ -27,7 +27,10 @@ _SET_PARENT_DEATH_SIGNAL = 1
 
 
 def run_both(
-    name: str, layer_command: Sequence[str], controller_command: Sequence[str], environment: Mapping[str, str]
+    name: str,
+    layer_command: Sequence[str],
+    controller_command: Sequence[str],
+    environment: Mapping[str, str],
 ) -> int:
     """Run both until one of them ends or a signal comes: 1 if the controller failed, else the layer's status.
 
@@ -51,7 +54,7 @@ def run_both(
             time.sleep(POLL_S)
         status = 0 if received else _failure_of(name, controller)
     except OSError as error:
-        sys.stderr.write(f"{name}: cannot start the controller: {error}\n")
+        sys.stderr.write(f'{name}: cannot start the controller: {error}\n')
         status = EXIT_USAGE
     # The layer first: what the controller still sends goes nowhere, and the robot is at rest.
     layer_status = _stopped(layer, LAYER_END_S)
@@ -76,7 +79,7 @@ def _failure_of(name: str, controller: subprocess.Popen[bytes]) -> int:
     status = controller.poll()
     if not status:
         return 0
-    sys.stderr.write(f"{name}: the controller ended with status {status}\n")
+    sys.stderr.write(f'{name}: the controller ended with status {status}\n')
     return EXIT_CONTROLLER
 
 

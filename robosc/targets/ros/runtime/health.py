@@ -62,28 +62,31 @@ class HealthMonitor:
         """Return the health of the executor."""
         executor = self._executor
         counters, status = executor.counters, executor.status
-        values = {"status": status.value, "reason": "; ".join(executor.reasons)}
+        values = {'status': status.value, 'reason': '; '.join(executor.reasons)}
         values.update((name, str(number)) for name, number in counters._asdict().items())
-        values["last decision (us)"] = "" if self._decision_us is None else f"{self._decision_us:.1f}"
+        values['last decision (us)'] = (
+            '' if self._decision_us is None else f'{self._decision_us:.1f}'
+        )
         level, message = self._judge(status, counters)
         return Health(level, message, values)
 
     def _judge(self, status: Status, counters: Counters) -> tuple[Level, str]:
         reasons = self._executor.reasons
         if reasons:
-            return Level.ERROR, "stopped: " + "; ".join(reasons)
+            return Level.ERROR, 'stopped: ' + '; '.join(reasons)
         if status is Status.NEW:
-            names = ", ".join(self.missing_servers)
-            return Level.WARN, f"waiting for servers: {names}" if names else "not started"
+            names = ', '.join(self.missing_servers)
+            return Level.WARN, f'waiting for servers: {names}' if names else 'not started'
         if status is Status.WAITING:
-            return Level.WARN, "waiting for the first message of every sensor with a maximum age"
+            return Level.WARN, 'waiting for the first message of every sensor with a maximum age'
         new = [
-            f"{after - before} {name}"
+            f'{after - before} {name}'
             for name, before, after in (
-                (name, getattr(self._before, name), getattr(counters, name)) for name in counters._fields
+                (name, getattr(self._before, name), getattr(counters, name))
+                for name in counters._fields
             )
             if after > before
         ]
         if new:
-            return Level.WARN, "since the last report: " + ", ".join(new)
-        return Level.OK, "running"
+            return Level.WARN, 'since the last report: ' + ', '.join(new)
+        return Level.OK, 'running'

@@ -1,22 +1,23 @@
 """Scans of any LiDAR as 360 ranges, one for each degree, so that `ranges[270]` is what stands at 270 degrees.
 
-Degrees count counter-clockwise from straight ahead, as ROS counts angles (REP 103). A bin is centred on its degree.
+Degrees count counter-clockwise from straight ahead, as ROS counts angles (REP 103). A bin is
+centred on its degree.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
 
 from __future__ import annotations
 
-import copy
-import math
 from array import array
 from collections.abc import Iterable
+import copy
+import math
 from typing import Any
 
 BIN_COUNT = 360
 _BINS_PER_RADIAN = BIN_COUNT / (2.0 * math.pi)
-_NAN = float("nan")
-_INFINITY = float("inf")
+_NAN = float('nan')
+_INFINITY = float('inf')
 
 
 def bin_numbers(angle_min: float, angle_increment: float, count: int) -> list[int]:
@@ -37,7 +38,9 @@ class Resampler:
         self._seen: Any = None
         self._copy: Any = None
 
-    def ranges(self, angle_min: float, angle_increment: float, ranges: Any, low: float, high: float) -> array[float]:
+    def ranges(
+        self, angle_min: float, angle_increment: float, ranges: Any, low: float, high: float
+    ) -> array[float]:
         """The smallest valid range of each bin; NaN where there is none.
 
         Args:
@@ -52,16 +55,18 @@ class Resampler:
             self._angles, self._bins = angles, bin_numbers(*angles)
         smallest = [_INFINITY] * BIN_COUNT
         # A NaN fails every comparison.
-        for number, distance in zip(self._bins, ranges):  # noqa: B905 - Python 3.8 knows no strict
+        for number, distance in zip(self._bins, ranges):
             if low <= distance <= high and distance < smallest[number]:
                 smallest[number] = distance
-        return array("f", [_NAN if distance == _INFINITY else distance for distance in smallest])
+        return array('f', [_NAN if distance == _INFINITY else distance for distance in smallest])
 
     def resample(self, scan: Any) -> Any:
         """The same sensor_msgs/LaserScan, changed to one with 360 ranges from 0 to 359 degrees."""
-        scan.ranges = self.ranges(scan.angle_min, scan.angle_increment, scan.ranges, scan.range_min, scan.range_max)
+        scan.ranges = self.ranges(
+            scan.angle_min, scan.angle_increment, scan.ranges, scan.range_min, scan.range_max
+        )
         # What belonged to single beams means nothing any more.
-        scan.intensities = array("f")
+        scan.intensities = array('f')
         scan.time_increment = 0.0
         scan.angle_min = 0.0
         scan.angle_increment = 1.0 / _BINS_PER_RADIAN
@@ -86,18 +91,24 @@ def resampling(system: Any, topics: Iterable[Any]) -> Any:
     resamplers = {
         topic.identifier: (Resampler(), topic.received)
         for topic in topics
-        if topic.received and (topic.package, topic.type) == ("sensor_msgs", "LaserScan")
+        if topic.received and (topic.package, topic.type) == ('sensor_msgs', 'LaserScan')
     }
-    by_event = {f"{name}.response": resampler for resampler, names in resamplers.values() for name in names}
+    by_event = {
+        f'{name}.response': resampler for resampler, names in resamplers.values() for name in names
+    }
     read, receive = system.read, system.receive
 
     def read_resampled(event: str, data: Any) -> Any:
         resampler = by_event.get(event)
-        return read(event, data if resampler is None or data is None else resampler.resampled(data))
+        return read(
+            event, data if resampler is None or data is None else resampler.resampled(data)
+        )
 
     def receive_resampled(identifier: str, data: Any) -> Any:
         resampler, _ = resamplers.get(identifier, (None, ()))
-        return receive(identifier, data if resampler is None or data is None else resampler.resampled(data))
+        return receive(
+            identifier, data if resampler is None or data is None else resampler.resampled(data)
+        )
 
     system.read, system.receive = read_resampled, receive_resampled
     return system

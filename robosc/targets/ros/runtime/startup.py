@@ -1,7 +1,7 @@
 """Messages that come before the executor starts: held, not lost, and taken in before the first decision.
 
-A node waits for its servers before its executor starts, and an executor ignores what comes before that. A stop button
-that is pressed meanwhile must not be forgotten.
+A node waits for its servers before its executor starts, and an executor ignores what comes before
+that. A stop button that is pressed meanwhile must not be forgotten.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -35,7 +35,10 @@ class HeldMessages:
 
     def take(self) -> list[tuple[str, Any, float]]:
         """Identifier, message and time of each that is kept, in the order in which they came."""
-        held = sorted((entry for entries in self._held.values() for entry in entries), key=lambda entry: entry[0])
+        held = sorted(
+            (entry for entries in self._held.values() for entry in entries),
+            key=lambda entry: entry[0],
+        )
         for entries in self._held.values():
             entries.clear()
         return [entry[1:] for entry in held]

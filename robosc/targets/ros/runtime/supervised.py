@@ -1,7 +1,7 @@
 """Names of a supervision layer: `/x` on the robot's side is `/supervised/x` on the existing controller's.
 
-A relative name stays relative, `x` and `supervised/x`, and is found in the namespace of the node, unless there is a
-prefix.
+A relative name stays relative, `x` and `supervised/x`, and is found in the namespace of the node,
+unless there is a prefix.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-BLOCKED = "blocked"
+BLOCKED = 'blocked'
 """Topic on which the identifiers of requests that are held back are published."""
 
-SUPERVISED = "supervised"
+SUPERVISED = 'supervised'
 
 
 def robots_name(prefix: str, identifier: str) -> str:
@@ -23,16 +23,18 @@ def robots_name(prefix: str, identifier: str) -> str:
         prefix: Text that stands before every name; empty, or beginning with a slash.
         identifier: A name of the model, `/x` or `x`.
     """
-    return prefix + "/" + identifier.lstrip("/") if prefix else identifier
+    return prefix + '/' + identifier.lstrip('/') if prefix else identifier
 
 
 def callers_name(prefix: str, identifier: str) -> str:
     """A name on the existing controller's side."""
-    root = "/" if identifier.startswith("/") else ""
-    return robots_name(prefix, f"{root}{SUPERVISED}/{identifier.lstrip('/')}")
+    root = '/' if identifier.startswith('/') else ''
+    return robots_name(prefix, f'{root}{SUPERVISED}/{identifier.lstrip("/")}')
 
 
 def old_and_new(identifiers: Iterable[str]) -> tuple[tuple[str, str], ...]:
     """Old and new name, without a prefix, of what the existing controller has to call otherwise."""
     # A service may be called like a topic: one rule is for both.
-    return tuple(dict.fromkeys((robots_name("", item), callers_name("", item)) for item in identifiers))
+    return tuple(
+        dict.fromkeys((robots_name('', item), callers_name('', item)) for item in identifiers)
+    )

@@ -1,8 +1,9 @@
 """Goals through actionlib's `ActionClient`: nothing waits, and every end is told to the executor.
 
-actionlib calls back in the threads of rospy; what it says goes through the inbox to the executor's thread, where
-everything here runs. A server of actionlib says in its status messages what became of each goal; there is no
-answer to a cancel. One that is ignored is noticed by status messages that go on without it.
+actionlib calls back in the threads of rospy; what it says goes through the inbox to the executor's
+thread, where everything here runs. A server of actionlib says in its status messages what became
+of each goal; there is no answer to a cancel. One that is ignored is noticed by status messages
+that go on without it.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -29,11 +30,11 @@ ABORTED = 4
 REJECTED = 5
 RECALLED = 8
 _OUTCOMES = {
-    PREEMPTED: "cancelled",
-    SUCCEEDED: "succeeded",
-    ABORTED: "aborted",
-    REJECTED: "rejected",
-    RECALLED: "cancelled",
+    PREEMPTED: 'cancelled',
+    SUCCEEDED: 'succeeded',
+    ABORTED: 'aborted',
+    REJECTED: 'rejected',
+    RECALLED: 'cancelled',
 }
 
 # actionlib.CommState: how far client and server understand each other about a goal.
@@ -51,7 +52,7 @@ Put = Callable[[Action, Optional[str]], None]
 
 def feedback_kind(name: str) -> str:
     """As what the feedback of an action, by its name on ROS, waits in the inbox."""
-    return f"feedback of {name}"
+    return f'feedback of {name}'
 
 
 class _Goal:
@@ -62,10 +63,11 @@ class _Goal:
         state: State of its progress, as heard last.
         since_s: Time since which it has that state, in seconds.
         is_accepted: True if its server has received it without refusing it.
-        cancelled_s: Time at which its cancel was asked for, in seconds, until it is heard of; or None.
+        cancelled_s: Time at which its cancel was asked for, in seconds, until it is heard of; or
+            None.
     """
 
-    __slots__ = ("cancelled_s", "handle", "is_accepted", "since_s", "state")
+    __slots__ = ('cancelled_s', 'handle', 'is_accepted', 'since_s', 'state')
 
     def __init__(self, now_s: float) -> None:
         self.handle: Any = None
@@ -83,7 +85,7 @@ class _Abandoned:
         is_asked: True if its cancel was asked for since its server was seen.
     """
 
-    __slots__ = ("handle", "is_asked")
+    __slots__ = ('handle', 'is_asked')
 
     def __init__(self, handle: Any) -> None:
         self.handle = handle
@@ -126,11 +128,13 @@ class ActionGoals:
     def send(self, goal_id: int, message: Any) -> None:
         """Send a goal without waiting."""
         if not self.is_ready():
-            self._end(goal_id, "lost")
+            self._end(goal_id, 'lost')
             return
         goal = self._goals[goal_id] = _Goal(self._monotonic())
         try:
-            goal.handle = self._client.send_goal(message, self._transition(goal_id), self._feedback(goal_id))
+            goal.handle = self._client.send_goal(
+                message, self._transition(goal_id), self._feedback(goal_id)
+            )
         except Exception:
             del self._goals[goal_id]
             raise
@@ -140,7 +144,8 @@ class ActionGoals:
         goal = self._goals.get(goal_id)
         # Its end may be known here and wait to be told.
         if goal is not None:
-            # Where its end is known and only the result awaited, no notice of the cancel will be taken.
+            # Where its end is known and only the result awaited, no notice of the cancel will be
+            # taken.
             goal.cancelled_s = None if goal.state in _CANCEL_HEARD else self._monotonic()
             goal.handle.cancel()
 
@@ -177,7 +182,7 @@ class ActionGoals:
     def _abandon(self, goal_id: int) -> None:
         """Tell that a goal is lost; it may be running, or on its way, and it is not forgotten."""
         self._abandoned[goal_id] = _Abandoned(self._goals[goal_id].handle)
-        self._end(goal_id, "lost")
+        self._end(goal_id, 'lost')
 
     def _look_for_server(self) -> None:
         """Cancel lost goals as soon as their server is seen: nobody else would ever stop them."""
@@ -200,7 +205,9 @@ class ActionGoals:
         return tell
 
     def _feedback(self, goal_id: int) -> Callable[[Any, Any], None]:
-        return lambda handle, data: self._put(lambda: self._told(goal_id, data), feedback_kind(self.name))
+        return lambda handle, data: self._put(
+            lambda: self._told(goal_id, data), feedback_kind(self.name)
+        )
 
     # The same in the executor's thread.
 
@@ -220,9 +227,13 @@ class ActionGoals:
             goal.cancelled_s = None
         if state == DONE:
             # Any other status means that the server does not know the goal: it was started anew.
-            outcome = _OUTCOMES.get(status, "lost")
-            self._end(goal_id, outcome, None if outcome == "lost" else result)
-        elif not goal.is_accepted and state != WAITING_FOR_CANCEL_ACK and status not in (REJECTED, RECALLED):
+            outcome = _OUTCOMES.get(status, 'lost')
+            self._end(goal_id, outcome, None if outcome == 'lost' else result)
+        elif (
+            not goal.is_accepted
+            and state != WAITING_FOR_CANCEL_ACK
+            and status not in (REJECTED, RECALLED)
+        ):
             goal.is_accepted = True
             self._reports.add(lambda executor: executor.on_goal_accepted(goal_id))
 

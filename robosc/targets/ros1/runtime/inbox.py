@@ -1,16 +1,16 @@
 """Inbox for what the threads of rospy hand to the one thread of the executor: in order of arrival, and bounded.
 
-rospy calls back in a thread of its own for each connection. Nothing of the executor runs there: a callback puts what
-is to be done here, and the node's loop takes and does it.
+rospy calls back in a thread of its own for each connection. Nothing of the executor runs there: a
+callback puts what is to be done here, and the node's loop takes and does it.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
 
 from __future__ import annotations
 
-import threading
 from collections import deque
 from collections.abc import Mapping
+import threading
 from typing import Callable
 
 Action = Callable[[], None]
@@ -20,8 +20,8 @@ class Inbox:
     """Things to be done by another thread.
 
     Args:
-        depths: Maximum number that may wait of each kind, such as the messages on a topic; of more the oldest are
-            lost. What is of no kind is never lost.
+        depths: Maximum number that may wait of each kind, such as the messages on a topic; of more
+            the oldest are lost. What is of no kind is never lost.
     """
 
     def __init__(self, depths: Mapping[str, int]) -> None:
@@ -53,7 +53,8 @@ class Inbox:
             if timeout_s > 0.0 and not any(self._waiting.values()):
                 self._arrived.wait(timeout_s)
             found = sorted(
-                (entry for entries in self._waiting.values() for entry in entries), key=lambda entry: entry[0]
+                (entry for entries in self._waiting.values() for entry in entries),
+                key=lambda entry: entry[0],
             )
             for entries in self._waiting.values():
                 entries.clear()

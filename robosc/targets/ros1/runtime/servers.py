@@ -1,19 +1,21 @@
 """Services and actions that the existing controller asks a supervision layer for: answers and ends come later.
 
-The servers are rospy's and actionlib's, which call in threads of their own; every call and goal goes through the inbox
-to the executor's thread. A call of ROS 1 is a handler that returns its reply: it waits there, in its own thread, until
-the executor's thread has the answer. That one waits for nothing.
+The servers are rospy's and actionlib's, which call in threads of their own; every call and goal
+goes through the inbox to the executor's thread. A call of ROS 1 is a handler that returns its
+reply: it waits there, in its own thread, until the executor's thread has the answer. That one
+waits for nothing.
 
-Once the layer takes its leave, nobody takes anything out of the inbox any more: what comes then is answered at once.
+Once the layer takes its leave, nobody takes anything out of the inbox any more: what comes then is
+answered at once.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+import threading
 from typing import Any
 
 from robosc.targets.ros1.runtime.inbox import Action
@@ -22,7 +24,7 @@ from robosc.targets.ros1.runtime.inbox import Action
 class _Call:
     """A call that waits in its thread."""
 
-    __slots__ = ("is_answered", "response")
+    __slots__ = ('is_answered', 'response')
 
     def __init__(self) -> None:
         self.is_answered = threading.Event()
@@ -35,11 +37,15 @@ class CalledService:
     Args:
         make_default: Makes the default response.
         put: Hands something to the executor's thread.
-        tell: Called there with the number and the message of each call; it, or something later, has it answered.
+        tell: Called there with the number and the message of each call; it, or something later,
+            has it answered.
     """
 
     def __init__(
-        self, make_default: Callable[[], Any], put: Callable[[Action], None], tell: Callable[[int, Any], None]
+        self,
+        make_default: Callable[[], Any],
+        put: Callable[[Action], None],
+        tell: Callable[[int, Any], None],
     ) -> None:
         self._make_default = make_default
         self._put = put
@@ -112,7 +118,8 @@ class ServedAction:
     Args:
         name: The action's name on ROS, for warnings.
         put: Hands something to the executor's thread.
-        tell_goal: Called there with the number and the message of each goal; it calls `accept` or `reject`.
+        tell_goal: Called there with the number and the message of each goal; it calls `accept` or
+            `reject`.
         tell_cancel: Called there with the number of a goal whose cancel was asked for.
         warn: Called with a text.
     """
@@ -136,7 +143,8 @@ class ServedAction:
         self._count = 0
         self._is_closed = False
 
-    # In the threads of rospy, while actionlib holds the lock of its server: the executor's thread may wait for that.
+    # In the threads of rospy, while actionlib holds the lock of its server: the executor's thread
+    # may wait for that.
 
     def goal_came(self, handle: Any) -> None:
         """A goal came, with its handle as of actionlib's `ServerGoalHandle`."""
@@ -165,23 +173,23 @@ class ServedAction:
 
     def accept(self, number: int) -> None:
         """The goal is let through."""
-        self._try_to("acceptance", self._goals[number].set_accepted)
+        self._try_to('acceptance', self._goals[number].set_accepted)
 
     def reject(self, number: int) -> None:
         """The goal is held back."""
-        self._try_to("rejection", self._forgotten(number).set_rejected)
+        self._try_to('rejection', self._forgotten(number).set_rejected)
 
     def feedback(self, number: int, data: Any) -> None:
         """Tell how far a goal is."""
         handle = self._goals[number]
-        self._try_to("feedback", lambda: handle.publish_feedback(data))
+        self._try_to('feedback', lambda: handle.publish_feedback(data))
 
     def end(self, number: int, outcome: str, result: Any) -> None:
         """A goal has ended: `succeeded`, `aborted` or `cancelled`, with its result, or None for the default one."""
         handle = self._forgotten(number)
-        ends = {"succeeded": handle.set_succeeded, "cancelled": handle.set_canceled}
+        ends = {'succeeded': handle.set_succeeded, 'cancelled': handle.set_canceled}
         end = ends.get(outcome, handle.set_aborted)
-        self._try_to("end", lambda: end(result))
+        self._try_to('end', lambda: end(result))
 
     def close(self) -> None:
         """From now on reject every new goal, without anybody's being told."""
@@ -191,7 +199,7 @@ class ServedAction:
     def take_leave(self) -> None:
         """Abort every goal: nobody else would end it."""
         for number in list(self._goals):
-            self.end(number, "aborted", None)
+            self.end(number, 'aborted', None)
 
     def _forgotten(self, number: int) -> Any:
         handle = self._goals.pop(number)
@@ -203,4 +211,4 @@ class ServedAction:
         try:
             tell()
         except Exception as error:
-            self._warn(f"no {what} of a goal of {self._name}: {error}")
+            self._warn(f'no {what} of a goal of {self._name}: {error}')

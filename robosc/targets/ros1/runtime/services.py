@@ -1,15 +1,15 @@
 """Service calls in threads of their own: a call of ROS 1 waits for its reply, and the executor must not.
 
-Each call has a connection and a thread; both end with it. Of calls that never end, only so many are kept. What became
-of a call goes through the inbox to the executor's thread.
+Each call has a connection and a thread; both end with it. Of calls that never end, only so many
+are kept. What became of a call goes through the inbox to the executor's thread.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
+import threading
 from typing import Any
 
 from robosc.targets.ros.runtime.reports import Reports
@@ -27,13 +27,20 @@ class ServiceCalls:
 
     Args:
         name: The service's name on ROS.
-        connect: Function that makes a connection for one call: `connection(message)` waits for the reply and raises
-            an exception where there is none; `connection.close()`, from another thread, makes it raise.
+        connect: Function that makes a connection for one call: `connection(message)` waits for the
+            reply and raises an exception where there is none; `connection.close()`, from another
+            thread, makes it raise.
         put: Function that hands something to the executor's thread.
         reports: Reports that take the replies.
     """
 
-    def __init__(self, name: str, connect: Callable[[], Any], put: Callable[[Action], None], reports: Reports) -> None:
+    def __init__(
+        self,
+        name: str,
+        connect: Callable[[], Any],
+        put: Callable[[Action], None],
+        reports: Reports,
+    ) -> None:
         self.name = name
         self.is_found = False
         self._connect = connect
@@ -45,7 +52,7 @@ class ServiceCalls:
     def call(self, request_id: int, message: Any) -> None:
         """Call it without waiting. Nobody may change the message any more."""
         if self._threads >= MAXIMUM_THREADS:
-            self._fail(request_id, f"{self._threads} calls of {self.name} have not ended")
+            self._fail(request_id, f'{self._threads} calls of {self.name} have not ended')
             return
         if len(self._calls) >= MAXIMUM_PENDING:
             self._calls.pop(next(iter(self._calls))).close()
@@ -54,7 +61,10 @@ class ServiceCalls:
         self._threads += 1
         # A daemon: a server that never answers must not keep the process from ending.
         threading.Thread(
-            target=self._work, args=(request_id, connection, message), name=f"call of {self.name}", daemon=True
+            target=self._work,
+            args=(request_id, connection, message),
+            name=f'call of {self.name}',
+            daemon=True,
         ).start()
 
     def _work(self, request_id: int, connection: Any, message: Any) -> None:
@@ -71,7 +81,7 @@ class ServiceCalls:
         if self._calls.pop(request_id, None) is None:
             return  # It was given up.
         if reason is not None:
-            self._fail(request_id, f"the call of {self.name} failed: {reason}")
+            self._fail(request_id, f'the call of {self.name} failed: {reason}')
         else:
             self._reports.add(lambda executor: executor.on_reply(request_id, reply))
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 
 class _Timer:
-    __slots__ = ("action", "next_s", "period_s")
+    __slots__ = ('action', 'next_s', 'period_s')
 
     def __init__(self, period_s: float, action: Callable[[], None], next_s: float) -> None:
         self.period_s = period_s
@@ -34,7 +34,7 @@ class Timers:
 
     def due_in_s(self, limit_s: float) -> float:
         """Seconds until the next one is due, at most `limit_s`."""
-        next_s = min((timer.next_s for timer in self._timers), default=float("inf"))
+        next_s = min((timer.next_s for timer in self._timers), default=float('inf'))
         return max(0.0, min(limit_s, next_s - self._monotonic()))
 
     def run_due(self) -> None:

@@ -34,10 +34,10 @@ def load_service(server: Server) -> ServerType:
         SetupError: It is not installed.
     """
     try:
-        found = getattr(importlib.import_module(f"{server.package}.srv"), server.type)
+        found = getattr(importlib.import_module(f'{server.package}.srv'), server.type)
         return ServerType(found, found._request_class, found._response_class, None)
     except (ImportError, AttributeError) as error:
-        raise _missing(server, f"{server.package}/srv/{server.type}") from error
+        raise _missing(server, f'{server.package}/srv/{server.type}') from error
 
 
 def load_action(server: Server) -> ServerType:
@@ -46,17 +46,22 @@ def load_action(server: Server) -> ServerType:
     Raises:
         SetupError: It is not installed.
     """
-    name = server.type if server.type.endswith("Action") else server.type + "Action"
+    name = server.type if server.type.endswith('Action') else server.type + 'Action'
     try:
-        found = getattr(importlib.import_module(f"{server.package}.msg"), name)
+        found = getattr(importlib.import_module(f'{server.package}.msg'), name)
         whole = found()
         return ServerType(
-            found, type(whole.action_goal.goal), type(whole.action_result.result), type(whole.action_feedback.feedback)
+            found,
+            type(whole.action_goal.goal),
+            type(whole.action_result.result),
+            type(whole.action_feedback.feedback),
         )
     except (ImportError, AttributeError) as error:
-        raise _missing(server, f"{server.package}/msg/{name}") from error
+        raise _missing(server, f'{server.package}/msg/{name}') from error
 
 
 def _missing(server: Server, name: str) -> SetupError:
-    kind = "action" if server.is_action else "service"
-    return SetupError(f"the {kind} type {name} is not installed; build {server.package} and source its workspace")
+    kind = 'action' if server.is_action else 'service'
+    return SetupError(
+        f'the {kind} type {name} is not installed; build {server.package} and source its workspace'
+    )

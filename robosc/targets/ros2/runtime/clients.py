@@ -1,8 +1,9 @@
 """Service calls and goals through clients of ROS 2: nothing waits, and every end is told to the executor.
 
-The clients are handed in; what they must do is what rclpy's `Client` and `ActionClient` do. Everything runs in the
-node's one thread. What comes back is kept in `Reports` until the node's loop hands it on: the executor must not be
-called from within itself, as it would be where a server is missing at the moment of a request.
+The clients are handed in; what they must do is what rclpy's `Client` and `ActionClient` do.
+Everything runs in the node's one thread. What comes back is kept in `Reports` until the node's
+loop hands it on: the executor must not be called from within itself, as it would be where a server
+is missing at the moment of a request.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -22,10 +23,10 @@ MAXIMUM_PENDING = 16
 """Calls of one service whose reply is still listened for, so that a late one is noticed."""
 
 # action_msgs/msg/GoalStatus.
-_OUTCOMES = {4: "succeeded", 5: "cancelled", 6: "aborted"}
+_OUTCOMES = {4: 'succeeded', 5: 'cancelled', 6: 'aborted'}
 
-# action_msgs/srv/CancelGoal: why a cancel was refused. The others are REJECTED, and NONE for no goal, which rclpy's
-# own server answers instead.
+# action_msgs/srv/CancelGoal: why a cancel was refused. The others are REJECTED, and NONE for no
+# goal, which rclpy's own server answers instead.
 _UNKNOWN_GOAL = 2
 _GOAL_TERMINATED = 3
 
@@ -33,7 +34,7 @@ _GOAL_TERMINATED = 3
 class _Call:
     """A call without a reply so far: its future, and when the executor no longer waits for it."""
 
-    __slots__ = ("deadline_s", "future")
+    __slots__ = ('deadline_s', 'future')
 
     def __init__(self, future: Any, deadline_s: float) -> None:
         self.future = future
@@ -48,17 +49,23 @@ class ServiceCalls:
         name: The service's name on ROS.
         reports: Reports that take the replies.
         monotonic: The clock.
-        timeout_s: Time after which the executor itself counts a call as failed, in seconds, or None.
+        timeout_s: Time after which the executor itself counts a call as failed, in seconds, or
+            None.
     """
 
     def __init__(
-        self, client: Any, name: str, reports: Reports, monotonic: Callable[[], float], timeout_s: float | None
+        self,
+        client: Any,
+        name: str,
+        reports: Reports,
+        monotonic: Callable[[], float],
+        timeout_s: float | None,
     ) -> None:
         self.name = name
         self._client = client
         self._reports = reports
         self._monotonic = monotonic
-        self._timeout_s = float("inf") if timeout_s is None else timeout_s
+        self._timeout_s = float('inf') if timeout_s is None else timeout_s
         self._presence = Presence(client.service_is_ready)
         self._calls: dict[int, _Call] = {}
 
@@ -69,7 +76,7 @@ class ServiceCalls:
     def call(self, request_id: int, message: Any) -> None:
         """Call it without waiting."""
         if not self.is_ready():
-            self._fail(request_id, f"there is no server of {self.name}")
+            self._fail(request_id, f'there is no server of {self.name}')
             return
         future = self._client.call_async(message)
         self._calls[request_id] = _Call(future, self._monotonic() + self._timeout_s)
@@ -85,7 +92,7 @@ class ServiceCalls:
             for request_id, call in list(self._calls.items()):
                 self._forget(request_id)
                 if now_s < call.deadline_s:
-                    self._fail(request_id, f"the server of {self.name} is lost")
+                    self._fail(request_id, f'the server of {self.name} is lost')
 
     def _forget(self, request_id: int) -> None:
         self._client.remove_pending_request(self._calls.pop(request_id).future)
@@ -97,7 +104,7 @@ class ServiceCalls:
         self._calls.pop(request_id, None)
         error = future.exception()
         if error is not None:
-            self._fail(request_id, f"the call of {self.name} failed: {error}")
+            self._fail(request_id, f'the call of {self.name} failed: {error}')
             return
         reply = future.result()
         self._reports.add(lambda executor: executor.on_reply(request_id, reply))
@@ -108,11 +115,12 @@ class _Goal:
 
     Attributes:
         handle: Handle by which rclpy refers to it, once it was accepted.
-        refused_s: Time at which its cancel was refused although it may be running, in seconds, or None.
+        refused_s: Time at which its cancel was refused although it may be running, in seconds, or
+            None.
         is_unknown: True if the refusal said that the server does not know it.
     """
 
-    __slots__ = ("handle", "is_unknown", "refused_s")
+    __slots__ = ('handle', 'is_unknown', 'refused_s')
 
     def __init__(self) -> None:
         self.handle: Any = None
@@ -128,7 +136,7 @@ class _Abandoned:
         is_asked: True if its cancel was asked for since its server was seen.
     """
 
-    __slots__ = ("handle", "is_asked")
+    __slots__ = ('handle', 'is_asked')
 
     def __init__(self, handle: Any) -> None:
         self.handle = handle
@@ -145,7 +153,9 @@ class ActionGoals:
         monotonic: The clock.
     """
 
-    def __init__(self, client: Any, name: str, reports: Reports, monotonic: Callable[[], float]) -> None:
+    def __init__(
+        self, client: Any, name: str, reports: Reports, monotonic: Callable[[], float]
+    ) -> None:
         self.name = name
         self._client = client
         self._reports = reports
@@ -161,7 +171,7 @@ class ActionGoals:
     def send(self, goal_id: int, message: Any) -> None:
         """Send a goal without waiting."""
         if not self.is_ready():
-            self._end(goal_id, "lost")
+            self._end(goal_id, 'lost')
             return
         future = self._client.send_goal_async(message, feedback_callback=self._feedback(goal_id))
         self._goals[goal_id] = _Goal()
@@ -188,7 +198,7 @@ class ActionGoals:
             if goal.refused_s is not None and now_s >= goal.refused_s + REFUSAL_S:
                 goal.refused_s = None
                 if goal.is_unknown:
-                    self._end(goal_id, "lost")
+                    self._end(goal_id, 'lost')
                 else:
                     self._refuse(goal_id, is_ended=False)
 
@@ -207,7 +217,7 @@ class ActionGoals:
         handle = self._goals[goal_id].handle
         if handle is not None:
             self._abandoned[goal_id] = _Abandoned(handle)
-        self._end(goal_id, "lost")
+        self._end(goal_id, 'lost')
 
     def _look_for_server(self) -> None:
         """Cancel lost goals as soon as their server is seen: nobody else would ever stop them."""
@@ -225,7 +235,8 @@ class ActionGoals:
         future.add_done_callback(lambda done: self._abandoned_answered(goal_id, done))
 
     def _abandoned_answered(self, goal_id: int, future: Any) -> None:
-        # Whatever the server says, it has heard; a client's failure is tried again when the server is seen anew.
+        # Whatever the server says, it has heard; a client's failure is tried again when the server
+        # is seen anew.
         if future.exception() is None:
             self._abandoned.pop(goal_id, None)
 
@@ -243,14 +254,14 @@ class ActionGoals:
         goal = self._goals.get(goal_id)
         if future.exception() is not None:
             if goal is not None:
-                self._end(goal_id, "lost")
+                self._end(goal_id, 'lost')
             return
         handle = future.result()
         if not handle.accepted:
             # rclpy keeps the callback of a rejected goal for ever.
-            getattr(self._client, "_feedback_callbacks", {}).pop(bytes(handle.goal_id.uuid), None)
+            getattr(self._client, '_feedback_callbacks', {}).pop(bytes(handle.goal_id.uuid), None)
             if goal is not None:
-                self._end(goal_id, "rejected")
+                self._end(goal_id, 'rejected')
             return
         if goal is None:
             # Its server counted as lost: nobody would ever stop this one.
@@ -272,8 +283,8 @@ class ActionGoals:
             return
         answer = future.result()
         # Any other status means that the server does not know the goal: it was started anew.
-        outcome = _OUTCOMES.get(answer.status, "lost")
-        self._end(goal_id, outcome, None if outcome == "lost" else answer.result)
+        outcome = _OUTCOMES.get(answer.status, 'lost')
+        self._end(goal_id, outcome, None if outcome == 'lost' else answer.result)
 
     def _cancel_answered(self, goal_id: int, future: Any) -> None:
         if goal_id not in self._goals or future.exception() is not None:

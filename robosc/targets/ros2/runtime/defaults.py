@@ -1,6 +1,7 @@
 """Test for all-default messages, whatever the fields of a message are: its header does not count (semantics 3.6).
 
-Messages are compared field by field: rclpy's own comparison of fixed-size arrays is not to be relied on.
+Messages are compared field by field: rclpy's own comparison of fixed-size arrays is not to be
+relied on.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -9,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-_HEADER = "std_msgs/Header"
+_HEADER = 'std_msgs/Header'
 
 
 def is_default(message: Any) -> bool:
@@ -23,8 +24,11 @@ def is_default(message: Any) -> bool:
 
 
 def _is_same(left: Any, right: Any) -> bool:
-    if hasattr(left, "get_fields_and_field_types"):
-        return all(_is_same(getattr(left, name), getattr(right, name)) for name in left.get_fields_and_field_types())
-    if isinstance(left, (str, bytes)) or not hasattr(left, "__len__"):
+    if hasattr(left, 'get_fields_and_field_types'):
+        return all(
+            _is_same(getattr(left, name), getattr(right, name))
+            for name in left.get_fields_and_field_types()
+        )
+    if isinstance(left, (str, bytes)) or not hasattr(left, '__len__'):
         return bool(left == right)
     return len(left) == len(right) and all(map(_is_same, left, right))

@@ -9,11 +9,13 @@ from typing import Any
 
 from robosc.targets.ros.runtime.parameters import AUTOSTART, ParameterError
 
-__all__ = ["AUTOSTART", "valid_autostart"]
+__all__ = ['AUTOSTART', 'valid_autostart']
 
 
 def valid_autostart(value: Any) -> bool:
     """The parameter's value; raises ParameterError."""
     if not isinstance(value, bool):
-        raise ParameterError(f"parameter '{AUTOSTART.name}' is {value!r}; it must be true or false")
+        raise ParameterError(
+            f"parameter '{AUTOSTART.name}' is {value!r}; it must be true or false"
+        )
     return value

@@ -5,8 +5,8 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
+import time
 
 from robosc.execution.runtime.clock import SystemClock
 
@@ -14,11 +14,13 @@ from robosc.execution.runtime.clock import SystemClock
 class SimulatedClock:
     """The executor's clock where the time of ROS is that of `/clock`.
 
-    No time passes before the first message on `/clock`, which would seem to be years after zero. Where time jumps back,
-    as a replayed bag does at its end, the executor's goes on from where it was.
+    No time passes before the first message on `/clock`, which would seem to be years after zero.
+    Where time jumps back, as a replayed bag does at its end, the executor's goes on from where it
+    was.
 
     Args:
-        now_ns: Function that returns the time of ROS in nanoseconds; 0 before the first message on `/clock`.
+        now_ns: Function that returns the time of ROS in nanoseconds; 0 before the first message on
+            `/clock`.
     """
 
     wall = staticmethod(time.time)

@@ -9,27 +9,33 @@ from collections.abc import Iterable
 
 from robosc.targets.ros.runtime.supervised import old_and_new, robots_name
 
-_OF_AN_ACTION = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
+_OF_AN_ACTION = ('send_goal', 'cancel_goal', 'get_result', 'feedback', 'status')
 
 
-def remapped(messages_and_services: Iterable[str], actions: Iterable[str]) -> tuple[tuple[str, str], ...]:
+def remapped(
+    messages_and_services: Iterable[str], actions: Iterable[str]
+) -> tuple[tuple[str, str], ...]:
     """Old and new name, without a prefix, of everything that the existing controller has to call otherwise.
 
-    ROS remaps the services and topics that an action is made of, and not the action, so each of them is named.
+    ROS remaps the services and topics that an action is made of, and not the action, so each of
+    them is named.
     """
-    parts = (f"{action}/_action/{part}" for action in actions for part in _OF_AN_ACTION)
+    parts = (f'{action}/_action/{part}' for action in actions for part in _OF_AN_ACTION)
     return old_and_new([*messages_and_services, *parts])
 
 
-def remapping_arguments(names: Iterable[tuple[str, str]], prefix: str, namespace: str = "/") -> list[str]:
+def remapping_arguments(
+    names: Iterable[tuple[str, str]], prefix: str, namespace: str = '/'
+) -> list[str]:
     """The arguments that make a program on ROS 2 use the new names.
 
     Args:
         names: Old and new name of each, without the prefix.
         prefix: Prefix of every name, or nothing.
-        namespace: Namespace of the layer, in which the program has to be as well: relative names are found there.
+        namespace: Namespace of the layer, in which the program has to be as well: relative names
+            are found there.
     """
-    rules = [f"{robots_name(prefix, old)}:={robots_name(prefix, new)}" for old, new in names]
-    if namespace != "/":
-        rules.append(f"__ns:={namespace}")
-    return ["--ros-args", *(argument for rule in rules for argument in ("-r", rule))]
+    rules = [f'{robots_name(prefix, old)}:={robots_name(prefix, new)}' for old, new in names]
+    if namespace != '/':
+        rules.append(f'__ns:={namespace}')
+    return ['--ros-args', *(argument for rule in rules for argument in ('-r', rule))]

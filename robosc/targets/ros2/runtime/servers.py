@@ -1,11 +1,12 @@
 """Services and actions that the existing controller asks a supervision layer for: answers and ends come later.
 
-The servers are handed in; what they must do is what rclpy's `Service`, `ActionServer` and `ServerGoalHandle` do.
-Everything runs in the node's one thread, and nothing in it waits: a coroutine that awaits an answer would be resumed
-by rclpy's executor again and again, without a pause, until the answer is there.
+The servers are handed in; what they must do is what rclpy's `Service`, `ActionServer` and
+`ServerGoalHandle` do. Everything runs in the node's one thread, and nothing in it waits: a
+coroutine that awaits an answer would be resumed by rclpy's executor again and again, without a
+pause, until the answer is there.
 
-A caller that is gone, so that it cannot be told anything, is worth a warning and no fault: the robot is not to stop
-for it.
+A caller that is gone, so that it cannot be told anything, is worth a warning and no fault: the
+robot is not to stop for it.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -19,7 +20,7 @@ from typing import Any
 class _Call:
     """A call without an answer so far: what addresses the answer, or the answer that came before that is known."""
 
-    __slots__ = ("header", "number", "response")
+    __slots__ = ('header', 'number', 'response')
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -56,7 +57,8 @@ class CalledService:
         """Send through a service, whose callback is `handle`.
 
         Args:
-            service: Has `send_response`, called with what `handle` returned and with what addresses the answer.
+            service: Has `send_response`, called with what `handle` returned and with what
+                addresses the answer.
         """
         self._send = service.send_response
         service.send_response = self._respond
@@ -95,7 +97,7 @@ class CalledService:
         try:
             self._send(response, header)
         except Exception as error:
-            self._warn(f"no answer to a call of {self._name}: {error}")
+            self._warn(f'no answer to a call of {self._name}: {error}')
 
 
 class _Goal:
@@ -106,7 +108,7 @@ class _Goal:
         end: Outcome and result, if they came before that.
     """
 
-    __slots__ = ("end", "handle")
+    __slots__ = ('end', 'handle')
 
     def __init__(self) -> None:
         self.handle: Any = None
@@ -119,7 +121,8 @@ class ServedAction:
     Args:
         name: The action's name on ROS, for warnings.
         make_default: Makes the default result.
-        tell_goal: Called with the number and the message of each goal; `accept` is called meanwhile, or not.
+        tell_goal: Called with the number and the message of each goal; `accept` is called
+            meanwhile, or not.
         tell_cancel: Called with the number of a goal whose cancel was asked for.
         warn: Called with a text.
     """
@@ -189,7 +192,7 @@ class ServedAction:
         number, self._beginning = self._beginning, None
         if number is not None:
             del self._goals[number]
-            self._warn(f"a goal of {self._name} is cancelled: its caller is gone")
+            self._warn(f'a goal of {self._name} is cancelled: its caller is gone')
             self._tell_cancel(number)
 
     # What the layer tells.
@@ -206,7 +209,7 @@ class ServedAction:
         try:
             goal.handle.publish_feedback(data)
         except Exception as error:
-            self._warn(f"no feedback of a goal of {self._name}: {error}")
+            self._warn(f'no feedback of a goal of {self._name}: {error}')
 
     def end(self, number: int, outcome: str, result: Any) -> None:
         """A goal has ended: `succeeded`, `aborted` or `cancelled`, with its result, or None for the default one."""
@@ -219,14 +222,16 @@ class ServedAction:
         del self._goals[number]
         del self._numbers[bytes(goal.handle.goal_id.uuid)]
         self._ending += 1
-        self._server.notify_execute(goal.handle, lambda handle: self._conclude(handle, outcome, result))
+        self._server.notify_execute(
+            goal.handle, lambda handle: self._conclude(handle, outcome, result)
+        )
 
     def _conclude(self, handle: Any, outcome: str, result: Any) -> Any:
         """End a goal: its result."""
         self._ending -= 1
-        if outcome == "succeeded":
+        if outcome == 'succeeded':
             handle.succeed()
-        elif outcome == "cancelled":
+        elif outcome == 'cancelled':
             handle.canceled()
         else:
             handle.abort()
@@ -235,7 +240,7 @@ class ServedAction:
     def take_leave(self) -> None:
         """Abort every goal: nobody else would end it."""
         for number in list(self._goals):
-            self.end(number, "aborted", None)
+            self.end(number, 'aborted', None)
 
     @property
     def is_ending(self) -> bool:

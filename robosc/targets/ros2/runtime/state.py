@@ -10,9 +10,9 @@ from typing import Any
 
 from robosc.targets.ros.runtime.parameters import STATE_MESSAGE, ParameterError
 
-JSON, TYPED, BOTH = "json", "typed", "both"
+JSON, TYPED, BOTH = 'json', 'typed', 'both'
 
-__all__ = ["BOTH", "JSON", "STATE_MESSAGE", "TYPED", "valid_state_message"]
+__all__ = ['BOTH', 'JSON', 'STATE_MESSAGE', 'TYPED', 'valid_state_message']
 
 
 def valid_state_message(given: Mapping[str, Any]) -> str:
@@ -26,5 +26,7 @@ def valid_state_message(given: Mapping[str, Any]) -> str:
     """
     value = given[STATE_MESSAGE.name]
     if value not in (JSON, TYPED, BOTH):
-        raise ParameterError(f"parameter '{STATE_MESSAGE.name}' is {value!r}; it must be one of json, typed, both")
+        raise ParameterError(
+            f"parameter '{STATE_MESSAGE.name}' is {value!r}; it must be one of json, typed, both"
+        )
     return str(value)

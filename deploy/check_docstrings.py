@@ -14,7 +14,7 @@ from pathlib import Path
 
 CLAUSES = "How|So|That|What|Whatever|When|Where|Whether|Which|Who|Whoever|Whom|Whose|Why"
 DOCSTRING = re.compile(rf"\s*({CLAUSES}|By|Of)\b")
-ITEM = re.compile(rf"\s+(?:\*{{0,2}}\w+(?: \([^)]*\))?|Returns?|Yields?):\s+({CLAUSES})\b")
+ITEM = re.compile(rf"\s+(?:\*{{0,2}}\w+(?: \([^)]*\))?|Returns?|Yields?|:\w+(?: [*\w]+)?):\s+({CLAUSES})\b")
 GENERATED = re.compile(r"_pb2(_grpc)?\.py$")
 
 

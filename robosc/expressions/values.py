@@ -1,8 +1,10 @@
-"""The arithmetic and logic of RoboSC on run-time values, with unknown values as None.
+"""
+The arithmetic and logic of RoboSC on run-time values, with unknown values as None.
 
-Strong Kleene logic for `and`, `or`, `not` (S. C. Kleene, Introduction to Metamathematics, 1952, sec. 64).
-Unknown are: integer results beyond 32 bits, division by zero, results that are not finite, a
-comparison with NaN, and whatever is computed from something unknown (language A.5 and B.4).
+Strong Kleene logic for `and`, `or`, `not` (S. C. Kleene, Introduction to Metamathematics, 1952,
+sec. 64). Unknown are: integer results beyond 32 bits, division by zero, results that are not
+finite, a comparison with NaN, and whatever is computed from something unknown (language A.5 and
+B.4).
 
 This module imports nothing and runs on Python 3.8 and later: generated code carries a copy of it.
 """
@@ -56,90 +58,98 @@ def unequal(a: Any, b: Any) -> Any:
 
 
 def less(a: Any, b: Any) -> Any:
-    """The value of a < b."""
+    """Return the value of a < b."""
     return None if _incomparable(a, b) else a < b
 
 
 def less_or_equal(a: Any, b: Any) -> Any:
-    """The value of a <= b."""
+    """Return the value of a <= b."""
     return None if _incomparable(a, b) else a <= b
 
 
 def greater(a: Any, b: Any) -> Any:
-    """The value of a > b."""
+    """Return the value of a > b."""
     return None if _incomparable(a, b) else a > b
 
 
 def greater_or_equal(a: Any, b: Any) -> Any:
-    """The value of a >= b."""
+    """Return the value of a >= b."""
     return None if _incomparable(a, b) else a >= b
 
 
 def _number(value: Any) -> Any:
-    """A result of arithmetic, or None where it is no 32-bit integer and no finite double."""
+    """Return a result of arithmetic; None where it is no 32-bit integer or finite double."""
     if isinstance(value, int):
         return value if -2147483648 <= value <= 2147483647 else None
     return value if -INFINITY < value < INFINITY else None
 
 
 def add(a: Any, b: Any) -> Any:
-    """The value of a + b."""
+    """Return the value of a + b."""
     return None if a is None or b is None else _number(a + b)
 
 
 def subtract(a: Any, b: Any) -> Any:
-    """The value of a - b."""
+    """Return the value of a - b."""
     return None if a is None or b is None else _number(a - b)
 
 
 def multiply(a: Any, b: Any) -> Any:
-    """The value of a * b."""
+    """Return the value of a * b."""
     return None if a is None or b is None else _number(a * b)
 
 
 def divide(a: Any, b: Any) -> Any:
-    """The value of a / b, always a double."""
+    """Return the value of a / b, always a double."""
     return None if a is None or b is None or b == 0 else _number(float(a) / float(b))
 
 
 def negate(a: Any) -> Any:
-    """The value of -a."""
+    """Return the value of -a."""
     return None if a is None else _number(-a)
 
 
 def conditional(condition: Any, then: Any, otherwise: Any) -> Any:
-    """The value of `if condition then ... else ...`: unknown if the condition is."""
+    """Return the value of `if condition then ... else ...`: unknown if the condition is."""
     if condition is None:
         return None
     return then if condition else otherwise
 
 
 def absolute(a: Any) -> Any:
-    """The value of abs(a)."""
+    """Return the value of abs(a)."""
     return None if a is None else _number(abs(a))
 
 
 def minimum(a: Any, b: Any) -> Any:
-    """The value of min(a, b); an infinity is an ordinary number."""
+    """Return the value of min(a, b); an infinity is an ordinary number."""
     if _incomparable(a, b):
         return None
     return a if a <= b else b
 
 
 def maximum(a: Any, b: Any) -> Any:
-    """The value of max(a, b); an infinity is an ordinary number."""
+    """Return the value of max(a, b); an infinity is an ordinary number."""
     if _incomparable(a, b):
         return None
     return a if a >= b else b
 
 
 def clamp(a: Any, low: Any, high: Any) -> Any:
-    """A number moved to the nearer of two bounds; where they are the wrong way round, the upper one."""
+    """
+    Return a number moved to the nearer of two bounds.
+
+    Where they are the wrong way round, the upper one.
+    """
     return minimum(maximum(a, low), high)
 
 
 def to_integer(a: Any) -> Any:
-    """The value of integer(a): towards zero, and the nearest 32-bit integer for what is beyond."""
+    """
+    Return the value of integer(a).
+
+    Towards zero, and the nearest 32-bit integer for what is beyond.
+    """
     if a is None or a != a:
         return None
     if a >= 2147483647:
@@ -148,26 +158,30 @@ def to_integer(a: Any) -> Any:
 
 
 def to_double(a: Any) -> Any:
-    """The value of double(a)."""
+    """Return the value of double(a)."""
     return None if a is None or a != a else float(a)
 
 
 def array_part(value: Any, low: Any = None, high: Any = None) -> Any:
-    """Return the elements of a received array from `low` to `high`, both included; None where it is no array.
+    """
+    Return the elements of a received array from `low` to `high`, both included.
 
-    Args:
-        value: Received value.
-        low: Index of the first element; None for the whole array.
-        high: Index of the last element; if it is less than `low`, the array's end is followed by its beginning.
+    None where it is no array.
+
+    :param value: Received value.
+    :param low: Index of the first element; None for the whole array.
+    :param high: Index of the last element; if it is less than `low`, the array's end is followed
+        by its beginning.
     """
     if isinstance(value, (str, dict)):
         return None
     try:
         if low is None:
             return list(value[:])
-        if low <= high:
-            return list(value[low : high + 1])
-        return list(value[low:]) + list(value[: high + 1])
+        end = high + 1
+        if low < end:
+            return list(value[low:end])
+        return list(value[low:]) + list(value[:end])
     except (TypeError, LookupError):
         return None
 
@@ -178,12 +192,12 @@ def array_length(elements: Any) -> Any:
 
 
 def least(elements: Any) -> Any:
-    """The least of numbers, NaN aside; unknown if one of them is, or if none is left."""
+    """Return the least of numbers, NaN aside; unknown if one of them is, or if none is left."""
     return _extreme(elements, min)
 
 
 def greatest(elements: Any) -> Any:
-    """The greatest of numbers, NaN aside; unknown if one of them is, or if none is left."""
+    """Return the greatest of numbers, NaN aside; unknown if one of them is, or if none is left."""
     return _extreme(elements, max)
 
 
@@ -195,12 +209,20 @@ def _extreme(elements: Any, choose: Any) -> Any:
 
 
 def any_of(elements: Any, condition: Any) -> Any:
-    """Kleene disjunction of a condition over elements, up to the first that is true; unknown if there are none."""
+    """
+    Kleene disjunction of a condition over elements, up to the first that is true.
+
+    Unknown if there are none.
+    """
     return _quantified(elements, condition, True)
 
 
 def all_of(elements: Any, condition: Any) -> Any:
-    """Kleene conjunction of a condition over elements, up to the first that is false; unknown if there are none."""
+    """
+    Kleene conjunction of a condition over elements, up to the first that is false.
+
+    Unknown if there are none.
+    """
     return _quantified(elements, condition, False)
 
 
@@ -218,14 +240,16 @@ def _quantified(elements: Any, condition: Any, decisive: Any) -> Any:
 
 
 def read_boolean(value: Any) -> Any:
-    """A received boolean; None where something else came."""
+    """Return a received boolean; None where something else came."""
     return value if value is True or value is False else None
 
 
 def read_whole(value: Any) -> Any:
-    """A received integer of any size; None where something else came.
+    """
+    Return a received integer of any size; None where something else came.
 
-    Numbers of array libraries (an element of a fixed-size array of a ROS message is one) count as well.
+    Numbers of array libraries (an element of a fixed-size array of a ROS message is one) count as
+    well.
     """
     if type(value) is int:
         return value
@@ -235,15 +259,19 @@ def read_whole(value: Any) -> Any:
 
 
 def read_integer(value: Any) -> Any:
-    """A received integer; None where something else came or it needs more than 32 bits."""
+    """Return a received integer; None where something else came or it needs more than 32 bits."""
     value = read_whole(value)
     return value if value is not None and -2147483648 <= value <= 2147483647 else None
 
 
 def read_double(value: Any) -> Any:
-    """A received number as a double, NaN and infinities included; None where something else came.
+    """
+    Return a received number as a double, NaN and infinities included.
 
-    A received infinity is an ordinary number in comparisons; arithmetic on it and assigning it are not.
+    None where something else came.
+
+    A received infinity is an ordinary number in comparisons; arithmetic on it and assigning it are
+    not.
     """
     if type(value) is float:
         return value
@@ -256,12 +284,12 @@ def read_double(value: Any) -> Any:
 
 
 def read_string(value: Any) -> Any:
-    """A received text; None where something else came."""
+    """Return a received text; None where something else came."""
     return value if isinstance(value, str) else None
 
 
 def read_element(values: Any, index: int) -> Any:
-    """An array's element; None outside the array."""
+    """Return an array's element; None outside the array."""
     try:
         return values[index] if 0 <= index < len(values) else None
     except (TypeError, LookupError):
@@ -269,17 +297,24 @@ def read_element(values: Any, index: int) -> Any:
 
 
 class Absent:
-    """Placeholder for a part of received data that has no place: beyond the end of an array, and below that."""
+    """
+    Placeholder for a part of received data that has no place.
+
+    Beyond the end of an array, and below that.
+    """
 
 
 ABSENT = Absent()
 
 
 def received_part(value: Any, step: Any) -> Any:
-    """A part of received data: an element (`step` is an index) or a property; `ABSENT` outside an array.
+    """
+    Return a part of received data: an element (`step` is an index) or a property.
 
-    An element that is there but does not fit is something else: an enum is made of it by its rules, while one of an
-    element that is absent is unknown.
+    `ABSENT` outside an array.
+
+    An element that is there but does not fit is something else: an enum is made of it by its
+    rules, while one of an element that is absent is unknown.
     """
     if value is ABSENT:
         return ABSENT
@@ -292,26 +327,34 @@ def received_part(value: Any, step: Any) -> Any:
 
 
 def read_property(value: Any, name: str) -> Any:
-    """A property of received data, whether a mapping or an object with attributes; None if it has none."""
+    """
+    Return a property of received data, whether a mapping or an object with attributes.
+
+    None if it has none.
+    """
     if isinstance(value, dict):
         return value.get(name)
     return getattr(value, name, None)
 
 
 def part_at(value: Any, path: Any) -> Any:
-    """A part of an array's element: property names and indices, outermost first."""
+    """Return a part of an array's element: property names and indices, outermost first."""
     for step in path:
         value = read_element(value, step) if isinstance(step, int) else read_property(value, step)
     return value
 
 
 def assignable_integer(value: Any, low: int, high: int) -> Any:
-    """Return the value that a code-only integer variable takes; None (skip the update) outside its range."""
+    """
+    Return the value that a code-only integer variable takes.
+
+    None (skip the update) outside its range.
+    """
     return value if value is not None and low <= value <= high else None
 
 
 def assignable_double(value: Any) -> Any:
-    """Return the value that a double variable takes; None (skip the update) for NaN and infinities."""
+    """Return the value that a double variable takes; None (no update) for NaN and infinities."""
     if value is None:
         return None
     value = float(value)

@@ -331,7 +331,7 @@ class LayerReference(Reference):
     def _open(self) -> list[str]:
         """Calls and goals that something may come back to."""
         calls = [call.service for call in self.executor._calls._calls.values()]
-        return calls + [goal.action for goal in self.executor._goals.all()]
+        return calls + [goal.action for goal in self.executor._goals.open_goals()]
 
     def _back_random(self, now: int) -> None:
         events = events_back(self.layout)
@@ -359,7 +359,7 @@ class LayerReference(Reference):
         self._told(words)
 
     def _goal(self, now: int) -> None:
-        open_ = [goal.number for goal in self.executor._goals.all()]
+        open_ = [goal.number for goal in self.executor._goals.open_goals()]
         number = self.dice.choice(open_) if open_ and self.dice.random() < 0.8 else self._some(self.goals)
         match self.dice.randrange(5):
             case 0 | 1:

@@ -94,7 +94,7 @@ class _World:
         return self.executor.is_faulty
 
     def held(self) -> Held:
-        goals = self.executor._replies._goals.all()
+        goals = self.executor._replies._goals.open_goals()
         return tuple((goal.action, goal.held if goal.held else ()) for goal in goals if goal.is_running and goal.held)
 
     def key(self) -> StateKey:
@@ -119,7 +119,7 @@ class _World:
             self.executor.on_feedback(self._goal(name), None)
         else:
             self.executor.on_goal_ended(self._goal(name), data[0])
-        for goal in self.executor._replies._goals.all():
+        for goal in self.executor._replies._goals.open_goals():
             if not goal.is_running:
                 self.executor.on_goal_ended(goal.number, "cancelled")
 
@@ -127,7 +127,7 @@ class _World:
         return self.executor._replies._calls._calls
 
     def _goal(self, action: str) -> int:
-        return next(goal.number for goal in self.executor._replies._goals.all() if goal.action == action)
+        return next(goal.number for goal in self.executor._replies._goals.open_goals() if goal.action == action)
 
     def _is_known(self, enum: str, data: dict[str, int]) -> bool:
         """Return True if every rule of an enum is true or false."""
@@ -155,7 +155,7 @@ class _World:
         for call in self._calls().values():
             yield ("service", call.service, "reply"), True
             yield ("service", call.service, "failed"), True
-        for goal in self.executor._replies._goals.all():
+        for goal in self.executor._replies._goals.open_goals():
             for outcome in ("feedback", "succeeded", "aborted"):
                 yield ("action", goal.action, outcome), True
 

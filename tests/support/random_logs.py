@@ -105,7 +105,7 @@ class World:
         return self.bench.executor._replies._calls._calls
 
     def _goals(self) -> Any:
-        return self.bench.executor._replies._goals.all()
+        return self.bench.executor._replies._goals.open_goals()
 
     def _wait(self) -> None:
         self.bench.clock.advance(self.dice.choice((0.1, 0.1, 0.5, 1.0)))

@@ -1,1 +1,5 @@
-"""Executors of supervisors. Generated packages carry copies of these modules, which run on Python 3.8 and later."""
+"""
+Executors of supervisors.
+
+Generated packages carry copies of these modules, which run on Python 3.8 and later.
+"""

@@ -1,4 +1,5 @@
-"""A controller for programs on asyncio: service calls and goals of the robot are coroutines.
+"""
+A controller for programs on asyncio: service calls and goals of the robot are coroutines.
 
 Everything happens in the thread of one event loop. A reply is what a coroutine returns, a failure
 what it raises, and a cancel ends it as asyncio ends tasks.
@@ -33,33 +34,43 @@ class GoalRejected(Exception):
 
 
 class AsyncRobot(Protocol):
-    """The robot, as a program on asyncio reaches it.
+    """
+    The robot, as a program on asyncio reaches it.
 
     Data is the model's: a dict of properties (nested dicts), a plain value, or None for the
     default of everything.
     """
 
     def publish(self, message: str, data: Any) -> None:
-        """Send an incoming message of the model; must not wait (`put_nowait` of a queue, `write` of a stream)."""
+        """
+        Send an incoming message of the model.
+
+        Must not wait (`put_nowait` of a queue, `write` of a stream).
+        """
 
     def publish_default(self, identifier: str) -> None:
-        """Send the default message on an identifier, which stops what keeps acting there; must not wait."""
+        """
+        Send the default message on an identifier, which stops what keeps acting there.
+
+        Must not wait.
+        """
 
     async def call(self, service: str, data: Any) -> Any:
         """Call a service: its response. Raising anything is its `error`."""
 
     async def execute(self, action: str, data: Any, feedback: Feedback) -> Any:
-        """Carry out a goal: its result.
+        """
+        Carry out a goal: its result.
 
-        Raises:
-            GoalRejected: It is not accepted.
-            asyncio.CancelledError: It was cancelled, as the controller wanted.
-            Exception: It was aborted.
+        :raises GoalRejected: It is not accepted.
+        :raises asyncio.CancelledError: It was cancelled, as the controller wanted.
+        :raises Exception: It was aborted.
         """
 
 
 class AsyncController:
-    """A supervisor that runs in an event loop.
+    """
+    A supervisor that runs in an event loop.
 
         controller = AsyncController(Supervisor(), robot)
         running = asyncio.create_task(controller.run())
@@ -71,21 +82,17 @@ class AsyncController:
     All methods are to be called in the event loop's thread, from another one by
     `loop.call_soon_threadsafe`, and not from within `AsyncRobot.publish`.
 
-    Args:
-        system: Plants, requirements and supervisor with their state.
-        robot: The robot.
-        settings: Settings that the deployment chose; the defaults if None.
-        clock: The only source of time; the computer's if None.
-        log: The event log; none if None.
-        sleep: Function that waits for some seconds of that clock.
-
-    Attributes:
-        executor: Executor that decides; its `status`, `reasons`, `counters` and `is_faulty` report
-            its condition.
-
-    Raises:
-        DeploymentError: The model has actions and the supervisor was made for a supervision layer.
-        SettingsError: A setting is wrong, or names what the model does not have.
+    :param system: Plants, requirements and supervisor with their state.
+    :param robot: The robot.
+    :param settings: Settings that the deployment chose; the defaults if None.
+    :param clock: The only source of time; the computer's if None.
+    :param log: The event log; none if None.
+    :param sleep: Function that waits for some seconds of that clock.
+    :ivar executor: Executor that decides; its `status`, `reasons`, `counters` and `is_faulty`
+        report its condition.
+    :raises DeploymentError: The model has actions and the supervisor was made for a supervision
+        layer.
+    :raises SettingsError: A setting is wrong, or names what the model does not have.
     """
 
     def __init__(
@@ -107,7 +114,11 @@ class AsyncController:
         self._early: Optional[Deque[Tuple[str, Any]]] = deque(maxlen=EARLY_MESSAGES)
 
     def receive(self, identifier: str, data: Any) -> None:
-        """A message of the robot came; of what comes before `run` begins, the last ones are taken in then."""
+        """
+        Take in a message of the robot.
+
+        Of what comes before `run` begins, the last ones are taken in then.
+        """
         if self._early is not None:
             self._early.append((identifier, data))
             return
@@ -121,11 +132,13 @@ class AsyncController:
         self._tell()
 
     async def run(self) -> None:
-        """Start, decide once a period, and end with the robot at rest: after `stop`, a fault, or this task's cancel.
+        """
+        Start, decide once a period, and end with the robot at rest.
 
-        Raises:
-            RuntimeError: It runs already or ran before, or ends because of a fault, which it
-                tells.
+        After `stop`, a fault, or this task's cancel.
+
+        :raises RuntimeError: It runs already or ran before, or ends because of a fault, which it
+            tells.
         """
         if self._news is not None:
             raise RuntimeError('a controller runs once')
@@ -197,7 +210,7 @@ class AsyncController:
         self._work.leave()
 
     def _told(self, tell: Callable[[Executor], None]) -> None:
-        """A coroutine of the robot has something for the executor."""
+        """Note that a coroutine of the robot has something for the executor."""
         tell(self.executor)
         self._tell()
 
@@ -208,11 +221,11 @@ class AsyncController:
 
 
 class _Work:
-    """The robot's coroutines as the middleware of an executor.
+    """
+    The robot's coroutines as the middleware of an executor.
 
-    Args:
-        robot: The robot.
-        told: Called, never from within the executor, with what it is to be told.
+    :param robot: The robot.
+    :param told: Called, never from within the executor, with what it is to be told.
     """
 
     def __init__(
@@ -226,7 +239,7 @@ class _Work:
     # The protocol `Middleware`.
 
     def prepare(self, communication: str, data: Any) -> Any:
-        """The model's data is the message."""
+        """Return the model's data, which is the message."""
         return data
 
     def is_default(self, communication: str, message: Any) -> bool:
@@ -300,7 +313,11 @@ class _Work:
 
 
 def _is_default(data: Any) -> bool:
-    """Return True if data of the model is all-default: none given, or only zero, false and the empty text."""
+    """
+    Return True if data of the model is all-default.
+
+    None given, or only zero, false and the empty text.
+    """
     if isinstance(data, dict):
         return all(_is_default(part) for part in data.values())
     if isinstance(data, (list, tuple)):

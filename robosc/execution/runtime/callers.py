@@ -8,11 +8,11 @@ from robosc.execution.runtime.calls import Calls, Goals
 
 
 class CallerCall(NamedTuple):
-    """A service call that waits for its answer.
+    """
+    A service call that waits for its answer.
 
-    Attributes:
-        service: Its service.
-        call_id: Id of the call on the caller's side.
+    :ivar service: Its service.
+    :ivar call_id: Id of the call on the caller's side.
     """
 
     service: str
@@ -20,13 +20,13 @@ class CallerCall(NamedTuple):
 
 
 class CallerGoal:
-    """A goal that has not ended for its caller.
+    """
+    A goal that has not ended for its caller.
 
-    Attributes:
-        number: Number of the goal on the robot's side.
-        action: Its action.
-        goal_id: Id of the goal on the caller's side.
-        is_cancelled: True if its caller asked to cancel it: it then ends as its server ends it.
+    :ivar number: Number of the goal on the robot's side.
+    :ivar action: Its action.
+    :ivar goal_id: Id of the goal on the caller's side.
+    :ivar is_cancelled: True if its caller asked to cancel it: it then ends as its server ends it.
     """
 
     __slots__ = ('action', 'goal_id', 'is_cancelled', 'number')
@@ -38,10 +38,10 @@ class CallerGoal:
         self.is_cancelled = False
 
     def outcome(self, outcome: str) -> str:
-        """Return the outcome of the goal for its caller.
+        """
+        Return the outcome of the goal for its caller.
 
-        Args:
-            outcome: Outcome from its server, or `rejected` or `lost`.
+        :param outcome: Outcome from its server, or `rejected` or `lost`.
         """
         if outcome == 'succeeded' or (self.is_cancelled and outcome == 'cancelled'):
             return outcome
@@ -49,13 +49,13 @@ class CallerGoal:
 
 
 class Callers:
-    """Calls and goals that the existing controller waits for.
+    """
+    Calls and goals that the existing controller waits for.
 
     An id of the robot's side never meets one of the caller's side.
 
-    Args:
-        calls: Service calls under way on the robot's side.
-        goals: Goals under way there.
+    :param calls: Service calls under way on the robot's side.
+    :param goals: Goals under way there.
     """
 
     __slots__ = ('_calls', '_goals', '_waiting_calls', '_waiting_goals')
@@ -67,39 +67,43 @@ class Callers:
         self._waiting_goals: Dict[int, CallerGoal] = {}
 
     def open_call(self, number: int, service: str, call_id: Any) -> None:
-        """A call went through under a number of the robot's side."""
+        """Note that a call went through under a number of the robot's side."""
         self._waiting_calls[number] = CallerCall(service, call_id)
 
     def open_goal(self, number: int, action: str, goal_id: Any) -> None:
-        """A goal went through under a number of the robot's side."""
+        """Note that a goal went through under a number of the robot's side."""
         self._waiting_goals[number] = CallerGoal(number, action, goal_id)
 
     def close_call(self, number: int) -> Optional[CallerCall]:
-        """A call is about to be answered: the call, or None if nobody waits for it."""
+        """Return the call that is about to be answered, or None if nobody waits for it."""
         return self._waiting_calls.pop(number, None)
 
     def close_goal(self, number: int) -> Optional[CallerGoal]:
-        """A goal is about to end for its caller: the goal, or None if nobody waits for it."""
+        """Return the goal that is about to end for its caller, or None if nobody waits for it."""
         return self._waiting_goals.pop(number, None)
 
     def goal(self, number: int) -> Optional[CallerGoal]:
-        """The goal with a number of the robot's side, if somebody waits for it."""
+        """Return the goal with a number of the robot's side, if somebody waits for it."""
         return self._waiting_goals.get(number)
 
     def find_goal(self, action: str, goal_id: Any) -> Optional[CallerGoal]:
-        """The goal of an action with an id of the caller's side, if it has not ended for its caller."""
+        """Return an action's goal with an id of the caller's side, if it has not ended there."""
         for goal in self._waiting_goals.values():
             if goal.action == action and goal.goal_id == goal_id:
                 return goal
         return None
 
     def close_failed_calls(self) -> List[CallerCall]:
-        """Calls that are no longer under way and were not answered: they ended in `error`, or before a restart."""
+        """
+        Return calls that are no longer under way and were not answered.
+
+        They ended in `error`, or before a restart.
+        """
         failed = [number for number in self._waiting_calls if not self._calls.is_open(number)]
         return [self._waiting_calls.pop(number) for number in failed]
 
     def close_failed_goals(self) -> List[CallerGoal]:
-        """Goals that the model no longer executes, though neither their server nor their caller ended them."""
+        """List the goals that the model no longer executes, though nobody else ended them."""
         failed = [number for number, goal in self._waiting_goals.items() if self._has_failed(goal)]
         return [self._waiting_goals.pop(number) for number in failed]
 

@@ -10,15 +10,19 @@ from robosc.execution.runtime.protocol import ControlledSystem, RobotSide
 FOREVER = float('inf')
 
 OUTCOMES = ('succeeded', 'rejected', 'aborted', 'cancelled', 'lost')
-"""Outcomes of a goal: with a result, refused by its server, given up by it, cancelled, or its server is gone."""
+"""
+Outcomes of a goal.
+
+With a result, refused by its server, given up by it, cancelled, or its server is gone.
+"""
 
 
 class Call(NamedTuple):
-    """A service call without a reply so far.
+    """
+    A service call without a reply so far.
 
-    Attributes:
-        service: Name of the service.
-        deadline_s: Reading of the clock at which it counts as failed.
+    :ivar service: Name of the service.
+    :ivar deadline_s: Reading of the clock at which it counts as failed.
     """
 
     service: str
@@ -36,7 +40,11 @@ class Calls:
         self._next_id = 1
 
     def call(self, robot: RobotSide, service: str, message: Any, now_s: float) -> int:
-        """Call a service: the id of the new call. Nothing is awaited from a call that could not be made."""
+        """
+        Call a service: the id of the new call.
+
+        Nothing is awaited from a call that could not be made.
+        """
         number = self._next_id
         self._next_id += 1
         self._calls[number] = Call(service, now_s + self._timeout_s)
@@ -61,7 +69,7 @@ class Calls:
         return [number for number, call in self._calls.items() if now_s >= call.deadline_s]
 
     def deadline_s(self) -> float:
-        """Return the reading of the clock, in seconds, at which the time of the next call is over."""
+        """Return the reading of the clock, in seconds, at which the next call is over its time."""
         return min((call.deadline_s for call in self._calls.values()), default=FOREVER)
 
     def clear(self) -> None:
@@ -70,18 +78,18 @@ class Calls:
 
 
 class Goal:
-    """A goal whose end is not known so far.
+    """
+    A goal whose end is not known so far.
 
-    Attributes:
-        number: Its id.
-        action: Name of the action.
-        is_running: True if the model's action executes it; no longer after its cancel or error.
-        is_accepted: True if its server accepted it.
-        is_cancel_wanted: True if it is to be cancelled.
-        is_cancel_sent: True if its server was asked to cancel it.
-        deadline_s: Reading of the clock at which it counts as failed.
-        held: Values for the requirements of the action: True if one held in a stable state since
-            the request.
+    :ivar number: Its id.
+    :ivar action: Name of the action.
+    :ivar is_running: True if the model's action executes it; no longer after its cancel or error.
+    :ivar is_accepted: True if its server accepted it.
+    :ivar is_cancel_wanted: True if it is to be cancelled.
+    :ivar is_cancel_sent: True if its server was asked to cancel it.
+    :ivar deadline_s: Reading of the clock at which it counts as failed.
+    :ivar held: Values for the requirements of the action: True if one held in a stable state since
+        the request.
     """
 
     __slots__ = (
@@ -109,12 +117,12 @@ class Goal:
 
 
 class Goals:
-    """Goals under way, by id; at most one of an action.
+    """
+    Goals under way, by id; at most one of an action.
 
-    Args:
-        system: Tells which requirements hold.
-        actions: Names of the actions, in source order.
-        timeout_s: Seconds until a goal counts as failed, or None.
+    :param system: Tells which requirements hold.
+    :param actions: Names of the actions, in source order.
+    :param timeout_s: Seconds until a goal counts as failed, or None.
     """
 
     __slots__ = ('_actions', '_goals', '_next_id', '_system', '_timeout_s')
@@ -132,7 +140,8 @@ class Goals:
         return bool(self._goals)
 
     def send(self, robot: RobotSide, action: str, message: Any, now_s: float) -> Goal:
-        """Send a new goal; the system is in the stable state after its request.
+        """
+        Send a new goal; the system is in the stable state after its request.
 
         Nothing is awaited from a goal that could not be sent.
         """
@@ -153,35 +162,38 @@ class Goals:
         return goal
 
     def find(self, number: int) -> Optional[Goal]:
-        """The goal with an id, if its end is not known."""
+        """Return the goal with an id, if its end is not known."""
         return self._goals.get(number)
 
     def close(self, number: int) -> Optional[Goal]:
-        """The end of a goal is known: the goal, or None if there is none with that id."""
+        """Take in a goal's end; return the goal, or None if there is none with that id."""
         return self._goals.pop(number, None)
 
     def is_open(self, action: str) -> bool:
         """Return True if a goal of an action may still be under way."""
         return any(goal.action == action for goal in self._goals.values())
 
-    def all(self) -> List[Goal]:
-        """Every goal, in source order of the actions."""
+    def open_goals(self) -> List[Goal]:
+        """Return every goal, in source order of the actions."""
         return list(self._goals.values())
 
     def expired(self, now_s: float) -> List[Goal]:
-        """Running goals whose time is over."""
+        """Return running goals whose time is over."""
         return [
             goal for goal in self._goals.values() if goal.is_running and now_s >= goal.deadline_s
         ]
 
     def deadline_s(self) -> float:
-        """Return the reading of the clock, in seconds, at which the time of the next running goal is over."""
+        """Return the reading of the clock, in seconds, at which the next goal is over its time."""
         return min(
             (goal.deadline_s for goal in self._goals.values() if goal.is_running), default=FOREVER
         )
 
     def to_cancel(self) -> Optional[Goal]:
-        """A goal to be cancelled now: a requirement that held since its request no longer does, and cancel is allowed.
+        """
+        Return a goal to be cancelled now.
+
+        A requirement that held since its request no longer does, and cancel is allowed.
 
         Only a change cancels: what the request itself made false never held since. Without
         requirements, never.
@@ -200,6 +212,6 @@ class Goals:
                 goal.held = held_ever(goal.held, self._system.requirements(goal.action))
 
     def leave_model(self) -> None:
-        """The model starts again and knows nothing of the goals; their end is still awaited."""
+        """Let the model start again without its goals; their end is still awaited."""
         for goal in self._goals.values():
             goal.is_running = False

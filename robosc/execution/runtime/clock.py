@@ -10,7 +10,7 @@ class Clock(Protocol):
     """Two readings of time."""
 
     def monotonic(self) -> float:
-        """Seconds since some moment; never goes back. Everything that waits is measured with it."""
+        """Seconds since some moment; never goes back. All that waits is measured with it."""
 
     def wall(self) -> float:
         """Seconds since 1970-01-01 UTC; stands in the event log and decides nothing."""
@@ -24,11 +24,11 @@ class SystemClock:
 
 
 class ManualClock:
-    """A clock that moves only when it is told to.
+    """
+    A clock that moves only when it is told to.
 
-    Args:
-        now_s: Its first reading.
-        epoch_s: Number of seconds added to a reading for the wall clock.
+    :param now_s: Its first reading.
+    :param epoch_s: Number of seconds added to a reading for the wall clock.
     """
 
     __slots__ = ('epoch_s', 'now_s')
@@ -38,18 +38,18 @@ class ManualClock:
         self.epoch_s = epoch_s
 
     def monotonic(self) -> float:
-        """The reading it was set to."""
+        """Return the reading it was set to."""
         return self.now_s
 
     def wall(self) -> float:
-        """The reading it was set to, after the epoch."""
+        """Return the reading it was set to, after the epoch."""
         return self.epoch_s + self.now_s
 
     def advance(self, seconds: float) -> None:
-        """Let time pass.
+        """
+        Let time pass.
 
-        Raises:
-            ValueError: Time would go back.
+        :raises ValueError: Time would go back.
         """
         if seconds < 0:
             raise ValueError('time does not go back')

@@ -9,11 +9,11 @@ from robosc.execution.runtime.release import Releases
 
 
 class CommandTimeouts:
-    """Detector of release identifiers whose last message acts while the existing controller has fallen silent there.
+    """
+    Detector of release identifiers that act while the existing controller has fallen silent.
 
-    Args:
-        releases: Messages that keep acting.
-        timeout_s: Seconds after which it counts as silent; 0: never.
+    :param releases: Messages that keep acting.
+    :param timeout_s: Seconds after which it counts as silent; 0: never.
     """
 
     __slots__ = ('_arrived_s', '_releases', '_timeout_s')
@@ -28,7 +28,7 @@ class CommandTimeouts:
         self._arrived_s[identifier] = now_s
 
     def silent(self, now_s: float) -> List[str]:
-        """Identifiers whose last message acts although nothing has come there for the time."""
+        """Return identifiers that act although nothing has come there for the time."""
         return [
             item
             for item in self._releases.acting()
@@ -36,7 +36,7 @@ class CommandTimeouts:
         ]
 
     def deadline_s(self) -> float:
-        """Return the reading of the clock, in seconds, at which the next of the identifiers is over its time."""
+        """Return the clock's reading, in seconds, at which the next identifier is late."""
         return min(
             (self._arrived_s[item] + self._timeout_s for item in self._releases.acting()),
             default=FOREVER,

@@ -1,4 +1,5 @@
-"""Choice of the enabled request that is issued: the policies of semantics 3.5.
+"""
+Choice of the enabled request that is issued: the policies of semantics 3.5.
 
 Requests are known by number, 0 up to N - 1 in source order. A decision is: `choose` among
 candidates, again without those that could not be issued, `issued` for the one that was, then
@@ -20,21 +21,21 @@ class Policy(Protocol):
         """One of the candidates (at least one, ascending)."""
 
     def issued(self, request: int) -> None:
-        """A chosen request was issued."""
+        """Note that a chosen request was issued."""
 
     def close(self, enabled: Tuple[int, ...]) -> None:
-        """The decision is over; `enabled` were the requests that were enabled at it."""
+        """End the decision; `enabled` were the requests that were enabled at it."""
 
 
 class FairPolicy:
-    """Newly enabled requests first, then the longest-ago issued, never-issued first, source order.
+    """
+    Newly enabled requests first, then the longest-ago issued, never-issued first, source order.
 
     A request profits from being new at most once in N decisions. So of any N decisions at which a
     request waits, N - 1 others take at most N - 1 by being new; the rest go to the longest-ago
     issued, and none starves.
 
-    Args:
-        count: Number of requests, N.
+    :param count: Number of requests, N.
     """
 
     __slots__ = ('_count', '_decision', '_favoured', '_issued', '_new', '_previous')
@@ -50,7 +51,7 @@ class FairPolicy:
         self._new = False
 
     def choose(self, candidates: Sequence[int]) -> int:
-        """The first by the order of the class."""
+        """Return the first of them in the order of the class."""
         previous, issued = self._previous, self._issued
         if candidates is previous:
             # The very same tuple as at the last decision, so nothing is new.
@@ -82,11 +83,11 @@ class FairPolicy:
 
 
 class PriorityPolicy:
-    """The first enabled request of a list; if none of them is enabled, fair.
+    """
+    The first enabled request of a list; if none of them is enabled, fair.
 
-    Args:
-        count: Number of requests.
-        order: Requests, most urgent first.
+    :param count: Number of requests.
+    :param order: Requests, most urgent first.
     """
 
     __slots__ = ('_fair', '_listed', '_order')
@@ -97,7 +98,7 @@ class PriorityPolicy:
         self._listed = frozenset(order)
 
     def choose(self, candidates: Sequence[int]) -> int:
-        """The most urgent candidate, else the fair one."""
+        """Return the most urgent candidate, else the fair one."""
         for request in self._order:
             if request in candidates:
                 return request
@@ -109,24 +110,25 @@ class PriorityPolicy:
             self._fair.issued(request)
 
     def close(self, enabled: Tuple[int, ...]) -> None:
-        """The decision is over."""
+        """End the decision."""
         self._fair.close(enabled)
 
 
 class RandomPolicy:
-    """Policy that takes any candidate with equal probability, the same sequence for the same seed.
+    """
+    Policy that takes any candidate with equal probability, the same sequence for the same seed.
 
-    Args:
-        seed: Start of the sequence.
+    :param seed: Start of the sequence.
     """
 
     __slots__ = ('_random',)
 
     def __init__(self, seed: int) -> None:
-        self._random = random.Random(seed)  # noqa: S311  # a choice between safe requests, no secret
+        # A choice between safe requests, no secret.
+        self._random = random.Random(seed)  # noqa: S311
 
     def choose(self, candidates: Sequence[int]) -> int:
-        """A random one."""
+        """Return a random one."""
         return candidates[self._random.randrange(len(candidates))]
 
     def issued(self, request: int) -> None:
@@ -137,13 +139,13 @@ class RandomPolicy:
 
 
 def make_policy(policy: str, names: Sequence[str], priority: Sequence[str], seed: int) -> Policy:
-    """A policy with no past.
+    """
+    Return a policy with no past.
 
-    Args:
-        policy: `fair`, `priority` or `random`.
-        names: Names of all requests' communications, in source order.
-        priority: Names, most urgent first, for `priority`.
-        seed: For `random`.
+    :param policy: `fair`, `priority` or `random`.
+    :param names: Names of all requests' communications, in source order.
+    :param priority: Names, most urgent first, for `priority`.
+    :param seed: For `random`.
     """
     if policy == 'random':
         return RandomPolicy(seed)

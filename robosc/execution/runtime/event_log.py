@@ -1,4 +1,7 @@
-"""The event log: one entry for everything that happens, written without making the loop wait (semantics 3.9).
+"""
+The event log.
+
+One entry for everything that happens, written without making the loop wait (semantics 3.9).
 
 An entry is a dict with `time` (seconds since 1970-01-01 UTC), `kind` and, by kind:
 
@@ -39,7 +42,7 @@ class EventLog(Protocol):
 
     @property
     def is_active(self) -> bool:
-        """True if entries are kept at all now; if not, nobody needs to make them."""
+        """Return True if entries are kept at all now; if not, nobody needs to make them."""
 
     @property
     def dropped(self) -> int:
@@ -83,13 +86,13 @@ class MemoryLog:
 
 
 class JsonLinesLog:
-    """Log that writes entries as JSON Lines in a thread of its own.
+    """
+    Log that writes entries as JSON Lines in a thread of its own.
 
     It drops and counts them when the disk is too slow or full.
 
-    Args:
-        stream: Stream to write to; closed at the end.
-        limit: Entries that may wait.
+    :param stream: Stream to write to; closed at the end.
+    :param limit: Entries that may wait.
     """
 
     is_active = True
@@ -120,7 +123,7 @@ class JsonLinesLog:
             self._refused += 1
 
     def close(self) -> None:
-        """Write what waits, a last line with the number of lost entries if there are any, and close the file."""
+        """Write what waits, then the number of lost entries if any are, and close the file."""
         if self._is_open:
             self._is_open = False
             self._waiting.put(None)
@@ -162,15 +165,13 @@ class JsonLinesLog:
 
 
 def open_event_log(folder: str, name: str, wall_s: float) -> JsonLinesLog:
-    """Return a log in a new file `<name>-<date>-<time>.jsonl` (UTC) of a folder, which is made if it is not there.
+    """
+    Return a log in a new file `<name>-<date>-<time>.jsonl` (UTC) of a folder, which may be new.
 
-    Args:
-        folder: Folder for the file.
-        name: First part of the file's name.
-        wall_s: The time for its name, in seconds since 1970-01-01 UTC.
-
-    Raises:
-        OSError: The folder or the file cannot be made.
+    :param folder: Folder for the file.
+    :param name: First part of the file's name.
+    :param wall_s: The time for its name, in seconds since 1970-01-01 UTC.
+    :raises OSError: The folder or the file cannot be made.
     """
     directory = Path(folder)
     directory.mkdir(parents=True, exist_ok=True)
@@ -187,7 +188,7 @@ def open_event_log(folder: str, name: str, wall_s: float) -> JsonLinesLog:
 
 
 def json_line(entry: Entry) -> str:
-    """An entry as one line of strictly valid JSON, whatever its values are."""
+    """Return an entry as one line of strictly valid JSON, whatever its values are."""
     try:
         return json.dumps(entry, allow_nan=False, separators=(',', ':')) + '\n'
     except (TypeError, ValueError, RecursionError):
@@ -195,7 +196,11 @@ def json_line(entry: Entry) -> str:
 
 
 def plain(value: Any, depth: int = 0) -> Any:
-    """A value in what JSON knows: messages by their fields; NaN, infinities, long integers, other objects as text."""
+    """
+    Return a value in what JSON knows: messages by their fields.
+
+    NaN, infinities, long integers, other objects as text.
+    """
     if value is None or value is True or value is False or isinstance(value, str):
         return value
     if isinstance(value, int):

@@ -1,4 +1,8 @@
-"""The executor of a controller: it issues the requests itself (semantics 3.5), on top of what all executors do."""
+"""
+The executor of a controller.
+
+It issues the requests itself (semantics 3.5), on top of what all executors do.
+"""
 
 from __future__ import annotations
 
@@ -15,18 +19,17 @@ from robosc.execution.runtime.settings import Settings
 
 
 class Executor(Runner):
-    """Executor that runs a controlled system as the robot's controller.
+    """
+    Executor that runs a controlled system as the robot's controller.
 
-    Args:
-        system: Plants, requirements and supervisor with their state.
-        middleware: Middleware of the robot.
-        settings: Settings that the deployment chose; the defaults if None.
-        clock: The only source of time; the computer's if None.
-        log: The event log; none if None.
-
-    Raises:
-        DeploymentError: The model has actions and the supervisor was made for a supervision layer.
-        SettingsError: A setting is wrong, or names what the model does not have.
+    :param system: Plants, requirements and supervisor with their state.
+    :param middleware: Middleware of the robot.
+    :param settings: Settings that the deployment chose; the defaults if None.
+    :param clock: The only source of time; the computer's if None.
+    :param log: The event log; none if None.
+    :raises DeploymentError: The model has actions and the supervisor was made for a supervision
+        layer.
+    :raises SettingsError: A setting is wrong, or names what the model does not have.
     """
 
     def __init__(
@@ -53,7 +56,7 @@ class Executor(Runner):
         self._decides_after_batch = self.settings.every == 'event'
 
     def tick(self) -> None:
-        """A period has passed: one decision."""
+        """Let a period pass: one decision."""
         # This and `receive` are written out for speed: the cycle time of the controller.
         if not self._is_started:
             return

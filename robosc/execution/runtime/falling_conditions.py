@@ -1,4 +1,8 @@
-"""Conditions that held in some stable state and hold no longer: what releases messages and cancels goals."""
+"""
+Conditions that held in some stable state and hold no longer.
+
+What releases messages and cancels goals.
+"""
 
 from __future__ import annotations
 

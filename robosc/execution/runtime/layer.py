@@ -1,4 +1,7 @@
-"""The executor of a supervision layer: it lets an existing controller's requests through or not (semantics 3.7).
+"""
+The executor of a supervision layer.
+
+It lets an existing controller's requests through or not (semantics 3.7).
 
 The existing controller, the caller, speaks to the layer instead of the robot. What it sends comes
 in through `on_request`, `on_call`, `on_goal` and `on_cancel`; what it receives goes out through a
@@ -43,20 +46,18 @@ _AT_REST = {
 
 
 class Layer(Runner):
-    """Executor that runs a controlled system as a supervision layer.
+    """
+    Executor that runs a controlled system as a supervision layer.
 
-    Args:
-        system: Plants, requirements and supervisor with their state.
-        robot: The robot's side of the middleware.
-        caller: The existing controller's side.
-        settings: Settings that the deployment chose; the defaults if None.
-        clock: The only source of time; the computer's if None.
-        log: The event log; none if None.
-
-    Raises:
-        DeploymentError: The model has actions and the supervisor was made for a controller, or the
-            model does not tell its incoming messages on one identifier apart.
-        SettingsError: A setting is wrong, or names what the model does not have.
+    :param system: Plants, requirements and supervisor with their state.
+    :param robot: The robot's side of the middleware.
+    :param caller: The existing controller's side.
+    :param settings: Settings that the deployment chose; the defaults if None.
+    :param clock: The only source of time; the computer's if None.
+    :param log: The event log; none if None.
+    :raises DeploymentError: The model has actions and the supervisor was made for a controller, or
+        the model does not tell its incoming messages on one identifier apart.
+    :raises SettingsError: A setting is wrong, or names what the model does not have.
     """
 
     def __init__(
@@ -79,12 +80,12 @@ class Layer(Runner):
 
     @guarded
     def on_request(self, identifier: str, message: Any) -> None:
-        """Let a message of the existing controller through unchanged if it is allowed now, else hold it back.
+        """
+        Let a message of the existing controller through unchanged, or hold it back.
 
-        Args:
-            identifier: Identifier that it is meant for.
-            message: Mapping or object with the properties, or the plain value of a basic type;
-                None for no data.
+        :param identifier: Identifier that it is meant for.
+        :param message: Mapping or object with the properties, or the plain value of a basic type;
+            None for no data.
         """
         names = self._messages.get(identifier)
         if names is None:
@@ -101,12 +102,14 @@ class Layer(Runner):
 
     @guarded
     def on_call(self, service: str, call_id: Any, message: Any) -> None:
-        """Take a service call of the existing controller: held back, it gets a default response at once.
+        """
+        Take a service call of the existing controller.
 
-        Args:
-            service: Name of the service in the model.
-            call_id: Id by which its answer is to be addressed; the executor only hands it back.
-            message: The request.
+        Held back, it gets a default response at once.
+
+        :param service: Name of the service in the model.
+        :param call_id: Id by which its answer is to be addressed; the executor only hands it back.
+        :param message: The request.
         """
         request = self._request_of(service, 'service')
         if request is None:
@@ -122,12 +125,12 @@ class Layer(Runner):
 
     @guarded
     def on_goal(self, action: str, goal_id: Any, message: Any) -> None:
-        """Take a goal of the existing controller: held back, it is rejected, else accepted.
+        """
+        Take a goal of the existing controller: held back, it is rejected, else accepted.
 
-        Args:
-            action: Name of the action in the model.
-            goal_id: Id of the goal on the caller's side.
-            message: The goal.
+        :param action: Name of the action in the model.
+        :param goal_id: Id of the goal on the caller's side.
+        :param message: The goal.
         """
         request = self._request_of(action, 'action')
         if request is None:
@@ -143,11 +146,13 @@ class Layer(Runner):
 
     @guarded
     def on_cancel(self, action: str, goal_id: Any) -> None:
-        """Cancel a goal for the existing controller: that is always forwarded, also while the robot is stopped.
+        """
+        Cancel a goal for the existing controller.
 
-        Args:
-            action: Name of the action in the model.
-            goal_id: Id of the goal on the caller's side.
+        That is always forwarded, also while the robot is stopped.
+
+        :param action: Name of the action in the model.
+        :param goal_id: Id of the goal on the caller's side.
         """
         self._look_at_clock()
         waiting = self._callers.find_goal(action, goal_id)
@@ -167,11 +172,13 @@ class Layer(Runner):
 
     @guarded
     def on_silent(self, identifier: str) -> None:
-        """Release the last message on an identifier now: the existing controller is known to be gone from it.
+        """
+        Release the last message on an identifier now.
 
-        Args:
-            identifier: Identifier on which it sent messages; where none of them acts, nothing
-                happens.
+        The existing controller is known to be gone from it.
+
+        :param identifier: Identifier on which it sent messages; where none of them acts, nothing
+            happens.
         """
         self._look_at_clock()
         if self._releases.is_acting(identifier):
@@ -180,18 +187,22 @@ class Layer(Runner):
     # What comes from the robot, and time.
 
     def receive(self, identifier: str, data: Any) -> None:
-        """A message of the robot came: one batch; then it is passed on."""
+        """Take in a message of the robot: one batch; then it is passed on."""
         super().receive(identifier, data)
         self._finish()
         if self._is_started and identifier in self._batches:
             self._tell(self._caller.pass_on, identifier, data)
 
     def tick(self) -> None:
-        """A period has passed: nothing is decided in a layer, so this is `watch`."""
+        """Let a period pass: nothing is decided in a layer, so this is `watch`."""
         self.watch()
 
     def watch(self) -> None:
-        """Time has passed: stale sensors, a caller that fell silent, replies that did not come, what is still owed."""
+        """
+        Time has passed.
+
+        Stale sensors, a caller that fell silent, replies that did not come, what is still owed.
+        """
         super().watch()
         self._finish()
 
@@ -232,7 +243,7 @@ class Layer(Runner):
                 self._tell(self._caller.end_goal, waiting.action, waiting.goal_id, end, data)
 
     def _finish(self) -> None:
-        """Tell the caller what has failed, or has turned against its requirements. Never raises."""
+        """Tell the caller what has failed, or turned against its requirements. Never raises."""
         for call in self._callers.close_failed_calls():
             self._tell(self._caller.answer_default, call.service, call.call_id)
         for goal in self._callers.close_failed_goals():
@@ -282,13 +293,13 @@ class Layer(Runner):
         return None
 
     def _refusal(self, message: Any) -> Optional[str]:
-        """Return the reason why no request at all, or none with this message, is let through now."""
+        """Return the reason why no request, or none with this message, is let through now."""
         if not self._may_request:
             return _AT_REST[self.status]
         return None if is_finite(message) else _NOT_FINITE
 
     def _take(self, request: Request, message: Any) -> None:
-        """The request happens, with all that follows from it, before its message goes out."""
+        """Let the request happen, with all that follows from it, before its message goes out."""
         self._steps.take(request.event, message)
         self._steps.settle(request.name)
         # What goes out now may wait for time to pass: looked up as soon as the clock is read
@@ -296,10 +307,10 @@ class Layer(Runner):
         self._deadline_s = self._now_s
 
     def _recognized(self, names: Sequence[str], message: Any) -> Optional[Request]:
-        """The request that a message is: the first whose condition is true (language B.13).
+        """
+        Return the request that a message is: the first whose condition is true (language B.13).
 
-        Raises:
-            ExecutionError: An enum of it is unknown, and that is a fault.
+        :raises ExecutionError: An enum of it is unknown, and that is a fault.
         """
         for name in names:
             match = self._system.matches(name, message)
@@ -335,10 +346,10 @@ class Layer(Runner):
 
 
 def _messages(infos: Sequence[CommunicationInfo]) -> Dict[str, Tuple[str, ...]]:
-    """The incoming messages of each identifier, in source order.
+    """
+    Return the incoming messages of each identifier, in source order.
 
-    Raises:
-        DeploymentError: One that has no condition is not the last of its identifier.
+    :raises DeploymentError: One that has no condition is not the last of its identifier.
     """
     found: Dict[str, Tuple[CommunicationInfo, ...]] = {}
     for info in infos:
@@ -348,8 +359,10 @@ def _messages(infos: Sequence[CommunicationInfo]) -> Dict[str, Tuple[str, ...]]:
         for info in sharing[:-1]:
             if not info.has_condition:
                 raise DeploymentError(
-                    "a message on '{}' may be '{}' or '{}': a supervision layer needs 'when: CONDITION' in the list of "
-                    "'{}'".format(identifier, info.name, sharing[-1].name, info.name)
+                    "a message on '{}' may be '{}' or '{}': a supervision layer needs 'when: "
+                    "CONDITION' in the list of '{}'".format(
+                        identifier, info.name, sharing[-1].name, info.name
+                    )
                 )
     return {
         identifier: tuple(info.name for info in sharing) for identifier, sharing in found.items()

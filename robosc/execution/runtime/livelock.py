@@ -1,4 +1,5 @@
-"""Runs of silent steps that do not end (semantics 3.3).
+"""
+Runs of silent steps that do not end (semantics 3.3).
 
 A run is deterministic: equal states are followed by equal steps. It ends if and only if no state
 comes twice, which R. P. Brent's algorithm finds with one remembered state ("An improved Monte
@@ -18,10 +19,10 @@ class LivelockError(Exception):
 
 
 class LivelockDetector:
-    """Detector of a livelock in one run.
+    """
+    Detector of a livelock in one run.
 
-    Args:
-        bound: More steps than this can only be a run that does not end.
+    :param bound: More steps than this can only be a run that does not end.
     """
 
     __slots__ = ('_bound', '_distance', '_power', '_remembered', '_steps')
@@ -34,14 +35,12 @@ class LivelockDetector:
         self._remembered: Any = None
 
     def check(self, signature: Callable[[], Any], event: str) -> None:
-        """Look at the state after one more step, taken by `event`.
+        """
+        Look at the state after one more step, taken by `event`.
 
-        Args:
-            signature: Gives a value that tells the state from others; a short run needs none.
-            event: The step's event.
-
-        Raises:
-            LivelockError: The state is one that the run was in before, or the bound is passed.
+        :param signature: Gives a value that tells the state from others; a short run needs none.
+        :param event: The step's event.
+        :raises LivelockError: The state is one that the run was in before, or the bound is passed.
         """
         self._steps += 1
         if self._steps > self._bound:

@@ -1,4 +1,7 @@
-"""Messages of a middleware, whatever its classes are: their fields, and whether every number in them is one.
+"""
+Messages of a middleware, whatever its classes are.
+
+Their fields, and whether every number in them is one.
 
 A message may be a mapping, an object, a plain value or anything made of these.
 """
@@ -10,14 +13,14 @@ import numbers
 from typing import Any, Dict, Iterable, Mapping
 
 MAXIMUM_PARTS = 1000000
-"""A message with more parts than this is not looked through to its end: it counts as not finite."""
+"""Number of parts of a message beyond which it is not looked through: it counts as not finite."""
 
 _HARMLESS = (bool, int, str, bytes, bytearray)
 _INTEGER_FORMATS = '?cbBhHiIlLqQnN'
 
 
 def fields_of(message: Any) -> Dict[str, Any]:
-    """The fields of an object by name; none if it has none, or does not let itself be asked."""
+    """Return the fields of an object by name; none if it has none, or cannot be asked."""
     try:
         return {name: getattr(message, name) for name in _field_names(message)}
     except Exception:
@@ -25,7 +28,8 @@ def fields_of(message: Any) -> Dict[str, Any]:
 
 
 def is_finite(message: Any) -> bool:
-    """Return True if there is neither a NaN nor an infinity anywhere in a message.
+    """
+    Return True if there is neither a NaN nor an infinity anywhere in a message.
 
     A message that cannot be looked through is not known to be finite, so the answer is no.
     """

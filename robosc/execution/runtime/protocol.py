@@ -1,4 +1,5 @@
-"""The two borders of the executor: the controlled system below it, the middleware beside it.
+"""
+The two borders of the executor: the controlled system below it, the middleware beside it.
 
 A `ControlledSystem` is the supervisor as code: `robosc.execution.interpreter` interprets a
 `Supervisor`, a target generates a class with the same methods. The `Executor` adds what semantics
@@ -20,20 +21,20 @@ OUTGOING = 'outgoing message'
 
 
 class CommunicationInfo(NamedTuple):
-    """Facts about a message, service or action that the executor must know.
+    """
+    Facts about a message, service or action that the executor must know.
 
-    Attributes:
-        name: Its name in the model.
-        component: The component that declares it.
-        kind: `incoming message`, `outgoing message`, `service` or `action`.
-        identifier: Topic, service or action name.
-        package: ROS package of its interface, or None if it is not linked.
-        interface: Type name of its interface, or None.
-        requirement_count: Number of requirements on its request.
-        conjunct_count: Number of top-level conjuncts of those requirements, all counted on.
-        max_age_s: Seconds after which an outgoing message is stale, if the model says so.
-        has_condition: True if an incoming message says with `when` which messages it is, in a
-            supervision layer.
+    :ivar name: Its name in the model.
+    :ivar component: The component that declares it.
+    :ivar kind: `incoming message`, `outgoing message`, `service` or `action`.
+    :ivar identifier: Topic, service or action name.
+    :ivar package: ROS package of its interface, or None if it is not linked.
+    :ivar interface: Type name of its interface, or None.
+    :ivar requirement_count: Number of requirements on its request.
+    :ivar conjunct_count: Number of top-level conjuncts of those requirements, all counted on.
+    :ivar max_age_s: Seconds after which an outgoing message is stale, if the model says so.
+    :ivar has_condition: True if an incoming message says with `when` which messages it is, in a
+        supervision layer.
     """
 
     name: str
@@ -49,16 +50,16 @@ class CommunicationInfo(NamedTuple):
 
 
 class Description(NamedTuple):
-    """The static part of a controlled system; all tuples in source order.
+    """
+    The static part of a controlled system; all tuples in source order.
 
-    Attributes:
-        name: The robot's name.
-        deployment: `controller` or `layer`.
-        bundle_sha256: Digest of the model's files.
-        communications: Every communication.
-        resets: Reset events of services and actions.
-        taus: Tau events that can change something.
-        silent_bound: More silent steps than this in a row can only be a run that does not end.
+    :ivar name: The robot's name.
+    :ivar deployment: `controller` or `layer`.
+    :ivar bundle_sha256: Digest of the model's files.
+    :ivar communications: Every communication.
+    :ivar resets: Reset events of services and actions.
+    :ivar taus: Tau events that can change something.
+    :ivar silent_bound: More silent steps than this in a row can only be a run that does not end.
     """
 
     name: str
@@ -71,12 +72,16 @@ class Description(NamedTuple):
 
 
 def requesting(infos: Sequence[CommunicationInfo]) -> Tuple[CommunicationInfo, ...]:
-    """The communications that are requested, in source order: a request's number is its place among them."""
+    """
+    Return the communications that are requested, in source order.
+
+    A request's number is its place among them.
+    """
     return tuple(info for info in infos if info.kind != OUTGOING)
 
 
 def batches(infos: Sequence[CommunicationInfo]) -> Dict[str, Tuple[Tuple[str, str], ...]]:
-    """For each identifier that is received, the messages of the model that it stands for, with their events."""
+    """Return the model's messages that each received identifier stands for, with their events."""
     found: Dict[str, Tuple[Tuple[str, str], ...]] = {}
     for info in infos:
         if info.kind == OUTGOING:
@@ -88,15 +93,15 @@ def batches(infos: Sequence[CommunicationInfo]) -> Dict[str, Tuple[Tuple[str, st
 
 
 class Reading(NamedTuple):
-    """Received data after conversion (enum rules, ranges), before anything changes.
+    """
+    Received data after conversion (enum rules, ranges), before anything changes.
 
-    Attributes:
-        values: One value (None: unknown) for each datum that updates on the event read, as the
-            system wants them.
-        data: The same by name (`value.front`), for the log.
-        unknown: Descriptions of what was unknown: an enum that fell to its default past an unknown
-            rule, an integer that was clamped. Empty: nothing was.
-        enum_unknown: True if an enum fell to its default although an earlier rule was unknown.
+    :ivar values: One value (None: unknown) for each datum that updates on the event read, as the
+        system wants them.
+    :ivar data: The same by name (`value.front`), for the log.
+    :ivar unknown: Descriptions of what was unknown: an enum that fell to its default past an
+        unknown rule, an integer that was clamped. Empty: nothing was.
+    :ivar enum_unknown: True if an enum fell to its default although an earlier rule was unknown.
     """
 
     values: Any
@@ -106,12 +111,12 @@ class Reading(NamedTuple):
 
 
 class Match(NamedTuple):
-    """Result of matching a message of an existing controller with a certain incoming message of the model.
+    """
+    Result of matching an existing controller's message with an incoming message of the model.
 
-    Attributes:
-        holds: True if the condition `when` is true of it, or if there is none.
-        unknown: Descriptions of what was unknown, as in a `Reading`.
-        enum_unknown: The same as in a `Reading`.
+    :ivar holds: True if the condition `when` is true of it, or if there is none.
+    :ivar unknown: Descriptions of what was unknown, as in a `Reading`.
+    :ivar enum_unknown: The same as in a `Reading`.
     """
 
     holds: bool
@@ -124,12 +129,12 @@ MATCHES = Match(True, (), False)
 
 
 class ControlledSystem(Protocol):
-    """Plants, requirements and supervisor of one robot, with their current state.
+    """
+    Plants, requirements and supervisor of one robot, with their current state.
 
-    Attributes:
-        description: Its static part.
-        changes: Grows whenever the state may have become another: while it stays the same, so does
-            the state.
+    :ivar description: Its static part.
+    :ivar changes: Grows whenever the state may have become another: while it stays the same, so
+        does the state.
     """
 
     description: Description
@@ -139,54 +144,70 @@ class ControlledSystem(Protocol):
         """Back to the initial state."""
 
     def enabled(self, event: str) -> bool:
-        """Return True if a controllable event is allowed now: by plants, ranges, requirements and supervisor.
+        """
+        Return True if a controllable event is allowed now.
+
+        By plants, ranges, requirements and supervisor.
 
         A tau that would change nothing in the current state is not enabled.
         """
 
     def enabled_requests(self) -> Tuple[int, ...]:
-        """Return the requests that are allowed now: their numbers, from 0, among all requests in source order."""
+        """
+        Return the requests that are allowed now.
+
+        Their numbers, from 0, among all requests in source order.
+        """
 
     def enabled_silent(self) -> Optional[str]:
-        """The first of the description's resets, then its taus, that is allowed now; None if none is."""
+        """
+        Return the first of the description's resets, then its taus, that is allowed now.
+
+        None if none is.
+        """
 
     def receive(
         self, identifier: str, data: Any
     ) -> Optional[Tuple[Tuple[str, Tuple[str, ...]], ...]]:
-        """Convert what came on an identifier, and take the events of all its outgoing messages, in source order.
+        """
+        Convert what came on an identifier, and take its outgoing messages' events in source order.
 
         For the common case, in which no `Reading` need be looked at. The state accepts these
         events whatever it is.
 
-        Returns:
-            The events at which updates were skipped, with these (mostly empty), or None if
+        :returns: The events at which updates were skipped, with these (mostly empty), or None if
             something of the data is unknown; then nothing has changed, and each event is to be
             read and taken by itself.
         """
 
     def read(self, event: str, data: Any) -> Reading:
-        """Convert what came with an uncontrollable event; changes nothing, never raises for any data."""
+        """Convert what came with an uncontrollable event; change nothing, never raise."""
 
     def step(self, event: str, reading: Optional[Reading] = None) -> Optional[Tuple[str, ...]]:
-        """Take an event: move and update, all at once.
+        """
+        Take an event: move and update, all at once.
 
-        Returns:
-            The updates that were skipped because their value is unknown, in words (mostly empty),
-            or None if the state cannot accept the event; then nothing has changed.
+        :returns: The updates that were skipped because their value is unknown, in words (mostly
+            empty), or None if the state cannot accept the event; then nothing has changed.
         """
 
     def provide(self, communication: str) -> Tuple[bool, Any]:
-        """Data for a request in the current state: (is known, data).
+        """
+        Return data for a request in the current state: (is known, data).
 
         Data is a dict of properties (nested dicts), a plain value, or None for the middleware's
         default.
         """
 
     def matches(self, communication: str, data: Any) -> Match:
-        """Tell whether a message is an incoming message, by its condition `when`; never raises for any data."""
+        """
+        Tell whether a message is an incoming message, by its condition `when`.
+
+        Never raises for any data.
+        """
 
     def requirements(self, communication: str) -> Tuple[bool, ...]:
-        """For each requirement on a communication's request, in source order: whether it holds now."""
+        """Tell of each requirement on a communication's request whether it holds, in order."""
 
     def conjuncts(self, communication: str) -> Tuple[bool, ...]:
         """For each top-level conjunct of those requirements: whether it holds now."""
@@ -195,14 +216,18 @@ class ControlledSystem(Protocol):
         """Location of a service's or action's plant."""
 
     def state(self) -> Dict[str, Dict[str, Any]]:
-        """{component: {"state": s, "variables": {v: value}}} for every component with a behaviour."""
+        """Return {component: {"state": s, "variables": {v: value}}} for those with a behaviour."""
 
     def signature(self) -> Any:
-        """A hashable value that tells states apart."""
+        """Return a hashable value that tells states apart."""
 
 
 class RobotSide(Protocol):
-    """Robot's side for an executor of either deployment; replies come back through the executor's methods, later."""
+    """
+    Robot's side for an executor of either deployment.
+
+    Replies come back through the executor's methods, later.
+    """
 
     def is_default(self, communication: str, message: Any) -> bool:
         """Return True if a message of a request is the all-default one (its header apart)."""
@@ -214,7 +239,7 @@ class RobotSide(Protocol):
         """Send the all-default message on an identifier that several communications may share."""
 
     def call(self, communication: str, request_id: int, message: Any) -> None:
-        """Call a service without waiting; one of the executor's `on_reply`, `on_call_failed` follows."""
+        """Call a service without waiting; the executor's `on_reply` or `on_call_failed` comes."""
 
     def send_goal(self, communication: str, goal_id: int, message: Any) -> None:
         """Send an action's goal without waiting; `on_goal_accepted` or `on_goal_ended` follows."""
@@ -224,53 +249,54 @@ class RobotSide(Protocol):
 
 
 class Middleware(RobotSide, Protocol):
-    """Middleware for the executor of a controller: the robot, and messages made of the model's data."""
+    """Middleware for a controller's executor: the robot, and messages made of the model's data."""
 
     def prepare(self, communication: str, data: Any) -> Any:
-        """The middleware's message for a request, from the model's data (None: the default message).
+        """
+        Return the middleware's message for a request, from the model's data; None: the default.
 
         The data is not to be changed: it stands in the log, and may come again.
 
-        Raises:
-            DataDoesNotFit: A value does not fit its field; the request is then not issued.
+        :raises DataDoesNotFit: A value does not fit its field; the request is then not issued.
         """
 
 
 class LayerMiddleware(Protocol):
-    """Reports of a supervision layer to the existing controller, the caller.
+    """
+    Reports of a supervision layer to the existing controller, the caller.
 
     The ids of calls and goals here are the caller's own; the robot's side never sees them.
     """
 
     def pass_on(self, identifier: str, message: Any) -> None:
-        """A message of the robot, unchanged, after the supervisor has seen it."""
+        """Pass on a message of the robot, unchanged, after the supervisor has seen it."""
 
     def blocked(self, identifier: str) -> None:
-        """A request on an identifier was held back."""
+        """Tell that a request on an identifier was held back."""
 
     def answer(self, communication: str, call_id: Any, data: Any) -> None:
-        """The service's reply to a call, unchanged."""
+        """Pass on the service's reply to a call, unchanged."""
 
     def answer_default(self, communication: str, call_id: Any) -> None:
-        """A default reply to a call that was held back or has failed."""
+        """Give a default reply to a call that was held back or has failed."""
 
     def accept_goal(self, communication: str, goal_id: Any) -> None:
-        """A goal is let through: it is accepted. Exactly one `end_goal` follows."""
+        """Accept a goal, which is let through. Exactly one `end_goal` follows."""
 
     def reject_goal(self, communication: str, goal_id: Any) -> None:
-        """A goal is held back: it is rejected."""
+        """Reject a goal, which is held back."""
 
     def pass_feedback(self, communication: str, goal_id: Any, data: Any) -> None:
         """Feedback of a goal, unchanged."""
 
     def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any) -> None:
-        """End an accepted goal for its caller.
+        """
+        End an accepted goal for its caller.
 
-        Args:
-            communication: The action.
-            goal_id: Id of the goal.
-            outcome: `succeeded`, `aborted` or `cancelled`.
-            data: The server's result, unchanged; None for the default one.
+        :param communication: The action.
+        :param goal_id: Id of the goal.
+        :param outcome: `succeeded`, `aborted` or `cancelled`.
+        :param data: The server's result, unchanged; None for the default one.
         """
 
 

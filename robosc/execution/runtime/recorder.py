@@ -10,15 +10,15 @@ from robosc.execution.runtime.protocol import ControlledSystem
 
 
 class Counters(NamedTuple):
-    """Counts of what went wrong so far.
+    """
+    Counts of what went wrong so far.
 
-    Attributes:
-        unknown: Enums that fell to their default past an unknown rule, received integers that were
-            moved into their range, updates that were skipped, requests whose data was unknown or
-            did not fit.
-        unexpected: Events that the state could not accept, replies that match no request.
-        faults: Faults.
-        dropped: Entries that the event log lost.
+    :ivar unknown: Enums that fell to their default past an unknown rule, received integers that
+        were moved into their range, updates that were skipped, requests whose data was unknown or
+        did not fit.
+    :ivar unexpected: Events that the state could not accept, replies that match no request.
+    :ivar faults: Faults.
+    :ivar dropped: Entries that the event log lost.
     """
 
     unknown: int
@@ -28,16 +28,14 @@ class Counters(NamedTuple):
 
 
 class Recorder:
-    """Recorder that counts, and writes entries; nothing in it raises.
+    """
+    Recorder that counts, and writes entries; nothing in it raises.
 
-    Args:
-        system: System whose state stands in the entries of events.
-        clock: Clock that gives the time of an entry.
-        log: Log for the entries.
-
-    Attributes:
-        began_s: Reading of the clock when the handling of what came last began: decision times
-            count from here.
+    :param system: System whose state stands in the entries of events.
+    :param clock: Clock that gives the time of an entry.
+    :param log: Log for the entries.
+    :ivar began_s: Reading of the clock when the handling of what came last began: decision times
+        count from here.
     """
 
     __slots__ = (
@@ -63,17 +61,17 @@ class Recorder:
 
     @property
     def is_active(self) -> bool:
-        """True if the log keeps anything now."""
+        """Return True if the log keeps anything now."""
         return self._log.is_active
 
     def counters(self) -> Counters:
-        """The counters now."""
+        """Return the counters now."""
         return Counters(
             self.unknown_count, self.unexpected_count, self.faults, self._lost + self._log.dropped
         )
 
     def event(self, event: str, is_controllable: bool, data: Any) -> None:
-        """An event was taken. Worth calling only while the log is active."""
+        """Note that an event was taken. Worth calling only while the log is active."""
         took_us = (self._clock.monotonic() - self.began_s) * 1e6
         self._write(
             {
@@ -97,20 +95,20 @@ class Recorder:
         self._write({'kind': 'unknown', 'event': event, 'unknown': list(what)})
 
     def fault(self, what: str) -> None:
-        """A fault."""
+        """Note a fault."""
         self.faults += 1
         self._write({'kind': 'fault', 'what': what})
 
     def release(self, identifier: str) -> None:
-        """The default message goes out on an identifier."""
+        """Note that the default message goes out on an identifier."""
         self._write({'kind': 'release', 'identifier': identifier})
 
     def blocked(self, identifier: str, why: str) -> None:
-        """A supervision layer held a request back."""
+        """Note that a supervision layer held a request back."""
         self._write({'kind': 'blocked', 'identifier': identifier, 'why': why})
 
     def note(self, kind: str, what: str) -> None:
-        """A stop, its end, or a restart."""
+        """Note a stop, its end, or a restart."""
         self._write({'kind': kind, 'what': what})
 
     def _write(self, entry: Dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""Messages that keep acting after they were sent, and when they must be released (semantics 3.6)."""
+"""Messages that act on after they were sent, and when they must be released (semantics 3.6)."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from robosc.execution.runtime.protocol import ControlledSystem
 
 
 class _Acting:
-    """The last message of an identifier, not the all-default one.
+    """
+    The last message of an identifier, not the all-default one.
 
-    Attributes:
-        request: Name of the communication whose request sent it.
-        event: Event of that request.
-        was_enabled: True if the request was enabled in the last stable state since.
-        held: Values for the conjuncts of its requirements: True if one held in that state.
-        is_due: True if it is to be released: something was so and is no longer. Once due it stays
-            so until something is sent there; that is why the last stable state is enough to
-            remember.
+    :ivar request: Name of the communication whose request sent it.
+    :ivar event: Event of that request.
+    :ivar was_enabled: True if the request was enabled in the last stable state since.
+    :ivar held: Values for the conjuncts of its requirements: True if one held in that state.
+    :ivar is_due: True if it is to be released: something was so and is no longer. Once due it
+        stays so until something is sent there; that is why the last stable state is enough to
+        remember.
     """
 
     __slots__ = ('event', 'held', 'is_due', 'request', 'was_enabled')
@@ -32,14 +32,14 @@ class _Acting:
 
 
 class Releases:
-    """Tracker of the last message of each release identifier.
+    """
+    Tracker of the last message of each release identifier.
 
-    Args:
-        system: System that shows what is enabled and what holds.
-        identifiers: The release identifiers.
-        requests: Communications of each of them, in source order.
-        may_wait: True if a due release waits while another request there is enabled: only a
-            controller's does.
+    :param system: System that shows what is enabled and what holds.
+    :param identifiers: The release identifiers.
+    :param requests: Communications of each of them, in source order.
+    :param may_wait: True if a due release waits while another request there is enabled: only a
+        controller's does.
     """
 
     __slots__ = ('_acting', '_events', '_may_wait', '_system', 'identifiers', 'waiting')
@@ -62,11 +62,13 @@ class Releases:
         self.waiting: Tuple[str, ...] = ()
 
     def due(self, issuing: Optional[str] = None) -> List[str]:
-        """The identifiers to release now, in this stable state; the caller does it and tells `released`.
+        """
+        Return the identifiers to release now, in this stable state.
 
-        Args:
-            issuing: Communication whose request brought the system here and whose message is about
-                to go out: what it makes false does not release its own earlier message.
+        The caller does it and tells `released`.
+
+        :param issuing: Communication whose request brought the system here and whose message is
+            about to go out: what it makes false does not release its own earlier message.
         """
         if not self._acting:
             return []
@@ -103,12 +105,16 @@ class Releases:
         return tuple(name for name, _ in self._events[identifier] if name != sender)
 
     def supersede(self, identifier: str) -> None:
-        """A request was decided whose message ends a release that waits here."""
+        """Note that a request was decided whose message ends a release that waits here."""
         if identifier in self.waiting:
             self.released(identifier)
 
     def sent(self, request: str, identifier: str, is_default: bool) -> None:
-        """A message went out on a release identifier; the system is in the stable state after its request."""
+        """
+        Note that a message went out on a release identifier.
+
+        The system is in the stable state after its request.
+        """
         self.released(identifier)
         if not is_default:
             is_enabled = self._system.enabled(request + '.request')
@@ -117,7 +123,11 @@ class Releases:
             )
 
     def sent_unchanged(self, request: str, identifier: str, is_default: bool) -> None:
-        """The same, where the request changed nothing: what was enabled still is, with all that it takes."""
+        """
+        Do the same where the request changed nothing.
+
+        What was enabled still is, with all that it takes.
+        """
         acting = self._acting.get(identifier)
         if is_default or acting is None or acting.request != request:
             self.sent(request, identifier, is_default)
@@ -127,16 +137,16 @@ class Releases:
         return identifier in self._acting
 
     def acting(self) -> Tuple[str, ...]:
-        """The release identifiers whose last message still acts."""
+        """Return the release identifiers whose last message still acts."""
         return tuple(self._acting)
 
     def released(self, identifier: str) -> None:
-        """The default message went out on an identifier, or another message is about to."""
+        """Note that the default message went out on an identifier, or another one will."""
         self._acting.pop(identifier, None)
         if identifier in self.waiting:
             self.waiting = tuple(item for item in self.waiting if item != identifier)
 
     def clear(self) -> None:
-        """The default message went out everywhere."""
+        """Note that the default message went out everywhere."""
         self._acting.clear()
         self.waiting = ()

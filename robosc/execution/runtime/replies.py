@@ -12,14 +12,16 @@ from robosc.execution.runtime.steps import ExecutionError, Steps
 
 
 class Replies:
-    """Matches replies to requests and takes their events; methods that take one tell whether they did.
+    """
+    Matches replies to requests and takes their events.
 
-    Args:
-        steps: Takes the events.
-        middleware: Cancels goals.
-        recorder: Is told what matches nothing.
-        calls: Service calls under way.
-        goals: Goals under way.
+    Methods that take one tell whether they did.
+
+    :param steps: Takes the events.
+    :param middleware: Cancels goals.
+    :param recorder: Is told what matches nothing.
+    :param calls: Service calls under way.
+    :param goals: Goals under way.
     """
 
     __slots__ = ('_calls', '_goals', '_middleware', '_recorder', '_steps')
@@ -34,12 +36,16 @@ class Replies:
         self._goals = goals
 
     def forget(self) -> None:
-        """The model starts again: what is under way is nothing to it, but the end of goals is still awaited."""
+        """
+        Let the model start again.
+
+        What is under way is nothing to it, but the end of goals is still awaited.
+        """
         self._calls.clear()
         self._goals.leave_model()
 
     def deadline_s(self) -> float:
-        """Return the reading of the clock, in seconds, at which the next call or goal is over its time."""
+        """Return the clock's reading, in seconds, at which the next call or goal is late."""
         return min(self._calls.deadline_s(), self._goals.deadline_s())
 
     def expire(self, now_s: float) -> None:
@@ -58,7 +64,7 @@ class Replies:
             request_cancel(self._middleware, goal)
 
     def reply(self, request_id: int, data: Any) -> bool:
-        """A service call was answered."""
+        """Take in that a service call was answered."""
         service = self._close_call(request_id)
         if service is None:
             return False
@@ -66,7 +72,7 @@ class Replies:
         return True
 
     def call_failed(self, request_id: int, reason: str) -> bool:
-        """A service call will not be answered."""
+        """Take in that a service call will not be answered."""
         service = self._close_call(request_id)
         if service is None:
             return False
@@ -74,7 +80,7 @@ class Replies:
         return True
 
     def goal_accepted(self, goal_id: int) -> None:
-        """A goal was accepted: a cancel that was decided before is sent now."""
+        """Note that a goal was accepted: a cancel that was decided before is sent now."""
         goal = self._find_goal(goal_id, 'an acceptance')
         if goal is not None:
             goal.is_accepted = True
@@ -82,7 +88,7 @@ class Replies:
                 request_cancel(self._middleware, goal)
 
     def feedback(self, goal_id: int, data: Any) -> bool:
-        """A goal's server told how far it is."""
+        """Take in how far a goal's server is."""
         goal = self._find_goal(goal_id, 'feedback')
         if goal is None:
             return False
@@ -93,10 +99,10 @@ class Replies:
         return True
 
     def goal_ended(self, goal_id: int, outcome: str, data: Any) -> bool:
-        """A goal's end is known, or its server is lost.
+        """
+        Take in a goal's end, or that its server is lost.
 
-        Raises:
-            ExecutionError: There is no such outcome.
+        :raises ExecutionError: There is no such outcome.
         """
         if outcome not in OUTCOMES:
             raise ExecutionError("a goal cannot end as '{}'".format(outcome))
@@ -115,10 +121,10 @@ class Replies:
         return goal.is_running
 
     def cancel_refused(self, goal_id: int, ended: bool) -> None:
-        """A cancel was refused; that means nothing if the goal had ended.
+        """
+        Note that a cancel was refused; that means nothing if the goal had ended.
 
-        Raises:
-            ExecutionError: The goal is running.
+        :raises ExecutionError: The goal is running.
         """
         goal = None if ended else self._find_goal(goal_id, 'a refused cancel')
         if goal is not None:

@@ -21,14 +21,14 @@ _MESSAGE = 'incoming message'
 
 
 class Request(NamedTuple):
-    """A request.
+    """
+    A request.
 
-    Attributes:
-        name: Its communication.
-        event: Its event.
-        identifier: Identifier that its message goes to.
-        kind: `incoming message`, `service` or `action`.
-        keeps_acting: True if that is a release identifier.
+    :ivar name: Its communication.
+    :ivar event: Its event.
+    :ivar identifier: Identifier that its message goes to.
+    :ivar kind: `incoming message`, `service` or `action`.
+    :ivar keeps_acting: True if that is a release identifier.
     """
 
     name: str
@@ -41,11 +41,11 @@ class Request(NamedTuple):
 def requests_of(
     infos: Sequence[CommunicationInfo], released: Sequence[str]
 ) -> Tuple[Request, ...]:
-    """The requests of a model, in source order.
+    """
+    Return the requests of a model, in source order.
 
-    Args:
-        infos: Its communications.
-        released: The release identifiers.
+    :param infos: Its communications.
+    :param released: The release identifiers.
     """
     return tuple(
         Request(
@@ -60,7 +60,7 @@ def requests_of(
 
 
 def by_identifier(requests: Sequence[Request]) -> Dict[str, Tuple[str, ...]]:
-    """The communications of each release identifier."""
+    """Return the communications of each release identifier."""
     found: Dict[str, Tuple[str, ...]] = {}
     for request in requests:
         if request.keeps_acting:
@@ -69,18 +69,18 @@ def by_identifier(requests: Sequence[Request]) -> Dict[str, Tuple[str, ...]]:
 
 
 class Decisions:
-    """Part of an executor that issues requests, at most one in a decision.
+    """
+    Part of an executor that issues requests, at most one in a decision.
 
-    Args:
-        system: The controlled system.
-        middleware: Middleware that requests go to.
-        requests: All of them, in source order.
-        steps: Steps that take their events.
-        recorder: Recorder of requests that cannot be issued.
-        releases: Messages that keep acting.
-        calls: Service calls under way.
-        goals: Goals under way.
-        policy: Policy that decides between enabled requests, by number; may be replaced.
+    :param system: The controlled system.
+    :param middleware: Middleware that requests go to.
+    :param requests: All of them, in source order.
+    :param steps: Steps that take their events.
+    :param recorder: Recorder of requests that cannot be issued.
+    :param releases: Messages that keep acting.
+    :param calls: Service calls under way.
+    :param goals: Goals under way.
+    :param policy: Policy that decides between enabled requests, by number; may be replaced.
     """
 
     __slots__ = (
@@ -118,11 +118,11 @@ class Decisions:
         self.policy = policy
 
     def decide(self, now_s: float) -> bool:
-        """Issue one of the enabled requests of this stable state, if there is any.
+        """
+        Issue one of the enabled requests of this stable state, if there is any.
 
-        Returns:
-            Whether a service was called or a goal was sent, so that something new waits for time
-            to pass.
+        :returns: True if a service was called or a goal was sent, so that something new waits for
+            time to pass.
         """
         enabled = self._steps.enabled
         if enabled is None:
@@ -138,7 +138,11 @@ class Decisions:
         return issued is not None and issued.kind != _MESSAGE
 
     def _find_enabled(self) -> Tuple[int, ...]:
-        """Numbers of the requests that may be issued; not of an action whose old goal may still be under way."""
+        """
+        Numbers of the requests that may be issued.
+
+        Not of an action whose old goal may still be under way.
+        """
         enabled, goals = self._system.enabled_requests(), self._goals
         if not goals:
             return enabled
@@ -147,7 +151,7 @@ class Decisions:
         )
 
     def _split(self, enabled: Tuple[int, ...]) -> Tuple[Tuple[int, ...], Tuple[int, ...]]:
-        """The requests whose message would end a release that waits, and the others."""
+        """Return the requests whose message would end a release that waits, and the others."""
         names = {
             name
             for identifier in self._releases.waiting
@@ -157,7 +161,11 @@ class Decisions:
         return ending, tuple([number for number in enabled if number not in ending])
 
     def _issue_one_of(self, candidates: Tuple[int, ...], now_s: float) -> Optional[Request]:
-        """Issue what the policy chooses, or the next if its data is unknown or does not fit; what was issued."""
+        """
+        Issue what the policy chooses, or the next if its data is unknown or does not fit.
+
+        What was issued.
+        """
         policy = self.policy
         while candidates:
             chosen = policy.choose(candidates)
@@ -208,7 +216,7 @@ class Decisions:
         return True
 
     def _withhold(self, request: Request, reason: str) -> bool:
-        """A request cannot be issued: what acts on its identifier is released at once."""
+        """Take in that a request cannot be issued: what acts on its identifier is released."""
         self._recorder.unknown(request.event, (reason,))
         if request.keeps_acting and self._releases.is_acting(request.identifier):
             self._steps.release(request.identifier)

@@ -1,4 +1,5 @@
-"""Common part of the executors of both deployments, around any `ControlledSystem`.
+"""
+Common part of the executors of both deployments, around any `ControlledSystem`.
 
 It covers semantics part 3, points 1 to 4 and 8.
 
@@ -54,14 +55,14 @@ class Status(str, Enum):
 
 
 class DeploymentError(ValueError):
-    """The supervisor was made for another deployment, or its model cannot be deployed like this."""
+    """A supervisor made for another deployment, or of a model that cannot be deployed so."""
 
 
 _Method = TypeVar('_Method', bound=Callable[..., None])
 
 
 def guarded(method: _Method) -> _Method:
-    """The method with every exception turned into a fault, and what is left to do done after it."""
+    """Return the method with each exception turned into a fault, and the rest done after it."""
 
     @wraps(method)
     def wrapper(self: Runner, *arguments: Any, **named: Any) -> None:
@@ -75,22 +76,19 @@ def guarded(method: _Method) -> _Method:
 
 
 class Runner:
-    """Runner that takes what comes from the robot, and brings the robot to rest.
+    """
+    Runner that takes what comes from the robot, and brings the robot to rest.
 
-    Args:
-        system: Plants, requirements and supervisor with their state.
-        robot: The robot's side of the middleware.
-        deployment: `controller` or `layer`.
-        settings: Settings that the deployment chose; the defaults if None.
-        clock: The only source of time; the computer's if None.
-        log: The event log; none if None.
-
-    Attributes:
-        settings: The settings in force, release identifiers spelled out.
-
-    Raises:
-        DeploymentError: The model has actions and the supervisor was made for another deployment.
-        SettingsError: A setting is wrong, or names what the model does not have.
+    :param system: Plants, requirements and supervisor with their state.
+    :param robot: The robot's side of the middleware.
+    :param deployment: `controller` or `layer`.
+    :param settings: Settings that the deployment chose; the defaults if None.
+    :param clock: The only source of time; the computer's if None.
+    :param log: The event log; none if None.
+    :ivar settings: The settings in force, release identifiers spelled out.
+    :raises DeploymentError: The model has actions and the supervisor was made for another
+        deployment.
+    :raises SettingsError: A setting is wrong, or names what the model does not have.
     """
 
     def __init__(
@@ -143,7 +141,7 @@ class Runner:
 
     @property
     def status(self) -> Status:
-        """Current status of the executor."""
+        """Return current status of the executor."""
         if self._safe_stop.reasons:
             return (
                 Status.STOPPING
@@ -161,29 +159,32 @@ class Runner:
 
     @property
     def is_faulty(self) -> bool:
-        """True if a fault stopped it; only `restart` ends that."""
+        """Return True if a fault stopped it; only `restart` ends that."""
         return _FAULT in self._safe_stop.reasons
 
     @property
     def missing_sensors(self) -> Tuple[str, ...]:
-        """Identifiers of the sensors with a maximum age that have not come since the start."""
+        """Return identifiers of the sensors with a maximum age that have not come yet."""
         return self._sensors.unseen()
 
     @property
     def counters(self) -> Counters:
-        """Counts of what went wrong so far."""
+        """Return counts of what went wrong so far."""
         return self._recorder.counters()
 
     # What an adapter tells.
 
     @guarded
     def start(self) -> None:
-        """Begin in the initial state; what comes earlier is ignored. Does nothing the second time."""
+        """Begin in the initial state; what comes earlier is ignored. Idempotent."""
         if not self._is_started:
             self._begin()
 
     def watch(self) -> None:
-        """Time has passed, but no period: stale sensors, replies that did not come, messages and cancels still owed.
+        """
+        Time has passed, but no period.
+
+        Stale sensors, replies that did not come, messages and cancels still owed.
 
         An adapter with a long period calls this in between: none of these may wait for the next
         decision.
@@ -198,12 +199,14 @@ class Runner:
             self._fail(describe_error(error))
 
     def receive(self, identifier: str, data: Any) -> None:
-        """Take a message of the robot: one batch, the events of all messages of the model that it stands for.
+        """
+        Take a message of the robot.
 
-        Args:
-            identifier: Identifier on which it came.
-            data: Mapping or object with the properties, or the plain value of a basic type; None
-                for no data.
+        One batch, the events of all messages of the model that it stands for.
+
+        :param identifier: Identifier on which it came.
+        :param data: Mapping or object with the properties, or the plain value of a basic type;
+            None for no data.
         """
         # This is written out for speed: the cycle time of the controller.
         if not self._is_started:
@@ -230,55 +233,58 @@ class Runner:
 
     @guarded
     def on_reply(self, request_id: int, data: Any) -> None:
-        """A service call was answered."""
+        """Take in the reply to a service call."""
         self._look_at_clock()
         self._take_reply(request_id, data)
 
     @guarded
     def on_call_failed(self, request_id: int, reason: str) -> None:
-        """A service call will not be answered: its server is absent or lost, or refuses it."""
+        """Note that a service call has no reply: its server is absent, lost or refuses it."""
         self._look_at_clock()
         if self._replies.call_failed(request_id, reason):
             self._end_batch()
 
     @guarded
     def on_goal_accepted(self, goal_id: int) -> None:
-        """A goal was accepted by its server."""
+        """Note that a goal was accepted by its server."""
         self._look_at_clock()
         self._replies.goal_accepted(goal_id)
 
     @guarded
     def on_feedback(self, goal_id: int, data: Any) -> None:
-        """A goal's server told how far it is."""
+        """Take in how far a goal's server is."""
         self._look_at_clock()
         self._take_feedback(goal_id, data)
 
     @guarded
     def on_goal_ended(self, goal_id: int, outcome: str, data: Any = None) -> None:
-        """Take the end of a goal, or the loss of its server.
+        """
+        Take the end of a goal, or the loss of its server.
 
-        Args:
-            goal_id: Id of the goal.
-            outcome: `succeeded`, `rejected`, `aborted`, `cancelled` or `lost`.
-            data: Its result, if it succeeded.
+        :param goal_id: Id of the goal.
+        :param outcome: `succeeded`, `rejected`, `aborted`, `cancelled` or `lost`.
+        :param data: Its result, if it succeeded.
         """
         self._look_at_clock()
         self._take_end(goal_id, outcome, data)
 
     @guarded
     def on_cancel_refused(self, goal_id: int, ended: bool) -> None:
-        """Take the refusal of a cancel.
+        """
+        Take the refusal of a cancel.
 
-        Args:
-            goal_id: Id of the goal.
-            ended: True if the reason is that the goal had ended already; its result follows or
-                came already.
+        :param goal_id: Id of the goal.
+        :param ended: True if the reason is that the goal had ended already; its result follows or
+            came already.
         """
         self._look_at_clock()
         self._replies.cancel_refused(goal_id, ended)
 
     def stop(self, reason: str, is_fault: bool = False) -> None:
-        """Come to rest until `restart`: on a signal, or, if `is_fault`, on a fault that the adapter found.
+        """
+        Come to rest until `restart`.
+
+        On a signal, or, if `is_fault`, on a fault that the adapter found.
 
         Goals that are running are cancelled: the status is `stopping` until they have ended, 0.5 s
         at most.
@@ -291,7 +297,11 @@ class Runner:
 
     @guarded
     def restart(self) -> None:
-        """Begin again in the initial state, whatever happened; goals and calls under way are the old run's."""
+        """
+        Begin again in the initial state, whatever happened.
+
+        Goals and calls under way are the old run's.
+        """
         self._now_s = self._clock.monotonic()
         if not self._safe_stop.reasons or self._safe_stop.unsent:
             self._come_to_rest()
@@ -324,7 +334,8 @@ class Runner:
         return min(self._replies.deadline_s(), self._sensors.deadline_s(now))
 
     def _check_time(self, now: float) -> None:
-        """Handle what is over by now.
+        """
+        Handle what is over by now.
 
         Never raises: after a fault, too, what comes is handled; a goal whose end were lost would
         never have ended.
@@ -335,7 +346,7 @@ class Runner:
             self._fail(describe_error(error))
 
     def _end_what_is_over(self, now: float) -> None:
-        """Replies that did not come in time, and stale sensors."""
+        """Take in replies that did not come in time, and stale sensors."""
         self._replies.expire(now)
         for name, identifier in self._sensors.stale(now):
             if _stale_key(name) not in self._safe_stop.reasons:
@@ -343,7 +354,7 @@ class Runner:
         self._deadline_s = self._next_deadline(now)
 
     def _see(self, name: str) -> None:
-        """A message came: its sensor is fresh, and a stop because it was not is over."""
+        """Note that a message came: its sensor is fresh, and a stop because it was not is over."""
         if self._sensors.see(name, self._now_s):
             if self._safe_stop.reasons.pop(_stale_key(name), None) is not None:
                 self._recorder.note('resume', '{} is back'.format(name))
@@ -379,19 +390,23 @@ class Runner:
     # Safe stop.
 
     def _fail(self, reason: str) -> None:
-        """A fault. Never raises."""
+        """Note a fault. Never raises."""
         self._recorder.fault(reason)
         self._safe_stop.reasons.setdefault(_FAULT, reason)
         self._come_to_rest()
 
     def _stop(self, key: str, reason: str) -> None:
-        """A safe stop that is no fault. Never raises."""
+        """Make a safe stop that is no fault. Never raises."""
         self._recorder.note('stop', reason)
         self._safe_stop.reasons.setdefault(key, reason)
         self._come_to_rest()
 
     def _come_to_rest(self) -> None:
-        """Nothing is requested any more, wheels stop, goals are cancelled; what fails is a fault. Never raises."""
+        """
+        Nothing is requested any more, wheels stop, goals are cancelled; what fails is a fault.
+
+        Never raises.
+        """
         self._may_request = False
         for failure in self._safe_stop.stop(self._now_s):
             self._recorder.fault(failure)

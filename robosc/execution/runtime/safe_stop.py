@@ -1,4 +1,8 @@
-"""Safe stop, whatever happens: default messages on release identifiers, goals cancelled (semantics 3.8)."""
+"""
+Safe stop, whatever happens.
+
+Default messages on release identifiers, goals cancelled (semantics 3.8).
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,7 @@ CANCEL_WAIT_S = 0.5
 
 
 def describe_error(error: BaseException) -> str:
-    """An exception in words."""
+    """Return an exception in words."""
     try:
         text = str(error)
     except Exception:
@@ -29,17 +33,15 @@ def request_cancel(middleware: RobotSide, goal: Goal) -> None:
 
 
 class SafeStop:
-    """The reasons why an executor has stopped, and what it does to stop safely.
+    """
+    The reasons why an executor has stopped, and what it does to stop safely.
 
-    Args:
-        middleware: Middleware that sends default messages and cancels.
-        releases: The release identifiers.
-        goals: Goals under way.
-
-    Attributes:
-        reasons: Reasons in words, by a key; nothing may be requested while there is one.
-        awaited_until_s: Time until which the goals' ends are awaited, in seconds.
-        unsent: Release identifiers whose default message could not be sent so far.
+    :param middleware: Middleware that sends default messages and cancels.
+    :param releases: The release identifiers.
+    :param goals: Goals under way.
+    :ivar reasons: Reasons in words, by a key; nothing may be requested while there is one.
+    :ivar awaited_until_s: Time until which the goals' ends are awaited, in seconds.
+    :ivar unsent: Release identifiers whose default message could not be sent so far.
     """
 
     __slots__ = ('_goals', '_middleware', '_releases', 'awaited_until_s', 'reasons', 'unsent')
@@ -53,9 +55,9 @@ class SafeStop:
         self.unsent: Tuple[str, ...] = ()
 
     def stop(self, now_s: float) -> List[str]:
-        """Send every default message and cancel every goal; what failed, in words. Never raises."""
+        """Send every default message, cancel every goal; return what failed. Never raises."""
         self.unsent = self._releases.identifiers
-        for goal in self._goals.all():
+        for goal in self._goals.open_goals():
             goal.is_cancel_wanted = True
         self.awaited_until_s = now_s + CANCEL_WAIT_S
         failures = self.retry()
@@ -63,7 +65,11 @@ class SafeStop:
         return failures
 
     def retry(self) -> List[str]:
-        """Send the default messages and cancels that are still owed; what failed, in words. Never raises."""
+        """
+        Send the default messages and cancels that are still owed; what failed, in words.
+
+        Never raises.
+        """
         failures: List[str] = []
         owed: List[str] = []
         for identifier in self.unsent:
@@ -77,7 +83,7 @@ class SafeStop:
                     )
                 )
         self.unsent = tuple(owed)
-        for goal in self._goals.all():
+        for goal in self._goals.open_goals():
             if goal.is_cancel_wanted:
                 try:
                     request_cancel(self._middleware, goal)

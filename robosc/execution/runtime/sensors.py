@@ -1,4 +1,4 @@
-"""Outgoing messages that must keep coming: those of identifiers with a `max_age` (semantics 3.8)."""
+"""Outgoing messages that must keep coming: those with a `max_age` (semantics 3.8)."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from robosc.execution.runtime.calls import FOREVER
 
 
 class _Sensor:
-    """An outgoing message with a maximum age.
+    """
+    An outgoing message with a maximum age.
 
-    Attributes:
-        identifier: Identifier on which it comes.
-        max_age_s: Seconds after which it is stale.
-        seen_s: Time when it came last, in seconds; before the first time, when the executor
-            started.
-        was_seen: True if it came since the start.
+    :ivar identifier: Identifier on which it comes.
+    :ivar max_age_s: Seconds after which it is stale.
+    :ivar seen_s: Time when it came last, in seconds; before the first time, when the executor
+        started.
+    :ivar was_seen: True if it came since the start.
     """
 
     __slots__ = ('identifier', 'max_age_s', 'name', 'seen_s', 'was_seen')
@@ -29,12 +29,13 @@ class _Sensor:
 
 
 class Sensors:
-    """Tells which sensors are stale. Several messages of the model may come on one identifier.
+    """
+    Tells which sensors are stale. Several messages of the model may come on one identifier.
 
-    Args:
-        messages: Name and identifier of every outgoing message, in source order, and its maximum
-            age in seconds as the model has it, or None.
-        max_age_s: Maximum age by identifier, as the deployment has it: it stands above the model.
+    :param messages: Name and identifier of every outgoing message, in source order, and its
+        maximum age in seconds as the model has it, or None.
+    :param max_age_s: Maximum age by identifier, as the deployment has it: it stands above the
+        model.
     """
 
     __slots__ = ('_sensors',)
@@ -62,7 +63,7 @@ class Sensors:
             sensor.was_seen = False
 
     def see(self, name: str, now_s: float) -> bool:
-        """A message came: whether it is one that is watched."""
+        """Take in a message; return True if it is one that is watched."""
         sensor = self._sensors.get(name)
         if sensor is None:
             return False
@@ -75,7 +76,7 @@ class Sensors:
         return all(sensor.was_seen for sensor in self._sensors.values())
 
     def unseen(self) -> Tuple[str, ...]:
-        """Identifiers of the sensors that have not come since the start, each once."""
+        """Return identifiers of the sensors that have not come since the start, each once."""
         return tuple(
             dict.fromkeys(item.identifier for item in self._sensors.values() if not item.was_seen)
         )
@@ -89,6 +90,6 @@ class Sensors:
         ]
 
     def deadline_s(self, now_s: float) -> float:
-        """Return the time, in seconds, at which the next sensor that is not stale becomes stale."""
+        """Return the time, in seconds, at which the next fresh sensor becomes stale."""
         ages = (sensor.seen_s + sensor.max_age_s for sensor in self._sensors.values())
         return min((age for age in ages if age > now_s), default=FOREVER)

@@ -22,25 +22,25 @@ class SettingsError(ValueError):
 
 
 class Settings(NamedTuple):
-    """Settings that a deployment may choose; `validated` makes them out of plain values.
+    """
+    Settings that a deployment may choose; `validated` makes them out of plain values.
 
-    Attributes:
-        period_s: Time between decisions, in seconds.
-        policy: Policy that chooses the enabled request to issue: `fair`, `priority` or `random`.
-        priority: Names of communications, most urgent first, for the policy `priority`.
-        seed: Seed of the policy `random`.
-        every: Times of decisions: each `period`, or after each batch as well (`event`).
-        release_identifiers: Identifiers whose last message keeps acting; None: every incoming
-            message that is linked to geometry_msgs Twist or TwistStamped.
-        max_age_s: Seconds without a message after which an outgoing message is stale, by its
-            identifier.
-        service_timeout_s: Seconds until a service call without a reply counts as failed; None:
-            never.
-        action_timeout_s: Seconds until a goal without a result counts as failed; None: never.
-        on_unknown: Reaction when an enum falls to its default past an unknown rule: `default`,
-            `keep`, `fault`.
-        command_timeout_s: Seconds without a message from the existing controller on a release
-            identifier after which its last one is released, in a supervision layer; 0: never.
+    :ivar period_s: Time between decisions, in seconds.
+    :ivar policy: Policy that chooses the enabled request to issue: `fair`, `priority` or `random`.
+    :ivar priority: Names of communications, most urgent first, for the policy `priority`.
+    :ivar seed: Seed of the policy `random`.
+    :ivar every: Times of decisions: each `period`, or after each batch as well (`event`).
+    :ivar release_identifiers: Identifiers whose last message keeps acting; None: every incoming
+        message that is linked to geometry_msgs Twist or TwistStamped.
+    :ivar max_age_s: Seconds without a message after which an outgoing message is stale, by its
+        identifier.
+    :ivar service_timeout_s: Seconds until a service call without a reply counts as failed; None:
+        never.
+    :ivar action_timeout_s: Seconds until a goal without a result counts as failed; None: never.
+    :ivar on_unknown: Reaction when an enum falls to its default past an unknown rule: `default`,
+        `keep`, `fault`.
+    :ivar command_timeout_s: Seconds without a message from the existing controller on a release
+        identifier after which its last one is released, in a supervision layer; 0: never.
     """
 
     period_s: float = 0.1
@@ -60,14 +60,18 @@ OTHER_DEPLOYMENT = {
     'controller': ('command_timeout_s',),
     'layer': ('policy', 'priority', 'seed', 'every'),
 }
-"""For each deployment the settings that mean something in the other one only: a layer decides nothing."""
+"""
+For each deployment the settings that mean something in the other one only.
+
+A layer decides nothing.
+"""
 
 
 def settings_from(given: Mapping[str, Any]) -> Settings:
-    """Valid settings from named plain values; what is not given has its default.
+    """
+    Return valid settings from named plain values; what is not given has its default.
 
-    Raises:
-        SettingsError: A name is unknown or a value is wrong.
+    :raises SettingsError: A name is unknown or a value is wrong.
     """
     for name in given:
         if name not in Settings._fields:
@@ -78,10 +82,10 @@ def settings_from(given: Mapping[str, Any]) -> Settings:
 
 
 def validated(settings: Settings) -> Settings:
-    """The same settings with numbers as floats and lists as tuples.
+    """
+    Return the same settings with numbers as floats and lists as tuples.
 
-    Raises:
-        SettingsError: A value is wrong.
+    :raises SettingsError: A value is wrong.
     """
     release = settings.release_identifiers
     return Settings(
@@ -100,10 +104,10 @@ def validated(settings: Settings) -> Settings:
 
 
 def settings_for(settings: Settings, description: Description) -> Settings:
-    """Valid settings with every name known to the model and the release identifiers spelled out.
+    """
+    Return valid settings: names known to the model, release identifiers spelled out.
 
-    Raises:
-        SettingsError: A value is wrong, or a name is none of the model's.
+    :raises SettingsError: A value is wrong, or a name is none of the model's.
     """
     checked = validated(settings)
     infos = description.communications
@@ -128,14 +132,12 @@ def settings_for(settings: Settings, description: Description) -> Settings:
 
 
 def require_settings_of(settings: Settings, deployment: str) -> None:
-    """Do nothing if every setting that means nothing in a deployment has its default.
+    """
+    Do nothing if every setting that means nothing in a deployment has its default.
 
-    Args:
-        settings: Valid settings.
-        deployment: `controller` or `layer`.
-
-    Raises:
-        SettingsError: One has not.
+    :param settings: Valid settings.
+    :param deployment: `controller` or `layer`.
+    :raises SettingsError: One has not.
     """
     defaults = Settings()._asdict()
     for name in OTHER_DEPLOYMENT[deployment]:
@@ -146,7 +148,7 @@ def require_settings_of(settings: Settings, deployment: str) -> None:
 
 
 def default_release_identifiers(description: Description) -> Tuple[str, ...]:
-    """Identifiers of incoming messages linked to geometry_msgs Twist or TwistStamped, in source order."""
+    """List identifiers of incoming messages linked to Twist or TwistStamped, in source order."""
     found = (
         info.identifier
         for info in description.communications

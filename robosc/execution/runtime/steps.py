@@ -1,4 +1,5 @@
-"""Events of the environment, and the silent steps that follow them (semantics 3.1 and 3.3).
+"""
+Events of the environment, and the silent steps that follow them (semantics 3.1 and 3.3).
 
 A state is *stable* when no silent step is enabled in it. What must be judged there, releases and
 the requirements of running goals, is judged once for each stable state that is new. One that was
@@ -23,22 +24,20 @@ class ExecutionError(Exception):
 
 
 class Steps:
-    """Part of an executor that takes events of a controlled system.
+    """
+    Part of an executor that takes events of a controlled system.
 
-    Args:
-        system: The controlled system.
-        middleware: Middleware that default messages and cancels go to.
-        recorder: Recorder of everything that happens.
-        releases: Messages that keep acting.
-        goals: Goals under way.
-        on_unknown: Meaning of an unknown enum: `default`, `keep` or `fault`.
-
-    Attributes:
-        enabled: Requests that the stable state enables, by number, once somebody worked it out,
-            else None.
-        unchanging: Messages whose request was issued in this stable state and changed nothing:
-            their data, and whether that is the default. A request's data and its step depend on
-            nothing but the state.
+    :param system: The controlled system.
+    :param middleware: Middleware that default messages and cancels go to.
+    :param recorder: Recorder of everything that happens.
+    :param releases: Messages that keep acting.
+    :param goals: Goals under way.
+    :param on_unknown: Meaning of an unknown enum: `default`, `keep` or `fault`.
+    :ivar enabled: Requests that the stable state enables, by number, once somebody worked it out,
+        else None.
+    :ivar unchanging: Messages whose request was issued in this stable state and changed nothing:
+        their data, and whether that is the default. A request's data and its step depend on
+        nothing but the state.
     """
 
     __slots__ = (
@@ -86,15 +85,13 @@ class Steps:
         self._pending = None
 
     def happen_with_data(self, event: str, data: Any, may_keep: bool = False) -> bool:
-        """Convert data and take the event that it came with.
+        """
+        Convert data and take the event that it came with.
 
-        Args:
-            event: An uncontrollable event.
-            data: Data that came.
-            may_keep: True if the setting `keep` applies: it does to messages.
-
-        Returns:
-            True if anything counts as having come; False if the data is unknown and `keep`
+        :param event: An uncontrollable event.
+        :param data: Data that came.
+        :param may_keep: True if the setting `keep` applies: it does to messages.
+        :returns: True if anything counts as having come; False if the data is unknown and `keep`
             applies.
         """
         reading = self._system.read(event, data)
@@ -110,10 +107,10 @@ class Steps:
         return True
 
     def happen_at_once(self, identifier: str, data: Any) -> bool:
-        """Take all events of a message that came, if nothing is unknown and no log wants to know about each of them.
+        """
+        Take all events of a message, if nothing is unknown and no log wants to know each of them.
 
-        Returns:
-            Whether they were taken; if not, nothing has happened.
+        :returns: True if they were taken; if not, nothing has happened.
         """
         skipped = None if self._recorder.is_active else self._system.receive(identifier, data)
         if skipped is None:
@@ -123,12 +120,12 @@ class Steps:
         return True
 
     def happen(self, event: str, reading: Optional[Reading], data: Any) -> None:
-        """Take an uncontrollable event, if the state accepts it.
+        """
+        Take an uncontrollable event, if the state accepts it.
 
-        Args:
-            event: The event.
-            reading: Its converted data, if it carries any.
-            data: Data that the log reports for it.
+        :param event: The event.
+        :param reading: Its converted data, if it carries any.
+        :param data: Data that the log reports for it.
         """
         skipped = self._system.step(event, reading)
         if skipped is None:
@@ -140,10 +137,10 @@ class Steps:
             self._skip(event, skipped)
 
     def take(self, event: str, data: Any) -> None:
-        """Take a controllable event that is enabled.
+        """
+        Take a controllable event that is enabled.
 
-        Raises:
-            ExecutionError: The state does not accept it.
+        :raises ExecutionError: The state does not accept it.
         """
         skipped = self._system.step(event)
         if skipped is None:
@@ -154,18 +151,16 @@ class Steps:
             self._skip(event, skipped)
 
     def settle(self, issuing: Optional[str] = None) -> bool:
-        """Silent steps to the end; then releases and running goals are judged, if the stable state is another one.
+        """
+        Silent steps to the end.
 
-        Args:
-            issuing: Communication whose request was just taken and whose message is about to go
-                out, if any.
+        Then releases and running goals are judged, if the stable state is another one.
 
-        Returns:
-            Whether the stable state may be another one.
-
-        Raises:
-            LivelockError: They do not end.
-            ExecutionError: Something was unknown, and that is a fault.
+        :param issuing: Communication whose request was just taken and whose message is about to go
+            out, if any.
+        :returns: True if the stable state may be another one.
+        :raises LivelockError: They do not end.
+        :raises ExecutionError: Something was unknown, and that is a fault.
         """
         has_changed = self._system.changes != self._stable
         if has_changed:
@@ -200,7 +195,11 @@ class Steps:
             event = self._silent_step()
 
     def _silent_step(self) -> Optional[str]:
-        """Take one silent step, cancels first, then resets, then taus: its event, or None if there is none."""
+        """
+        Take one silent step, cancels first, then resets, then taus.
+
+        Its event, or None if there is none.
+        """
         if self._goals:
             goal = self._goals.to_cancel()
             if goal is not None:
@@ -215,7 +214,7 @@ class Steps:
         return silent
 
     def _skip(self, event: str, skipped: Tuple[str, ...]) -> None:
-        """Updates were skipped."""
+        """Take in that updates were skipped."""
         self._recorder.unknown(event, skipped)
         self._handle_unknown(event, skipped)
 

@@ -243,7 +243,7 @@ def declaration(parameter: Parameter) -> str:
     else:
         items = ", ".join(string_literal(item) for item in default)
         value = f"Value(std::in_place_type<Texts>, Texts{{{items}}})"
-    range_ = "std::nullopt" if parameter.range is None else "Range{{{!r}, {!r}}}".format(*parameter.range)
+    range_ = "std::nullopt" if parameter.bounds is None else "Range{{{!r}, {!r}}}".format(*parameter.bounds)
     return f"{{{string_literal(parameter.name)}, {value}, {string_literal(parameter.description)}, {range_}}},"
 
 

@@ -9,7 +9,8 @@ from importlib import resources
 
 _OWN = "robosc."
 _COPIED = re.compile(r"\n*A copy of this module stands in generated packages, which run on Python 3\.8 and later\.\n?")
-_WIDTH = 120
+WIDTH = 99
+"""Columns of generated Python: those of ament_flake8."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,22 +79,30 @@ def bundle(roots: tuple[str, ...]) -> Bundle:
 
 
 def statements(imports: frozenset[tuple[str, str | None]]) -> list[str]:
-    """Import statements, whole modules first, each module once."""
-    lines = [f"import {module}" for module in sorted(module for module, name in imports if name is None)]
-    by_module: dict[str, list[str]] = {}
-    for module, name in sorted((module, name) for module, name in imports if name is not None):
-        by_module.setdefault(module, []).append(name)
-    for module, names in by_module.items():
-        line = f"from {module} import {', '.join(names)}"
-        lines += (
-            [line] if len(line) <= _WIDTH else [f"from {module} import (", *(f"    {name}," for name in names), ")"]
+    """Import statements by module, whole modules before names of them."""
+    lines: list[str] = []
+    for module in sorted({module for module, _ in imports}, key=_place):
+        names = sorted(
+            (name for source, name in imports if source == module and name), key=lambda name: (name.lower(), name)
         )
+        if (module, None) in imports:
+            lines.append(f"import {module}")
+        if names:
+            line = f"from {module} import {', '.join(names)}"
+            lines += (
+                [line] if len(line) <= WIDTH else [f"from {module} import (", *(f"    {name}," for name in names), ")"]
+            )
     return lines
+
+
+def _place(module: str) -> tuple[int, str]:
+    """A module's place among imports, as linters of ROS want them: nearer packages first, then by name, in any case."""
+    return len(module) - len(module.lstrip(".")), module.lower()
 
 
 def section_title(lines: Sequence[str]) -> list[str]:
     """Comment lines that begin a part of a module."""
-    rule = "# " + "-" * (_WIDTH - 2)
+    rule = "# " + "-" * (WIDTH - 2)
     return [rule, *(f"# {line}".rstrip() for line in lines), rule, "", ""]
 
 

@@ -1,11 +1,13 @@
 """The target `python`: one file with the supervisor and its executor, and nothing else to install."""
 
+import ast
 import re
 
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets.code.naming import package_name
 from robosc.targets.files import GeneratedFiles
+from robosc.targets.python.bundle import statements
 from robosc.targets.python.generate import supervisor_module
 from robosc.targets.registry import GenerateOptions
 
@@ -54,8 +56,7 @@ and `LayerMiddleware`.
 """Text that stands at the top of a module."""
 
 
-_OF_SUPERVISOR = re.compile(r"from robosc\.(execution\.runtime\.[a-z0-9_]+|expressions\.values) import ")
-_OF_RUNTIME = re.compile(r"from robosc\.targets\.[a-z0-9_]+\.runtime\.(?P<module>[a-z0-9_]+) import ")
+_OF_SUPERVISOR = re.compile(r"robosc\.(execution\.runtime\.[a-z0-9_]+|expressions\.values)")
 
 
 def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles:
@@ -74,10 +75,25 @@ def beside_supervisor(text: str) -> str:
 
     What that one holds is imported from there, other runtime modules from the folder.
     """
-    lines = []
-    for line in text.splitlines(keepends=True):
-        if line.lstrip().startswith("from robosc."):
-            line = _OF_SUPERVISOR.sub("from ..supervisor import ", line, count=1)
-            line = _OF_RUNTIME.sub(r"from .\g<module> import ", line, count=1)
-        lines.append(line)
-    return "".join(lines)
+    lines = text.splitlines(keepends=True)
+    own = [
+        node
+        for node in ast.parse(text).body
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("robosc.")
+    ]
+    if not own:
+        return text
+    names: dict[str, set[str]] = {}
+    for node in own:
+        names.setdefault(_beside(node.module or ""), set()).update(alias.name for alias in node.names)
+    # The formatter keeps imports of the project together, after all others.
+    first, last = own[0].lineno - 1, own[-1].end_lineno
+    imports = frozenset((module, name) for module, found in names.items() for name in found)
+    return "".join([*lines[:first], *(line + "\n" for line in statements(imports)), *lines[last:]])
+
+
+def _beside(module: str) -> str:
+    """The name by which a runtime module imports another one of a package."""
+    if _OF_SUPERVISOR.fullmatch(module):
+        return "..supervisor"
+    return "." + module.rpartition(".")[2]

@@ -44,7 +44,18 @@ def require_sound_python(folder: Path, rules: str = "F,E4,E7,E9,B,PLE") -> None:
         text = path.read_text()
         ast.parse(text, filename=str(path), feature_version=(3, 8))
         assert not re.search(r"^\s*(from|import) robosc", text, re.MULTILINE), path
-    ruff = [sys.executable, "-m", "ruff", "check", "--isolated", "--select", rules, str(folder)]
+    ruff = [
+        sys.executable,
+        "-m",
+        "ruff",
+        "check",
+        "--isolated",
+        "--target-version",
+        "py38",
+        "--select",
+        rules,
+        str(folder),
+    ]
     result = subprocess.run(ruff, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stdout
 

@@ -84,7 +84,18 @@ def test_python_files_run_on_3_8_and_name_nothing_undefined(name: str, tmp_path:
         if path.endswith(".py"):
             ast.parse(text, filename=path, feature_version=(3, 8))
             assert not re.search(r"^\s*(from|import) robosc", text, re.MULTILINE), path
-    ruff = [sys.executable, "-m", "ruff", "check", "--isolated", "--select", "F,E4,E7,E9,B,PLE", str(tmp_path)]
+    ruff = [
+        sys.executable,
+        "-m",
+        "ruff",
+        "check",
+        "--isolated",
+        "--target-version",
+        "py38",
+        "--select",
+        "F,E4,E7,E9,B,PLE",
+        str(tmp_path),
+    ]
     result = subprocess.run(ruff, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stdout
 
@@ -425,11 +436,11 @@ def test_a_wrong_parameter_is_one_clear_error(changes: dict[str, Any], complaint
 
 def test_the_ends_of_a_range_are_valid_and_what_lies_beyond_is_not() -> None:
     description = describe(example_supervisor(FOLLOWER))
-    ranged = [item for item in declarations(("/cmd_vel",)) if item.range is not None]
+    ranged = [item for item in declarations(("/cmd_vel",)) if item.bounds is not None]
     assert {item.name for item in ranged} == {"period", "service_timeout", "action_timeout", "server_wait"}
     for item in ranged:
-        assert item.range is not None
-        low, high = item.range
+        assert item.bounds is not None
+        low, high = item.bounds
         for value in (low, item.default, high):
             validate(given(**{item.name: value}), description)
         for value in (math.nextafter(low, -math.inf), math.nextafter(high, math.inf)):

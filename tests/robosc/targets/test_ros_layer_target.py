@@ -96,7 +96,18 @@ def test_python_files_run_on_3_8_and_name_nothing_undefined(files: GeneratedFile
         if path.endswith(".py"):
             ast.parse(text, filename=path, feature_version=(3, 8))
             assert not re.search(r"^\s*(from|import) robosc", text, re.MULTILINE), path
-    ruff = [sys.executable, "-m", "ruff", "check", "--isolated", "--select", "F,E4,E7,E9,B,PLE", str(folder)]
+    ruff = [
+        sys.executable,
+        "-m",
+        "ruff",
+        "check",
+        "--isolated",
+        "--target-version",
+        "py38",
+        "--select",
+        "F,E4,E7,E9,B,PLE",
+        str(folder),
+    ]
     result = subprocess.run(ruff, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stdout
 

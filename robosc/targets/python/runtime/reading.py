@@ -1,4 +1,7 @@
-"""Received numbers, with NaN for whatever is unknown: comparisons with NaN are false, so conditions stay plain Python.
+"""
+Received numbers, with NaN for whatever is unknown.
+
+Comparisons with NaN are false, so conditions stay plain Python.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -14,7 +17,7 @@ NAN = float('nan')
 
 
 def array(value: Any) -> Any:
-    """The elements of a received array; None where something else came."""
+    """Return the elements of a received array; None where something else came."""
     try:
         return array_part(value)
     except Exception:  # Foreign objects may do anything when they are asked for a part.
@@ -22,13 +25,13 @@ def array(value: Any) -> Any:
 
 
 def elements(value: Any, path: str, notes: Any, convert: Any) -> Any:
-    """Return a received array with every element converted; None where something else came.
+    """
+    Return a received array with every element converted; None where something else came.
 
-    Args:
-        value: Received value.
-        path: Place of the value, in words.
-        notes: A list that takes what was unknown, as texts and a flag.
-        convert: Function that takes an element, its path and the notes.
+    :param value: Received value.
+    :param path: Place of the value, in words.
+    :param notes: A list that takes what was unknown, as texts and a flag.
+    :param convert: Function that takes an element, its path and the notes.
     """
     found = array(value)
     if found is None:
@@ -37,13 +40,17 @@ def elements(value: Any, path: str, notes: Any, convert: Any) -> Any:
 
 
 def plain_elements(value: Any, convert: Any) -> Any:
-    """The same where there is nothing to note: `convert` takes an element alone."""
+    """Return the same where there is nothing to note: `convert` takes an element alone."""
     found = array(value)
     return None if found is None else [convert(item) for item in found]
 
 
 def noted_integer(value: Any, path: str, notes: Any, low: int, high: int) -> Any:
-    """A received integer moved into its declared range, noted if it was; None where something else came."""
+    """
+    Return a received integer moved into its declared range, noted if it was.
+
+    None where something else came.
+    """
     value = read_whole(value)
     if value is None:
         return None
@@ -52,7 +59,7 @@ def noted_integer(value: Any, path: str, notes: Any, low: int, high: int) -> Any
 
 
 def noted_enum(converted: Any, notes: Any) -> Any:
-    """The value of an enum from what its converter returned; what was unknown is noted."""
+    """Return the value of an enum from what its converter returned; what was unknown is noted."""
     value, words, is_unknown = converted
     notes.append((words, is_unknown))
     return value
@@ -69,7 +76,7 @@ def flag_of(notes: Any) -> bool:
 
 
 def number(value: Any) -> Any:
-    """A received number as a double; NaN where something else came."""
+    """Return a received number as a double; NaN where something else came."""
     if type(value) is float:
         return value
     result = read_double(value)
@@ -77,7 +84,11 @@ def number(value: Any) -> Any:
 
 
 def number_at(array: Any, index: int) -> Any:
-    """An element of a received array as a double; NaN outside the array or where something else came."""
+    """
+    Return an element of a received array as a double.
+
+    NaN outside the array or where something else came.
+    """
     try:
         value = array[index] if index < len(array) else None
     except Exception:  # As above.
@@ -86,41 +97,45 @@ def number_at(array: Any, index: int) -> Any:
 
 
 def integer(value: Any) -> Any:
-    """A received integer; NaN where something else came or it needs more than 32 bits."""
+    """Return a received integer; NaN where something else came or it needs more than 32 bits."""
     result = read_integer(value)
     return NAN if result is None else result
 
 
 def whole(value: Any) -> Any:
-    """A received integer of any size, for a declared range; NaN where something else came."""
+    """Return a received integer of any size, for a declared range; NaN for anything else."""
     result = read_whole(value)
     return NAN if result is None else result
 
 
 def clamped(value: Any, low: int, high: int) -> Any:
-    """A received integer moved into its declared range; NaN stays NaN."""
+    """Return a received integer moved into its declared range; NaN stays NaN."""
     if value < low:
         return low
     return high if value > high else value
 
 
 def moved(path: str, value: Any, low: int, high: int) -> Any:
-    """In words, that a received integer was moved into its declared range; no words if it was not."""
+    """Say that a received integer was moved into its declared range; '' if it was not."""
     if value < low or value > high:
         return (f'{path} is {value}, outside {low}..{high}',)
     return ()
 
 
 def known(value: Any) -> Any:
-    """A received integer as the rest of the world sees it: None where it is unknown."""
+    """Return a received integer as the rest of the world sees it: None where it is unknown."""
     return None if value != value else value
 
 
 def numbers_of(flags: Any) -> Any:
-    """The places of the flags that are set, from 0."""
+    """Return the places of the flags that are set, from 0."""
     return tuple(compress(range(len(flags)), flags))
 
 
 def stays_in_range(value: Any, low: int, high: int) -> bool:
-    """Return True if assigning a value does not leave a range; an unknown value is not assigned at all."""
+    """
+    Return True if assigning a value does not leave a range.
+
+    An unknown value is not assigned at all.
+    """
     return value is None or not (value < low or value > high)

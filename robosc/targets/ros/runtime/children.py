@@ -1,4 +1,7 @@
-"""A supervision layer and the controller behind it as child processes: they end together, and with their parent.
+"""
+A supervision layer and the controller behind it as child processes.
+
+They end together, and with their parent.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -32,13 +35,15 @@ def run_both(
     controller_command: Sequence[str],
     environment: Mapping[str, str],
 ) -> int:
-    """Run both until one of them ends or a signal comes: 1 if the controller failed, else the layer's status.
+    """
+    Run both until one of them ends or a signal comes.
 
-    Args:
-        name: Name that stands before what goes wrong, on standard error.
-        layer_command: Command that starts the layer.
-        controller_command: Command that starts the controller.
-        environment: Environment of the layer; the controller gets this process's.
+    1 if the controller failed, else the layer's status.
+
+    :param name: Name that stands before what goes wrong, on standard error.
+    :param layer_command: Command that starts the layer.
+    :param controller_command: Command that starts the controller.
+    :param environment: Environment of the layer; the controller gets this process's.
     """
     received: list[int] = []
     for number in _SIGNALS:
@@ -48,7 +53,9 @@ def run_both(
     status = 0
     try:
         # What is run is what the user wrote on the command line.
-        layer = subprocess.Popen(layer_command, env=environment, preexec_fn=end_with_parent)  # noqa: S603
+        layer = subprocess.Popen(  # noqa: S603
+            layer_command, env=environment, preexec_fn=end_with_parent
+        )
         controller = subprocess.Popen(controller_command, preexec_fn=end_with_parent)  # noqa: S603
         while not received and layer.poll() is None and controller.poll() is None:
             time.sleep(POLL_S)
@@ -63,7 +70,8 @@ def run_both(
 
 
 def _end_with_parent() -> Callable[[], Any] | None:
-    """Return the function that a child runs first, so that it is ended even where its parent is killed.
+    """
+    Return the function that a child runs first, to be ended even where its parent is killed.
 
     None where that cannot be had.
     """

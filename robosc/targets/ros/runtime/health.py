@@ -1,4 +1,5 @@
-"""Content of `/diagnostics` about a controller or a supervision layer.
+"""
+Content of `/diagnostics` about a controller or a supervision layer.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -21,12 +22,12 @@ class Level(IntEnum):
 
 
 class Health(NamedTuple):
-    """One report.
+    """
+    One report.
 
-    Attributes:
-        level: Severity.
-        message: Reason, in words.
-        values: Further values, by name.
+    :ivar level: Severity.
+    :ivar message: Reason, in words.
+    :ivar values: Further values, by name.
     """
 
     level: Level
@@ -35,13 +36,11 @@ class Health(NamedTuple):
 
 
 class HealthMonitor:
-    """Judges an executor.
+    """
+    Judges an executor.
 
-    Args:
-        executor: The executor.
-
-    Attributes:
-        missing_servers: Servers that the start waits for.
+    :param executor: The executor.
+    :ivar missing_servers: Servers that the start waits for.
     """
 
     def __init__(self, executor: Runner) -> None:
@@ -51,7 +50,7 @@ class HealthMonitor:
         self.missing_servers: tuple[str, ...] = ()
 
     def decided(self, took_s: float) -> None:
-        """A decision took so long."""
+        """Note how long a decision took."""
         self._decision_us = took_s * 1e6
 
     def next_interval(self) -> None:

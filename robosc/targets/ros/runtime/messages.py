@@ -1,4 +1,7 @@
-"""Between the model's data and ROS messages: every field is checked at start-up, every value before it is sent.
+"""
+Between the model's data and ROS messages.
+
+Every field is checked at start-up, every value before it is sent.
 
 ROS messages check nothing themselves: a number too large is wrapped, a None becomes garbage. So
 each field that is sent gets a conversion of its own, chosen from the message's own list of fields.
@@ -46,22 +49,22 @@ _GENPY_OWN = {
 
 
 class Topic(NamedTuple):
-    """A topic of the node.
+    """
+    A topic of the node.
 
-    Attributes:
-        identifier: Its name in the model.
-        package: Package of its message type.
-        type: Name of its message type.
-        published: Messages of the model that go out on it.
-        received: Messages of the model that come in on it.
-        publisher: Quality of service and depth of what goes out.
-        subscription: Quality of service and depth of what comes in.
-        frames: Frame of each message that goes out with its header filled in.
+    :ivar identifier: Its name in the model.
+    :ivar package: Package of its message type.
+    :ivar type_name: Name of its message type.
+    :ivar published: Messages of the model that go out on it.
+    :ivar received: Messages of the model that come in on it.
+    :ivar publisher: Quality of service and depth of what goes out.
+    :ivar subscription: Quality of service and depth of what comes in.
+    :ivar frames: Frame of each message that goes out with its header filled in.
     """
 
     identifier: str
     package: str
-    type: str
+    type_name: str
     published: tuple[str, ...]
     received: tuple[str, ...]
     publisher: Any
@@ -70,27 +73,27 @@ class Topic(NamedTuple):
 
 
 class Server(NamedTuple):
-    """A service or an action that the node asks.
+    """
+    A service or an action that the node asks.
 
-    Attributes:
-        name: Its name in the model.
-        is_action: True for an action, False for a service.
-        identifier: Service or action name in the model.
-        package: Package of its type.
-        type: Name of its type.
-        frame: Frame of the header of its requests, or None.
+    :ivar name: Its name in the model.
+    :ivar is_action: True for an action, False for a service.
+    :ivar identifier: Service or action name in the model.
+    :ivar package: Package of its type.
+    :ivar type_name: Name of its type.
+    :ivar frame: Frame of the header of its requests, or None.
     """
 
     name: str
     is_action: bool
     identifier: str
     package: str
-    type: str
+    type_name: str
     frame: str | None
 
     @property
     def subject(self) -> str:
-        """It in words."""
+        """Return it in words."""
         return '{} {}'.format('action' if self.is_action else 'service', self.name)
 
 
@@ -99,23 +102,23 @@ class SetupError(Exception):
 
 
 def load_message(package: str, name: str) -> Any:
-    """The class of a message type.
+    """
+    Return the class of a message type.
 
-    Raises:
-        SetupError: It cannot be imported.
+    :raises SetupError: It cannot be imported.
     """
     return _load(package, 'msg', 'message', name)
 
 
 def load_server(server: Server) -> Any:
-    """The class of a service's or action's type.
+    """
+    Return the class of a service's or action's type.
 
-    Raises:
-        SetupError: It cannot be imported.
+    :raises SetupError: It cannot be imported.
     """
     if server.is_action:
-        return _load(server.package, 'action', 'action', server.type)
-    return _load(server.package, 'srv', 'service', server.type)
+        return _load(server.package, 'action', 'action', server.type_name)
+    return _load(server.package, 'srv', 'service', server.type_name)
 
 
 def _load(package: str, folder: str, kind: str, name: str) -> Any:
@@ -123,27 +126,31 @@ def _load(package: str, folder: str, kind: str, name: str) -> Any:
         return getattr(importlib.import_module(f'{package}.{folder}'), name)
     except (ImportError, AttributeError) as error:
         raise SetupError(
-            f'the {kind} type {package}/{folder}/{name} is not installed; build {package} and source its workspace'
+            f'the {kind} type {package}/{folder}/{name} is not installed; build {package} and '
+            f'source its workspace'
         ) from error
 
 
 def require_header(message_class: Any, subject: str) -> None:
-    """Do nothing if a message has a header that can be stamped.
+    """
+    Do nothing if a message has a header that can be stamped.
 
-    Raises:
-        SetupError: It has none.
+    :raises SetupError: It has none.
     """
     if fields_of(message_class).get('header') != 'std_msgs/Header':
         raise SetupError(
-            f'{subject}: it is stamped, but {message_name(message_class)} has no header of type std_msgs/Header'
+            f'{subject}: it is stamped, but {message_name(message_class)} has no header of type '
+            f'std_msgs/Header'
         )
 
 
 def headers_of(message: Any, subject: str) -> list[Any]:
-    """The headers to be stamped in the request of an action: its own, else those of its fields.
+    """
+    Return the headers to be stamped in the request of an action.
 
-    Raises:
-        SetupError: There is none.
+    Its own, else those of its fields.
+
+    :raises SetupError: There is none.
     """
     fields = fields_of(message)
     if fields.get('header') == 'std_msgs/Header':
@@ -155,13 +162,14 @@ def headers_of(message: Any, subject: str) -> list[Any]:
             found.append(inner.header)
     if not found:
         raise SetupError(
-            f'{subject}: it is stamped, but neither {message_name(type(message))} nor a field has a header'
+            f'{subject}: it is stamped, but neither {message_name(type(message))} nor a field has '
+            f'a header'
         )
     return found
 
 
 def fields_of(message: Any) -> dict[str, str]:
-    """The type of each field of a message or of its class, in order."""
+    """Return the type of each field of a message or of its class, in order."""
     if hasattr(message, 'get_fields_and_field_types'):
         return dict(message.get_fields_and_field_types())
     message_class: Any = message if isinstance(message, type) else type(message)
@@ -171,7 +179,11 @@ def fields_of(message: Any) -> dict[str, str]:
 
 
 def message_name(message_class: Any) -> str:
-    """A message class as its ROS names it: `geometry_msgs/msg/Twist`, in ROS 1 `geometry_msgs/Twist`."""
+    """
+    Return a message class as its ROS names it.
+
+    `geometry_msgs/msg/Twist`, in ROS 1 `geometry_msgs/Twist`.
+    """
     if hasattr(message_class, 'get_fields_and_field_types'):
         package, folder = message_class.__module__.split('.')[:2]
         return f'{package}/{folder}/{message_class.__name__}'
@@ -199,10 +211,10 @@ def _translated(slot_type: str) -> str:
 
 
 def basic_field(message_class: Any) -> str:
-    """The field that stands for a basic type: `data`, else the only one.
+    """
+    Return the field that stands for a basic type: `data`, else the only one.
 
-    Raises:
-        SetupError: There are several, or none.
+    :raises SetupError: There are several, or none.
     """
     fields = fields_of(message_class)
     if 'data' in fields:
@@ -210,7 +222,8 @@ def basic_field(message_class: Any) -> str:
     if len(fields) == 1:
         return str(next(iter(fields)))
     raise SetupError(
-        'the message {} has {}, so a basic type can stand for none of them: use an object type'.format(
+        'the message {} has {}, so a basic type can stand for none of them: '
+        'use an object type'.format(
             message_name(message_class),
             'the fields ' + ', '.join(fields) if fields else 'no field',
         )
@@ -218,15 +231,13 @@ def basic_field(message_class: Any) -> str:
 
 
 def check_shape(message_class: Any, shape: Any, subject: str) -> None:
-    """Do nothing if a message has every field that the model speaks of, with a type that fits.
+    """
+    Do nothing if a message has every field that the model speaks of, with a type that fits.
 
-    Args:
-        message_class: The message's class.
-        shape: Shape of the data in the model.
-        subject: Subject of the check, for the error message, e.g. `message scan`.
-
-    Raises:
-        SetupError: It does not.
+    :param message_class: The message's class.
+    :param shape: Shape of the data in the model.
+    :param subject: Subject of the check, for the error message, e.g. `message scan`.
+    :raises SetupError: It does not.
     """
     if isinstance(shape, dict):
         _check_object(message_class, shape, subject, ())
@@ -301,7 +312,8 @@ def _fits(field_type: str, shape: str) -> bool:
 
 
 def converter(field_type: str, shape: str) -> Callable[[Any], Any]:
-    """The function that turns a value of the model into one of a field.
+    """
+    Return the function that turns a value of the model into one of a field.
 
     It raises DataDoesNotFit for a value that the field cannot hold, NaN and infinities included.
     """
@@ -386,20 +398,16 @@ class _Slot(NamedTuple):
 
 
 class Sender:
-    """The one message object of a communication, filled anew for each request.
+    """
+    The one message object of a communication, filled anew for each request.
 
-    Args:
-        message_class: The message's class.
-        shape: Shape of the data in the model.
-        paths: Every property that some request sets; the empty path for a basic type.
-        subject: Subject of the message, for error messages.
-
-    Attributes:
-        message: The message.
-        is_default: True if it is the all-default one.
-
-    Raises:
-        SetupError: The message does not fit the model.
+    :param message_class: The message's class.
+    :param shape: Shape of the data in the model.
+    :param paths: Every property that some request sets; the empty path for a basic type.
+    :param subject: Subject of the message, for error messages.
+    :ivar message: The message.
+    :ivar is_default: True if it is the all-default one.
+    :raises SetupError: The message does not fit the model.
     """
 
     def __init__(
@@ -411,10 +419,10 @@ class Sender:
         self._slots: list[_Slot] = [_slot(self.message, shape, path) for path in paths]
 
     def fill(self, data: Any) -> None:
-        """Put data into the message; what it does not mention gets its default.
+        """
+        Put data into the message; what it does not mention gets its default.
 
-        Raises:
-            DataDoesNotFit: A value does not fit its field.
+        :raises DataDoesNotFit: A value does not fit its field.
         """
         is_default = True
         for path, owner, field, convert, default in self._slots:
@@ -432,7 +440,7 @@ class Sender:
 
 
 def _part(data: Any, path: tuple[str, ...]) -> Any:
-    """The part of nested data at a path; None where it is not given."""
+    """Return the part of nested data at a path; None where it is not given."""
     for name in path:
         if data is None:
             return None
@@ -453,10 +461,12 @@ def _slot(message: Any, shape: Any, path: tuple[str, ...]) -> _Slot:
 
 
 def received_field(message_class: Any, shape: Any, subject: str) -> str | None:
-    """The field of a received message that holds the model's datum; None if the whole message does.
+    """
+    Return the field of a received message that holds the model's datum.
 
-    Raises:
-        SetupError: The message does not fit the model.
+    None if the whole message does.
+
+    :raises SetupError: The message does not fit the model.
     """
     check_shape(message_class, shape, subject)
     return None if shape is None or isinstance(shape, dict) else basic_field(message_class)

@@ -1,4 +1,7 @@
-"""The parameters of a generated node: names, defaults, descriptions, and one clear error for a wrong value.
+"""
+The parameters of a generated node.
+
+Names, defaults, descriptions, and one clear error for a wrong value.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -42,19 +45,20 @@ class ParameterError(Exception):
 
 
 class Parameter(NamedTuple):
-    """A parameter as users see it.
+    """
+    A parameter as users see it.
 
-    Attributes:
-        name: Its name.
-        default: Value that it has if none is given.
-        description: Its meaning, in sentences.
-        range: The smallest and the greatest value of a number; None for what is no number, or any.
+    :ivar name: Its name.
+    :ivar default: Value that it has if none is given.
+    :ivar description: Its meaning, in sentences.
+    :ivar bounds: The smallest and the greatest value of a number; None for what is no number, or
+        any.
     """
 
     name: str
     default: Any
     description: str
-    range: tuple[float, float] | None = None
+    bounds: tuple[float, float] | None = None
 
 
 _PERIODS = (MINIMUM_PERIOD_S, MAXIMUM_PERIOD_S)
@@ -89,7 +93,8 @@ _OF_A_LAYER = (
     Parameter(
         'command_timeout',
         1.0,
-        'Seconds without a message from the existing controller on a release identifier after which its last one is '
+        'Seconds without a message from the existing controller on a release identifier after '
+        'which its last one is '
         'taken back with the all-default message; 0 for never.',
         _SECONDS,
     ),
@@ -101,31 +106,32 @@ _RESAMPLED_IN_A_LAYER = ' Only the supervisor sees it so: what is passed on is u
 AUTOSTART = Parameter(
     'autostart',
     True,
-    'True if the node configures and activates itself at its start; if not, a lifecycle manager does so, and a fault '
+    'True if the node configures and activates itself at its start; if not, a lifecycle manager '
+    'does so, and a fault '
     'leaves the node at rest until it is deactivated and activated again.',
 )
 """Parameter of ROS 2, where nodes can be managed."""
 
 STATE_MESSAGE = Parameter(
-    "state_message",
-    "json",
-    "Form of the state (publish_state): json, a text on the topic state; typed, robosc_msgs/msg/SupervisorState on the "
-    "topic ~/state; or both.",
+    'state_message',
+    'json',
+    'Form of the state (publish_state): json, a text on the topic state; typed, robosc_msgs/msg/SupervisorState on the '
+    'topic ~/state; or both.',
 )
 """Parameter of ROS 2, where the state can be a typed message."""
 
 
 class Parameters(NamedTuple):
-    """Valid values.
+    """
+    Valid values.
 
-    Attributes:
-        settings: Settings of the executor.
-        topic_prefix: Prefix of every topic name.
-        log_folder: Folder of the event log; empty for none.
-        publish_state: True if the state is published on `/state`.
-        server_wait_s: Time that the start waits for servers, in seconds.
-        resample_scans: True if laser scans are brought to 360 ranges.
-        use_sim_time: True if time is simulated.
+    :ivar settings: Settings of the executor.
+    :ivar topic_prefix: Prefix of every topic name.
+    :ivar log_folder: Folder of the event log; empty for none.
+    :ivar publish_state: True if the state is published on `/state`.
+    :ivar server_wait_s: Time that the start waits for servers, in seconds.
+    :ivar resample_scans: True if laser scans are brought to 360 ranges.
+    :ivar use_sim_time: True if time is simulated.
     """
 
     settings: Settings
@@ -147,45 +153,53 @@ def declarations(
         Parameter(
             'release_identifiers',
             list(release_identifiers) or [''],
-            'Topics that keep acting after a message (velocities): the all-default message is sent there as soon as '
+            'Topics that keep acting after a message (velocities): the all-default message is '
+            'sent there as soon as '
             'the last one is no longer allowed, and at every stop; [""] for none.',
         ),
         Parameter(
             'max_age',
             [''],
-            'Received topics that count as stale after so many seconds without a message, each as topic=seconds; '
+            'Received topics that count as stale after so many seconds without a message, each as '
+            'topic=seconds; '
             'a stale topic stops the robot until it is back.',
         ),
         Parameter(
             'on_unknown',
             'default',
-            'Behaviour when received data leaves an enum unknown: default (it takes its default value), keep (as if '
+            'Behaviour when received data leaves an enum unknown: default (it takes its default '
+            'value), keep (as if '
             'nothing had come), fault (stop).',
         ),
         Parameter(
             'service_timeout',
             10.0,
-            'Seconds after which a service call without a reply has failed, also if its server was lost; 0 for never.',
+            'Seconds after which a service call without a reply has failed, also if its server '
+            'was lost; 0 for never.',
             _SECONDS,
         ),
         Parameter(
             'action_timeout',
             0.0,
-            'Seconds after which a goal without a result has failed and is cancelled; 0 for never.',
+            'Seconds after which a goal without a result has failed and is cancelled; 0 for '
+            'never.',
             _SECONDS,
         ),
         Parameter(
             'server_wait',
             5.0,
-            f'Seconds that the start waits for the servers of all services and actions; the {deployment} then starts '
+            f'Seconds that the start waits for the servers of all services and actions; the '
+            f'{deployment} then starts '
             'without those that are missing, and their requests fail until they are there.',
             _SECONDS,
         ),
         Parameter(
             'resample_scans',
             False,
-            'True if every received sensor_msgs/LaserScan is brought to 360 ranges, one for each degree '
-            'counter-clockwise from straight ahead (the smallest valid one, NaN if there is none), so that ranges[270] '
+            'True if every received sensor_msgs/LaserScan is brought to 360 ranges, one for each '
+            'degree '
+            'counter-clockwise from straight ahead (the smallest valid one, NaN if there is '
+            'none), so that ranges[270] '
             'is what stands at 270 degrees whatever the LiDAR.'
             + (_RESAMPLED_IN_A_LAYER if is_layer else ''),
         ),
@@ -205,21 +219,20 @@ def declarations(
         Parameter(
             USE_SIM_TIME,
             False,
-            'True if time is that of /clock: in headers, and for periods, ages and timeouts, none of which passes '
+            'True if time is that of /clock: in headers, and for periods, ages and timeouts, none '
+            'of which passes '
             'while the simulation is paused.',
         ),
     )
 
 
 def validate(given: Mapping[str, Any], description: Description) -> Parameters:
-    """Valid parameters.
+    """
+    Return valid parameters.
 
-    Args:
-        given: Value of every declared parameter.
-        description: The system that they are for.
-
-    Raises:
-        ParameterError: A value is wrong.
+    :param given: Value of every declared parameter.
+    :param description: The system that they are for.
+    :raises ParameterError: A value is wrong.
     """
     settings = _of_deployment(given, description.deployment)._replace(
         period_s=given['period'],
@@ -247,7 +260,7 @@ def validate(given: Mapping[str, Any], description: Description) -> Parameters:
 
 
 def _of_deployment(given: Mapping[str, Any], deployment: str) -> Settings:
-    """The settings that only one deployment has."""
+    """Return the settings that only one deployment has."""
     if deployment == LAYER:
         return Settings(command_timeout_s=given['command_timeout'])
     return Settings(
@@ -290,7 +303,7 @@ def _text(given: Mapping[str, Any], name: str) -> str:
 
 
 def _texts(given: Mapping[str, Any], name: str) -> tuple[str, ...]:
-    """A list of strings without the empty ones: ROS parameter files know no empty list."""
+    """Return a list of strings without the empty ones: ROS parameter files know no empty list."""
     value = given[name]
     if not isinstance(value, (list, tuple)) or not all(isinstance(item, str) for item in value):
         raise _wrong(name, value, 'a list of strings')
@@ -321,10 +334,10 @@ def _prefix(given: Mapping[str, Any]) -> str:
 
 
 def valid_prefix(text: str) -> str:
-    """A valid value of the parameter `topic_prefix`, without a slash at its end.
+    """
+    Return a valid value of the parameter `topic_prefix`, without a slash at its end.
 
-    Raises:
-        ParameterError: The value is wrong.
+    :raises ParameterError: The value is wrong.
     """
     prefix = text.rstrip('/')
     if prefix and not _PREFIX.match(prefix):
@@ -335,7 +348,11 @@ def valid_prefix(text: str) -> str:
 
 
 def prefixed(prefix: str, identifier: str) -> str:
-    """A topic's, service's or action's name on the wire; private ones (`~/x`) belong to the node and get no prefix."""
+    """
+    Return a topic's, service's or action's name on the wire.
+
+    Private ones (`~/x`) belong to the node and get no prefix.
+    """
     if not prefix or identifier.startswith('~'):
         return identifier
     return prefix + '/' + identifier.lstrip('/')

@@ -1,4 +1,5 @@
-"""Detection of lost servers.
+"""
+Detection of lost servers.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -8,15 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable
 
 LOST_S = 1.0
-"""A server that was not seen for so long is lost; discovery may lose sight of it for a moment, and a connection may be
-made anew."""
+"""
+A server that was not seen for so long is lost.
+
+Discovery may lose sight of it for a moment, and a connection may be
+
+made anew.
+"""
 
 
 class Presence:
-    """Detector of a lost server.
+    """
+    Detector of a lost server.
 
-    Args:
-        is_ready: Function that returns True if it is seen now.
+    :param is_ready: Function that returns True if it is seen now.
     """
 
     def __init__(self, is_ready: Callable[[], bool]) -> None:

@@ -1,4 +1,5 @@
-"""Outcomes of service calls and goals, on their way to the executor.
+"""
+Outcomes of service calls and goals, on their way to the executor.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -22,7 +23,11 @@ class Reports:
         self._waiting.append(report)
 
     def deliver(self, executor: Runner) -> bool:
-        """Tell what was kept until now; what that brings about waits for the next time. Whether there was anything."""
+        """
+        Tell what was kept until now; what that brings about waits for the next time.
+
+        Whether there was anything.
+        """
         count = len(self._waiting)
         for _ in range(count):
             self._waiting.popleft()(executor)

@@ -1,4 +1,5 @@
-"""Scans of any LiDAR as 360 ranges, one for each degree, so that `ranges[270]` is what stands at 270 degrees.
+"""
+Scans of any LiDAR as 360 ranges, one for each degree: `ranges[270]` is at 270 degrees.
 
 Degrees count counter-clockwise from straight ahead, as ROS counts angles (REP 103). A bin is
 centred on its degree.
@@ -21,7 +22,11 @@ _INFINITY = float('inf')
 
 
 def bin_numbers(angle_min: float, angle_increment: float, count: int) -> list[int]:
-    """The bin of each beam: its angle, rounded to a degree; empty if the angles are no numbers."""
+    """
+    Return the bin of each beam: its angle, rounded to a degree.
+
+    Empty if the angles are no numbers.
+    """
     if not (math.isfinite(angle_min) and math.isfinite(angle_increment)):
         return []
     first, step = angle_min * _BINS_PER_RADIAN + 0.5, angle_increment * _BINS_PER_RADIAN
@@ -30,7 +35,11 @@ def bin_numbers(angle_min: float, angle_increment: float, count: int) -> list[in
 
 
 class Resampler:
-    """Resamples the scans of one topic; the beams' bins are computed anew only when the angles change."""
+    """
+    Resamples the scans of one topic.
+
+    The beams' bins are computed anew only when the angles change.
+    """
 
     def __init__(self) -> None:
         self._angles: tuple[float, float, int] = (_NAN, _NAN, 0)
@@ -41,14 +50,14 @@ class Resampler:
     def ranges(
         self, angle_min: float, angle_increment: float, ranges: Any, low: float, high: float
     ) -> array[float]:
-        """The smallest valid range of each bin; NaN where there is none.
+        """
+        Return the smallest valid range of each bin; NaN where there is none.
 
-        Args:
-            angle_min: Angle of the first beam, in radians.
-            angle_increment: Angle from a beam to the next, in radians.
-            ranges: Range of each beam, in metres.
-            low: The smallest valid range.
-            high: The greatest valid range; an infinity is never one.
+        :param angle_min: Angle of the first beam, in radians.
+        :param angle_increment: Angle from a beam to the next, in radians.
+        :param ranges: Range of each beam, in metres.
+        :param low: The smallest valid range.
+        :param high: The greatest valid range; an infinity is never one.
         """
         angles = (angle_min, angle_increment, len(ranges))
         if angles != self._angles:
@@ -61,7 +70,7 @@ class Resampler:
         return array('f', [_NAN if distance == _INFINITY else distance for distance in smallest])
 
     def resample(self, scan: Any) -> Any:
-        """The same sensor_msgs/LaserScan, changed to one with 360 ranges from 0 to 359 degrees."""
+        """Return the sensor_msgs/LaserScan, changed to 360 ranges from 0 to 359 degrees."""
         scan.ranges = self.ranges(
             scan.angle_min, scan.angle_increment, scan.ranges, scan.range_min, scan.range_max
         )
@@ -74,7 +83,11 @@ class Resampler:
         return scan
 
     def resampled(self, scan: Any) -> Any:
-        """A copy with 360 ranges, the scan left as it is; asked for one scan several times, the same copy."""
+        """
+        Return a copy with 360 ranges, the scan left as it is.
+
+        Asked for one scan several times, the same copy.
+        """
         if scan is not self._seen:
             # A shallow one: whatever is resampled is replaced, not changed.
             self._seen, self._copy = scan, self.resample(copy.copy(scan))
@@ -82,16 +95,18 @@ class Resampler:
 
 
 def resampling(system: Any, topics: Iterable[Any]) -> Any:
-    """A controlled system that sees every laser scan with 360 ranges; the scans themselves stay as they are.
+    """
+    Return a controlled system that sees every laser scan with 360 ranges.
 
-    Args:
-        system: It is changed.
-        topics: The topics of the node.
+    The scans themselves stay as they are.
+
+    :param system: It is changed.
+    :param topics: The topics of the node.
     """
     resamplers = {
         topic.identifier: (Resampler(), topic.received)
         for topic in topics
-        if topic.received and (topic.package, topic.type) == ('sensor_msgs', 'LaserScan')
+        if topic.received and (topic.package, topic.type_name) == ('sensor_msgs', 'LaserScan')
     }
     by_event = {
         f'{name}.response': resampler for resampler, names in resamplers.values() for name in names

@@ -1,4 +1,7 @@
-"""Messages that come before the executor starts: held, not lost, and taken in before the first decision.
+"""
+Messages that come before the executor starts.
+
+Held, not lost, and taken in before the first decision.
 
 A node waits for its servers before its executor starts, and an executor ignores what comes before
 that. A stop button that is pressed meanwhile must not be forgotten.
@@ -16,10 +19,12 @@ from robosc.execution.runtime.runner import Runner
 
 
 class HeldMessages:
-    """Messages that came too early; of each topic the last ones, as many as its subscription would keep.
+    """
+    Messages that came too early.
 
-    Args:
-        depths: Maximum number of messages, by identifier.
+    Of each topic the last ones, as many as its subscription would keep.
+
+    :param depths: Maximum number of messages, by identifier.
     """
 
     def __init__(self, depths: Mapping[str, int]) -> None:
@@ -34,7 +39,7 @@ class HeldMessages:
         self._held[identifier].append((self._count, identifier, message, now_s))
 
     def take(self) -> list[tuple[str, Any, float]]:
-        """Identifier, message and time of each that is kept, in the order in which they came."""
+        """Return identifier, message and time of each that is kept, in order of arrival."""
         held = sorted(
             (entry for entries in self._held.values() for entry in entries),
             key=lambda entry: entry[0],
@@ -50,10 +55,10 @@ class StartupBufferingRunner(Runner):
     _came_s: float | None = None
 
     def start_with(self, messages: list[tuple[str, Any, float]]) -> None:
-        """Begin in the initial state and take messages in, before anything is requested.
+        """
+        Begin in the initial state and take messages in, before anything is requested.
 
-        Args:
-            messages: Identifier, message and time of each, in the order in which they came.
+        :param messages: Identifier, message and time of each, in the order in which they came.
         """
         self.start()
         self._take_in(messages)

@@ -1,4 +1,5 @@
-"""A controller that takes in what came before its start.
+"""
+A controller that takes in what came before its start.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -12,7 +13,11 @@ from robosc.targets.ros.runtime.startup import StartupBufferingRunner
 
 
 class StartupBufferingExecutor(StartupBufferingRunner, Executor):
-    """The executor of a controller that starts with what came before: nothing is decided before the last of it."""
+    """
+    The executor of a controller that starts with what came before.
+
+    Nothing is decided before the last of it.
+    """
 
     def _take_in(self, messages: list[tuple[str, Any, float]]) -> None:
         decides = self._decides_after_batch

@@ -1,4 +1,7 @@
-"""Names of a supervision layer: `/x` on the robot's side is `/supervised/x` on the existing controller's.
+"""
+Names of a supervision layer.
+
+`/x` on the robot's side is `/supervised/x` on the existing controller's.
 
 A relative name stays relative, `x` and `supervised/x`, and is found in the namespace of the node,
 unless there is a prefix.
@@ -17,23 +20,24 @@ SUPERVISED = 'supervised'
 
 
 def robots_name(prefix: str, identifier: str) -> str:
-    """Return a name on the robot's side.
+    """
+    Return a name on the robot's side.
 
-    Args:
-        prefix: Text that stands before every name; empty, or beginning with a slash.
-        identifier: A name of the model, `/x` or `x`.
+    :param prefix: Text that stands before every name; empty, or beginning with a slash.
+    :param identifier: A name of the model, `/x` or `x`.
     """
     return prefix + '/' + identifier.lstrip('/') if prefix else identifier
 
 
 def callers_name(prefix: str, identifier: str) -> str:
-    """A name on the existing controller's side."""
+    """Return a name on the existing controller's side."""
     root = '/' if identifier.startswith('/') else ''
-    return robots_name(prefix, f'{root}{SUPERVISED}/{identifier.lstrip("/")}')
+    name = identifier.lstrip('/')
+    return robots_name(prefix, f'{root}{SUPERVISED}/{name}')
 
 
 def old_and_new(identifiers: Iterable[str]) -> tuple[tuple[str, str], ...]:
-    """Old and new name, without a prefix, of what the existing controller has to call otherwise."""
+    """List old and new names, without a prefix, that the existing controller has to use."""
     # A service may be called like a topic: one rule is for both.
     return tuple(
         dict.fromkeys((robots_name('', item), callers_name('', item)) for item in identifiers)

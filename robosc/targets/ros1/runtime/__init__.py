@@ -1,1 +1,5 @@
-"""Modules that generated ROS 1 packages carry copies of, beside those of all ROS packages; none of them imports ROS."""
+"""
+Modules that generated ROS 1 packages carry copies of, beside those of all ROS packages.
+
+None of them imports ROS.
+"""

@@ -1,4 +1,5 @@
-"""Goals through actionlib's `ActionClient`: nothing waits, and every end is told to the executor.
+"""
+Goals through actionlib's `ActionClient`: nothing waits, and every end is told to the executor.
 
 actionlib calls back in the threads of rospy; what it says goes through the inbox to the executor's
 thread, where everything here runs. A server of actionlib says in its status messages what became
@@ -17,7 +18,7 @@ from robosc.targets.ros.runtime.reports import Reports
 from robosc.targets.ros1.runtime.inbox import Action
 
 REFUSAL_S = 1.0
-"""A server that still reports a goal as running so long after its cancel does not mean to cancel it."""
+"""Seconds after a cancel after which a goal that is still running is not meant to be cancelled."""
 
 SILENCE_S = 5.0
 """A goal whose receipt, or whose result after its end, was not heard of for so long is lost."""
@@ -56,15 +57,15 @@ def feedback_kind(name: str) -> str:
 
 
 class _Goal:
-    """A goal whose end is not known.
+    """
+    A goal whose end is not known.
 
-    Attributes:
-        handle: Handle by which actionlib refers to it.
-        state: State of its progress, as heard last.
-        since_s: Time since which it has that state, in seconds.
-        is_accepted: True if its server has received it without refusing it.
-        cancelled_s: Time at which its cancel was asked for, in seconds, until it is heard of; or
-            None.
+    :ivar handle: Handle by which actionlib refers to it.
+    :ivar state: State of its progress, as heard last.
+    :ivar since_s: Time since which it has that state, in seconds.
+    :ivar is_accepted: True if its server has received it without refusing it.
+    :ivar cancelled_s: Time at which its cancel was asked for, in seconds, until it is heard of; or
+        None.
     """
 
     __slots__ = ('cancelled_s', 'handle', 'is_accepted', 'since_s', 'state')
@@ -78,11 +79,11 @@ class _Goal:
 
 
 class _Abandoned:
-    """A goal that was reported lost although it may be running.
+    """
+    A goal that was reported lost although it may be running.
 
-    Attributes:
-        handle: Handle by which actionlib refers to it.
-        is_asked: True if its cancel was asked for since its server was seen.
+    :ivar handle: Handle by which actionlib refers to it.
+    :ivar is_asked: True if its cancel was asked for since its server was seen.
     """
 
     __slots__ = ('handle', 'is_asked')
@@ -93,15 +94,15 @@ class _Abandoned:
 
 
 class ActionGoals:
-    """The goals of one action.
+    """
+    The goals of one action.
 
-    Args:
-        client: Client with `send_goal` and `last_status_msg` as actionlib's `ActionClient`.
-        is_ready: Function that returns True if its server is connected.
-        name: The action's name on ROS.
-        put: The inbox's method of that name.
-        reports: Reports that take what is heard of goals.
-        monotonic: The clock.
+    :param client: Client with `send_goal` and `last_status_msg` as actionlib's `ActionClient`.
+    :param is_ready: Function that returns True if its server is connected.
+    :param name: The action's name on ROS.
+    :param put: The inbox's method of that name.
+    :param reports: Reports that take what is heard of goals.
+    :param monotonic: The clock.
     """
 
     def __init__(
@@ -150,7 +151,7 @@ class ActionGoals:
             goal.handle.cancel()
 
     def check(self, now_s: float) -> None:
-        """Notice a lost server, one that is back, goals that nothing is heard of, and cancels that are ignored."""
+        """Notice lost servers, those that are back, silent goals and cancels that are ignored."""
         status = self._client.last_status_msg
         if status is not self._last_status:
             self._last_status, self._heard_s = status, now_s
@@ -170,11 +171,15 @@ class ActionGoals:
 
     @property
     def has_abandoned(self) -> bool:
-        """True if a goal that was reported lost may be running."""
+        """Return True if a goal that was reported lost may be running."""
         return bool(self._abandoned)
 
     def cancel_abandoned(self) -> None:
-        """Ask for the cancel of every goal that was told to be lost: its server may be there and only be unseen."""
+        """
+        Ask for the cancel of every goal that was told to be lost.
+
+        Its server may be there and only be unseen.
+        """
         for abandoned in list(self._abandoned.values()):
             abandoned.is_asked = True
             abandoned.handle.cancel()

@@ -1,4 +1,7 @@
-"""Inbox for what the threads of rospy hand to the one thread of the executor: in order of arrival, and bounded.
+"""
+Inbox for what the threads of rospy hand to the one thread of the executor.
+
+In order of arrival, and bounded.
 
 rospy calls back in a thread of its own for each connection. Nothing of the executor runs there: a
 callback puts what is to be done here, and the node's loop takes and does it.
@@ -17,11 +20,11 @@ Action = Callable[[], None]
 
 
 class Inbox:
-    """Things to be done by another thread.
+    """
+    Things to be done by another thread.
 
-    Args:
-        depths: Maximum number that may wait of each kind, such as the messages on a topic; of more
-            the oldest are lost. What is of no kind is never lost.
+    :param depths: Maximum number that may wait of each kind, such as the messages on a topic; of
+        more the oldest are lost. What is of no kind is never lost.
     """
 
     def __init__(self, depths: Mapping[str, int]) -> None:
@@ -35,7 +38,7 @@ class Inbox:
 
     @property
     def dropped(self) -> int:
-        """Number lost so far."""
+        """Return number lost so far."""
         return self._dropped
 
     def put(self, action: Action, kind: str | None = None) -> None:

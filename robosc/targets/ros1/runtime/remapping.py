@@ -1,4 +1,5 @@
-"""Remapping on ROS 1 for a program that has to call things otherwise.
+"""
+Remapping on ROS 1 for a program that has to call things otherwise.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -16,7 +17,8 @@ PARTS_OF_ACTIONS = ('goal', 'cancel', 'status', 'feedback', 'result')
 def remapped(
     messages_and_services: Iterable[str], actions: Iterable[str]
 ) -> tuple[tuple[str, str], ...]:
-    """Old and new name, without a prefix, of everything that the existing controller has to call otherwise.
+    """
+    List old and new names, without a prefix, that the existing controller has to use.
 
     An action is no name of its own on ROS 1: each of its topics is named.
     """
@@ -25,5 +27,5 @@ def remapped(
 
 
 def remapping_arguments(names: Iterable[tuple[str, str]], prefix: str) -> list[str]:
-    """The arguments that make a program on ROS 1 use the new names."""
+    """Return the arguments that make a program on ROS 1 use the new names."""
     return [f'{robots_name(prefix, old)}:={robots_name(prefix, new)}' for old, new in names]

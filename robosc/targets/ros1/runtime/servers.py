@@ -1,4 +1,7 @@
-"""Services and actions that the existing controller asks a supervision layer for: answers and ends come later.
+"""
+Services and actions that the existing controller asks a supervision layer for.
+
+Answers and ends come later.
 
 The servers are rospy's and actionlib's, which call in threads of their own; every call and goal
 goes through the inbox to the executor's thread. A call of ROS 1 is a handler that returns its
@@ -32,13 +35,13 @@ class _Call:
 
 
 class CalledService:
-    """The calls of one service.
+    """
+    The calls of one service.
 
-    Args:
-        make_default: Makes the default response.
-        put: Hands something to the executor's thread.
-        tell: Called there with the number and the message of each call; it, or something later,
-            has it answered.
+    :param make_default: Makes the default response.
+    :param put: Hands something to the executor's thread.
+    :param tell: Called there with the number and the message of each call; it, or something later,
+        has it answered.
     """
 
     def __init__(
@@ -70,7 +73,7 @@ class CalledService:
                 self._handled -= 1
 
     def handle(self, request: Any) -> Any:
-        """A call came: its answer. Waits for it."""
+        """Take in a call; return its answer. Waits for it."""
         call = _Call()
         with self._lock:
             if self._is_closed:
@@ -96,7 +99,7 @@ class CalledService:
         self.answer(number, self._make_default())
 
     def close(self) -> None:
-        """From now on answer every new call with the default response, without anybody's being told."""
+        """Answer every new call with the default response from now on, and tell nobody."""
         with self._lock:
             self._is_closed = True
 
@@ -107,21 +110,21 @@ class CalledService:
 
     @property
     def is_busy(self) -> bool:
-        """True if an answer has still to be sent."""
+        """Return True if an answer has still to be sent."""
         with self._lock:
             return self._handled > 0
 
 
 class ServedAction:
-    """The goals of one action.
+    """
+    The goals of one action.
 
-    Args:
-        name: The action's name on ROS, for warnings.
-        put: Hands something to the executor's thread.
-        tell_goal: Called there with the number and the message of each goal; it calls `accept` or
-            `reject`.
-        tell_cancel: Called there with the number of a goal whose cancel was asked for.
-        warn: Called with a text.
+    :param name: The action's name on ROS, for warnings.
+    :param put: Hands something to the executor's thread.
+    :param tell_goal: Called there with the number and the message of each goal; it calls `accept`
+        or `reject`.
+    :param tell_cancel: Called there with the number of a goal whose cancel was asked for.
+    :param warn: Called with a text.
     """
 
     def __init__(
@@ -147,7 +150,7 @@ class ServedAction:
     # may wait for that.
 
     def goal_came(self, handle: Any) -> None:
-        """A goal came, with its handle as of actionlib's `ServerGoalHandle`."""
+        """Take in a goal, with its handle as of actionlib's `ServerGoalHandle`."""
         with self._lock:
             if not self._is_closed:
                 self._put(lambda: self._judge(handle))
@@ -155,7 +158,7 @@ class ServedAction:
         handle.set_rejected()
 
     def cancel_came(self, handle: Any) -> None:
-        """A caller wants to cancel a goal."""
+        """Take in that a caller wants to cancel a goal."""
         self._put(lambda: self._cancel(handle))
 
     # In the executor's thread.
@@ -172,11 +175,11 @@ class ServedAction:
             self._tell_cancel(number)
 
     def accept(self, number: int) -> None:
-        """The goal is let through."""
+        """Let the goal through."""
         self._try_to('acceptance', self._goals[number].set_accepted)
 
     def reject(self, number: int) -> None:
-        """The goal is held back."""
+        """Hold the goal back."""
         self._try_to('rejection', self._forgotten(number).set_rejected)
 
     def feedback(self, number: int, data: Any) -> None:
@@ -185,7 +188,11 @@ class ServedAction:
         self._try_to('feedback', lambda: handle.publish_feedback(data))
 
     def end(self, number: int, outcome: str, result: Any) -> None:
-        """A goal has ended: `succeeded`, `aborted` or `cancelled`, with its result, or None for the default one."""
+        """
+        End a goal.
+
+        `succeeded`, `aborted` or `cancelled`, with its result, or None for the default one.
+        """
         handle = self._forgotten(number)
         ends = {'succeeded': handle.set_succeeded, 'cancelled': handle.set_canceled}
         end = ends.get(outcome, handle.set_aborted)
@@ -207,7 +214,11 @@ class ServedAction:
         return handle
 
     def _try_to(self, what: str, tell: Callable[[], None]) -> None:
-        """A caller that cannot be told something is worth a warning and no fault: the robot is not to stop for it."""
+        """
+        Warn of a caller that cannot be told something: that is no fault.
+
+        The robot is not to stop for it.
+        """
         try:
             tell()
         except Exception as error:

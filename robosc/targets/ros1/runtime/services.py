@@ -1,4 +1,7 @@
-"""Service calls in threads of their own: a call of ROS 1 waits for its reply, and the executor must not.
+"""
+Service calls in threads of their own.
+
+A call of ROS 1 waits for its reply, and the executor must not.
 
 Each call has a connection and a thread; both end with it. Of calls that never end, only so many
 are kept. What became of a call goes through the inbox to the executor's thread.
@@ -19,19 +22,19 @@ MAXIMUM_PENDING = 16
 """Calls of one service whose reply is still listened for, so that a late one is noticed."""
 
 MAXIMUM_THREADS = 2 * MAXIMUM_PENDING
-"""Threads of one service; one that is connecting cannot be ended before its connection has failed."""
+"""Threads of one service; one that is connecting cannot be ended before that has failed."""
 
 
 class ServiceCalls:
-    """The calls of one service; its methods are for the executor's thread.
+    """
+    The calls of one service; its methods are for the executor's thread.
 
-    Args:
-        name: The service's name on ROS.
-        connect: Function that makes a connection for one call: `connection(message)` waits for the
-            reply and raises an exception where there is none; `connection.close()`, from another
-            thread, makes it raise.
-        put: Function that hands something to the executor's thread.
-        reports: Reports that take the replies.
+    :param name: The service's name on ROS.
+    :param connect: Function that makes a connection for one call: `connection(message)` waits for
+        the reply and raises an exception where there is none; `connection.close()`, from another
+        thread, makes it raise.
+    :param put: Function that hands something to the executor's thread.
+    :param reports: Reports that take the replies.
     """
 
     def __init__(

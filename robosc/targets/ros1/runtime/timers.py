@@ -1,4 +1,7 @@
-"""Timers of the node's one loop, on the steady clock: neither a simulated time nor a set clock moves them.
+"""
+Timers of the node's one loop, on the steady clock.
+
+Neither a simulated time nor a set clock moves them.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -18,10 +21,10 @@ class _Timer:
 
 
 class Timers:
-    """Actions that come again and again.
+    """
+    Actions that come again and again.
 
-    Args:
-        monotonic: The clock.
+    :param monotonic: The clock.
     """
 
     def __init__(self, monotonic: Callable[[], float]) -> None:

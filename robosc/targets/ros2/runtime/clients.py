@@ -1,4 +1,7 @@
-"""Service calls and goals through clients of ROS 2: nothing waits, and every end is told to the executor.
+"""
+Service calls and goals through clients of ROS 2.
+
+Nothing waits, and every end is told to the executor.
 
 The clients are handed in; what they must do is what rclpy's `Client` and `ActionClient` do.
 Everything runs in the node's one thread. What comes back is kept in `Reports` until the node's
@@ -42,15 +45,15 @@ class _Call:
 
 
 class ServiceCalls:
-    """The calls of one service.
+    """
+    The calls of one service.
 
-    Args:
-        client: Client with `service_is_ready`, `call_async` and `remove_pending_request`.
-        name: The service's name on ROS.
-        reports: Reports that take the replies.
-        monotonic: The clock.
-        timeout_s: Time after which the executor itself counts a call as failed, in seconds, or
-            None.
+    :param client: Client with `service_is_ready`, `call_async` and `remove_pending_request`.
+    :param name: The service's name on ROS.
+    :param reports: Reports that take the replies.
+    :param monotonic: The clock.
+    :param timeout_s: Time after which the executor itself counts a call as failed, in seconds, or
+        None.
     """
 
     def __init__(
@@ -111,13 +114,13 @@ class ServiceCalls:
 
 
 class _Goal:
-    """A goal whose end is not known.
+    """
+    A goal whose end is not known.
 
-    Attributes:
-        handle: Handle by which rclpy refers to it, once it was accepted.
-        refused_s: Time at which its cancel was refused although it may be running, in seconds, or
-            None.
-        is_unknown: True if the refusal said that the server does not know it.
+    :ivar handle: Handle by which rclpy refers to it, once it was accepted.
+    :ivar refused_s: Time at which its cancel was refused although it may be running, in seconds,
+        or None.
+    :ivar is_unknown: True if the refusal said that the server does not know it.
     """
 
     __slots__ = ('handle', 'is_unknown', 'refused_s')
@@ -129,11 +132,11 @@ class _Goal:
 
 
 class _Abandoned:
-    """A goal that was reported lost although it may be running.
+    """
+    A goal that was reported lost although it may be running.
 
-    Attributes:
-        handle: Handle by which rclpy refers to it.
-        is_asked: True if its cancel was asked for since its server was seen.
+    :ivar handle: Handle by which rclpy refers to it.
+    :ivar is_asked: True if its cancel was asked for since its server was seen.
     """
 
     __slots__ = ('handle', 'is_asked')
@@ -144,13 +147,13 @@ class _Abandoned:
 
 
 class ActionGoals:
-    """The goals of one action.
+    """
+    The goals of one action.
 
-    Args:
-        client: Client with `server_is_ready` and `send_goal_async`.
-        name: The action's name on ROS.
-        reports: Reports that take what is heard of goals.
-        monotonic: The clock.
+    :param client: Client with `server_is_ready` and `send_goal_async`.
+    :param name: The action's name on ROS.
+    :param reports: Reports that take what is heard of goals.
+    :param monotonic: The clock.
     """
 
     def __init__(
@@ -204,16 +207,20 @@ class ActionGoals:
 
     @property
     def has_abandoned(self) -> bool:
-        """True if a goal that was reported lost may be running."""
+        """Return True if a goal that was reported lost may be running."""
         return bool(self._abandoned)
 
     def cancel_abandoned(self) -> None:
-        """Ask for the cancel of every goal that was told to be lost: its server may be there and only be unseen."""
+        """
+        Ask for the cancel of every goal that was told to be lost.
+
+        Its server may be there and only be unseen.
+        """
         for goal_id in list(self._abandoned):
             self._cancel_abandoned(goal_id)
 
     def _abandon(self, goal_id: int) -> None:
-        """Tell that a goal is lost; if it was accepted, it may be running, and it is not forgotten."""
+        """Tell that a goal is lost; an accepted one may be running, and is not forgotten."""
         handle = self._goals[goal_id].handle
         if handle is not None:
             self._abandoned[goal_id] = _Abandoned(handle)
@@ -250,7 +257,7 @@ class ActionGoals:
         return receive
 
     def _answered(self, goal_id: int, future: Any) -> None:
-        """The server accepted or rejected a goal."""
+        """Note that the server accepted or rejected a goal."""
         goal = self._goals.get(goal_id)
         if future.exception() is not None:
             if goal is not None:

@@ -1,4 +1,7 @@
-"""Test for all-default messages, whatever the fields of a message are: its header does not count (semantics 3.6).
+"""
+Test for all-default messages, whatever the fields of a message are.
+
+Its header does not count (semantics 3.6).
 
 Messages are compared field by field: rclpy's own comparison of fixed-size arrays is not to be
 relied on.

@@ -1,4 +1,5 @@
-"""The check of the parameter that says who starts a node: it itself, or whoever manages it.
+"""
+The check of the parameter that says who starts a node: it itself, or whoever manages it.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -13,7 +14,7 @@ __all__ = ['AUTOSTART', 'valid_autostart']
 
 
 def valid_autostart(value: Any) -> bool:
-    """The parameter's value; raises ParameterError."""
+    """Return the parameter's value; raise ParameterError if there is none."""
     if not isinstance(value, bool):
         raise ParameterError(
             f"parameter '{AUTOSTART.name}' is {value!r}; it must be true or false"

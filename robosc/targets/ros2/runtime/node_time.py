@@ -1,4 +1,5 @@
-"""Simulated time as the executor's clock: it stands while the simulation does, and never goes back.
+"""
+Simulated time as the executor's clock: it stands while the simulation does, and never goes back.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -12,15 +13,15 @@ from robosc.execution.runtime.clock import SystemClock
 
 
 class SimulatedClock:
-    """The executor's clock where the time of ROS is that of `/clock`.
+    """
+    The executor's clock where the time of ROS is that of `/clock`.
 
     No time passes before the first message on `/clock`, which would seem to be years after zero.
     Where time jumps back, as a replayed bag does at its end, the executor's goes on from where it
     was.
 
-    Args:
-        now_ns: Function that returns the time of ROS in nanoseconds; 0 before the first message on
-            `/clock`.
+    :param now_ns: Function that returns the time of ROS in nanoseconds; 0 before the first message
+        on `/clock`.
     """
 
     wall = staticmethod(time.time)
@@ -43,7 +44,7 @@ class SimulatedClock:
 
     @property
     def has_begun(self) -> bool:
-        """True if there was a message on `/clock` when the time was last taken."""
+        """Return True if there was a message on `/clock` when the time was last taken."""
         return self._last_ns > 0
 
     def take_jump(self) -> float:
@@ -54,10 +55,14 @@ class SimulatedClock:
 
 
 class SteadyClock(SystemClock):
-    """The executor's clock where the time of ROS is the computer's: steady, whatever happens to that time."""
+    """
+    The executor's clock where the time of ROS is the computer's.
+
+    Steady, whatever happens to that time.
+    """
 
     has_begun = True
 
     def take_jump(self) -> float:
-        """A steady clock never goes back."""
+        """Go on: a steady clock never goes back."""
         return 0.0

@@ -1,4 +1,5 @@
-"""Remapping on ROS 2 for a program that has to call things otherwise.
+"""
+Remapping on ROS 2 for a program that has to call things otherwise.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -15,7 +16,8 @@ _OF_AN_ACTION = ('send_goal', 'cancel_goal', 'get_result', 'feedback', 'status')
 def remapped(
     messages_and_services: Iterable[str], actions: Iterable[str]
 ) -> tuple[tuple[str, str], ...]:
-    """Old and new name, without a prefix, of everything that the existing controller has to call otherwise.
+    """
+    List old and new names, without a prefix, that the existing controller has to use.
 
     ROS remaps the services and topics that an action is made of, and not the action, so each of
     them is named.
@@ -27,13 +29,13 @@ def remapped(
 def remapping_arguments(
     names: Iterable[tuple[str, str]], prefix: str, namespace: str = '/'
 ) -> list[str]:
-    """The arguments that make a program on ROS 2 use the new names.
+    """
+    Return the arguments that make a program on ROS 2 use the new names.
 
-    Args:
-        names: Old and new name of each, without the prefix.
-        prefix: Prefix of every name, or nothing.
-        namespace: Namespace of the layer, in which the program has to be as well: relative names
-            are found there.
+    :param names: Old and new name of each, without the prefix.
+    :param prefix: Prefix of every name, or nothing.
+    :param namespace: Namespace of the layer, in which the program has to be as well: relative
+        names are found there.
     """
     rules = [f'{robots_name(prefix, old)}:={robots_name(prefix, new)}' for old, new in names]
     if namespace != '/':

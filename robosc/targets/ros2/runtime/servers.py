@@ -1,4 +1,7 @@
-"""Services and actions that the existing controller asks a supervision layer for: answers and ends come later.
+"""
+Services and actions that the existing controller asks a supervision layer for.
+
+Answers and ends come later.
 
 The servers are handed in; what they must do is what rclpy's `Service`, `ActionServer` and
 `ServerGoalHandle` do. Everything runs in the node's one thread, and nothing in it waits: a
@@ -18,7 +21,11 @@ from typing import Any
 
 
 class _Call:
-    """A call without an answer so far: what addresses the answer, or the answer that came before that is known."""
+    """
+    A call without an answer so far.
+
+    What addresses the answer, or the answer that came before that is known.
+    """
 
     __slots__ = ('header', 'number', 'response')
 
@@ -29,13 +36,13 @@ class _Call:
 
 
 class CalledService:
-    """The calls of one service.
+    """
+    The calls of one service.
 
-    Args:
-        name: The service's name on ROS, for warnings.
-        make_default: Makes the default response.
-        tell: Called with the number and the message of each call.
-        warn: Called with a text.
+    :param name: The service's name on ROS, for warnings.
+    :param make_default: Makes the default response.
+    :param tell: Called with the number and the message of each call.
+    :param warn: Called with a text.
     """
 
     def __init__(
@@ -54,17 +61,17 @@ class CalledService:
         self._send: Callable[[Any, Any], None]
 
     def attach(self, service: Any) -> None:
-        """Send through a service, whose callback is `handle`.
+        """
+        Send through a service, whose callback is `handle`.
 
-        Args:
-            service: Has `send_response`, called with what `handle` returned and with what
-                addresses the answer.
+        :param service: Has `send_response`, called with what `handle` returned and with what
+            addresses the answer.
         """
         self._send = service.send_response
         service.send_response = self._respond
 
     def handle(self, request: Any, _: Any) -> Any:
-        """A call came: its answer, or a promise of one."""
+        """Take in a call; return its answer, or a promise of one."""
         self._count += 1
         call = self._calls[self._count] = _Call(self._count)
         self._tell(call.number, request)
@@ -101,11 +108,11 @@ class CalledService:
 
 
 class _Goal:
-    """A goal that was accepted.
+    """
+    A goal that was accepted.
 
-    Attributes:
-        handle: Handle by which rclpy refers to it, once it is known.
-        end: Outcome and result, if they came before that.
+    :ivar handle: Handle by which rclpy refers to it, once it is known.
+    :ivar end: Outcome and result, if they came before that.
     """
 
     __slots__ = ('end', 'handle')
@@ -116,15 +123,15 @@ class _Goal:
 
 
 class ServedAction:
-    """The goals of one action.
+    """
+    The goals of one action.
 
-    Args:
-        name: The action's name on ROS, for warnings.
-        make_default: Makes the default result.
-        tell_goal: Called with the number and the message of each goal; `accept` is called
-            meanwhile, or not.
-        tell_cancel: Called with the number of a goal whose cancel was asked for.
-        warn: Called with a text.
+    :param name: The action's name on ROS, for warnings.
+    :param make_default: Makes the default result.
+    :param tell_goal: Called with the number and the message of each goal; `accept` is called
+        meanwhile, or not.
+    :param tell_cancel: Called with the number of a goal whose cancel was asked for.
+    :param warn: Called with a text.
     """
 
     def __init__(
@@ -148,17 +155,17 @@ class ServedAction:
         self._server: Any = None
 
     def attach(self, server: Any) -> None:
-        """Serve through a server, whose callbacks are `decide`, `begin` and `cancel`.
+        """
+        Serve through a server, whose callbacks are `decide`, `begin` and `cancel`.
 
-        Args:
-            server: Has `notify_execute`, which has a function end a goal.
+        :param server: Has `notify_execute`, which has a function end a goal.
         """
         self._server = server
 
     # What the server asks.
 
     def decide(self, message: Any) -> bool:
-        """A goal came: whether it is accepted."""
+        """Take in a goal; return True if it is accepted."""
         self._count += 1
         number = self._count
         self._tell_goal(number, message)
@@ -168,7 +175,7 @@ class ServedAction:
         return True
 
     def begin(self, handle: Any) -> None:
-        """The goal that was just accepted has got its handle."""
+        """Note that the goal that was just accepted has got its handle."""
         number, self._beginning = self._beginning, None
         if number is None or number not in self._goals:
             return
@@ -180,7 +187,7 @@ class ServedAction:
             self.end(number, *goal.end)
 
     def cancel(self, handle: Any) -> bool:
-        """A caller wants to cancel a goal: whether it is told that its goal is about to be."""
+        """Take in that a caller wants to cancel a goal; tell whether that is about to happen."""
         number = self._numbers.get(bytes(handle.goal_id.uuid))
         if number is None:
             return False  # Its end is on the way.
@@ -188,7 +195,11 @@ class ServedAction:
         return True
 
     def check(self) -> None:
-        """Cancel a goal whose caller was gone before it could be told that it is accepted: nobody else would."""
+        """
+        Cancel a goal whose caller was gone before it could be told that it is accepted.
+
+        Nobody else would.
+        """
         number, self._beginning = self._beginning, None
         if number is not None:
             del self._goals[number]
@@ -198,7 +209,7 @@ class ServedAction:
     # What the layer tells.
 
     def accept(self, number: int) -> None:
-        """The goal is let through."""
+        """Let the goal through."""
         self._goals[number] = _Goal()
 
     def feedback(self, number: int, data: Any) -> None:
@@ -212,7 +223,11 @@ class ServedAction:
             self._warn(f'no feedback of a goal of {self._name}: {error}')
 
     def end(self, number: int, outcome: str, result: Any) -> None:
-        """A goal has ended: `succeeded`, `aborted` or `cancelled`, with its result, or None for the default one."""
+        """
+        End a goal.
+
+        `succeeded`, `aborted` or `cancelled`, with its result, or None for the default one.
+        """
         goal = self._goals.get(number)
         if goal is None:
             return  # Its caller was gone.
@@ -244,5 +259,5 @@ class ServedAction:
 
     @property
     def is_ending(self) -> bool:
-        """True if the end of a goal has still to be reported."""
+        """Return True if the end of a goal has still to be reported."""
         return self._ending > 0

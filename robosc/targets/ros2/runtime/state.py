@@ -1,4 +1,5 @@
-"""The parameter that says in which form a node publishes its state.
+"""
+The parameter that says in which form a node publishes its state.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -8,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from robosc.targets.ros.runtime.parameters import STATE_MESSAGE, ParameterError
+from robosc.targets.ros.runtime.parameters import ParameterError, STATE_MESSAGE
 
 JSON, TYPED, BOTH = 'json', 'typed', 'both'
 
@@ -16,13 +17,11 @@ __all__ = ['BOTH', 'JSON', 'STATE_MESSAGE', 'TYPED', 'valid_state_message']
 
 
 def valid_state_message(given: Mapping[str, Any]) -> str:
-    """The parameter's value.
+    """
+    Return the parameter's value.
 
-    Args:
-        given: Value of every declared parameter.
-
-    Raises:
-        ParameterError: It is none of the three.
+    :param given: Value of every declared parameter.
+    :raises ParameterError: It is none of the three.
     """
     value = given[STATE_MESSAGE.name]
     if value not in (JSON, TYPED, BOTH):

@@ -1,4 +1,5 @@
-"""The types of services and actions of ROS 1, taken apart into the messages that they are made of.
+"""
+The types of services and actions of ROS 1, taken apart into the messages that they are made of.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -12,13 +13,13 @@ from robosc.targets.ros.runtime.messages import Server, SetupError
 
 
 class ServerType(NamedTuple):
-    """A service's or action's type.
+    """
+    A service's or action's type.
 
-    Attributes:
-        specification: The class that stands for all of it.
-        request: Class of what is sent.
-        response: Class of the reply or the result.
-        feedback: Class of an action's feedback, else None.
+    :ivar specification: The class that stands for all of it.
+    :ivar request: Class of what is sent.
+    :ivar response: Class of the reply or the result.
+    :ivar feedback: Class of an action's feedback, else None.
     """
 
     specification: Any
@@ -28,25 +29,27 @@ class ServerType(NamedTuple):
 
 
 def load_service(server: Server) -> ServerType:
-    """The type of a service.
+    """
+    Return the type of a service.
 
-    Raises:
-        SetupError: It is not installed.
+    :raises SetupError: It is not installed.
     """
     try:
-        found = getattr(importlib.import_module(f'{server.package}.srv'), server.type)
+        found = getattr(importlib.import_module(f'{server.package}.srv'), server.type_name)
         return ServerType(found, found._request_class, found._response_class, None)
     except (ImportError, AttributeError) as error:
-        raise _missing(server, f'{server.package}/srv/{server.type}') from error
+        raise _missing(server, f'{server.package}/srv/{server.type_name}') from error
 
 
 def load_action(server: Server) -> ServerType:
-    """The type of an action: `MoveBase` and `MoveBaseAction` both mean `move_base_msgs/MoveBaseAction`.
-
-    Raises:
-        SetupError: It is not installed.
     """
-    name = server.type if server.type.endswith('Action') else server.type + 'Action'
+    Return the type of an action.
+
+    `MoveBase` and `MoveBaseAction` both mean `move_base_msgs/MoveBaseAction`.
+
+    :raises SetupError: It is not installed.
+    """
+    name = server.type_name if server.type_name.endswith('Action') else server.type_name + 'Action'
     try:
         found = getattr(importlib.import_module(f'{server.package}.msg'), name)
         whole = found()

@@ -21,6 +21,7 @@ from robosc.targets.cpp.model import Writer, fill_name, received_topics, take_na
 from robosc.targets.cpp.naming import require_namespace, require_package_name
 from robosc.targets.cpp.recording import PERIOD_S, record
 from robosc.targets.files import GeneratedFiles
+from robosc.targets.python.folding import folded
 from robosc.targets.registry import GenerateOptions, StateMessage
 from robosc.targets.ros.package import chosen, error_context, packages, release_identifiers, require_own_names
 from robosc.targets.ros.runtime.parameters import Parameter, declarations
@@ -112,7 +113,8 @@ def _generate(supervisor: Supervisor, name: str, options: GenerateOptions, middl
     environment = _environment(middleware.module)
     context = _context(supervisor, unit, name, found, asked, options, middleware)
     for path, template in middleware.templates.items():
-        files[path.format(package=name)] = environment.get_template(template).render(context)
+        text = environment.get_template(template).render(context)
+        files[path.format(package=name)] = folded(text) if path.endswith(".py") else text
     return GeneratedFiles(files)
 
 

@@ -96,14 +96,14 @@ def enabled_requests_method(allows: Sequence[str]) -> list[str]:
     if not count:
         return [
             "def enabled_requests(self):",
-            '    """Numbers of the requests that are allowed now: there are none."""',
+            '    """Return numbers of the requests that are allowed now: there are none."""',
             "    return ()",
         ]
     if count <= ASKED_TOGETHER:
         answers = "".join(f"self.{allow}(), " for allow in allows).strip()
         return f'''\
 def enabled_requests(self):
-    """Numbers of the requests that are allowed now; asks only if one of them may have changed."""
+    """Return numbers of the requests that are allowed now; ask only if one may be new."""
     if self._stale & {(1 << count) - 1:#x}:
         allowed = ({answers})
         self._stale &= ~{(1 << count) - 1:#x}
@@ -113,7 +113,7 @@ def enabled_requests(self):
     return self._enabled'''.splitlines()
     return f'''\
 def enabled_requests(self):
-    """Numbers of the requests that are allowed now; asks only those that may have changed."""
+    """Return numbers of the requests that are allowed now; ask only what may be new."""
     stale = self._stale & {(1 << count) - 1:#x}
     if stale:
         self._stale ^= stale
@@ -136,12 +136,12 @@ def enabled_silent_method(requests: int, count: int) -> list[str]:
     if not count:
         return [
             "def enabled_silent(self):",
-            '    """The first silent step that is allowed now: there are none."""',
+            '    """Return the first silent step that is allowed now: there are none."""',
             "    return None",
         ]
     return f'''\
 def enabled_silent(self):
-    """The first silent step that is allowed now, or None; asks only those that may have become so."""
+    """Return the first silent step that is allowed now, or None; ask only what may be new."""
     stale = self._stale >> {requests}
     while stale:
         bit = stale & -stale

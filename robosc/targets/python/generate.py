@@ -1,5 +1,7 @@
 """The generated `supervisor.py`: a class that implements `robosc.execution.runtime.protocol.ControlledSystem`."""
 
+import textwrap
+
 from robosc._version import __version__
 from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import communication_plant_name
@@ -13,7 +15,7 @@ from robosc.targets.code.expressions import Code
 from robosc.targets.code.steps import initial_state
 from robosc.targets.code.text import indent, printable
 from robosc.targets.model_text import requirement_texts
-from robosc.targets.python.bundle import bundle, section_title
+from robosc.targets.python.bundle import WIDTH, bundle, section_title
 from robosc.targets.python.changes import (
     asked_lines,
     enabled_requests_method,
@@ -22,6 +24,7 @@ from robosc.targets.python.changes import (
     stale_bits,
 )
 from robosc.targets.python.expressions import constant
+from robosc.targets.python.folding import folded
 from robosc.targets.python.provide import provide_method
 from robosc.targets.python.received import converter
 from robosc.targets.python.statements import statement_lines
@@ -59,10 +62,15 @@ def supervisor_module(supervisor: Supervisor, usage: str) -> str:
         UnsupportedModelError: An expression is nested too deeply for Python.
     """
     runtime = bundle(RUNTIME[supervisor.deployment])
-    contents = [f"  {name}: {title[0]}" for name, title, _ in runtime.sections]
+    contents = [
+        line
+        for name, title, _ in runtime.sections
+        for line in textwrap.wrap(f"{name}: {title[0]}", WIDTH, initial_indent="  ", subsequent_indent="   ")
+    ]
     lines = [
         *header(supervisor).splitlines(),
-        f'"""The supervisor of the robot {supervisor.model.name}, and what it runs on.',
+        '"""',
+        f"The supervisor of the robot {supervisor.model.name}, and what it runs on.",
         "",
         *usage.splitlines(),
         "",
@@ -79,7 +87,7 @@ def supervisor_module(supervisor: Supervisor, usage: str) -> str:
         "",
         "",
     ]
-    return "\n".join(lines) + runtime.text() + "\n\n" + model_part(supervisor)
+    return folded("\n".join(lines) + runtime.text() + "\n\n" + model_part(supervisor))
 
 
 def model_part(supervisor: Supervisor) -> str:
@@ -207,7 +215,7 @@ def _constructor(writer: Writer, description: Description) -> list[str]:
 
 def _restart(writer: Writer, requests: int, silent: int) -> list[str]:
     start = initial_state(writer.layout.executable, writer.scope, _initial)
-    head = ["def restart(self):", '    """Back to the initial state."""']
+    head = ["def restart(self):", '    """Go back to the initial state."""']
     return [*head, *indent([*restart_lines(requests, silent), *statement_lines(start)])]
 
 
@@ -216,7 +224,11 @@ def _initial(type_: Type, value: bool | int | float | str) -> Code:
 
 
 def _state(writer: Writer) -> list[str]:
-    lines = ["def state(self):", '    """State and variables of every component with a behaviour."""', "    return {"]
+    lines = [
+        "def state(self):",
+        '    """Return state and variables of every component with a behaviour."""',
+        "    return {",
+    ]
     for component, behaviour in writer.layout.executable.behaviours:
         lines += [f"        {component!r}: {{", f"            'state': self.{writer.layout.locations[component]},"]
         lines.append("            'variables': {")
@@ -231,7 +243,7 @@ def _signature(writer: Writer) -> list[str]:
     attributes = [*writer.layout.locations.values(), *(name for name, _ in writer.layout.variables.values())]
     return [
         "def signature(self):",
-        '    """A hashable value that tells states apart."""',
+        '    """Return a hashable value that tells states apart."""',
         "    return (",
         *(f"        self.{attribute}," for attribute in attributes),
         "    )",
@@ -240,7 +252,7 @@ def _signature(writer: Writer) -> list[str]:
 
 def _location(writer: Writer) -> list[str]:
     plants = [item for item in writer.model.communications if item.kind in CALLED_KINDS]
-    lines = ["def location(self, communication):", '    """Location of a service\'s or action\'s plant."""']
+    lines = ["def location(self, communication):", '    """Return the location of a service\'s or action\'s plant."""']
     for item in plants:
         place = writer.scope.location(communication_plant_name(item))
         lines += [f"    if communication == {item.name!r}:", f"        return {place}"]
@@ -255,11 +267,11 @@ def enabled(self, event):
     return self._allow[event]()
 
 def read(self, event, data):
-    """Convert what came with an uncontrollable event; changes nothing."""
+    """Convert what came with an uncontrollable event; change nothing."""
     return self._read[event](data)
 
 def step(self, event, reading=None):
-    """Take an event: the skipped updates, or None if it cannot happen now."""
+    """Take an event; return the skipped updates, or None if it cannot happen now."""
     if event not in self._read:
         return self._step[event]()
     if reading is None:
@@ -267,22 +279,22 @@ def step(self, event, reading=None):
     return self._step[event](*reading.values)
 
 def receive(self, identifier, data):
-    """Take all events of what came: where updates were skipped; None if anything is unknown."""
+    """Take all events of what came; return skipped updates, None if anything is unknown."""
     return self._receive[identifier](data)
 
 def provide(self, communication):
-    """Data for a request in the current state: (is known, data)."""
+    """Return data for a request in the current state: (is known, data)."""
     return self._provide[communication]()
 
 def matches(self, communication, data):
-    """Tell whether a message that a supervision layer received is an incoming message, by its condition `when`."""
+    """Tell whether a message is an incoming message, by its condition `when`."""
     return self._matches[communication](data) if communication in self._matches else MATCHES
 
 def requirements(self, communication):
-    """For each requirement on a request: whether it holds now."""
+    """Return for each requirement on a request whether it holds now."""
     return self._requirements[communication]()
 
 def conjuncts(self, communication):
-    """For each top-level conjunct of those requirements: whether it holds now."""
+    """Return for each top-level conjunct of those requirements whether it holds now."""
     return self._conjuncts[communication]()'''.split("\n\n")
 ]

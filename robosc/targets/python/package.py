@@ -20,8 +20,9 @@ As a controller, in a program on asyncio:
     controller = AsyncController(Supervisor(), robot)
     await controller.run()
 
-What `robot` must offer is the protocol `AsyncRobot`: a function that publishes, and coroutines for services and
-actions. Tell `controller.receive(identifier, message)` what the robot sends, and call `controller.stop(why)` to end.
+What `robot` must offer is the protocol `AsyncRobot`: a function that publishes, and coroutines for
+services and actions. Tell `controller.receive(identifier, message)` what the robot sends, and call
+`controller.stop(why)` to end.
 
 In any other program:
 
@@ -30,9 +31,10 @@ In any other program:
     executor = Executor(Supervisor(), middleware)
     executor.start()
 
-Then call, always from one thread, `executor.tick()` once a period, `executor.receive(identifier, message)` when
-the robot sends a message, `on_reply`, `on_goal_ended` and so on when it answers, and `executor.stop(why)` at the end.
-What `middleware` must offer is the protocol `Middleware`.
+Then call, always from one thread, `executor.tick()` once a period,
+`executor.receive(identifier, message)` when the robot sends a message, `on_reply`, `on_goal_ended`
+and so on when it answers, and `executor.stop(why)` at the end. What `middleware` must offer is the
+protocol `Middleware`.
 
 `Settings` are those of the deployment; `open_event_log` makes the file of an event log.
 """,
@@ -44,11 +46,11 @@ As a supervision layer before an existing controller:
     layer = Layer(Supervisor(), robot, caller)
     layer.start()
 
-Then call, always from one thread, `layer.on_request(identifier, message)`, `on_call`, `on_goal` and `on_cancel`
-when the existing controller sends something; `layer.receive(identifier, message)`, `on_reply`, `on_goal_ended` and so
-on when the robot does; `layer.tick()` once a period, so that time is noticed; and `layer.stop(why)` at the end. What
-is let through goes to `robot`, what the existing controller is told to `caller`: they offer the protocols `RobotSide`
-and `LayerMiddleware`.
+Then call, always from one thread, `layer.on_request(identifier, message)`, `on_call`, `on_goal` and
+`on_cancel` when the existing controller sends something; `layer.receive(identifier, message)`,
+`on_reply`, `on_goal_ended` and so on when the robot does; `layer.tick()` once a period, so that
+time is noticed; and `layer.stop(why)` at the end. What is let through goes to `robot`, what the
+existing controller is told to `caller`: they offer the protocols `RobotSide` and `LayerMiddleware`.
 
 `Settings` are those of the deployment; `open_event_log` makes the file of an event log.
 """,

@@ -16,7 +16,7 @@ def provide_method(writer: Writer, communication: str) -> list[str]:
     statements = writer.model.provides_for(communication)
     default = Return(operation("list", TRUE_CODE, _NOTHING))
     body = first_provided(statements, writer.scope, lambda value: _result(writer, value), default)
-    words = f"Data of a request of {communication}: (is known, data); None is the default message."
+    words = f"Return data of a request of {communication}: (is known, data); None is the default message."
     return method(writer.layout.methods["provide", communication], words, body)
 
 

@@ -214,6 +214,6 @@ def converter(layout: Layout, enum: EnumDefinition, used: set[str]) -> list[str]
     absent = when(operation("is", _DATA, variable("ABSENT")), Return(operation("list", *_ABSENT)))
     return [
         f"def {layout.converters[enum.name]}(data, path):",
-        f'    """{enum.name} from received data; in words what was unknown; whether that decided an enum."""',
+        f'    """Return {enum.name} from data; what was unknown, in words; if that decided an enum."""',
         *indent(statement_lines([absent, *Reader(layout, enum.source, used).conversion(enum)])),
     ]

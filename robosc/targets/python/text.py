@@ -4,7 +4,7 @@ import textwrap
 
 from robosc.targets.code.text import printable
 
-_WIDTH = 110
+_WIDTH = 88
 
 
 def comment(text: str) -> list[str]:

@@ -1,6 +1,5 @@
 """The packages of a middleware in Python, given a record of what sets it apart: ROS 1 or ROS 2."""
 
-import pprint
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache, partial
@@ -14,6 +13,7 @@ from robosc.supervisor import Supervisor
 from robosc.targets.code import templates
 from robosc.targets.code.naming import package_name
 from robosc.targets.files import GeneratedFiles
+from robosc.targets.python.folding import folded
 from robosc.targets.python.generate import header
 from robosc.targets.python.package import beside_supervisor, python_text
 from robosc.targets.registry import GenerateOptions, StateMessage
@@ -134,7 +134,10 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
     scripts = _scripts(supervisor, str(values["starter"])) if middleware.script else {}
     for path, (module, purpose) in scripts.items():
         files[path] = get_template(middleware.script).render(values, module=module, purpose=purpose)
-    return GeneratedFiles(files, frozenset(scripts))
+    return GeneratedFiles(
+        {path: folded(text) if path.endswith(".py") or path in scripts else text for path, text in files.items()},
+        frozenset(scripts),
+    )
 
 
 def _scripts(supervisor: Supervisor, starter: str) -> dict[str, tuple[str, str]]:
@@ -170,7 +173,6 @@ def _environment(package: str) -> jinja2.Environment:
         "callers": partial(callers_name, ""),
         "literal": ascii,
         "names": lambda communications: tuple(item.name for item in communications),
-        "pretty": lambda value: pprint.pformat(value, width=110, sort_dicts=False),
         "robots": partial(robots_name, ""),
     }
     return templates.environment(package, _SHARED, filters=filters)

@@ -242,9 +242,11 @@ def test_it_reads_like_the_model() -> None:
     for line in (
         "# value.ranges[0] > 0.4 and value.ranges[20] > 0.4 and value.ranges[340] > 0.4 -> clear",
         "if value_ranges_0 > 0.4 and value_ranges_20 > 0.4 and value_ranges_340 > 0.4:",
-        "# requirement move needs LineDetector.line_found and LidarSensor.safe and EmergencyStop.in_service",
+        "# requirement move needs LineDetector.line_found and LidarSensor.safe and",
+        "# EmergencyStop.in_service",
         "self.LidarSensor__ahead = value",
-        "return True, {'linear': {'x': 0.15}, 'angular': {'z': self.LineDetector__current_correction}}",
+        "'linear': {'x': 0.15},",
+        "'angular': {'z': self.LineDetector__current_correction},",
     ):
         assert any(line == found.strip() for found in text.splitlines()), line
 

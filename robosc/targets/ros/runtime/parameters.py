@@ -115,8 +115,8 @@ AUTOSTART = Parameter(
 STATE_MESSAGE = Parameter(
     'state_message',
     'json',
-    'Form of the state (publish_state): json, a text on the topic state; typed, robosc_msgs/msg/SupervisorState on the '
-    'topic ~/state; or both.',
+    'Form of the state (publish_state): json, a text on the topic state; typed, '
+    'robosc_msgs/msg/SupervisorState on the topic ~/state; or both.',
 )
 """Parameter of ROS 2, where the state can be a typed message."""
 

@@ -152,7 +152,8 @@ bindings: $(READY) ## regenerate the gRPC bindings
 
 # Extras stay where they are asked for: a lock without them is not complete. `lock_images.py` asks the installed packages
 # what they need, so that the new lock has to be installed before.
-COMPILE := $(BIN)/uv pip compile --quiet --upgrade --no-strip-extras --generate-hashes --python-version 3.12
+LOCK := $(BIN)/uv pip compile --quiet --upgrade --no-strip-extras --generate-hashes
+COMPILE := $(LOCK) --python-version 3.12
 EXTRAS := server postgresql dask tracing client signing ros2 examples bridge plot mcap simulation view lsp build dev
 
 lock: $(READY) ## choose new versions and write the locks
@@ -160,6 +161,7 @@ lock: $(READY) ## choose new versions and write the locks
 	for tools in colcon checkers soak; do \
 	  $(COMPILE) --output-file deploy/requirements-$$tools.txt deploy/requirements-$$tools.in || exit 1; \
 	done
+	$(LOCK) --universal --python-version 3.10 --output-file deploy/requirements-rclpy.txt deploy/requirements-rclpy.in
 	sh deploy/make_environment.sh $(VENV)
 	$(BIN)/python deploy/lock_images.py
 
@@ -167,4 +169,4 @@ benchmark: $(READY) ## print the tables of tests/benchmarks
 	$(BIN)/python tests/benchmarks/run.py
 
 clean: ## remove the environment and everything generated
-	rm -rf $(VENV) $(COLCON) $(CHECKERS) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(COLCON) $(CHECKERS) .venv-rclpy-* out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

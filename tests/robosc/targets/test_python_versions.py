@@ -1,6 +1,6 @@
 """Generated Python packages under other Pythons: the oldest that is promised, those of ROS distributions, and newer.
 
-A node runs with rclpy in acceptance/end_to_end.
+Nodes run with rclpy in acceptance/equivalence/test_other_pythons.py.
 """
 
 import json

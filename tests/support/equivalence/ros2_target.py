@@ -2,8 +2,10 @@
 
 import json
 import signal
+import sys
 import time
 from array import array
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -33,9 +35,11 @@ class Ros2Surroundings:
     Args:
         supervisor: Supervisor that the node is generated from.
         folder: Folder for files and output.
+        python: Words that begin the node's command.
     """
 
-    def __init__(self, supervisor: Supervisor, folder: Path) -> None:
+    def __init__(self, supervisor: Supervisor, folder: Path, python: Sequence[str] = (sys.executable,)) -> None:
+        self._program, *self._words = python
         self._supervisor = supervisor
         self._model = supervisor.model
         self._folder = folder
@@ -66,9 +70,9 @@ class Ros2Surroundings:
         reports = self._peer.receive(DiagnosticArray, "/diagnostics")
         parameters = folder.parent / "parameters.yaml"
         parameters.write_text(json.dumps({"/**": {"ros__parameters": _parameters(scenario, folder, self._is_layer)}}))
-        command = ["-m", f"{package}.node", "--ros-args", "--params-file", str(parameters)]
+        command = [*self._words, "-m", f"{package}.node", "--ros-args", "--params-file", str(parameters)]
         self._node = self._stack.enter_context(
-            RosProcess(command, variables, self._folder / "run", [self._folder / "package"])
+            RosProcess(command, variables, self._folder / "run", [self._folder / "package"], program=self._program)
         )
         self._peer.wait_for_peers([item.identifier for item in topics(self._model)])
         self._peer.spin_until(
@@ -271,7 +275,7 @@ def _plain(message: Any) -> Any:
     return {name: _plain(getattr(message, name)) for name in message.get_fields_and_field_types() if name != "header"}
 
 
-def ros2_target(supervisor: Supervisor, folder: Path) -> NodeTarget:
-    """The target `ros2`."""
+def ros2_target(supervisor: Supervisor, folder: Path, python: Sequence[str] = (sys.executable,)) -> NodeTarget:
+    """The target `ros2`, under the Python that a command begins with."""
     sight = Sight(has_requests=supervisor.deployment is Deployment.CONTROLLER)
-    return NodeTarget("ros2", supervisor.model, Ros2Surroundings(supervisor, folder), folder / "events", sight)
+    return NodeTarget("ros2", supervisor.model, Ros2Surroundings(supervisor, folder, python), folder / "events", sight)

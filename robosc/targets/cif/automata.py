@@ -99,7 +99,8 @@ class _Writer:
         self._domains = diagram_domains(system)
         self._root = _Node()
         self._inputs = {item.event for item in system.inputs}
-        for name in self._inputs.difference(item.name for item in system.automata):
+        variables = {item.name for item in system.automata if item.alphabet == {item.name} and len(item.variables) == 1}
+        for name in sorted(self._inputs - variables):
             raise UnsupportedModelError(f"target cif: the event '{name}' carries data")
         self._enums = {
             variable.type.name: variable.type
@@ -108,7 +109,7 @@ class _Writer:
             if isinstance(variable.type, EnumType)
         }
         for enum in self._enums.values():
-            literals = ", ".join(escaped(item) for item in enum.values)
+            literals = ", ".join(escaped(_checked(item)) for item in enum.values)
             self._declare(_path(enum.name), "enum {} = " + literals, enum.values)
         for event in system.events:
             if event.name not in self._inputs:

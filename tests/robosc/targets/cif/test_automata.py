@@ -5,13 +5,13 @@ from typing import Any
 
 import pytest
 
-from robosc.automata import Automaton, Edge, Event, InputVariable, System
+from robosc.automata import Automaton, DiscreteVariable, Edge, Event, InputVariable, System
 from robosc.automata.controlled import controlled_graph
 from robosc.automata.semantics import Semantics
 from robosc.automata.state import subjects
 from robosc.cif import check_cif
 from robosc.errors import UnsupportedModelError
-from robosc.expressions import BooleanType
+from robosc.expressions import BooleanType, EnumType
 from robosc.pipeline.options import DEFAULT_OPTIONS
 from robosc.pipeline.systems import SystemSupervisor, synthesize_system
 from robosc.source import Bundle, SourceFile
@@ -172,13 +172,19 @@ def test_a_name_that_is_hidden_is_written_from_the_root() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "inputs", "message"),
+    ("name", "literal", "data", "message"),
     [
-        ("service calibrate", (), "'service calibrate' is no name of CIF"),
-        ("p", (InputVariable("e", (), BooleanType()),), "the event 'e' carries data"),
+        ("service calibrate", "a", "", "'service calibrate' is no name of CIF"),
+        ("p", "a-b", "", "'a-b' is no name of CIF"),
+        ("p", "a", "e", "the event 'e' carries data"),
+        ("e", "a", "e", "the event 'e' carries data"),
     ],
 )
-def test_automata_that_are_none_of_cif(name: str, inputs: tuple[InputVariable, ...], message: str) -> None:
-    automaton = Automaton(name, ("l",), ("l",), frozenset({"l"}), frozenset({"e"}), (Edge("l", "e", "l"),))
+def test_automata_that_are_none_of_cif(name: str, literal: str, data: str, message: str) -> None:
+    variable = DiscreteVariable("v", EnumType("E", (literal, "b")), (literal,))
+    automaton = Automaton(
+        name, ("l",), ("l",), frozenset({"l"}), frozenset({"e", "f"}), (Edge("l", "e", "l"),), (variable,)
+    )
+    inputs = (InputVariable(data, (), BooleanType()),) if data else ()
     with pytest.raises(UnsupportedModelError, match=message):
         automata.controlled_system(System("s", (Event("e", is_controllable=True),), (automaton,), inputs))

@@ -117,7 +117,7 @@ def synth(arguments: argparse.Namespace) -> ExitCode:
     refuse(arguments.allow_livelock, "--allow-livelock: a CIF model has no silent steps of a controller")
     made = synthesized(arguments)
     if made.supervisor is None:
-        return _without(arguments, made)
+        return report_none(arguments, made)
     if output is not None:
         for file in (made.bundle.main, *made.bundle.libraries):
             require_other_file(output, Path(file.name))
@@ -157,7 +157,7 @@ def explore(arguments: argparse.Namespace) -> ExitCode:
 
     made = synthesized(arguments)
     if made.supervisor is None:
-        return _without(arguments, made)
+        return report_none(arguments, made)
     graph = graph_of(made.supervisor, limit=arguments.limit)
     if arguments.json:
         print_json(graph_json(graph))
@@ -184,7 +184,7 @@ def verify(arguments: argparse.Namespace) -> ExitCode:
     refuse(bool(arguments.signed_by), "--signed-by: there is no supervisor file of a CIF model")
     made = synthesized(arguments)
     if made.supervisor is None:
-        return _without(arguments, made)
+        return report_none(arguments, made)
     progress = ProgressLine()
     try:
         result = verify_system(
@@ -257,7 +257,7 @@ def _synthesis(arguments: argparse.Namespace, found: "CheckedCif") -> "SystemSyn
         progress.clear()
 
 
-def _without(arguments: argparse.Namespace, made: Synthesized) -> ExitCode:
+def report_none(arguments: argparse.Namespace, made: Synthesized) -> ExitCode:
     """Report that there is no supervisor."""
     if arguments.json:
         print_json({"status": str(made.status), "reason": made.reason, **diagnostics_json(made.diagnostics)})

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from robosc.cli import cif
 from robosc.cli.arguments import add_engine_options, add_model_arguments
 from robosc.cli.given import given_supervisor
 from robosc.cli.output import ESCAPED, CommandError, ExitCode, UsageError, has_unicode_output
@@ -15,9 +16,10 @@ from robosc.source import visible
 
 if TYPE_CHECKING:
     from robosc.certification.supervisor_file import StateInWords
-    from robosc.pipeline.led_run import Step
+    from robosc.pipeline.led_run import LedRun, Step
     from robosc.pipeline.saved_runs import ModelOfTest
     from robosc.pipeline.simulation import Run
+    from robosc.pipeline.system_runs import SystemRun
     from robosc.pipeline.walking import Trouble
 
 DEFAULT_STEPS = 1000
@@ -26,6 +28,7 @@ _DESCRIPTION = """\
 Lead the robot under its supervisor by hand: you play the world, and choose among what the controller may do. Events
 come from a file (--events), by chance (--random, --until-trouble), or as commands that are typed: 'help' tells them.
 With none of these options commands are read from standard input; on a terminal with a prompt, a history and completion.
+A CIF model (FILE.cif) is led likewise: there you are the plants.
 """
 
 _EPILOG = """\
@@ -34,6 +37,7 @@ a file of events has one a line, with its data as JSON or as name=value; what is
   scan.response {"front": 0.7}
   level.response 3
   move.request                         a request, where it is allowed
+  take -> Buffer = full                of a CIF model, which of several states it leads to
 An event log (.jsonl) is taken as well: its events happen again.
 
 trouble, for --trouble and until-trouble:
@@ -80,6 +84,11 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         choices=["deadlock", "waiting", "blocked", "unknown"],
         help="kind of trouble that --until-trouble looks for (may be repeated; default: all)",
     )
+    parser.add_argument(
+        "--initial",
+        metavar="STATE",
+        help="state in which a CIF model begins that may begin in several: 'p.x = 1, q = on'",
+    )
     group.add_argument(
         "--save",
         action="append",
@@ -118,6 +127,10 @@ def run(arguments: argparse.Namespace) -> int:
     is_scripted = arguments.events is not None or arguments.random or arguments.until_trouble
     if not is_scripted and (arguments.json or arguments.save):
         raise UsageError("--json and --save need events: --events, --random or --until-trouble")
+    if cif.is_cif(arguments):
+        return _run_cif(arguments, is_scripted=bool(is_scripted))
+    if arguments.initial is not None:
+        raise UsageError("--initial chooses where a CIF model begins: a robot begins in one state")
     supervisor = given_supervisor(arguments, is_json=arguments.json)
     if supervisor is None:
         return ExitCode.FAILED
@@ -129,6 +142,64 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc.cli.simulation_shell import Shell
 
     return Shell(run_, model_of_test(arguments)).loop(sys.stdin)
+
+
+def _run_cif(arguments: argparse.Namespace, *, is_scripted: bool) -> int:
+    """Simulate a CIF model.
+
+    Raises:
+        UsageError: An argument means nothing for it, or it cannot be read.
+        CommandError: It may begin in several states, or not as it is asked for.
+    """
+    from robosc.cli.simulation_shell import Shell
+    from robosc.errors import UnknownNameError
+    from robosc.pipeline.system_runs import ChoiceError, SystemRun, asked_parts
+
+    cif.refuse(bool(arguments.save), "--save: event logs and tests are of robots, and a CIF model is none")
+    made = cif.synthesized(arguments)
+    if made.supervisor is None:
+        return cif.report_none(arguments, made)
+    try:
+        initial = None if arguments.initial is None else asked_parts(made.supervisor.system, arguments.initial)
+        run_ = SystemRun(made.supervisor, initial)
+    except ChoiceError as error:
+        choose = f"; choose one: --initial '{_parts_text(error.example)}'" if error.example else ""
+        raise CommandError(f"{error.problem}{choose}", ExitCode.FAILED) from error
+    except UnknownNameError as error:
+        raise UsageError(f"--initial: {error}") from error
+    return _script(arguments, run_) if is_scripted else Shell(run_, None).loop(sys.stdin)
+
+
+def _parts_text(parts: Mapping[str, object]) -> str:
+    from robosc.explanation.notation import value_text
+
+    return ", ".join(f"{name} = {value_text(value)}" for name, value in parts.items())  # type: ignore[arg-type]
+
+
+def taken(run_: "Run | SystemRun", name: str, data: object, target: str) -> "Step":
+    """Take an event as a person wrote it.
+
+    Args:
+        run_: The run.
+        name: Name of the event.
+        data: Data that it carries; NO_DATA for none.
+        target: Parts of the state that it is to lead to; of automata.
+
+    Raises:
+        RoboscError: It cannot happen so.
+    """
+    from robosc.pipeline.received_data import NO_DATA
+    from robosc.pipeline.simulation import Run
+    from robosc.pipeline.system_runs import ChoiceError, asked_parts
+
+    event, given = run_.event_called(name), () if data is NO_DATA else (data,)
+    if isinstance(run_, Run):
+        return run_.step(event, *given)
+    try:
+        return run_.step(event, *given, to=asked_parts(run_.supervisor.system, target) if target else None)
+    except ChoiceError as error:
+        choose = f"; choose one: {name} -> {_parts_text(error.example)}" if error.example else ""
+        raise ChoiceError(f"{error.problem}{choose}") from error
 
 
 def model_of_test(arguments: argparse.Namespace) -> "ModelOfTest":
@@ -143,9 +214,10 @@ def model_of_test(arguments: argparse.Namespace) -> "ModelOfTest":
     )
 
 
-def _script(arguments: argparse.Namespace, run_: "Run") -> int:
+def _script(arguments: argparse.Namespace, run_: "Run | SystemRun") -> int:
     """Have happen what the options say, and report it."""
     from robosc.errors import RoboscError
+    from robosc.pipeline.simulation import Run
     from robosc.pipeline.walking import ALL_TROUBLE, TroubleKind
 
     report = _JsonReport(run_) if arguments.json else _TextReport(run_)
@@ -162,8 +234,9 @@ def _script(arguments: argparse.Namespace, run_: "Run") -> int:
             trouble = run_.walk_until_trouble(arguments.until_trouble, arguments.seed, kinds)
             for step in run_.history[before:]:
                 report.step(step)
-        for file in arguments.save:
-            run_.save(file, model_of_test(arguments))
+        if isinstance(run_, Run):
+            for file in arguments.save:
+                run_.save(file, model_of_test(arguments))
     except OSError as error:
         raise UsageError(str(error)) from error
     except RoboscError as error:
@@ -175,23 +248,27 @@ def _script(arguments: argparse.Namespace, run_: "Run") -> int:
     return ExitCode.FAILED if problem or trouble is not None else ExitCode.OK
 
 
-def _take_events(name: str, run_: "Run", report: Callable[["Step"], None]) -> str:
+def _take_events(name: str, run_: "Run | SystemRun", report: Callable[["Step"], None]) -> str:
     """Take the events of a file; returns what is wrong with the first that is not possible.
 
     Raises:
         UsageError: The file cannot be read.
     """
+    from robosc.errors import UnknownNameError
     from robosc.pipeline.event_scripts import ScriptError, read_script
-    from robosc.pipeline.led_run import EventNotPossibleError, UnknownEventError
-    from robosc.pipeline.received_data import NO_DATA, DataError
+    from robosc.pipeline.led_run import EventNotPossibleError
+    from robosc.pipeline.received_data import DataError
+    from robosc.pipeline.simulation import Run
+    from robosc.pipeline.system_runs import ChoiceError
 
     shown = "standard input" if name == "-" else name
+    model = run_.supervisor.model if isinstance(run_, Run) else None
     try:
         if name == "-":
-            script = read_script(sys.stdin.buffer, shown, run_.supervisor.model)
+            script = read_script(sys.stdin.buffer, shown, model)
         else:
             with Path(name).open("rb") as stream:
-                script = read_script(stream, shown, run_.supervisor.model)
+                script = read_script(stream, shown, model)
     except OSError as error:
         raise UsageError(f"cannot read {shown}: {error.strerror or error}") from error
     except ScriptError as error:
@@ -201,9 +278,8 @@ def _take_events(name: str, run_: "Run", report: Callable[["Step"], None]) -> st
             run_.restart()
             continue
         try:
-            arguments = () if item.data is NO_DATA else (item.data,)
-            report(run_.step(run_.event_called(item.event), *arguments))
-        except (DataError, EventNotPossibleError, UnknownEventError) as error:
+            report(taken(run_, item.event, item.data, item.target))
+        except (ChoiceError, DataError, EventNotPossibleError, UnknownNameError) as error:
             return f"{shown}:{item.line}: {error}"
     return ""
 
@@ -211,7 +287,7 @@ def _take_events(name: str, run_: "Run", report: Callable[["Step"], None]) -> st
 class _TextReport:
     """Report for a person."""
 
-    def __init__(self, run_: "Run") -> None:
+    def __init__(self, run_: "LedRun") -> None:
         self._run = run_
         self._count = 0
         self._state = run_.state
@@ -228,7 +304,7 @@ class _TextReport:
 class _JsonReport:
     """Report for a machine: one JSON object a line."""
 
-    def __init__(self, run_: "Run") -> None:
+    def __init__(self, run_: "LedRun") -> None:
         self._run = run_
         self._count = 0
 
@@ -303,7 +379,7 @@ def step_lines(number: int, step: "Step", before: "StateInWords") -> list[str]:
     return lines
 
 
-def standing(run_: "Run") -> list[str]:
+def standing(run_: "LedRun") -> list[str]:
     """Return the state and what can happen in it, in lines."""
     others = [event for event in run_.possible if not run_.is_controllable(event)]
     return [

@@ -7,16 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from robosc.cli.output import ExitCode
-from robosc.cli.simulate import DEFAULT_STEPS, standing, step_lines, write_lines
+from robosc.cli.simulate import DEFAULT_STEPS, standing, step_lines, taken, write_lines
 from robosc.errors import RoboscError
-from robosc.pipeline.event_scripts import parse_event
-from robosc.pipeline.received_data import NO_DATA, DataField
+from robosc.pipeline.event_scripts import parse_event, target_split
+from robosc.pipeline.received_data import DataField
 from robosc.source import visible
 
 if TYPE_CHECKING:
     from robosc.pipeline.led_run import Step
     from robosc.pipeline.saved_runs import ModelOfTest
     from robosc.pipeline.simulation import Run
+    from robosc.pipeline.system_runs import SystemRun
 
 PROMPT = "> "
 
@@ -34,6 +35,10 @@ save FILE                  the events so far, as an event log (.jsonl) or a test
 help, quit
 """
 
+AUTOMATA_HELP = """\
+EVENT [DATA] [-> STATE]    an event: press, sensor true, take -> Buffer = full where it can lead to several states
+""" + "".join(line for line in HELP.splitlines(keepends=True)[1:] if not line.startswith("save"))
+
 _MOST = 1_000_000
 _MOST_TOLD = 20
 """Steps of a walk that are told at once."""
@@ -48,10 +53,10 @@ class Shell:
 
     Args:
         run: The run.
-        model: Model that a saved test loads.
+        model: Model that a saved test loads; None for automata.
     """
 
-    def __init__(self, run: "Run", model: "ModelOfTest") -> None:
+    def __init__(self, run: "Run | SystemRun", model: "ModelOfTest | None") -> None:
         self._run = run
         self._model = model
         self._walks = 0
@@ -95,9 +100,7 @@ class Shell:
             readline.set_completer(lambda text, state: self._completion(readline.get_line_buffer(), text, state))
             is_libedit = getattr(readline, "backend", "readline") == "editline"
             readline.parse_and_bind("bind ^I rl_complete" if is_libedit else "tab: complete")
-        write_lines(
-            [f"{self._run.supervisor.model.name}: 'help' tells the commands, Tab completes", *standing(self._run)]
-        )
+        write_lines([f"{self._run.name}: 'help' tells the commands, Tab completes", *standing(self._run)])
         while True:
             try:
                 line = input(PROMPT)
@@ -124,9 +127,10 @@ class Shell:
         if words[0] in self._commands:
             self._commands[words[0]](words[1:])
             return True
-        event, data = parse_event(line)
+        text, target = target_split(line) if self._model is None else (line, "")
+        event, data = parse_event(text)
         before = self._run.state
-        step = self._run.step(self._run.event_called(event), *(() if data is NO_DATA else (data,)))
+        step = taken(self._run, event, data, target)
         write_lines([*step_lines(len(self._run), step, before), *standing(self._run)])
         return True
 
@@ -192,12 +196,16 @@ class Shell:
         write_lines([f"seed {seed}", *standing(self._run)])
 
     def _save(self, words: Sequence[str]) -> None:
+        from robosc.pipeline.simulation import Run
+
         if len(words) != 1:
             raise _CommandFault("save to which file? save FILE, with a name that ends in .jsonl or .py")
+        if not isinstance(self._run, Run):
+            raise _CommandFault("a run of automata is not saved: event logs and tests are of robots")
         write_lines([f"written to {self._run.save(Path(words[0]), self._model)}"])
 
     def _help(self, words: Sequence[str]) -> None:
-        sys.stdout.write(HELP)
+        sys.stdout.write(HELP if self._model is not None else AUTOMATA_HELP)
 
     # Output and completion
 

@@ -39,20 +39,23 @@ class ScriptedEvent:
         line: Number of its line, from 1.
         event: Its name; empty: the model begins again.
         data: Data that it carries; NO_DATA where none is told.
+        target: Parts of the state that it leads to, as told; of events of automata.
     """
 
     line: int
     event: str
     data: object
+    target: str = ""
 
 
-def read_script(stream: BinaryIO, name: str, model: Model) -> tuple[ScriptedEvent, ...]:
+def read_script(stream: BinaryIO, name: str, model: Model | None) -> tuple[ScriptedEvent, ...]:
     """Read events, one a line, or an event log (JSON Lines).
 
     Args:
         stream: The file, at its beginning.
         name: Name of the file, for messages.
-        model: Model that the events are of.
+        model: Model that the events are of; None: they are of automata, of which there are no logs, and what follows
+            the name of an event, its data, may tell where it leads.
 
     Raises:
         ScriptError: A line tells no event, or there is too much; the message begins with the place.
@@ -60,6 +63,8 @@ def read_script(stream: BinaryIO, name: str, model: Model) -> tuple[ScriptedEven
     """
     content = stream.read(MAXIMUM_BYTES + 1)
     if content.lstrip().startswith(b"{"):
+        if model is None:
+            raise ScriptError(f"{name}: an event log is of a robot's model, and this is run without one")
         return tuple(_logged(_Joined(content, stream), name, model))
     if len(content) > MAXIMUM_BYTES:
         raise ScriptError(f"{name}: more than {MAXIMUM_BYTES} bytes, which is too long for a file of events")
@@ -72,10 +77,17 @@ def read_script(stream: BinaryIO, name: str, model: Model) -> tuple[ScriptedEven
         text = line.strip()
         if text and not text.startswith("#"):
             try:
-                found.append(ScriptedEvent(number, *parse_event(text)))
+                line, target = target_split(text) if model is None else (text, "")
+                found.append(ScriptedEvent(number, *parse_event(line), target))
             except ScriptError as error:
                 raise ScriptError(f"{name}:{number}: {error}") from None
     return tuple(found)
+
+
+def target_split(text: str) -> tuple[str, str]:
+    """An event of automata, and the parts of the state that it leads to: `take -> Buffer = full`."""
+    event, _, target = text.partition("->")
+    return event.strip(), target.strip()
 
 
 def parse_event(text: str) -> tuple[str, object]:

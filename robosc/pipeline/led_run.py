@@ -11,7 +11,7 @@ from robosc.errors import RoboscError, UnknownNameError
 from robosc.pipeline.conditions import unknown_event
 from robosc.pipeline.files import FileAccessError, given_path, write_whole
 from robosc.pipeline.loading import FileName
-from robosc.pipeline.received_data import NO_DATA
+from robosc.pipeline.received_data import NO_DATA, DataField
 from robosc.pipeline.saved_runs import event_log
 from robosc.pipeline.walking import ALL_TROUBLE, Trouble, TroubleKind, Walker
 from robosc.tables import html_table
@@ -107,7 +107,28 @@ class LedRun(ABC):
     def _begin(self) -> None:
         """Back to the initial state."""
 
+    @abstractmethod
+    def data_fields(self, event: str) -> tuple[DataField, ...]:
+        """The parts of the data that an event carries, which can be given with it.
+
+        Raises:
+            UnknownEventError: There is no such event; the message names the nearest one.
+        """
+
     # Events that can happen
+
+    @property
+    def name(self) -> str:
+        """Name of the system."""
+        return self._name
+
+    def event_called(self, name: str) -> str:
+        """The event that a name stands for.
+
+        Raises:
+            UnknownEventError: There is no such event; the message names the nearest one.
+        """
+        return self._known(name)
 
     @property
     def initial(self) -> StateInWords:

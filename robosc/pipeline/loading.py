@@ -135,7 +135,7 @@ def read_model(
 
     if model.suffix == ".cif":
         raise FileAccessError(
-            f"{model} is a CIF model, which check, synth, explore, verify and generate --target cif of robosc take; "
+            f"{model} is a CIF model, which check, synth, explore, verify, simulate and generate --target cif take; "
             "this is for RoboSC's own"
         )
     try:

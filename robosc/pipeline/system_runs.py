@@ -8,11 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from random import Random
 from typing import Any
 
-from robosc.automata import InputVariable, Semantics
+from robosc.automata import InputVariable, Semantics, System
 from robosc.automata.compile import Path, State
 from robosc.automata.inputs import valuations
 from robosc.automata.semantics import TooManyChoicesError
-from robosc.automata.state import subjects
+from robosc.automata.state import subject_domain, subjects
 from robosc.certification.supervisor_file import StateInWords, state_in_words
 from robosc.errors import RoboscError, UnknownNameError, UnsupportedModelError
 from robosc.explanation.disabled import Disabled
@@ -31,9 +31,44 @@ from robosc.supervisor.predicates import state_predicates
 _MAXIMUM_WAYS = 4
 """States that an error lists."""
 
+_MAXIMUM_VALUES = 8
+"""Values that an error lists."""
+
 
 class ChoiceError(RoboscError, ValueError):
-    """Automata that leave open what happens: several states are possible, or none of those that were asked for."""
+    """Automata that leave open what happens: several states are possible, or none of those that were asked for.
+
+    Attributes:
+        problem: Choice that is open, without a way to make it.
+        example: Parts that choose one of several states; empty where there is none.
+    """
+
+    def __init__(self, problem: str, example: Mapping[str, Value] | None = None, keyword: str = "") -> None:
+        choose = f"; choose one, for instance with {keyword}={example}" if example else ""
+        super().__init__(f"{problem}{choose}")
+        self.problem = problem
+        self.example = example or {}
+
+
+def asked_parts(system: System, text: str) -> dict[str, Value]:
+    """The parts of a state that a text tells, such as `Buffer = full, Buffer.count = 2`.
+
+    Raises:
+        UnknownNameError: There is no such part; the message names the nearest one.
+        ChoiceError: A part has no such value, or the text tells none.
+    """
+    found: dict[str, Value] = {}
+    known = {str(subject): subject for subject in subjects(system)}
+    for part in text.split(","):
+        name, _, value = (item.strip() for item in part.partition("="))
+        if name not in known:
+            raise UnknownNameError(unknown_event(name, known, "part of the state"))
+        values = {value_text(item): item for item in subject_domain(system, known[name])}
+        if value not in values:
+            shown = ", ".join([*list(values)[:_MAXIMUM_VALUES], *(["..."] if len(values) > _MAXIMUM_VALUES else [])])
+            raise ChoiceError(f"{name} is never {value!r:.100}: it is one of {shown}")
+        found[name] = values[value]
+    return found
 
 
 class SystemRun(LedRun):
@@ -190,9 +225,7 @@ class SystemRun(LedRun):
             with_what = f" with {asked}" if asked else ""
             raise ChoiceError(f"{what} cannot {verb} a state{with_what}; it can {verb}: {told or 'none'}")
         example = {self._subjects[place]: found[0][place] for place in _varying(found)}
-        raise ChoiceError(
-            f"{what} can {verb} {len(found)} states: {told}; choose one, for instance with {keyword}={example}"
-        )
+        raise ChoiceError(f"{what} can {verb} {len(found)} states: {told}", example, keyword)
 
     def _ways(self, states: Sequence[State]) -> str:
         """States by what tells them apart; of very many the first."""

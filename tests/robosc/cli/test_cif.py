@@ -1,5 +1,6 @@
 """CIF models on the command line."""
 
+import io
 import json
 from pathlib import Path
 
@@ -110,6 +111,85 @@ def test_verify(model: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(capsys, "verify", model, "--quiet") == (0, "", "")
 
 
+CHOICE = """input bool sensor;
+plant p:
+  uncontrollable u;
+  location a: initial; marked; edge u when sensor goto b; edge u when sensor goto c;
+  location b: marked;
+  location c: marked;
+end
+"""
+
+
+def test_simulate(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, _, err = run(capsys, "simulate", model, "--random", "3")
+    assert (status, "--initial 'tank.level = 0'" in err) == (1, True)
+    begin = ["simulate", model, "--initial", "tank.level = 1"]
+    script = tmp_path / "events.txt"
+    script.write_text("tank.c_fill\ntank.u_drain\n")
+    status, out, err = run(capsys, *begin, "--events", str(script))
+    assert (status, err) == (0, "")
+    assert out.splitlines() == [
+        "   1  tank.c_fill: tank.level = 2",
+        "   2  tank.u_drain: tank.level = 1",
+        "now       tank = *, tank.level = 1 (marked)",
+        "allowed   tank.c_fill",
+        "can come  nothing",
+    ]
+    script.write_text("tank.c_fill\ntank.c_fill\n")
+    status, out, err = run(capsys, *begin, "--events", str(script))
+    assert status == 1
+    assert f"{script}:2: 'tank.c_fill' is not allowed now: the supervisor forbids it" in err
+    status, out, _ = run(capsys, *begin, "--random", "4", "--json")
+    assert (status, len(out.splitlines()), json.loads(out.splitlines()[-1])["status"]) == (0, 5, "done")
+
+
+def test_simulate_says_which_of_several_states(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "choice.cif"
+    path.write_text(CHOICE)
+    begin = ["simulate", str(path), "--initial", "sensor.value = false"]
+
+    def typed(text: str) -> tuple[int, str, str]:
+        monkeypatch.setattr("sys.stdin", io.StringIO(text))
+        return run(capsys, *begin)
+
+    status, out, err = typed("sensor true\np.u -> p = c\nundo\np.u -> p = b\n")
+    assert (status, err) == (0, "")
+    assert [line for line in out.splitlines() if "p.u" in line and "come" not in line] == [
+        "   2  p.u: p = c", "taken back: p.u", "   2  p.u: p = b",
+    ]  # fmt: skip
+    status, _, err = typed("sensor true\np.u\n")
+    assert (status, "choose one: p.u -> p = b" in err) == (1, True)
+    for text, message in (
+        ("p.u -> p = d", "p is never 'd': it is one of a, b, c"),
+        ("p.u -> q = a", "there is no part of the state 'q'"),
+        ("p.u", "p: sensor.value does not hold"),
+        ("save run.jsonl", "a run of automata is not saved"),
+    ):
+        status, _, err = typed(f"{text}\n")
+        assert (status, message in err) == (1, True), err
+    assert "-> STATE" in typed("help\n")[1]
+
+
+def test_simulate_begins_as_it_is_told(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for text, status, message in (
+        ("tank.level = 3", 1, "tank cannot begin in a state with tank.level = 3"),
+        ("tank.level = 9", 1, "tank.level is never '9': it is one of 0, 1, 2, 3"),
+        ("tank.levl = 1", 2, "--initial: there is no part of the state 'tank.levl'; did you mean 'tank.level'?"),
+    ):
+        assert run(capsys, "simulate", model, "--random", "1", "--initial", text)[0] == status
+        assert message in run(capsys, "simulate", model, "--random", "1", "--initial", text)[2]
+    log = tmp_path / "run.jsonl"
+    log.write_text('{"event": "tank.c_fill"}\n')
+    begin = ["simulate", model, "--initial", "tank.level = 1"]
+    status, _, err = run(capsys, *begin, "--events", str(log))
+    assert (status, "an event log is of a robot's model" in err) == (1, True)
+    Path(model).write_text(f"{TANK}marked false;\n")
+    assert run(capsys, "simulate", model, "--random", "1")[0] == 1
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -123,7 +203,8 @@ def test_verify(model: str, capsys: pytest.CaptureFixture[str]) -> None:
         ["generate", "--target", "all", "-o", "out"],
         ["generate", "--target", "cif", "--package", "tank", "-o", "out"],
         ["generate", "--target", "cif", "--allow-livelock", "-o", "out"],
-        ["simulate"],
+        ["simulate", "--random", "3", "--save", "run.jsonl"],
+        ["simulate", "--deployment", "layer"],
         ["doc"],
         ["explain-synthesis"],
         ["format"],

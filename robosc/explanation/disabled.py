@@ -114,7 +114,7 @@ class Disabled:
         targets = self._free.targets(state, event) if invariants else ()
         broken = [[item for item in invariants if not self._holds(item, target)] for target in targets]
         if all(broken):
-            for item in dict.fromkeys(item for items in broken for item in items):
+            for item in (item for item in invariants if any(item in items for items in broken)):
                 yield f"it leads only to what the plants cannot be: there {self._text(item)} does not hold"
 
     def _stays(self, expression: Expression, state: State, event: str, low: int, high: int) -> bool:

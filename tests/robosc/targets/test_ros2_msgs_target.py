@@ -85,6 +85,6 @@ def test_without_the_package_a_typed_state_says_how_to_get_it(tmp_path: Path) ->
     pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
     with (
         imported(generate(example_supervisor(MAZE), "ros2"), tmp_path, f"{PACKAGE}.state_publisher") as generated,
-        pytest.raises(generated.SetupError, match=r"robosc_msgs.*--target ros2-msgs, and build it"),
+        pytest.raises(generated.SetupError, match=r"robosc_msgs.*generate and build --target ros2-msgs"),
     ):
         generated.StatePublisher(Node(), "", "typed")

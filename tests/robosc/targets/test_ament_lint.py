@@ -1,0 +1,50 @@
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from robosc.targets import generate, write_files
+from support.ament_lint import MAZE, PACKAGES
+from support.generated import example_supervisor
+
+# Rules of ament_flake8 and ament_pep257 that ruff has, too; the linters themselves run in acceptance/.
+SELECTED = "A001,A002,C4,D,E,F,Q,W"
+IGNORED = "C416,D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404"
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_nothing_is_found_in_a_generated_package(name: str, tmp_path: Path) -> None:
+    write_files(PACKAGES[name](), tmp_path)
+    (tmp_path / "ruff.toml").write_text('lint.flake8-quotes.inline-quotes = "single"\nline-length = 99\n')
+    options = ["--config", str(tmp_path / "ruff.toml"), "--select", SELECTED, "--ignore", IGNORED]
+    ruff = [sys.executable, "-m", "ruff", "check", "--no-cache", "--target-version", "py38", *options, "."]
+    done = subprocess.run(ruff, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+def test_only_long_names_need_a_mark() -> None:
+    for name, package in PACKAGES.items():
+        if not name.endswith("-long"):
+            for path, text in package().items():
+                assert path.endswith("supervisor.py") or "noqa: E501" not in text, (name, path)
+
+
+def test_a_package_in_python_has_tests_of_the_linters() -> None:
+    files = generate(example_supervisor(MAZE), "ros2")
+    needed = {item.text for item in ElementTree.fromstring(files["package.xml"]).iterfind("test_depend")}
+    linters = ("copyright", "flake8", "pep257", "xmllint")
+    assert needed == {"python3-pytest", *(f"ament_{linter}" for linter in linters)}
+    for linter in linters:
+        assert f"pytest.importorskip('ament_{linter}.main')" in files[f"test/test_{linter}.py"]
+
+
+def test_a_package_in_cpp_can_have_all_common_linters() -> None:
+    text = generate(example_supervisor(MAZE), "ros2-cpp")["CMakeLists.txt"]
+    before, _, _ = text.partition("ament_lint_auto_find_test_dependencies()")
+    assert "find_package(ament_lint_auto QUIET)" in before
+    for linter in ("copyright", "cpplint", "uncrustify"):
+        assert f"set(ament_cmake_{linter}_FOUND TRUE)" in before
+    # The longest line that lint_cmake takes.
+    assert max(map(len, text.splitlines())) <= 140

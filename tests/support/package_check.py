@@ -42,6 +42,9 @@ class Thing(metaclass=Accepting):
     def __init__(self, *positional: Any, **named: Any) -> None:
         pass
 
+    def __call__(self, *positional: Any, **named: Any) -> Thing:
+        return self
+
     def keys(self) -> list[str]:
         """As keyword arguments it is none."""
         return []

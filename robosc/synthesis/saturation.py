@@ -101,7 +101,7 @@ class Saturation:
             low, high = (self._saturated(part, inside, group) for part, inside in parts)
             return self._manager.ite(self._variables[level], high, low)
         states = self._saturated(states, within, group + 1)
-        # What came of states that a step has seen is there already, so it is asked about new ones only.
+        # The targets of states that a step has seen are there already: it is asked about new ones only.
         seen = [self._false] * len(steps)
         # Once nothing has come of any step since the last time that something has, nothing ever will.
         vain, number = 0, 0

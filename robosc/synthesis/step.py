@@ -21,7 +21,7 @@ class Step:
 
     def grown(self, states: Any, within: Any, new: Any) -> Any:
         """Return some states and what the event adds to them of those within a predicate, led from new ones."""
-        # What it leads to is expensive; mostly all that it could is there already.
+        # The image is expensive, and mostly all that it could hold is there already.
         if self.room is not None and states | (within & self.room) == states:
             return states
         return states | (within & self.add(new))

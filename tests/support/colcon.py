@@ -18,7 +18,7 @@ MAKE_LIMIT_S = 900.0
 BUILD_LIMIT_S = 900.0
 PROGRAMS = ("g++", "cmake", "bash", "sh")
 
-# What a Python with ROS 2 hands down to programs that have their own.
+# A Python with ROS 2 hands variables down to programs that have their own.
 _ENTER = 'unset LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE PYTHONPATH; . "$0/install/setup.bash" && exec "$@"'
 
 

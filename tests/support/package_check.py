@@ -132,7 +132,7 @@ def check_files(folder: Path) -> None:
         assert runpy.run_path(str(path))["generate_launch_description"]() is not None
     files = sorted(folder.glob("test/test_*.py"))
     items = [item for path in files for name, item in runpy.run_path(str(path)).items() if name.startswith("test_")]
-    # What a stand-in has decorated is no function any more: a linter's test, which needs the linter.
+    # A function that a stand-in decorates is none any more: a linter's test, which needs the linter.
     tests = [item for item in items if isinstance(item, FunctionType)]
     assert tests or not files, files
     for test in tests:

@@ -12,7 +12,7 @@ import pytest
 
 START_LIMIT_S = 60.0
 
-# What a Python with ROS 2 hands down, and what would make a program of an environment another one.
+# A Python with ROS 2 hands some down; others would make a program of an environment another one.
 _OWN = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE", "PYTHONPATH", "PYTHONHOME", "PYENV_VERSION")
 
 

@@ -11,7 +11,7 @@ TARGETS = {
 }
 """Target that each package exports: those that a node without actions needs."""
 
-LINK_VARIABLES = {"LDFLAGS": "-Wl,--unresolved-symbols=ignore-in-shared-libs"}
+LINK_VARIABLES = {"LDFLAGS": "-Wl,--allow-shlib-undefined"}
 """Environment in which colcon links programs with the messages of wheels.
 
 These have libraries for Python among them, whose symbols only Python has.

@@ -122,7 +122,7 @@ class _Writer:
             self._node_prefix += "_"
         self._diagram_lines: dict[str, Text] = {}
 
-    # Where what stands
+    # Places of the parts
 
     def _node(self, path: _Path) -> _Node:
         node = self._root

@@ -134,7 +134,7 @@ def test_a_plant_condition_bars_an_event_whoever_controls_it(event: str, states:
     made = replace(counting(event), plant_conditions=(EventCondition(event, below(2)),))
     semantics = Semantics(made)
     assert [semantics.enabled(("l", n), event) for n in range(4)] == [True, True, False, False]
-    # What does not happen is against no requirement and leaves no range.
+    # An event that does not happen is against no requirement and leaves no range.
     strict = replace(made, conditions=(EventCondition(event, below(2)),))
     assert not any(Semantics(strict).bad(("l", n)) for n in (2, 3))
     result = synthesize(strict)
@@ -202,7 +202,7 @@ def test_choices_between_edges_are_told() -> None:
     found = [("go", "A", "a"), ("go", "B", "l")]
     assert [(item.event, item.automaton, item.location) for item in controllable_choices(made)] == found
     assert str(controllable_choices(made)[0]) == "A: go has several edges that can be taken in one state of a"
-    # Where the other automaton blocks the event, or an edge leaves a range, there is no choice.
+    # There is no choice if the other automaton blocks the event, or if an edge leaves a range.
     blocking = replace(made, automata=(made.automata[0], automaton("B", ["m -x-> m"], blocks=["go"])))
     assert controllable_choices(replace(blocking, events=(*made.events, Event("x", True)))) == ()
     narrow = DiscreteVariable("n", IntegerType(0, 1), (0,))

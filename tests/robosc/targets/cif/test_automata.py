@@ -131,7 +131,7 @@ def test_random_models(seed: int, limit: int, monkeypatch: pytest.MonkeyPatch) -
     if supervisor is None:
         return
     text = written(supervisor)
-    # Where ranges are wider than they were, the supervisor alone keeps to them.
+    # The supervisor alone keeps to ranges that are wider than they were.
     wider = text.replace("disc int[0..2] x in any;", "disc int[-9..9] x in {0, 1, 2};")
     assert runs(read_again(wider)) == runs(supervisor.system, supervisor), text
 

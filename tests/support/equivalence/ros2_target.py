@@ -206,7 +206,7 @@ class _ServerType:
     """As much of a server as loading its type needs."""
 
     def __init__(self, is_action: bool, package: str, type_: str) -> None:
-        self.is_action, self.package, self.type = is_action, package, type_
+        self.is_action, self.package, self.type_name = is_action, package, type_
 
 
 def _parameters(scenario: Scenario, folder: Path, is_layer: bool) -> dict[str, Any]:

@@ -4,6 +4,7 @@ Statements are broken at brackets and operators, comments at words. What cannot 
 model, is marked: `# noqa: E501`.
 """
 
+import ast
 import io
 import re
 import textwrap
@@ -11,6 +12,7 @@ import tokenize
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from robosc.errors import InternalError
 from robosc.targets.python.bundle import WIDTH
 
 _TOKEN = re.compile(
@@ -19,6 +21,7 @@ _TOKEN = re.compile(
 )
 _STATEMENT = re.compile(r"(?P<head>return |if |elif |while |[\w.]+ = )(?P<value>.*[^:,(\[{])(?P<tail>:?)")
 _OPERATORS = frozenset(("if", "else", "and", "or", "for"))
+_LONG = ('"""', "'''")
 _MARK = "  # noqa: E501"
 
 
@@ -33,15 +36,20 @@ def folded(text: str) -> str:
     """The text of a module with lines that are not too long, and the same meaning; docstrings stay as they are.
 
     Once more, it changes nothing.
+
+    Raises:
+        InternalError: The result would have another meaning.
     """
-    lines = text.splitlines()
+    # Not `splitlines`, which sees more ends of lines than Python does.
+    lines = text.removesuffix("\n").split("\n")
     if all(len(line) <= WIDTH for line in lines):
         return text
     ends: dict[int, int] = {}
     depths: dict[int, int] = {}
     depth = 0
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        if token.type == tokenize.STRING and token.start[0] < token.end[0]:
+        # Texts of several lines, or that could be: what stands in them is no code, whatever it looks like.
+        if token.type == tokenize.STRING and token.string.endswith(_LONG):
             ends.update((row, token.end[0]) for row in range(token.start[0], token.end[0] + 1))
         depths.setdefault(token.start[0], depth)
         if token.type == tokenize.OP:
@@ -54,7 +62,10 @@ def folded(text: str) -> str:
             found.append(line + _MARK if row in marked else line)
         else:
             found += _broken(line, is_inside=depths[row] > 0)
-    return "\n".join(found) + "\n"
+    result = "\n".join(found) + "\n"
+    if ast.dump(ast.parse(result)) != ast.dump(ast.parse(text)):
+        raise InternalError("a generated module has another meaning with shorter lines")
+    return result
 
 
 def _broken(line: str, is_inside: bool) -> Iterator[str]:

@@ -68,6 +68,24 @@ def test_docstrings_keep_their_words_and_are_marked_once() -> None:
     assert found.count(MARK) == 2 and folded(found) == found
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        r"""a \\"; __import__('os').system('touch {}')""",
+        """a '; f(1, "{}", (2, 3))""",
+        "a # {}, (b, c), [d]",
+        "a \u2028 if b == 'c' and d: {}",
+        r"a \"\"\"; f({}, [1, 2])",
+    ],
+)
+@pytest.mark.parametrize("statement", ['"""{}."""', "found = f('''{}.''', [1, 2, 3], (4, 5))"])
+def test_texts_that_look_like_code_stay_texts(words: str, statement: str) -> None:
+    text = "def a():\n    " + statement.format(words.format("x" * 120)) + "\n    return {}\n"
+    found = folded(text)
+    assert ast.dump(ast.parse(found)) == ast.dump(ast.parse(text))
+    assert found.count(MARK) == 1 and folded(found) == found
+
+
 def test_what_fits_stays_as_it_is() -> None:
     text = "a = [1,2]   # as it was\n"
     assert folded(text) == text

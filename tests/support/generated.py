@@ -1,8 +1,11 @@
 """Loads generated Python packages, and compares what they do with the interpreter."""
 
+import ast
 import importlib
 import itertools
 import math
+import re
+import subprocess
 import sys
 import types
 from collections.abc import Iterator
@@ -29,6 +32,28 @@ def example_supervisor(name: str, deployment: Deployment = Deployment.CONTROLLER
     made = make_supervisor(example_bundle(name), deployment=deployment)
     assert made.supervisor is not None, made.reason
     return made.supervisor
+
+
+def require_sound_python(folder: Path, rules: str = "F,E4,E7,E9,B,PLE") -> None:
+    """Assert that Python files of a folder parse on 3.8, import nothing of RoboSC, and break none of ruff's rules."""
+    for path in folder.rglob("*.py"):
+        text = path.read_text()
+        ast.parse(text, filename=str(path), feature_version=(3, 8))
+        assert not re.search(r"^\s*(from|import) robosc", text, re.MULTILINE), path
+    ruff = [
+        sys.executable,
+        "-m",
+        "ruff",
+        "check",
+        "--isolated",
+        "--target-version",
+        "py38",
+        "--select",
+        rules,
+        str(folder),
+    ]
+    result = subprocess.run(ruff, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stdout
 
 
 @contextmanager

@@ -1,10 +1,7 @@
 """The generated ROS 1 package: its files are what catkin, roslaunch and a reader expect; what is refused is named."""
 
-import ast
 import re
 import stat
-import subprocess
-import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -16,7 +13,7 @@ from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_files
 from robosc.targets.ros.runtime.parameters import USE_SIM_TIME, declarations, validate
-from support.generated import example_supervisor
+from support.generated import example_supervisor, require_sound_python
 from support.models import model_of
 from support.own_tests import PYTEST, own_tests
 from support.random_supervisors import CERTIFICATE
@@ -37,27 +34,6 @@ def robot(body: str, name: str = "Robot") -> Supervisor:
 @pytest.fixture(scope="module")
 def files() -> GeneratedFiles:
     return generate(example_supervisor(FOLLOWER), "ros1")
-
-
-def require_sound_python(folder: Path, rules: str = "F,E4,E7,E9,B,PLE") -> None:
-    for path in folder.rglob("*.py"):
-        text = path.read_text()
-        ast.parse(text, filename=str(path), feature_version=(3, 8))
-        assert not re.search(r"^\s*(from|import) robosc", text, re.MULTILINE), path
-    ruff = [
-        sys.executable,
-        "-m",
-        "ruff",
-        "check",
-        "--isolated",
-        "--target-version",
-        "py38",
-        "--select",
-        rules,
-        str(folder),
-    ]
-    result = subprocess.run(ruff, capture_output=True, text=True, check=False)
-    assert result.returncode == 0, result.stdout
 
 
 @pytest.mark.parametrize("name", [FOLLOWER, MAZE, NAVIGATION])

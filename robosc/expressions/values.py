@@ -298,7 +298,7 @@ def read_element(values: Any, index: int) -> Any:
 
 class Absent:
     """
-    Placeholder for a part of received data that has no place.
+    Mark of a part of received data that has no place.
 
     Beyond the end of an array, and below that.
     """

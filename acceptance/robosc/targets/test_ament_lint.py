@@ -8,7 +8,7 @@ from robosc.targets import write_files
 from support.ament_lint import PACKAGES
 from support.colcon import colcon_program
 
-# What a Python with ROS 2 hands down to programs that have their own.
+# A Python with ROS 2 hands these variables down to programs that have their own.
 HANDED_DOWN = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE", "PYTHONPATH")
 
 

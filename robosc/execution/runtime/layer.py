@@ -302,8 +302,8 @@ class Layer(Runner):
         """Let the request happen, with all that follows from it, before its message goes out."""
         self._steps.take(request.event, message)
         self._steps.settle(request.name)
-        # What goes out now may wait for time to pass: looked up as soon as the clock is read
-        # again.
+        # A message that goes out now may wait for time to pass: looked up as soon as the clock
+        # is read again.
         self._deadline_s = self._now_s
 
     def _recognized(self, names: Sequence[str], message: Any) -> Optional[Request]:

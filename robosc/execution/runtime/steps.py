@@ -70,8 +70,7 @@ class Steps:
         self._on_unknown = on_unknown
         self.enabled: Optional[Tuple[int, ...]] = None
         self.unchanging: Dict[str, Tuple[Any, bool]] = {}
-        # What the system's `changes` were in the last stable state, or None if the state may not
-        # be stable.
+        # The system's `changes` in the last stable state, or None if the state may not be stable.
         self._stable: Optional[int] = None
         # A fault that waits for the end of its batch, because on_unknown is `fault`.
         self._pending: Optional[str] = None

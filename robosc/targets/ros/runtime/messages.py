@@ -28,7 +28,7 @@ _SEQUENCE = re.compile(r'sequence<(?P<element>.+?)(, [0-9]+)?>\Z|(?P<fixed>.+)\[
 _NESTED = re.compile(r'[a-z0-9_]+/[A-Za-z0-9]+\Z')
 _STRING = re.compile(r'w?string(<(?P<bound>[0-9]+)>)?\Z')
 
-# What genpy, of ROS 1, calls the types of fields, in the words of ROS 2. Its own times and
+# Types of fields as genpy, of ROS 1, calls them, in the words of ROS 2. Its own times and
 # durations count as messages.
 _GENPY_ARRAY = re.compile(r'(?P<element>[^\[]+)\[(?P<length>[0-9]*)\]\Z')
 

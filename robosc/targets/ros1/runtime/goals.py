@@ -145,8 +145,8 @@ class ActionGoals:
         goal = self._goals.get(goal_id)
         # Its end may be known here and wait to be told.
         if goal is not None:
-            # Where its end is known and only the result awaited, no notice of the cancel will be
-            # taken.
+            # No notice of the cancel is taken of a goal whose end is known and only its result
+            # awaited.
             goal.cancelled_s = None if goal.state in _CANCEL_HEARD else self._monotonic()
             goal.handle.cancel()
 

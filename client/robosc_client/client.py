@@ -1,6 +1,5 @@
 """Client for synchronous programs."""
 
-import threading
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing, suppress
@@ -9,7 +8,7 @@ from typing import Any, Concatenate, Self
 
 import grpc
 
-from robosc_api.security import Credentials, SecurityError, open_channel
+from robosc_api.security import Credentials, SecurityError, close_channel, open_channel
 from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
 from robosc_client import operations
 from robosc_client.calls import CHANNEL_OPTIONS, WATCH_INTERRUPTED, JobPages, JobWatch, Operation, RetriedCall
@@ -19,9 +18,6 @@ from robosc_client.errors import CredentialsError
 from robosc_client.jobs import Job
 from robosc_client.operations import client_method
 from robosc_client.retry import DEFAULT_RETRIES, RetryPolicy
-
-_CLOSE_S = 0.5
-"""Time for an interrupted program to close its connection, in seconds."""
 
 
 def _unary_method[**P, Result](describe: Callable[P, Operation[Result]]) -> "Callable[Concatenate[Client, P], Result]":
@@ -102,18 +98,11 @@ class Client:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is None or issubclass(kind, Exception):
-            self.close()
-            return
-        # An interrupt during the start of a call would make gRPC wait for ever for its end. Closing cancels all calls
-        # before it waits.
-        ending = threading.Thread(target=self._channel.close, daemon=True)
-        ending.start()
-        ending.join(_CLOSE_S)
+        close_channel(self._channel, error)
 
     def close(self) -> None:
         """Close the connection; open calls are cancelled."""
-        self._channel.close()
+        close_channel(self._channel)
 
     check = _unary_method(operations.check)
     synthesize = _unary_method(operations.synthesize)

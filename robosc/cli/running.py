@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from robosc.cli.output import CommandError, ExitCode, prepare_streams, print_diagnostics, print_json
+from robosc.cli.starting import interrupts_as_such
 from robosc.errors import Diagnostic, LanguageError, RoboscError
 from robosc.json_documents import counts_text, diagnostics_json
 from robosc.source import visible
@@ -106,7 +107,8 @@ def guarded(program: str, run: Callable[[], int], *, as_json: bool = False) -> i
     prepare_streams()
     diagnostics: Sequence[Diagnostic] = ()
     try:
-        status = run()
+        with interrupts_as_such():
+            status = run()
         sys.stdout.flush()
         return status
     except LanguageError as error:

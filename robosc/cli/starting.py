@@ -7,7 +7,7 @@ import contextlib
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NoReturn
 
 from robosc.python_versions import FIX, OLDEST, unsupported
@@ -16,6 +16,24 @@ INTERRUPTED = 130
 """Exit status after Ctrl-C, as of a shell."""
 
 _WRONG_USE = 2
+
+
+@contextlib.contextmanager
+def interrupts_as_such() -> Iterator[None]:
+    """Within the block an error that an interrupt has caused is a `KeyboardInterrupt`.
+
+    `threading.Condition.wait`, for one, which gRPC waits with, gives up its lock before it is ready for an interrupt;
+    one just then comes out as `RuntimeError: cannot release un-acquired lock`.
+    """
+    try:
+        yield
+    except Exception as error:
+        cause: BaseException | None = error
+        while cause is not None and not isinstance(cause, KeyboardInterrupt):
+            cause = cause.__context__
+        if cause is not None:
+            raise KeyboardInterrupt from error
+        raise
 
 
 def start(program: str, load: Callable[[], Callable[[], int]], extra: str | None = None) -> NoReturn:

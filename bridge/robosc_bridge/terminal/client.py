@@ -17,7 +17,7 @@ import grpc
 from google.protobuf.json_format import MessageToDict
 from google.protobuf.struct_pb2 import Value
 
-from robosc_api.security import Credentials, SecurityError, open_channel
+from robosc_api.security import Credentials, SecurityError, close_channel, open_channel
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_api.v1 import bridge_pb2_grpc
 
@@ -102,11 +102,11 @@ class BridgeClient:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        close_channel(self._channel, error)
 
     def close(self) -> None:
         """End the connection, and every call that is under way; may be called again, from any thread."""
-        self._channel.close()
+        close_channel(self._channel)
 
     def stop(self) -> None:
         """Stop the robot."""

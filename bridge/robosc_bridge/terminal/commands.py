@@ -5,8 +5,10 @@ import json
 import os
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
+from robosc.cli.starting import interrupts_as_such
 from robosc_api.security import (
     Scope,
     SecurityError,
@@ -92,7 +94,7 @@ def _connected(arguments: argparse.Namespace, work: Callable[[Any, argparse.Name
     from robosc_bridge.terminal.client import BridgeClient, RefusedError, UnreachableError
 
     try:
-        with BridgeClient(arguments.address, credentials_of(arguments)) as client:
+        with interrupts_as_such(), BridgeClient(arguments.address, credentials_of(arguments)) as client:
             return work(client, arguments)
     except RefusedError as error:
         return _failed(str(error), REFUSED)
@@ -145,15 +147,13 @@ def _watch(client: Any, arguments: argparse.Namespace) -> int:
     from robosc_bridge.terminal.formatting import Lines
 
     lines = Lines()
-    try:
+    with suppress(KeyboardInterrupt), interrupts_as_such():
         for response in client.watch(with_scans=arguments.scans and arguments.json, rate_hz=arguments.rate):
             if arguments.json:
                 sys.stdout.write(json.dumps(as_json(response), separators=(",", ":")) + "\n")
             else:
                 sys.stdout.writelines(f"{line}\n" for line in lines.of(response))
             sys.stdout.flush()
-    except KeyboardInterrupt:
-        pass
     return DONE
 
 

@@ -15,7 +15,7 @@ from robosc_api.security.arguments import (
     server_security_of,
 )
 from robosc_api.security.callers import CALLER, ENTRY, caller_of, is_admin, network_of, token_or_host_of
-from robosc_api.security.client import Credentials, check_credentials, open_async_channel, open_channel
+from robosc_api.security.client import Credentials, check_credentials, close_channel, open_async_channel, open_channel
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.guard import Guard, Rule
 from robosc_api.security.listening import ServerSecurity, add_port, check_files, check_listening
@@ -41,6 +41,7 @@ __all__ = [
     "check_credentials",
     "check_files",
     "check_listening",
+    "close_channel",
     "credentials_of",
     "is_admin",
     "is_loopback_host",

@@ -1,5 +1,6 @@
 """Credentials of a client, and channels that use them."""
 
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,9 @@ from robosc_api.security.addresses import is_loopback_host, split_address
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.listening import check_certificates, read, read_secret
 from robosc_api.security.tokens import MAXIMUM_TOKEN
+
+_CLOSE_S = 0.5
+"""Time for a program that an error ends to close a channel, in seconds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +70,23 @@ def open_async_channel(
         secrets = _channel_credentials(credentials)
         return grpc.aio.secure_channel(address, secrets, options=options, interceptors=interceptors)
     return grpc.aio.insecure_channel(address, options=options, interceptors=interceptors)
+
+
+def close_channel(channel: grpc.Channel, error: BaseException | None = None) -> None:
+    """Close a channel; open calls are cancelled.
+
+    Args:
+        channel: Channel to close.
+        error: Error that ends its use, if one does. An interrupt during the start of a call, which may come out as
+            another error, would make gRPC wait for ever for the call's end, so the wait is bounded then.
+    """
+    if error is None:
+        channel.close()
+        return
+    # Closing cancels all calls before it waits.
+    ending = threading.Thread(target=channel.close, daemon=True)
+    ending.start()
+    ending.join(_CLOSE_S)
 
 
 def _is_secure(credentials: Credentials) -> bool:

@@ -26,6 +26,7 @@ from robosc_bridge.terminal import client
 from robosc_bridge.terminal.commands import NAMES, main
 from robosc_bridge.terminal.formatting import Lines, event_line, status_lines
 from support.certificates import Authority
+from support.interrupts import interrupt_without_its_lock
 from support.remote import READING, FakeDaemon, connected, served
 from support.waiting import PATIENCE_S, wait_until
 
@@ -91,6 +92,19 @@ class TestWishes:
         assert errors.startswith(f"robosc-bridge: no bridge answers at {NOWHERE}: ")
         assert errors.count("\n") == 1
 
+    @pytest.mark.parametrize(
+        ("name", "status", "errors"), [("status", 130, "robosc-bridge: interrupted\n"), ("watch", 0, "")]
+    )
+    def test_an_interrupt_that_comes_out_as_another_error(
+        self, name: str, status: int, errors: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        def interrupted(*_: Any, **__: Any) -> Any:
+            interrupt_without_its_lock()
+
+        monkeypatch.setattr(client.BridgeClient, name, interrupted)
+        assert main([name, "--address", NOWHERE]) == status
+        assert capsys.readouterr().err == errors
+
     def test_the_whole_program_knows_them(self, daemon: FakeDaemon, address: str) -> None:
         assert robosc_bridge(["stop", "--address", address]) == 0
         assert daemon.commands() == [OperatorCommand.STOP]
@@ -110,8 +124,9 @@ class TestWishes:
 
     def test_a_stop_loads_nothing_that_runs_a_robot(self) -> None:
         text = (
-            "import sys; from robosc_bridge.terminal import client, commands; "
-            "print([name for name in sys.modules if name.split('.')[0] in ('robosc', 'numpy', 'cv2', 'serial')])"
+            "import sys, robosc.cli.starting; start = set(sys.modules); "
+            "from robosc_bridge.terminal import client, commands; loaded = set(sys.modules) - start; "
+            "print([name for name in loaded if name.split('.')[0] in ('robosc', 'numpy', 'cv2', 'serial')])"
         )
         done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
         assert done.stdout == "[]\n"

@@ -12,6 +12,7 @@ from robosc.cli.main import guarded, main, make_parser
 from robosc.cli.output import ExitCode
 from robosc_client.main import main as client_main
 from robosc_client.main import make_parser as make_client_parser
+from support.interrupts import interrupt_without_its_lock
 from support.models import EXAMPLES
 
 LINE_FOLLOWER = str(EXAMPLES / "line_follower" / "line_follower.rscd")
@@ -126,6 +127,11 @@ def test_a_text_that_cannot_be_a_model(capsys: pytest.CaptureFixture[str], tmp_p
     found = capsys.readouterr()
     assert json.loads(found.out)
     assert plain.out == ""
+
+
+def test_an_interrupt_that_comes_out_as_another_error(capsys: pytest.CaptureFixture[str]) -> None:
+    assert guarded("robosc", interrupt_without_its_lock, as_json=True) == ExitCode.INTERRUPTED
+    assert error_of(capsys.readouterr().out)["message"] == "interrupted"
 
 
 def test_a_server_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:

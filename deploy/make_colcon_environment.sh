@@ -35,7 +35,7 @@ export AMENT_PREFIX_PATH='$venv' CMAKE_PREFIX_PATH='$venv' PATH='$venv/bin:/usr/
 verb=\$1
 shift
 if [ "\$verb" = build ]; then
-    exec colcon build "\$@" --cmake-args -DPython3_EXECUTABLE='$venv/bin/python' -DBUILD_TESTING=OFF
+    exec colcon build "\$@" --cmake-args -DPython3_EXECUTABLE='$venv/bin/python'
 fi
 exec colcon "\$verb" "\$@"
 END

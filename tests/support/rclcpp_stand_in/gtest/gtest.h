@@ -48,12 +48,27 @@ inline int add(const std::string& name, std::function<void()> test)
     return 0;
 }
 
+/* A test is a member of a class that is made of this one, whose names hide those of the file. */
+class Test {
+private:
+    void Run();
+    void DeleteSelf_();
+
+protected:
+    void SetUp();
+    void TearDown();
+};
+
 }  // namespace testing
 
 #define TEST(Suite, Name)                                                                                              \
-    static void Suite##_##Name();                                                                                      \
-    static const int Suite##_##Name##_added = ::testing::add(#Suite "." #Name, Suite##_##Name);                       \
-    static void Suite##_##Name()
+    class Suite##_##Name##_Test : public ::testing::Test {                                                             \
+    public:                                                                                                            \
+        void TestBody();                                                                                               \
+    };                                                                                                                 \
+    static const int Suite##_##Name##_added                                                                            \
+        = ::testing::add(#Suite "." #Name, [] { Suite##_##Name##_Test().TestBody(); });                                \
+    void Suite##_##Name##_Test::TestBody()
 #define EXPECT_EQ(one, other) ::testing::check((one) == (other), #one " == " #other)
 #define EXPECT_TRUE(value) ::testing::check((value), #value)
 #define SCOPED_TRACE(text) const ::testing::Trace trace(text)

@@ -80,7 +80,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "generate",
         help="generate a package that runs the supervisor",
         description="Synthesize the supervisor of a model and write a complete package that runs it. Of a CIF model "
-        "(FILE.cif), --target cif writes the controlled system.",
+        "(FILE.cif), --target c99 and python write a library, and --target cif the controlled system.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -158,25 +158,24 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _generate_cif(arguments: argparse.Namespace) -> ExitCode:
-    """Write the controlled system of a CIF model; its problem is in CIF already.
+    """Generate from a CIF model.
 
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
     """
-    from robosc.targets import GeneratedFiles
-    from robosc.targets.cif.generate import SUPERVISED
+    from robosc.targets import ALL, generate_automata
 
+    cif.refuse(arguments.target == ALL, "--target all: of a CIF model name one target: c99, cif or python")
     cif.refuse(
-        arguments.target != "cif",
-        f"--target {arguments.target}: a CIF model has no messages to generate code for, so only --target cif takes it",
+        arguments.target == "cif" and arguments.package is not None,
+        "--package: of a CIF model, --target cif makes one file and no package",
     )
-    cif.refuse(arguments.package is not None, "--package: of a CIF model one file is made and no package")
     cif.refuse(arguments.allow_livelock, "--allow-livelock: a CIF model has no silent steps of a controller")
-    generate_options(arguments)
+    options = generate_options(arguments)
     made = cif.synthesized(arguments)
     files = None
-    if made.supervisor is not None:
-        files = GeneratedFiles({SUPERVISED: cif.controlled_system(made.supervisor)})
+    if (found := made.supervisor) is not None:
+        files = generate_automata(found.system, found.added, found.initial, arguments.target, options)
     return report_generated(arguments, made, files, made.bundle)
 
 

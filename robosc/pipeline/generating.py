@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from robosc.automata import System
 from robosc.certification import OutcomeStatus, Progress, SynthesisOutcome
 from robosc.errors import UnsupportedModelError
 from robosc.pipeline.findings import Findings
@@ -10,8 +11,9 @@ from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import Generation, SynthesisStatus
 from robosc.pipeline.supervisors import Supervisor
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, make, never, status_of
+from robosc.pipeline.systems import SystemSupervisor, synthesize_system
 from robosc.supervisor import Supervisor as CoreSupervisor
-from robosc.targets import GenerateOptions, TargetRefusal, generate_or_refuse, require_generatable
+from robosc.targets import GenerateOptions, TargetRefusal, generate_automata, generate_or_refuse, require_generatable
 
 DEFAULT_GENERATION = GenerateOptions()
 UNKNOWN_FINDINGS = (
@@ -21,7 +23,7 @@ UNKNOWN_FINDINGS = (
 
 
 def generate(
-    model: ModelLike | CoreSupervisor,
+    model: ModelLike | CoreSupervisor | System | SystemSupervisor,
     target: str,
     generation: GenerateOptions = DEFAULT_GENERATION,
     options: SynthesisOptions = DEFAULT_OPTIONS,
@@ -35,7 +37,8 @@ def generate(
 
     Args:
         model: A supervisor that `synthesize` has made, what `load` returns, or the path of a model. Of one that was
-            read from a file nothing is generated: some findings about its model are errors for a target.
+            read from a file nothing is generated: some findings about its model are errors for a target. Or automata,
+            or their supervisor, for the targets c99, cif and python.
         target: Name of the target, or `all`.
         generation: Choices about the files.
         options: Options for making the supervisor of a model.
@@ -46,6 +49,7 @@ def generate(
         UnknownTargetError: There is no such target.
         FileAccessError: The file is not there or cannot be read.
         LanguageError: A file is too large or not UTF-8.
+        InvalidSystemError: The automata do not fit together.
         NodeLimitError: Decision diagrams became larger than the options allow.
         UnknownEngineError: There is no such engine.
         SynthesisCancelled: `should_stop` became true.
@@ -58,6 +62,18 @@ def generate(
         return _generation(
             SynthesisOutcome(OutcomeStatus.SUPERVISOR, model, diagnostics), target, generation, on_progress
         )
+    if isinstance(model, System):
+        made = synthesize_system(model, options, on_progress, should_stop)
+        if made.supervisor is None:
+            return Generation(made.status, (), made.reason, None, target=target)
+        model = made.supervisor
+    if isinstance(model, SystemSupervisor):
+        on_progress(Progress("generation", target))
+        try:
+            files = generate_automata(model.system, model.added, model.initial, target, generation)
+        except UnsupportedModelError as error:
+            return Generation(SynthesisStatus.UNSUPPORTED_MODEL, (), str(error), None, target=target)
+        return Generation(SynthesisStatus.SUPERVISOR, (), "", files, target=target)
     bundle = loaded(model)
     attempt = make(bundle, options, on_progress, should_stop, allow_livelock=options.allow_livelock)
     if isinstance(attempt, Unsupported):

@@ -107,8 +107,8 @@ def loaded(model: ModelLike) -> LoadedModel:
     if isinstance(model, System | SystemSupervisor):
         raise TypeError(
             f"this takes a RoboSC model, not automata ({model.name if isinstance(model, System) else repr(model)}), "
-            "which have no text to find faults in, and no messages or ROS interfaces to generate code for: write the "
-            "robot as a model, or use synthesize, verify, explore or simulate"
+            "which have no text to find faults in, and no messages or ROS interfaces: write the robot as a model, or "
+            "use synthesize, verify, explore, simulate or generate"
         )
     raise TypeError(
         f"a model is the path of a file or what robosc.load returns, not {type(model).__name__}: {model!r:.80}"

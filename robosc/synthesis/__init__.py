@@ -1,6 +1,6 @@
 """Symbolic supervisor synthesis on extended finite automata."""
 
-from robosc.synthesis.choices import ControllableChoice, controllable_choices
+from robosc.synthesis.choices import EdgeChoice, edge_choices
 from robosc.synthesis.engines import EngineOptions, UnknownEngineError, engine_names, register, resolve_engine
 from robosc.synthesis.findings import findings, questions_about
 from robosc.synthesis.questions import Answers, Cause, EnabledTogether, NeverEnabled, Questions, Restriction
@@ -10,7 +10,7 @@ from robosc.synthesis.synthesize import synthesize
 __all__ = [
     "Answers",
     "Cause",
-    "ControllableChoice",
+    "EdgeChoice",
     "EnabledTogether",
     "EngineOptions",
     "NeverEnabled",
@@ -21,7 +21,7 @@ __all__ = [
     "SynthesisResult",
     "SynthesisStatus",
     "UnknownEngineError",
-    "controllable_choices",
+    "edge_choices",
     "engine_names",
     "findings",
     "questions_about",

@@ -1,4 +1,4 @@
-"""Choices between edges that nobody controls, for front ends whose language does not allow them."""
+"""Choices between edges that nobody controls, for languages that have none."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ from robosc.synthesis.workspace import workspace
 
 
 @dataclass(frozen=True, slots=True)
-class ControllableChoice:
-    """A location in which an automaton has several edges to take for a controllable event.
+class EdgeChoice:
+    """A location in which an automaton has several edges to take for an event.
 
     Attributes:
         event: The event.
@@ -27,16 +27,21 @@ class ControllableChoice:
         return f"{self.automaton}: {self.event} has several edges that can be taken in one state of {self.location}"
 
 
-def controllable_choices(
-    system: System, *, engine: str | EngineOptions = "auto", should_stop: Callable[[], bool] = lambda: False
-) -> tuple[ControllableChoice, ...]:
-    """The choices between edges of controllable events, in the system's order.
+def edge_choices(
+    system: System,
+    *,
+    is_controllable: bool | None = None,
+    engine: str | EngineOptions = "auto",
+    should_stop: Callable[[], bool] = lambda: False,
+) -> tuple[EdgeChoice, ...]:
+    """The choices between edges for one event, in the system's order.
 
     Edges count that the guards of all automata and the ranges allow together in some state, reached or not; what plant
     conditions and invariants and requirements say of it does not.
 
     Args:
         system: The system.
+        is_controllable: True for the controllable events alone, False for the others; None for all.
         engine: Name of the engine for decision diagrams, or its options.
         should_stop: Function called before each step of the work with one event; once it returns true, the work ends.
 
@@ -46,10 +51,10 @@ def controllable_choices(
         UnknownEngineError: There is no such engine.
         UnsupportedModelError: An expression computes with too many doubles.
     """
-    found: list[ControllableChoice] = []
+    found: list[EdgeChoice] = []
     with workspace(system, engine, should_stop, lambda progress: None) as place:
         for event in system.events:
-            if event.is_controllable:
+            if is_controllable in (None, event.is_controllable):
                 place.monitor.check_stop()
-                found += (ControllableChoice(event.name, *where) for where in choices(place.encoding, event))
+                found += (EdgeChoice(event.name, *where) for where in choices(place.encoding, event))
     return tuple(found)

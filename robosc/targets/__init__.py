@@ -29,6 +29,7 @@ from robosc.targets.registry import (
     UnknownTargetError,
     available_targets,
     generate,
+    generate_automata,
     register,
     require_target,
 )
@@ -52,6 +53,7 @@ __all__ = [
     "apply_target_errors",
     "available_targets",
     "generate",
+    "generate_automata",
     "generate_or_refuse",
     "read_controller_config",
     "register",

@@ -6,14 +6,15 @@ Built-in targets are listed here; an installed distribution adds its own through
 
 import importlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from enum import StrEnum
 from importlib.metadata import entry_points
 
-from robosc.errors import RoboscError
-from robosc.supervisor import Supervisor
+from robosc.automata.structure import System
+from robosc.errors import RoboscError, UnsupportedModelError
+from robosc.supervisor import AddedCondition, DecisionDiagram, Supervisor
 from robosc.targets.files import GeneratedFiles
 
 ENTRY_POINT_GROUP = "robosc.targets"
@@ -141,6 +142,9 @@ GENERAL_ERRORS = frozenset({"conflicting-topic"})
 """Codes of the check's warnings that are errors wherever something is generated."""
 
 
+GenerateAutomata = Callable[[System, Sequence[AddedCondition], DecisionDiagram | None, GenerateOptions], GeneratedFiles]
+
+
 @dataclass(frozen=True, slots=True)
 class Target:
     """A target: what it is, and its generator.
@@ -148,12 +152,15 @@ class Target:
     Attributes:
         info: Name and description.
         generate: Makes the files; raises UnsupportedModelError for a model outside what it handles.
+        generate_automata: The same for automata under the conditions that their supervisor adds to events and to the
+            initial states; None for a target that needs a model of a robot.
         errors: Codes of the check's warnings that are errors for this target.
     """
 
     info: TargetInfo
     generate: Callable[[Supervisor, GenerateOptions], GeneratedFiles]
     errors: frozenset[str] = GENERAL_ERRORS
+    generate_automata: GenerateAutomata | None = None
 
 
 class UnknownTargetError(RoboscError, LookupError):
@@ -243,6 +250,35 @@ def generate(supervisor: Supervisor, target: str, options: GenerateOptions | Non
     """
     require_target(target)
     return _load(target).generate(supervisor, options or GenerateOptions())
+
+
+def generate_automata(
+    system: System,
+    added: Sequence[AddedCondition],
+    initial: DecisionDiagram | None,
+    target: str,
+    options: GenerateOptions | None = None,
+) -> GeneratedFiles:
+    """The files of a target for automata under their supervisor.
+
+    Args:
+        system: The automata.
+        added: Conditions that the supervisor adds to events.
+        initial: Condition on the initial states in which it lets the system begin; None if in all.
+        target: Name of the target.
+        options: Choices of the user; the defaults if None.
+
+    Raises:
+        UnknownTargetError: There is no such target.
+        UnsupportedModelError: It needs a model of a robot, or the automata are outside what it handles.
+    """
+    require_target(target)
+    found = _load(target).generate_automata
+    if found is None:
+        raise UnsupportedModelError(
+            f"the target {target} needs a model of a robot: automata have no messages; c99, cif and python take them"
+        )
+    return found(system, added, initial, options or GenerateOptions())
 
 
 def errors_for(target: str) -> frozenset[str]:

@@ -1,5 +1,6 @@
 """Random CIF models, of automata at the root with variables, guards, updates and monitors."""
 
+import re
 from random import Random
 
 EVENTS = {"c": True, "d": True, "u": False}
@@ -11,6 +12,18 @@ def random_model(random: Random) -> str:
     return "controllable c, d; uncontrollable u;\n" + "\n".join(
         _automaton(random, role, name) for role, name in (("plant", "p"), ("plant", "q"), ("requirement", "r"))
     )
+
+
+def random_controller(random: Random) -> str:
+    """A model that leaves nothing open but its inputs, a truth value and a number: each event leads to one state."""
+    text = "controllable c, d; uncontrollable u;\ninput bool s; input int[-1..2] n;\n" + "\n".join(
+        _automaton(random, role, name, is_open=False)
+        for role, name in (("plant", "p"), ("plant", "q"), ("requirement", "r"))
+    )
+    more = ["requirement c needs p.b or n > 0;", "plant d needs q.l or s;", "plant invariant p.x < 2 or q.x < 2;",
+            "requirement {d, c} disables p.k and s;", "marked q.x != 2;"]  # fmt: skip
+    text += "\n" + "\n".join(random.sample(more, random.randint(0, 2)))
+    return re.sub(r"not q\.b|q\.x", lambda found: random.choice([found[0], "s" if "b" in found[0] else "n"]), text)
 
 
 def _number(random: Random, own: str, depth: int = 2) -> str:
@@ -56,15 +69,16 @@ def _updates(random: Random, own: str) -> str:
     )
 
 
-def _automaton(random: Random, role: str, name: str) -> str:
+def _automaton(random: Random, role: str, name: str, is_open: bool = True) -> str:
     lines = [f"{role} {name}:"]
     if random.random() < 0.2:
         lines.append("monitor;")
-    lines.append("disc int[0..2] x in any; disc bool b in any;")
+    lines.append("disc int[0..2] x in any; disc bool b in any;" if is_open else "disc int[0..2] x = 1; disc bool b;")
     for place in "lk":
-        lines.append(f"location {place}: initial; marked;")
+        lines.append(f"location {place}: {'initial; ' if is_open or place == 'l' else ''}marked;")
+        left = [] if is_open else random.sample(sorted(EVENTS), 3)
         for _ in range(random.randint(1, 3)):
-            events = ", ".join(random.sample(sorted(EVENTS), random.randint(1, 2)))
+            events = ", ".join(random.sample(sorted(EVENTS), random.randint(1, 2)) if is_open else [left.pop()])
             guard = f" when {_truth(random, name)}" if random.random() < 0.7 else ""
             assigned = f" do {_updates(random, name)}" if random.random() < 0.6 else ""
             lines.append(f"edge {events}{guard}{assigned}{random.choice(['', ' goto l', ' goto k'])};")

@@ -1,18 +1,46 @@
 """Generated functions that tell whether a controllable event is allowed now, and which requirements hold."""
 
+from abc import abstractmethod
+
 from robosc.supervisor import DecisionNode
 from robosc.targets.c99.expressions import number_code
 from robosc.targets.c99.statements import statement_lines, unused
 from robosc.targets.c99.unit import Reading, Unit
-from robosc.targets.code.conditions import Condition, Conditions
+from robosc.targets.code.conditions import Condition, Conditions, Diagrams
 from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, Kind, Sort, call, operation, variable
 from robosc.targets.code.statements import Assign, Block, Comment, Return, Statement, when
 
 _SIGNATURE = "const state_t *s"
 
 
-class CConditions(Conditions):
-    """Writes conditions over the state in C.
+class CDiagrams(Diagrams):
+    """Writes decision diagrams over the state in C."""
+
+    @abstractmethod
+    def _definition(self, name: str, head: str, body: Block) -> list[str]:
+        """The function of a node."""
+
+    def _node_call(self, number: int) -> Code:
+        return call(f"node_{number + 1}", Code(Kind.PLACE, "s"))
+
+    def _node_function(self, number: int, words: str, body: Block) -> list[str]:
+        name = f"node_{number + 1}"
+        lines = self._definition(name, f"static bool {name}({_SIGNATURE})", [*unused("s"), *body])
+        return [*statement_lines([Comment(words)]), *lines]
+
+    def _node_test(self, node: DecisionNode, start: int, end: int) -> Code:
+        domain = self._formulas.domains[node.automaton, node.variable]
+        if node.variable is None:
+            # Locations are numbered in the order of their domain.
+            return operation("below", self._scope.location_place(node.automaton), number_code(end))
+        subject = self._scope.variable_place(node.automaton, node.variable)
+        if isinstance(domain[0], bool):
+            return self._scope.negated(subject)
+        return operation("below", subject, number_code(int(domain[end]) if subject.sort is Sort.INTEGER else end))
+
+
+class CConditions(CDiagrams, Conditions):
+    """Writes the conditions of a model and its supervisor in C.
 
     Args:
         unit: The file.
@@ -46,20 +74,6 @@ class CConditions(Conditions):
         head = f"static void {self._layout.function(purpose, communication)}({_SIGNATURE}, bool *holds)"
         return self._unit.definition(head, body)
 
-    def _node_call(self, number: int) -> Code:
-        return call(f"node_{number + 1}", Code(Kind.PLACE, "s"))
-
-    def _node_function(self, number: int, words: str, body: Block) -> list[str]:
-        head = f"static bool node_{number + 1}({_SIGNATURE})"
-        with self._unit.uses_apart() as self._unit.uses[f"node_{number + 1}"]:
-            return [*statement_lines([Comment(words)]), *self._unit.definition(head, [*unused("s"), *body])]
-
-    def _node_test(self, node: DecisionNode, start: int, end: int) -> Code:
-        domain = self._formulas.domains[node.automaton, node.variable]
-        if node.variable is None:
-            # Locations are numbered in the order of their domain.
-            return operation("below", self._scope.location_place(node.automaton), number_code(end))
-        subject = self._scope.variable_place(node.automaton, node.variable)
-        if isinstance(domain[0], bool):
-            return self._scope.negated(subject)
-        return operation("below", subject, number_code(int(domain[end]) if subject.sort is Sort.INTEGER else end))
+    def _definition(self, name: str, head: str, body: Block) -> list[str]:
+        with self._unit.uses_apart() as self._unit.uses[name]:
+            return self._unit.definition(head, body)

@@ -45,6 +45,8 @@ C = Language(
         "negate": Shape("-{}", _OTHER, (ATOM,)),
         "=": _infix("=="),
         **{operator: _infix(operator) for operator in ("+", "-", "*", "/", "!=", "<", "<=", ">", ">=")},
+        "div": _infix("/"),
+        "mod": _infix("%"),
         "below": Shape("{} < {}", _OTHER, (ATOM, _OTHER)),
         "is true": Shape("{} == 1", _OTHER, (ATOM,)),
         "is false": Shape("{} == 0", _OTHER, (ATOM,)),

@@ -1,5 +1,7 @@
 """The functions that generated expressions call: `robosc.expressions.values` in C; a unit gets what it calls."""
 
+from collections.abc import Mapping
+
 _MAXIMUM, _MINIMUM = "INT64_C(2147483647)", "(-INT64_C(2147483647) - 1)"
 
 _I, _D = "int64_t a, int64_t b", "double a, double b"
@@ -179,3 +181,20 @@ HELPER_CALLS = {
     **{f"clamp_{letter}": {f"min_{letter}", f"max_{letter}"} for letter in "id"},
 }
 """The functions that each of them calls."""
+
+
+def called(names: set[str], calls: Mapping[str, set[str]]) -> set[str]:
+    """The functions of some names, and those that they call: a compiler warns about others.
+
+    Args:
+        names: Names that the code uses.
+        calls: Functions that others call, by the caller's name, beside those that helpers do.
+    """
+    found: set[str] = set()
+    to_do = [*names]
+    while to_do:
+        name = to_do.pop()
+        if name not in found:
+            found.add(name)
+            to_do += [*calls.get(name, ()), *HELPER_CALLS.get(name, ())]
+    return found

@@ -11,7 +11,7 @@ from robosc.model.structure import CommunicationKind, EventKind, is_tau
 from robosc.targets.c99.conditions import CConditions
 from robosc.targets.c99.expressions import number_code
 from robosc.targets.c99.header import batch, batch_parameters, counts, head, receive_head, reply_head, runtime_text
-from robosc.targets.c99.helpers import HELPER_CALLS, HELPERS
+from robosc.targets.c99.helpers import HELPERS, called
 from robosc.targets.c99.layer_source import request_functions
 from robosc.targets.c99.layout import Layout, data_that_comes, event_data
 from robosc.targets.c99.provide import default_function, provide_function
@@ -56,22 +56,10 @@ def source_file(unit: Unit) -> str:
         **dict(unit.functions.values()),
         **{name: "\n".join(lines) for name, lines in (*converters.items(), *conditions.nodes.items())},
     }
-    called = _called(unit.used, HELPER_CALLS | unit.uses)
-    heads = [f"{converter_head(unit, enum)};" for enum in layout.model.enums if layout.converters[enum.name] in called]
-    texts = [*heads, *(text for name, text in functions.items() if name in called)]
+    needed = called(unit.used, unit.uses)
+    heads = [f"{converter_head(unit, enum)};" for enum in layout.model.enums if layout.converters[enum.name] in needed]
+    texts = [*heads, *(text for name, text in functions.items() if name in needed)]
     return "\n\n".join([_prologue(layout), *texts, *("\n".join(block) for block in rest)]) + "\n"
-
-
-def _called(called: set[str], calls: dict[str, set[str]]) -> set[str]:
-    """The functions that are called, or that those call: a compiler warns about others."""
-    found: set[str] = set()
-    to_do = [*called]
-    while to_do:
-        name = to_do.pop()
-        if name not in found:
-            found.add(name)
-            to_do += calls.get(name, ())
-    return found
 
 
 def _never_taken(layout: Layout, event: str) -> bool:

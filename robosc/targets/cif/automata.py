@@ -42,7 +42,10 @@ from robosc.recursion import allow_depth
 from robosc.supervisor import AddedCondition, DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import diagram_domains
 from robosc.targets.cif import text
+from robosc.targets.cif.generate import SUPERVISED
 from robosc.targets.cif.text import Level, Text, all_of, any_of, chosen, comment, compared, escaped, implied, negated
+from robosc.targets.files import GeneratedFiles
+from robosc.targets.registry import GenerateOptions
 
 FORMULA_LIMIT = 60
 """Operands beyond which a condition is written as a decision diagram."""
@@ -68,6 +71,15 @@ def controlled_system(
     """
     allow_depth(_LEVELS, _FRAMES)
     return "".join(f"{line}\n" for line in _Writer(system).lines(added, initial))
+
+
+def generate(
+    system: System, added: Sequence[AddedCondition], initial: DecisionDiagram | None, options: GenerateOptions
+) -> GeneratedFiles:
+    """The one file of a system under its supervisor; parameters and errors as of `controlled_system`."""
+    if options.package is not None:
+        raise UnsupportedModelError("target cif: it makes one file and no package, so there is nothing to be named")
+    return GeneratedFiles({SUPERVISED: controlled_system(system, added, initial)})
 
 
 @dataclass(slots=True)

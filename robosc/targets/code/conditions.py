@@ -1,6 +1,7 @@
 """Conditions that allow a controllable event as code: those of the model, and those that the supervisor adds."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Collection
 
 from robosc.automata import System
 from robosc.automata.executable import ExecutableEvent
@@ -24,21 +25,21 @@ def accepted(event: ExecutableEvent, scope: ExpressionWriter) -> list[Condition]
     return [item for item in found if item[1] != TRUE_CODE]
 
 
-class Conditions(ABC):
-    """Writes conditions over the state; equal nodes of all decision diagrams share one function.
+class Diagrams(ABC):
+    """Writes decision diagrams over the state; equal nodes of all of them share one function.
 
     Args:
-        supervisor: The supervisor.
-        system: Its automata, for the domains of the diagrams.
+        system: The automata, for the domains of the diagrams.
         scope: Writes expressions over the state.
+        names: Names that are kept whole in words.
 
     Attributes:
         nodes: Lines of each node's function so far, by its name.
     """
 
-    def __init__(self, supervisor: Supervisor, system: System, scope: ExpressionWriter) -> None:
-        self._supervisor = supervisor
+    def __init__(self, system: System, scope: ExpressionWriter, names: Collection[str]) -> None:
         self._scope = scope
+        self._names = names
         self._formulas = Formulas(diagram_domains(system))
         self._numbers: dict[tuple[object, ...], int] = {}
         self.nodes: dict[str, list[str]] = {}
@@ -55,32 +56,15 @@ class Conditions(ABC):
     def _node_function(self, number: int, words: str, body: Block) -> list[str]:
         """The function of a node."""
 
-    def enabling(self, event: str) -> list[Condition]:
-        """Return the conditions for an event to be allowed: plants, ranges, requirements, then the supervisor's."""
-        needed = enabling_conditions(self._supervisor.executable.events[event])
-        found = [(words, self._scope.condition(item)) for words, item in needed]
-        diagram = self._supervisor.added_condition(event)
-        if diagram is not None:
-            words, code = self._diagram(diagram)
-            found.append((f"added by the supervisor: {words}", code))
-        return [item for item in found if item[1] != TRUE_CODE]
-
-    def requirements(self, communication: str) -> list[Condition]:
-        """Return the requirements on a communication."""
-        found = self._supervisor.model.requirements_on(communication)
-        return [(requirement_text(item), self._scope.truth(item.condition)) for item in found]
-
-    def conjuncts(self, communication: str) -> list[Condition]:
-        """Return the top-level conjuncts of the requirements on a communication; they need no words."""
-        found = self._supervisor.model.requirements_on(communication)
-        return [("", self._scope.truth(part)) for item in found for part in conjuncts(item.condition)]
+    def added(self, diagram: DecisionDiagram) -> Condition:
+        """Return a condition of the supervisor: a formula where it is short, else functions that share nodes."""
+        words, code = self._diagram(diagram)
+        return f"added by the supervisor: {words}", code
 
     def _diagram(self, diagram: DecisionDiagram) -> Condition:
-        """A formula where it is short, else functions that share nodes."""
         expression = self._formulas.formula(diagram)
         if expression is not None:
-            components = frozenset(item.name for item in self._supervisor.model.components)
-            return in_words(expression, components), self._scope.truth(expression)
+            return in_words(expression, self._names), self._scope.truth(expression)
         codes = [FALSE_CODE, TRUE_CODE]
         for node in diagram.nodes:
             codes.append(self._node(node, tuple(codes[child] for child in node.children)))
@@ -99,3 +83,36 @@ class Conditions(ABC):
             body: Block = [*tests, Return(branches[-1])]
             self.nodes[code.word] = self._node_function(number, f"Node of the decision diagrams: {subject}.", body)
         return code
+
+
+class Conditions(Diagrams):
+    """Writes the conditions of a model and its supervisor.
+
+    Args:
+        supervisor: The supervisor.
+        system: Its automata, for the domains of the diagrams.
+        scope: Writes expressions over the state.
+    """
+
+    def __init__(self, supervisor: Supervisor, system: System, scope: ExpressionWriter) -> None:
+        super().__init__(system, scope, frozenset(item.name for item in supervisor.model.components))
+        self._supervisor = supervisor
+
+    def enabling(self, event: str) -> list[Condition]:
+        """Return the conditions for an event to be allowed: plants, ranges, requirements, then the supervisor's."""
+        needed = enabling_conditions(self._supervisor.executable.events[event])
+        found = [(words, self._scope.condition(item)) for words, item in needed]
+        diagram = self._supervisor.added_condition(event)
+        if diagram is not None:
+            found.append(self.added(diagram))
+        return [item for item in found if item[1] != TRUE_CODE]
+
+    def requirements(self, communication: str) -> list[Condition]:
+        """Return the requirements on a communication."""
+        found = self._supervisor.model.requirements_on(communication)
+        return [(requirement_text(item), self._scope.truth(item.condition)) for item in found]
+
+    def conjuncts(self, communication: str) -> list[Condition]:
+        """Return the top-level conjuncts of the requirements on a communication; they need no words."""
+        found = self._supervisor.model.requirements_on(communication)
+        return [("", self._scope.truth(part)) for item in found for part in conjuncts(item.condition)]

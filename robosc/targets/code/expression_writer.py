@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any, NoReturn
 
-from robosc.errors import InternalError
+from robosc.errors import InternalError, UnsupportedModelError
 from robosc.expressions import (
     MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
@@ -155,6 +155,10 @@ class ExpressionWriter(ABC):
     def as_double(self, code: Code) -> Code:
         """A number as an operation on doubles takes it."""
         return code
+
+    def _divided(self, operator: str, left: Code, right: Code) -> Code:
+        """Native `div` or `mod`, towards zero."""
+        return operation(operator, left, right)
 
     def _joined_unknown(self, left: Code, right: Code) -> Unknown:
         """Way in which something is unknown that is one of two codes."""
@@ -358,6 +362,8 @@ class ExpressionWriter(ABC):
         if operator in COMPARISONS:
             left, right = self._alike(left, right)
             return (self._compare if is_known else self._kleene_comparison)(operator, left, right)
+        if operator in ("div", "mod"):
+            return self._whole(operator, left, right)
         if operator not in ("and", "or", "implies"):
             return self._arithmetic(operator, left, right, divisor)
         if not is_known:
@@ -385,6 +391,16 @@ class ExpressionWriter(ABC):
         if not is_native:
             return self._kleene_call(operator, left, right, sort=sort)
         return Code(Kind.OPERATION, operator, (left, right), sort, unknown, low, high)
+
+    def _whole(self, operator: str, left: Code, right: Code) -> Code:
+        """The whole quotient, towards zero, or the remainder of a division by a constant above zero."""
+        if not (left.is_known and right.is_literal and right.low > 0):
+            raise UnsupportedModelError(f"{operator} has code only where it divides by a constant above zero")
+        low, high = (-(-item // right.low) if item < 0 else item // right.low for item in (left.low, left.high))
+        if operator == "mod":
+            most = right.low - 1
+            low, high = max(min(left.low, 0), -most), min(max(left.high, 0), most)
+        return replace(self._divided(operator, left, right), sort=Sort.INTEGER, low=low, high=high)
 
 
 def _is_chain(code: Code, operator: str) -> bool:

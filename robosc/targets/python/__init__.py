@@ -1,10 +1,13 @@
 """The target `python`."""
 
+from robosc.targets.python import automata
 from robosc.targets.python.package import generate
 from robosc.targets.registry import Target, TargetInfo
 
 TARGET = Target(
-    TargetInfo("python", "the supervisor and its executor as one Python file without any dependency"), generate
+    TargetInfo("python", "the supervisor and its executor as one Python file without any dependency"),
+    generate,
+    generate_automata=automata.generate,
 )
 
 __all__ = ["TARGET"]

@@ -2,7 +2,7 @@
 
 from robosc.automata import System
 from robosc.supervisor import DecisionNode
-from robosc.targets.code.conditions import Condition, Conditions
+from robosc.targets.code.conditions import Condition, Conditions, Diagrams
 from robosc.targets.code.expressions import Code, call, integer, operation, words_of
 from robosc.targets.code.statements import Block, codes
 from robosc.targets.code.text import indent
@@ -12,8 +12,29 @@ from robosc.targets.python.statements import method
 from robosc.targets.python.text import comment, docstring
 
 
-class PythonConditions(Conditions):
-    """Writes conditions over the state in Python.
+class PythonDiagrams(Diagrams):
+    """Writes decision diagrams over the state in Python."""
+
+    def _node_test(self, node: DecisionNode, start: int, end: int) -> Code:
+        values = self._formulas.domains[node.automaton, node.variable]
+        if node.variable is None:
+            subject = self._scope.location_place(node.automaton)
+        else:
+            subject = self._scope.variable_code(node.automaton, node.variable)
+        if isinstance(values[0], bool):
+            return subject if values[end - 1] else self._scope.negated(subject)
+        if isinstance(values[0], int):
+            return operation("<", subject, integer(int(values[end])))
+        found = tuple(values[start:end])
+        return (
+            operation("=", subject, constant(found[0]))
+            if len(found) == 1
+            else operation("in", subject, constant(found))
+        )
+
+
+class PythonConditions(PythonDiagrams, Conditions):
+    """Writes the conditions of a model and its supervisor in Python.
 
     Args:
         layout: Names.
@@ -63,20 +84,3 @@ class PythonConditions(Conditions):
     def _node_function(self, number: int, words: str, body: Block) -> list[str]:
         self.reads[f"self._node_{number}"] = words_of(codes(body))
         return method(f"_node_{number}", words, body)
-
-    def _node_test(self, node: DecisionNode, start: int, end: int) -> Code:
-        values = self._formulas.domains[node.automaton, node.variable]
-        if node.variable is None:
-            subject = self._scope.location_place(node.automaton)
-        else:
-            subject = self._scope.variable_code(node.automaton, node.variable)
-        if isinstance(values[0], bool):
-            return subject if values[end - 1] else self._scope.negated(subject)
-        if isinstance(values[0], int):
-            return operation("<", subject, integer(int(values[end])))
-        found = tuple(values[start:end])
-        return (
-            operation("=", subject, constant(found[0]))
-            if len(found) == 1
-            else operation("in", subject, constant(found))
-        )

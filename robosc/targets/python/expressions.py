@@ -67,6 +67,8 @@ PYTHON = Language(
         "-": _arithmetic("-", Precedence.SUM),
         "*": _arithmetic("*", Precedence.PRODUCT),
         "/": _arithmetic("/", Precedence.PRODUCT),
+        "div": _arithmetic("//", Precedence.PRODUCT),
+        "mod": _arithmetic("%", Precedence.PRODUCT),
         "=": _comparison("=="),
         **{operator: _comparison(operator) for operator in ("!=", "<", "<=", ">", ">=", "in", "not in", "is")},
         "between": Shape("{} <= {} <= {}", Precedence.COMPARISON, (Precedence.SUM,) * 3),
@@ -227,6 +229,10 @@ class Scope(ExpressionWriter):
         if first.sort is Sort.INTEGER is sort:
             code = replace(code, low=first.low, high=first.high)
         return replace(code, unknown=Unknown.NEVER) if first.is_known else code
+
+    def _divided(self, operator: str, left: Code, right: Code) -> Code:
+        # Python's own operators go towards minus infinity.
+        return operation(operator, left, right) if left.low >= 0 else self._helper(operator, left, right)
 
     def _nan_comparison(self, operator: str, left: Code, right: Code) -> Code | None:
         if left.sort not in (Sort.INTEGER, Sort.DOUBLE):

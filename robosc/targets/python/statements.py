@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from robosc.targets.code.expressions import Code
+from robosc.targets.code.expressions import Code, variable
 from robosc.targets.code.statements import Assign, Block, Comment, Do, If, Let, Return, Statement
 from robosc.targets.code.text import indent
 from robosc.targets.python.expressions import code_text
@@ -11,7 +11,12 @@ from robosc.targets.python.text import comment, docstring
 
 def method(name: str, words: str, body: Block, parameters: Sequence[Code] = ()) -> list[str]:
     """A method, which words explain."""
-    head = ", ".join(["self", *map(code_text, parameters)])
+    return function(name, words, body, [variable("self"), *parameters])
+
+
+def function(name: str, words: str, body: Block, parameters: Sequence[Code]) -> list[str]:
+    """A function, which words explain."""
+    head = ", ".join(map(code_text, parameters))
     return [f"def {name}({head}):", f"    {docstring(words)}", *indent(statement_lines(body))]
 
 

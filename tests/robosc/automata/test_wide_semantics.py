@@ -1,6 +1,7 @@
 """Tests of automata beyond RoboSC: ways to begin, requirement automata, monitors, plant conditions, input variables."""
 
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
@@ -8,7 +9,7 @@ from robosc.automata import Role, Semantics, System, check_system, disables, env
 from robosc.automata.semantics import MAXIMUM_CHOICES, TooManyChoicesError
 from robosc.automata.structure import DiscreteVariable, Edge, Event, EventCondition
 from robosc.expressions import FALSE, TRUE, Binary, Constant, Expression, IntegerType, StateTest, Unary, VariableRead
-from robosc.synthesis import SynthesisStatus, controllable_choices, synthesize
+from robosc.synthesis import SynthesisStatus, edge_choices, synthesize
 from robosc.verification import synthesize_explicit
 from support.systems import automaton, edge, system
 
@@ -200,14 +201,17 @@ def test_choices_between_edges_are_told() -> None:
         ),
     )
     found = [("go", "A", "a"), ("go", "B", "l")]
-    assert [(item.event, item.automaton, item.location) for item in controllable_choices(made)] == found
-    assert str(controllable_choices(made)[0]) == "A: go has several edges that can be taken in one state of a"
+    choices = partial(edge_choices, is_controllable=True)
+    assert [(item.event, item.automaton, item.location) for item in choices(made)] == found
+    assert str(choices(made)[0]) == "A: go has several edges that can be taken in one state of a"
+    assert {item.event for item in edge_choices(made)} == {"go", "u_back"}
+    assert [str(item)[:1] for item in edge_choices(made, is_controllable=False)] == ["A"]
     # There is no choice if the other automaton blocks the event, or if an edge leaves a range.
     blocking = replace(made, automata=(made.automata[0], automaton("B", ["m -x-> m"], blocks=["go"])))
-    assert controllable_choices(replace(blocking, events=(*made.events, Event("x", True)))) == ()
+    assert choices(replace(blocking, events=(*made.events, Event("x", True)))) == ()
     narrow = DiscreteVariable("n", IntegerType(0, 1), (0,))
     leaving = replace(made, automata=(made.automata[0], replace(made.automata[1], variables=(narrow,))))
-    assert [item.automaton for item in controllable_choices(leaving)] == ["A"]
+    assert [item.automaton for item in choices(leaving)] == ["A"]
 
 
 def test_guards_that_meet_only_where_there_is_no_value_do_not_meet() -> None:

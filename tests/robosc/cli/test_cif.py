@@ -84,6 +84,19 @@ def test_no_file_of_the_model_is_written_over(model: str, tmp_path: Path, capsys
     assert (tmp_path / "other.cif").read_text() == TANK
 
 
+def test_code_is_generated(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "out"
+    status, _, err = run(capsys, "generate", model, "--target", "c99", "-o", str(folder))
+    assert (status, "tank may begin in 3 states, and code begins in one" in err) == (1, True)
+    status, _, err = run(capsys, "generate", model, "--target", "ros2", "-o", str(folder))
+    assert (status, "the target ros2 needs a model of a robot" in err) == (1, True)
+    Path(model).write_text(TANK.replace("level in any", "level = 1"))
+    assert run(capsys, "generate", model, "--target", "c99", "-o", str(folder))[0] == 0
+    assert {path.name for path in folder.iterdir()} >= {"tank_supervisor.c", "tank_supervisor.h", "main.c", "README.md"}
+    arguments = ["generate", model, "--target", "python", "--package", "basin", "-o", str(folder)]
+    assert run(capsys, *arguments)[:2] == (0, f"{folder}/basin.py\n")
+
+
 def test_generate_without_a_supervisor(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for addition, status in (("marked false;", "empty"), ("marked x;", "model errors")):
         Path(model).write_text(f"{TANK}{addition}\n")
@@ -199,7 +212,6 @@ def test_simulate_begins_as_it_is_told(model: str, tmp_path: Path, capsys: pytes
         ["check", "-L", "."],
         ["check", "-I", "."],
         ["verify", "--property", "never deadlock"],
-        ["generate", "--target", "c99", "-o", "out"],
         ["generate", "--target", "all", "-o", "out"],
         ["generate", "--target", "cif", "--package", "tank", "-o", "out"],
         ["generate", "--target", "cif", "--allow-livelock", "-o", "out"],

@@ -13,7 +13,7 @@ from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.semantics import Semantics
 from robosc.automata.state import Subject, subjects
-from robosc.automata.structure import System
+from robosc.automata.structure import Automaton, Edge, System
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import Value
 from robosc.expressions.text import automaton_text
@@ -144,6 +144,26 @@ def explore(
             for target in targets
         ),
     )
+
+
+def graph_automaton(graph: Graph, system: System) -> System:
+    """The controlled system as one plain automaton, whose states are `s0`, `s1`, ...
+
+    Args:
+        graph: The graph.
+        system: Its automata, which say what is controllable.
+    """
+    known = frozenset[str]().union(*(item.alphabet for item in system.automata))
+    names = tuple(f"s{number}" for number in range(len(graph.states)))
+    automaton = Automaton(
+        name="supervisor",
+        locations=names,
+        initial=tuple(names[number] for number in graph.initial_states),
+        marked=frozenset(name for name, state in zip(names, graph.states, strict=True) if state.is_marked),
+        alphabet=known,
+        edges=tuple(Edge(names[source], event, names[target]) for source, event, target in graph.transitions),
+    )
+    return System(system.name, tuple(event for event in system.events if event.name in known), (automaton,))
 
 
 def _states(semantics: Semantics, model: Model | None, graph: ControlledGraph) -> tuple[GraphState, ...]:

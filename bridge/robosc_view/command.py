@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from robosc.cli.arguments import add_given_supervisor_options, suggest
 from robosc.cli.output import CommandError, ExitCode, UsageError
+from robosc.pipeline.automata_files import is_automata
 
 if TYPE_CHECKING:
     from robosc.event_logs import LoggedRun
@@ -215,9 +216,9 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc_view.sources import ViewError, require_view
 
     _take_played(arguments)
-    if arguments.model is not None and arguments.model.suffix == ".cif":
+    if arguments.model is not None and is_automata(arguments.model):
         raise UsageError(
-            f"{arguments.model} is a CIF model: 'robosc explore --dot' draws one; a view needs RoboSC's own"
+            f"{arguments.model} holds automata: 'robosc explore --dot' draws them; a view needs RoboSC's own models"
         )
     if not (arguments.bridge or arguments.ros2 or arguments.log or arguments.model):
         raise UsageError("what is shown? MODEL, --bridge HOST, --ros2, or --log FILE --model FILE")

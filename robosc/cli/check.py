@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from robosc.cli import cif, synth
+from robosc.cli import automata, synth
 from robosc.cli.arguments import add_deployment_argument, add_engine_options, add_model_arguments, read_bundle
 from robosc.cli.output import ExitCode, UsageError, has_errors, print_diagnostics, print_json
 from robosc.errors import Diagnostic, LanguageError, UnsupportedModelError
@@ -25,8 +25,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser = commands.add_parser(
         "check",
         help="find everything that is wrong with a model",
-        description="Check a model, library or CIF model (FILE.cif) and print every finding with its place and how to "
-        "fix it.",
+        description="Check a model, library or automata (FILE.cif, .gen, .wmod) and print every finding with its place "
+        "and how to fix it.",
     )
     add_model_arguments(parser)
     parser.add_argument("--strict", action="store_true", help="exit with 1 for warnings too")
@@ -45,8 +45,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 def run(arguments: argparse.Namespace) -> int:
     """Check the model; 0 without errors (and, where it was asked for, with a supervisor), else 1."""
     _require_synthesis(arguments)
-    if cif.is_cif(arguments):
-        return cif.check(arguments)
+    if automata.is_given(arguments):
+        return automata.check(arguments)
     return run_with(arguments, _checked, lambda bundle: synth.make(arguments, bundle, allow_livelock=False))
 
 

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from robosc.cli import cif, synth
+from robosc.cli import automata, synth
 from robosc.cli.arguments import add_deployment_argument, add_engine_options, add_model_arguments, read_bundle
 from robosc.cli.output import ExitCode, print_json
 from robosc.json_documents import diagnostics_json
@@ -26,8 +26,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser = commands.add_parser(
         "explore",
         help="print the controlled system's states and transitions",
-        description="Print every state that the robot, or a CIF model (FILE.cif), can be in under its supervisor, and "
-        "every transition.",
+        description="Print every state that the robot, or automata (FILE.cif, .gen, .wmod), can be in under their "
+        "supervisor, and every transition.",
     )
     add_model_arguments(parser)
     parser.add_argument("--dot", action="store_true", help="print a graph for Graphviz instead of a table")
@@ -48,8 +48,8 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc.exploration import graph_dot, graph_json, graph_text
     from robosc.pipeline.exploring import graph_of
 
-    if cif.is_cif(arguments):
-        return cif.explore(arguments)
+    if automata.is_given(arguments):
+        return automata.explore(arguments)
     bundle = read_bundle(arguments)
     # The graph is of everything allowed, whatever an executor would choose.
     outcome = synth.make(arguments, bundle, allow_livelock=True)

@@ -13,6 +13,7 @@ from pathlib import Path
 from robosc.cli.output import ExitCode, UsageError, print_diagnostics, print_json, write_bytes
 from robosc.errors import Diagnostic, LanguageError, Severity
 from robosc.json_documents import diagnostics_json
+from robosc.pipeline.automata_files import is_automata
 from robosc.source import Bundle, Location, SourceFile
 
 type FormatText = Callable[[str, str], str]
@@ -141,8 +142,8 @@ def _files(path: Path) -> Sequence[Path]:
         return below
     if not path.exists():
         raise UsageError(f"there is no file {_shown(path)}")
-    if path.suffix == ".cif":
-        raise UsageError(f"{_shown(path)} is a CIF model: only RoboSC's own can be formatted")
+    if is_automata(path):
+        raise UsageError(f"{_shown(path)} holds automata: only RoboSC's own models can be formatted")
     if not path.is_file():
         raise UsageError(f"{_shown(path)} is no plain file")
     return [path]

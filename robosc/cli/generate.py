@@ -5,7 +5,7 @@ import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from robosc.cli import cif, synth
+from robosc.cli import automata, synth
 from robosc.cli.arguments import (
     add_deployment_argument,
     add_engine_options,
@@ -79,8 +79,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser = commands.add_parser(
         "generate",
         help="generate a package that runs the supervisor",
-        description="Synthesize the supervisor of a model and write a complete package that runs it. Of a CIF model "
-        "(FILE.cif), --target c99 and python write a library, and --target cif the controlled system.",
+        description="Synthesize the supervisor of a model and write a complete package that runs it. Of automata "
+        "(FILE.cif, .gen, .wmod), --target c99 and python write a library, and --target cif the controlled system.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -148,8 +148,8 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc.targets import require_generatable
 
     require_generatable(arguments.target)
-    if cif.is_cif(arguments):
-        return _generate_cif(arguments)
+    if automata.is_given(arguments):
+        return _generate_automata(arguments)
     options = generate_options(arguments)
     bundle = read_bundle(arguments)
     outcome = synth.make(arguments, bundle, allow_livelock=arguments.allow_livelock)
@@ -157,22 +157,22 @@ def run(arguments: argparse.Namespace) -> int:
     return report_generated(arguments, generation, generation.files, bundle)
 
 
-def _generate_cif(arguments: argparse.Namespace) -> ExitCode:
-    """Generate from a CIF model.
+def _generate_automata(arguments: argparse.Namespace) -> ExitCode:
+    """Generate from automata.
 
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
     """
     from robosc.targets import ALL, generate_automata
 
-    cif.refuse(arguments.target == ALL, "--target all: of a CIF model name one target: c99, cif or python")
-    cif.refuse(
+    automata.refuse(arguments.target == ALL, "--target all: of automata name one target: c99, cif or python")
+    automata.refuse(
         arguments.target == "cif" and arguments.package is not None,
-        "--package: of a CIF model, --target cif makes one file and no package",
+        "--package: of automata, --target cif makes one file and no package",
     )
-    cif.refuse(arguments.allow_livelock, "--allow-livelock: a CIF model has no silent steps of a controller")
+    automata.refuse(arguments.allow_livelock, "--allow-livelock: automata have no silent steps of a controller")
     options = generate_options(arguments)
-    made = cif.synthesized(arguments)
+    made = automata.synthesized(arguments)
     files = None
     if (found := made.supervisor) is not None:
         files = generate_automata(found.system, found.added, found.initial, arguments.target, options)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robosc.cli import cif
+from robosc.cli import automata
 from robosc.cli.arguments import add_engine_options, add_model_arguments
 from robosc.cli.given import given_supervisor
 from robosc.cli.output import ESCAPED, CommandError, ExitCode, UsageError, has_unicode_output
@@ -28,7 +28,7 @@ _DESCRIPTION = """\
 Lead the robot under its supervisor by hand: you play the world, and choose among what the controller may do. Events
 come from a file (--events), by chance (--random, --until-trouble), or as commands that are typed: 'help' tells them.
 With none of these options commands are read from standard input; on a terminal with a prompt, a history and completion.
-A CIF model (FILE.cif) is led likewise: there you are the plants.
+Automata (FILE.cif, .gen, .wmod) are led likewise: there you are the plants.
 """
 
 _EPILOG = """\
@@ -37,7 +37,7 @@ a file of events has one a line, with its data as JSON or as name=value; what is
   scan.response {"front": 0.7}
   level.response 3
   move.request                         a request, where it is allowed
-  take -> Buffer = full                of a CIF model, which of several states it leads to
+  take -> Buffer = full                of automata, which of several states it leads to
 An event log (.jsonl) is taken as well: its events happen again.
 
 trouble, for --trouble and until-trouble:
@@ -87,7 +87,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument(
         "--initial",
         metavar="STATE",
-        help="state in which a CIF model begins that may begin in several: 'p.x = 1, q = on'",
+        help="state in which automata begin that may begin in several: 'p.x = 1, q = on'",
     )
     group.add_argument(
         "--save",
@@ -127,10 +127,10 @@ def run(arguments: argparse.Namespace) -> int:
     is_scripted = arguments.events is not None or arguments.random or arguments.until_trouble
     if not is_scripted and (arguments.json or arguments.save):
         raise UsageError("--json and --save need events: --events, --random or --until-trouble")
-    if cif.is_cif(arguments):
-        return _run_cif(arguments, is_scripted=bool(is_scripted))
+    if automata.is_given(arguments):
+        return _run_automata(arguments, is_scripted=bool(is_scripted))
     if arguments.initial is not None:
-        raise UsageError("--initial chooses where a CIF model begins: a robot begins in one state")
+        raise UsageError("--initial chooses where automata begin: a robot begins in one state")
     supervisor = given_supervisor(arguments, is_json=arguments.json)
     if supervisor is None:
         return ExitCode.FAILED
@@ -144,8 +144,8 @@ def run(arguments: argparse.Namespace) -> int:
     return Shell(run_, model_of_test(arguments)).loop(sys.stdin)
 
 
-def _run_cif(arguments: argparse.Namespace, *, is_scripted: bool) -> int:
-    """Simulate a CIF model.
+def _run_automata(arguments: argparse.Namespace, *, is_scripted: bool) -> int:
+    """Simulate automata.
 
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
@@ -155,10 +155,10 @@ def _run_cif(arguments: argparse.Namespace, *, is_scripted: bool) -> int:
     from robosc.errors import UnknownNameError
     from robosc.pipeline.system_runs import ChoiceError, SystemRun, asked_parts
 
-    cif.refuse(bool(arguments.save), "--save: event logs and tests are of robots, and a CIF model is none")
-    made = cif.synthesized(arguments)
+    automata.refuse(bool(arguments.save), "--save: event logs and tests are of robots, not of automata")
+    made = automata.synthesized(arguments)
     if made.supervisor is None:
-        return cif.report_none(arguments, made)
+        return automata.report_none(arguments, made)
     try:
         initial = None if arguments.initial is None else asked_parts(made.supervisor.system, arguments.initial)
         run_ = SystemRun(made.supervisor, initial)

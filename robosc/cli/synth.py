@@ -5,7 +5,7 @@ import sys
 from enum import StrEnum
 from typing import TYPE_CHECKING, Protocol
 
-from robosc.cli import cif
+from robosc.cli import automata
 from robosc.cli.arguments import (
     SYNTHESIS_STATES,
     add_deployment_argument,
@@ -57,8 +57,9 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser = commands.add_parser(
         "synth",
         help="synthesize a supervisor",
-        description="Synthesize the supervisor of a model: safe, controllable, nonblocking, maximally permissive. Of a "
-        "CIF model (FILE.cif), its conditions are printed, and -o FILE.cif writes the controlled system as another.",
+        description="Synthesize the supervisor of a model: safe, controllable, nonblocking, maximally permissive. Of "
+        "automata (FILE.cif, .gen, .wmod) the conditions are printed; -o FILE.cif writes the controlled system as a "
+        "CIF model, -o FILE.gen and -o FILE.wmod as one automaton of libFAUDES or Supremica.",
     )
     add_model_arguments(parser)
     add_output_argument(parser)
@@ -78,8 +79,8 @@ def add_output_argument(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize; 0 with a supervisor, 1 without."""
-    if cif.is_cif(arguments):
-        return cif.synth(arguments)
+    if automata.is_given(arguments):
+        return automata.synth(arguments)
     require_other_file(arguments.output, arguments.model)
     bundle = read_bundle(arguments)
     allow_livelock, verify_limit = arguments.allow_livelock, arguments.verify_limit

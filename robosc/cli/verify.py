@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from robosc.cli import cif, properties
+from robosc.cli import automata, properties
 from robosc.cli.arguments import (
     add_engine_options,
     add_model_arguments,
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _USAGE = """robosc verify [options] FILE.rsup MODEL
        robosc verify [options] [FILE.rsup] MODEL --property PROPERTY
        robosc verify FILE.rsup --signed-by FILE.pub
-       robosc verify [options] FILE.cif"""
+       robosc verify [options] FILE.cif|FILE.gen|FILE.wmod"""
 
 _DESCRIPTION = """\
 With FILE.rsup: check a supervisor file against the texts of its model, believing nothing that the file says of itself:
@@ -36,7 +36,7 @@ nonblocking. That it forbids no more than it must is checked for systems of mode
 With --signed-by: the file must be signed by that key, too; without MODEL, nothing else is checked.
 With properties: verify them in the robot under its supervisor, which is synthesized unless a file is given and passes,
 with a run that shows why each of them holds or fails.
-With FILE.cif: synthesize the supervisor of a CIF model, and verify it by other means than it was made.
+With automata (FILE.cif, .gen, .wmod): synthesize their supervisor, and verify it by other means than it was made.
 """
 
 
@@ -81,8 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         UsageError: A file is not there or cannot be read, or there is nothing to check.
     """
-    if cif.is_cif(arguments):
-        return cif.verify(arguments)
+    if automata.is_given(arguments):
+        return automata.verify(arguments)
     return run_with(arguments, _verify_supervisor, properties.run)
 
 

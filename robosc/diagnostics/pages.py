@@ -14,8 +14,8 @@ There is one Markdown file a code in the folder `pages`, of one shape:
     - `another-code`
 
 A fence says what it holds: `robosc` (the model), `robosc library=NAME` (a library that the model imports), `cif` (a
-CIF model), `cif library=NAME` (a file that it imports), or `console` (a session at a shell, where no text could show
-the fault: a NUL, a file of 16 MiB).
+CIF model), `cif library=NAME` (a file that it imports), `gen` or `wmod` (plain automata), or `console` (a session at a
+shell, where no text could show the fault: a NUL, a file of 16 MiB).
 """
 
 import re
@@ -60,7 +60,7 @@ class Block:
     """A fenced text of a page.
 
     Attributes:
-        kind: `robosc`, `cif` or `console`.
+        kind: `robosc`, `cif`, `gen`, `wmod` or `console`.
         library: Name of the library that it holds, or None where it holds the robot or a session.
         text: Text between the fences.
     """

@@ -4,6 +4,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from robosc.pipeline.automata_files import is_automata
 from robosc.pipeline.files import FileAccessError, given_path
 from robosc.source import Bundle, SourceFile
 
@@ -133,10 +134,10 @@ def read_model(
     from robosc.language import decode_source, load_bundle
     from robosc.language.interfaces import interface_folders
 
-    if model.suffix == ".cif":
+    if is_automata(model):
         raise FileAccessError(
-            f"{model} is a CIF model, which check, synth, explore, verify, simulate and generate --target cif take; "
-            "this is for RoboSC's own"
+            f"{model} holds automata, which check, synth, explore, verify, simulate and generate take; this is for "
+            "RoboSC's own models"
         )
     try:
         if text is None:

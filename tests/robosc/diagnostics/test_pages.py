@@ -21,6 +21,7 @@ from robosc.language.bundle import MAXIMUM_BYTES, decode_source
 from robosc.language.interfaces import find_interfaces, interface_folders
 from robosc.model import check
 from robosc.model.structure import Deployment
+from robosc.plain_automata import check_automata
 from robosc.source import Bundle, SourceFile
 from support.diagnostic_codes import NO_CODES, assembled_codes, reportable_codes
 
@@ -32,7 +33,8 @@ def bundle_of(blocks: tuple[Block, ...]) -> Bundle:
     (main,) = (block for block in blocks if block.library is None)
     libraries = [block for block in blocks if block.library is not None]
     files = tuple(SourceFile(f"{block.library}{n}.rscd", block.text) for n, block in enumerate(libraries))
-    return Bundle(SourceFile("model.rscd", main.text), files)
+    ending = main.kind if main.kind in ("gen", "wmod") else "rscd"
+    return Bundle(SourceFile(f"model.{ending}", main.text), files)
 
 
 def findings(item: Page, blocks: tuple[Block, ...]) -> tuple[Diagnostic, ...]:
@@ -40,6 +42,8 @@ def findings(item: Page, blocks: tuple[Block, ...]) -> tuple[Diagnostic, ...]:
     bundle = bundle_of(blocks)
     if blocks[0].kind == "cif":
         return cif_findings(bundle)
+    if blocks[0].kind in ("gen", "wmod"):
+        return check_automata(bundle).diagnostics
     # The definitions of ROS's own types come with what the tests are installed with.
     texts = (file.text for file in bundle.files)
     # Some packages of other pages are made up, and nobody looked for them.
@@ -89,7 +93,9 @@ def marked(blocks: tuple[Block, ...]) -> list[tuple[str, int]]:
 
 
 PAGES = pages()
-SHOWN = [item for item in PAGES if item.example[0].kind in ("robosc", "cif")]
+AUTOMATIC = ("robosc", "cif", "gen", "wmod")
+"""Kinds of texts that are checked."""
+SHOWN = [item for item in PAGES if item.example[0].kind in AUTOMATIC]
 TYPED = [item for item in PAGES if item.example[0].kind == "console"]
 
 
@@ -109,7 +115,7 @@ def test_a_page_has_its_shape(item: Page) -> None:
     assert not item.markdown.endswith("\n\n")
     assert max(map(len, item.markdown.splitlines())) <= 120
     assert item.fixed
-    assert {block.kind for block in (*item.example, *item.fixed)} <= {"robosc", "cif", "console"}
+    assert {block.kind for block in (*item.example, *item.fixed)} <= {*AUTOMATIC, "console"}
     assert set(item.see_also) <= set(codes()) - {item.code}
     assert len(set(item.see_also)) == len(item.see_also)
     assert not any(block.marked_lines for block in item.fixed)
@@ -131,7 +137,7 @@ def test_all_examples_bear_a_mark_where_there_is_a_place() -> None:
 
 @pytest.mark.parametrize("item", PAGES, ids=lambda item: item.code)
 def test_what_is_fixed_is_sound(item: Page) -> None:
-    if item.fixed[0].kind in ("robosc", "cif"):
+    if item.fixed[0].kind in AUTOMATIC:
         found = findings(item, item.fixed)
         # A note tells no fault, and what is fixed may well be worth one.
         assert [one for one in found if one.severity is not Severity.NOTE or one.code == item.code] == []

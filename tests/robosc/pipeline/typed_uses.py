@@ -38,6 +38,7 @@ def right(system: System) -> None:
         taken: robosc.Step = by_hand.step("a", to={"A": "busy", "A.n": 3})
         saved = robosc.explore(of_system.supervisor).write("graph.svg")
         print(taken.state.components, by_hand.choices("a"), robosc.explore(system).graph, saved)
+        print(robosc.generate(of_system.supervisor, "c99").files, robosc.generate(system, "python").files)
 
 
 def wrong(system: System, model: robosc.LoadedModel, result: robosc.Synthesis, run: robosc.Run) -> None:
@@ -59,7 +60,6 @@ def wrong(system: System, model: robosc.LoadedModel, result: robosc.Synthesis, r
     robosc.verify(system)  # type: ignore[call-overload]
     robosc.explain()  # type: ignore[call-overload]
     robosc.explain(model, code="unknown-name")  # type: ignore[call-overload]
-    robosc.generate(system, "ros2")  # type: ignore[arg-type]
     robosc.simulate(system)  # type: ignore[call-overload]
     robosc.simulate("robot.rsup", initial={"A": "idle"})  # type: ignore[call-overload]
     run.step(3)  # type: ignore[arg-type]

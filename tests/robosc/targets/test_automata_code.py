@@ -67,7 +67,7 @@ def supervisor_of(text: str) -> SystemSupervisor | None:
 
 
 class Reference:
-    """What the automata mean, told as the generated programs tell it."""
+    """Meaning of the automata, told as the generated programs tell it."""
 
     def __init__(self, supervisor: SystemSupervisor, first: dict[str, Any]) -> None:
         self.system = supervisor.system

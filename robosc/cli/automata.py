@@ -1,4 +1,4 @@
-"""CIF models in `check`, `synth`, `explore` and `verify`: automata without a text of RoboSC."""
+"""Automata without a text of RoboSC in `check`, `synth`, `explore` and `verify`: CIF, libFAUDES and Supremica."""
 
 import argparse
 import sys
@@ -19,20 +19,19 @@ from robosc.cli.output import (
 from robosc.errors import Diagnostic
 from robosc.json_documents import counts_text, diagnostics_json
 from robosc.model.structure import Deployment
+from robosc.pipeline.automata_files import SUFFIXES, is_automata
 from robosc.source import Bundle
 
 if TYPE_CHECKING:
-    from robosc.cif import CheckedCif
+    from robosc.pipeline.automata_files import CheckedFile
     from robosc.pipeline.options import SynthesisOptions
     from robosc.pipeline.results import SynthesisStatus
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
 
-SUFFIX = ".cif"
 
-
-def is_cif(arguments: argparse.Namespace) -> bool:
-    """Return True if the model of a command is one of CIF: the ending of its name tells."""
-    return bool(arguments.model.suffix == SUFFIX)
+def is_given(arguments: argparse.Namespace) -> bool:
+    """Return True if the model of a command holds automata: the ending of its name tells."""
+    return is_automata(arguments.model)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,15 +70,20 @@ def synthesized(arguments: argparse.Namespace) -> Synthesized:
     return Synthesized(bundle, made.status, found.diagnostics, made.reason, made.supervisor)
 
 
-def controlled_system(supervisor: "SystemSupervisor") -> str:
-    """The controlled system as a CIF model."""
+def controlled_system(supervisor: "SystemSupervisor", suffix: str) -> str:
+    """The controlled system as the text of a file: a CIF model, or one automaton of libFAUDES or Supremica."""
+    from robosc.exploration import DEFAULT_LIMIT, graph_automaton
+    from robosc.pipeline.exploring import graph_of
+    from robosc.plain_automata import WRITERS
     from robosc.targets.cif import automata
 
-    return automata.controlled_system(supervisor.system, supervisor.added, supervisor.initial)
+    if suffix not in WRITERS:
+        return automata.controlled_system(supervisor.system, supervisor.added, supervisor.initial)
+    return WRITERS[suffix](graph_automaton(graph_of(supervisor, limit=DEFAULT_LIMIT), supervisor.system))
 
 
 def check(arguments: argparse.Namespace) -> ExitCode:
-    """Check a CIF model, and synthesize if that is asked for; 0 without errors, else 1.
+    """Check automata, and synthesize if that is asked for; 0 without errors, else 1.
 
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
@@ -111,17 +115,17 @@ def synth(arguments: argparse.Namespace) -> ExitCode:
     """
     output = arguments.output
     refuse(
-        output is not None and output.suffix != SUFFIX,
-        f"-o: the controlled system of a CIF model is a CIF model, too: write it to a file that ends in {SUFFIX}",
+        output is not None and output.suffix not in SUFFIXES,
+        f"-o: the controlled system of automata is written to a file that ends in {', '.join(sorted(SUFFIXES))}",
     )
-    refuse(arguments.allow_livelock, "--allow-livelock: a CIF model has no silent steps of a controller")
+    refuse(arguments.allow_livelock, "--allow-livelock: automata have no silent steps of a controller")
     made = synthesized(arguments)
     if made.supervisor is None:
         return report_none(arguments, made)
     if output is not None:
         for file in (made.bundle.main, *made.bundle.libraries):
             require_other_file(output, Path(file.name))
-        write_bytes(output, controlled_system(made.supervisor).encode())
+        write_bytes(output, controlled_system(made.supervisor, output.suffix).encode())
     initial = made.supervisor.initial_condition
     if arguments.json:
         print_json(
@@ -177,11 +181,9 @@ def verify(arguments: argparse.Namespace) -> ExitCode:
     from robosc.pipeline.systems import verify_system
     from robosc.verification import Limits
 
-    refuse(arguments.supervisor is not None, "FILE.rsup: there is no supervisor file of a CIF model")
-    refuse(
-        bool(arguments.property or arguments.properties), "--property: properties are of RoboSC's models, not of CIF's"
-    )
-    refuse(bool(arguments.signed_by), "--signed-by: there is no supervisor file of a CIF model")
+    refuse(arguments.supervisor is not None, "FILE.rsup: a supervisor file is of a robot, not of automata")
+    refuse(bool(arguments.property or arguments.properties), "--property: properties are of robots, not of automata")
+    refuse(bool(arguments.signed_by), "--signed-by: a supervisor file is of a robot, not of automata")
     made = synthesized(arguments)
     if made.supervisor is None:
         return report_none(arguments, made)
@@ -207,24 +209,23 @@ def verify(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.OK if has_passed else ExitCode.FAILED
 
 
-def _checked(arguments: argparse.Namespace) -> "tuple[Bundle, CheckedCif]":
-    from robosc.cif import check_cif
-    from robosc.pipeline.cif_models import load_cif_model
+def _checked(arguments: argparse.Namespace) -> "tuple[Bundle, CheckedFile]":
+    from robosc.pipeline.automata_files import check_automata_file, load_automata_file
 
-    refuse(bool(arguments.library_path), "-L: a CIF model imports files by their places")
-    refuse(bool(arguments.interface_path), "-I: a CIF model has no types of ROS")
-    refuse(arguments.deployment == str(Deployment.LAYER), "--deployment: a CIF model is no node of a robot")
+    refuse(bool(arguments.library_path), "-L: automata import no libraries, and CIF models files by their places")
+    refuse(bool(arguments.interface_path), "-I: automata have no types of ROS")
+    refuse(arguments.deployment == str(Deployment.LAYER), "--deployment: automata are no node of a robot")
     from robosc.pipeline.files import FileAccessError
 
     try:
-        bundle = load_cif_model(arguments.model)
+        bundle = load_automata_file(arguments.model)
     except FileAccessError as error:
         raise UsageError(str(error)) from error
-    return bundle, check_cif(bundle)
+    return bundle, check_automata_file(bundle)
 
 
 def refuse(is_given: bool, message: str) -> None:
-    """Do nothing if an argument that means nothing for a CIF model is not given.
+    """Do nothing if an argument that means nothing for automata is not given.
 
     Raises:
         UsageError: It is.
@@ -241,7 +242,7 @@ def _options(arguments: argparse.Namespace) -> "SynthesisOptions":
     )
 
 
-def _synthesis(arguments: argparse.Namespace, found: "CheckedCif") -> "SystemSynthesis":
+def _synthesis(arguments: argparse.Namespace, found: "CheckedFile") -> "SystemSynthesis":
     from robosc.pipeline.systems import synthesize_system
 
     assert found.system is not None  # noqa: S101 - asked only of models without errors

@@ -75,6 +75,24 @@ def test_the_controlled_system_is_written(model: str, tmp_path: Path, capsys: py
     assert (folder / "supervisor.cif").read_text() == text
 
 
+def test_plain_automata_of_other_tools(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A controlled system that is written for libFAUDES or Supremica is read again, and needs no more supervising."""
+    model = tmp_path / "tank.cif"
+    model.write_text(TANK.replace("level in any", "level = 1"))
+    for ending in (".gen", ".wmod"):
+        controlled = tmp_path / f"controlled{ending}"
+        assert run(capsys, "synth", str(model), "-o", str(controlled))[0] == 0
+        assert run(capsys, "check", str(controlled))[:2] == (0, f"{controlled}: no findings\n")
+        document = json.loads(run(capsys, "synth", str(controlled), "--json")[1])
+        assert (document["states"], document["conditions"]) == (2, {"tank.c_fill": "true"})
+        assert run(capsys, "verify", str(controlled))[0] == 0
+        assert run(capsys, "generate", str(controlled), "--target", "c99", "-o", str(tmp_path / ending))[0] == 0
+        assert run(capsys, "view" if ending == ".gen" else "doc", str(controlled))[0] == 2
+        controlled.write_text("x")
+        status, out, err = run(capsys, "check", str(controlled))
+        assert (status, "[automata-syntax]" in out + err) == (1, True)
+
+
 def test_no_file_of_the_model_is_written_over(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "other.cif").write_text(TANK)
     Path(model).write_text('import "other.cif";\n')
@@ -223,12 +241,12 @@ def test_simulate_begins_as_it_is_told(model: str, tmp_path: Path, capsys: pytes
         ["view"],
     ],
 )
-def test_what_means_nothing_for_cif_is_refused(
+def test_what_means_nothing_for_automata_is_refused(
     arguments: list[str], model: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     status, out, err = run(capsys, *arguments, model)
     assert (status, out) == (2, "")
-    assert "CIF" in err
+    assert "automata" in err
     assert err.count("\n") == 1
 
 

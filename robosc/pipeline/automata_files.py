@@ -1,0 +1,69 @@
+"""Files of automata (CIF, libFAUDES, Supremica), loaded: what `robosc.synthesize(system)` takes is made of them."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from robosc.errors import Diagnostic
+from robosc.source import Bundle
+
+if TYPE_CHECKING:
+    from robosc.automata import System
+
+_CIF = ".cif"
+
+SUFFIXES = frozenset({_CIF, ".gen", ".wmod"})
+"""Endings of files of automata."""
+
+
+class CheckedFile(Protocol):
+    """Result of checking.
+
+    Attributes:
+        system: The automata; None if there are errors.
+        diagnostics: Every finding, sorted by place.
+    """
+
+    @property
+    def system(self) -> "System | None":
+        """The automata."""
+
+    @property
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
+        """Every finding."""
+
+
+def is_automata(path: Path) -> bool:
+    """Return True if a file holds automata: the ending of its name tells."""
+    return path.suffix in SUFFIXES
+
+
+def load_automata_file(path: Path) -> Bundle:
+    """Read a file of automata; a CIF model with the files that it imports.
+
+    Raises:
+        FileAccessError: The file is not there or cannot be read.
+        LanguageError: A file is too large or not UTF-8.
+    """
+    from robosc.cif import load_cif
+    from robosc.language.bundle import read_source
+    from robosc.pipeline.files import FileAccessError
+    from robosc.source import SourceFile
+
+    try:
+        if path.is_dir():
+            raise FileAccessError(f"{path} is a folder, not a model's file")
+        if not path.exists():
+            raise FileAccessError(f"there is no file {path}")
+        return load_cif(path) if path.suffix == _CIF else Bundle(SourceFile(str(path), read_source(path, str(path))))
+    except FileAccessError:
+        raise
+    except OSError as error:
+        raise FileAccessError(f"cannot read {error.filename or path}: {error.strerror or error}") from error
+
+
+def check_automata_file(bundle: Bundle) -> CheckedFile:
+    """Check a file of automata, as its ending says what it is."""
+    from robosc.cif import check_cif
+    from robosc.plain_automata import check_automata
+
+    return (check_cif if bundle.main.name.endswith(_CIF) else check_automata)(bundle)

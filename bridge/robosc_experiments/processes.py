@@ -225,7 +225,10 @@ class Program:
         while True:
             # Before the look: what it has told just before its end counts.
             has_ended = self.status is not None
-            found = re.search(pattern, self.log.read_text(encoding="utf-8", errors="replace"), re.MULTILINE)
+            told = self.log.read_text(encoding="utf-8", errors="replace")
+            # Of a program that lives, the last line may be half of one.
+            whole = told if has_ended else told[: told.rfind("\n") + 1]
+            found = re.search(pattern, whole, re.MULTILINE)
             if found:
                 return found
             if has_ended:

@@ -50,6 +50,29 @@ def test_what_a_program_tells_is_waited_for(tmp_path: Path) -> None:
     assert str(raised.value) == "teller ended by itself with status 0:\nport 17"
 
 
+def test_half_a_line_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = """
+        import pathlib, signal, sys, time
+        sys.stdout.write("port 1")
+        while not pathlib.Path("seen").exists():
+            time.sleep(0.001)
+        sys.stdout.write("7\\n")
+        signal.pause()
+    """
+    sleep = time.sleep
+
+    def look(duration_s: float) -> None:
+        if (tmp_path / "teller.log").read_text() == "port 1":
+            (tmp_path / "seen").touch()
+        sleep(duration_s)
+
+    with Program("teller", script(tmp_path, text), tmp_path) as program:
+        # The first look is at half a line.
+        wait_until(lambda: (tmp_path / "teller.log").read_text() == "port 1")
+        monkeypatch.setattr(time, "sleep", look)
+        assert program.wait_for(r"^port (\d+)$")[1] == "17"
+
+
 def test_a_program_that_dies_is_told_with_its_last_words(tmp_path: Path) -> None:
     text = "raise SystemExit('no such device')"
     with Program("dying", script(tmp_path, text), tmp_path) as program, pytest.raises(ScenarioError) as raised:

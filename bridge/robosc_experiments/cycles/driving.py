@@ -10,7 +10,9 @@ from pathlib import Path
 
 from robosc.model.structure import Communication, CommunicationKind, Model
 from robosc.supervisor import Supervisor
+from robosc.targets import GenerateOptions
 from robosc.targets.c99.layout import make_layout
+from robosc.targets.code.naming import package_name
 from robosc.targets.cpp.model import fill_name
 from robosc_experiments.cycles.isolated import SCRIPTS, write_unit
 from robosc_experiments.cycles.times import LIMIT_S, OTHER, Samples, clear_scan
@@ -84,6 +86,7 @@ def _compiled(experiment: str, supervisor: Supervisor, move: Communication, fold
     filled = {
         "p": unit.stem,
         "communication": layout.communications[move.name],
+        "package": package_name(supervisor, GenerateOptions(), "controller"),
         "fill": fill_name(layout, move),
         "first": OTHER[experiment][2],
         "topic": TOPIC,

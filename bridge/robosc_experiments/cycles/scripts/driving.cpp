@@ -26,7 +26,7 @@ bool publish(void *, const @p@_request_t *request)
 {
     if (request->communication == @communication@) {
         message = geometry_msgs::Twist();
-        robosc::model::@fill@(*request, message);
+        @package@::model::@fill@(*request, message);
         publisher.publish(message);
     }
     return true;

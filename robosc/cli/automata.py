@@ -78,7 +78,7 @@ def controlled_system(supervisor: "SystemSupervisor", suffix: str) -> str:
     from robosc.targets.cif import automata
 
     if suffix not in WRITERS:
-        return automata.controlled_system(supervisor.system, supervisor.added, supervisor.initial)
+        return automata.controlled_system(supervisor)
     return WRITERS[suffix](graph_automaton(graph_of(supervisor, limit=DEFAULT_LIMIT), supervisor.system))
 
 

@@ -175,7 +175,7 @@ def _generate_automata(arguments: argparse.Namespace) -> ExitCode:
     made = automata.synthesized(arguments)
     files = None
     if (found := made.supervisor) is not None:
-        files = generate_automata(found.system, found.added, found.initial, arguments.target, options)
+        files = generate_automata(found, arguments.target, options)
     return report_generated(arguments, made, files, made.bundle)
 
 

@@ -70,7 +70,7 @@ def generate(
     if isinstance(model, SystemSupervisor):
         on_progress(Progress("generation", target))
         try:
-            files = generate_automata(model.system, model.added, model.initial, target, generation)
+            files = generate_automata(model, target, generation)
         except UnsupportedModelError as error:
             return Generation(SynthesisStatus.UNSUPPORTED_MODEL, (), str(error), None, target=target)
         return Generation(SynthesisStatus.SUPERVISOR, (), "", files, target=target)

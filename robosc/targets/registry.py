@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from enum import StrEnum
 from importlib.metadata import entry_points
+from typing import Protocol
 
 from robosc.automata.structure import System
 from robosc.errors import RoboscError, UnsupportedModelError
@@ -142,7 +143,26 @@ GENERAL_ERRORS = frozenset({"conflicting-topic"})
 """Codes of the check's warnings that are errors wherever something is generated."""
 
 
-GenerateAutomata = Callable[[System, Sequence[AddedCondition], DecisionDiagram | None, GenerateOptions], GeneratedFiles]
+class SupervisedSystem(Protocol):
+    """Automata under their supervisor.
+
+    Attributes:
+        system: The automata.
+        added: Conditions that the supervisor adds to events.
+        initial: Condition on the initial states in which it lets the system begin; None if in all.
+    """
+
+    @property
+    def system(self) -> System:
+        """The automata."""
+
+    @property
+    def added(self) -> Sequence[AddedCondition]:
+        """The conditions on events."""
+
+    @property
+    def initial(self) -> DecisionDiagram | None:
+        """The condition on initial states."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,15 +172,14 @@ class Target:
     Attributes:
         info: Name and description.
         generate: Makes the files; raises UnsupportedModelError for a model outside what it handles.
-        generate_automata: The same for automata under the conditions that their supervisor adds to events and to the
-            initial states; None for a target that needs a model of a robot.
+        generate_automata: The same for automata; None for a target that needs a model of a robot.
         errors: Codes of the check's warnings that are errors for this target.
     """
 
     info: TargetInfo
     generate: Callable[[Supervisor, GenerateOptions], GeneratedFiles]
     errors: frozenset[str] = GENERAL_ERRORS
-    generate_automata: GenerateAutomata | None = None
+    generate_automata: Callable[[SupervisedSystem, GenerateOptions], GeneratedFiles] | None = None
 
 
 class UnknownTargetError(RoboscError, LookupError):
@@ -253,20 +272,9 @@ def generate(supervisor: Supervisor, target: str, options: GenerateOptions | Non
 
 
 def generate_automata(
-    system: System,
-    added: Sequence[AddedCondition],
-    initial: DecisionDiagram | None,
-    target: str,
-    options: GenerateOptions | None = None,
+    supervised: SupervisedSystem, target: str, options: GenerateOptions | None = None
 ) -> GeneratedFiles:
     """The files of a target for automata under their supervisor.
-
-    Args:
-        system: The automata.
-        added: Conditions that the supervisor adds to events.
-        initial: Condition on the initial states in which it lets the system begin; None if in all.
-        target: Name of the target.
-        options: Choices of the user; the defaults if None.
 
     Raises:
         UnknownTargetError: There is no such target.
@@ -278,7 +286,7 @@ def generate_automata(
         raise UnsupportedModelError(
             f"the target {target} needs a model of a robot: automata have no messages; c99, cif and python take them"
         )
-    return found(system, added, initial, options or GenerateOptions())
+    return found(supervised, options or GenerateOptions())
 
 
 def errors_for(target: str) -> frozenset[str]:

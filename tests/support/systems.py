@@ -5,6 +5,7 @@ An edge is written `idle -go-> busy`. Events whose names start with `u_` are unc
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 from robosc.automata import (
     Assignment,
@@ -20,6 +21,14 @@ from robosc.automata import (
 from robosc.automata.compile import State
 from robosc.automata.state import Subject, subjects
 from robosc.expressions import TRUE, Binary, BinaryOperator, Constant, Expression, Received, Value, VariableRead
+
+
+class Unrestricted(NamedTuple):
+    """Automata with a supervisor that adds nothing."""
+
+    system: System
+    added: tuple[()] = ()
+    initial: None = None
 
 
 def edge(text: str, guard: Expression = TRUE, /, **updates: Expression) -> Edge:

@@ -17,14 +17,13 @@ from robosc.expressions import (
 )
 from robosc.model.received import Path
 from robosc.model.structure import Model
-from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.targets.c99.conditions import CDiagrams
 from robosc.targets.c99.expressions import CWriter, number_code
 from robosc.targets.c99.helpers import HELPERS, called
 from robosc.targets.c99.naming import CNamer, prefix_for
 from robosc.targets.c99.statements import statement_lines, unused
-from robosc.targets.c99.text import safe, string_literal
-from robosc.targets.code.automata import AutomataWriter, ControlledAutomata, always
+from robosc.targets.c99.text import is_nested_too_deeply, safe, string_literal
+from robosc.targets.code.automata import AutomataWriter, ControlledAutomata, always, shallow
 from robosc.targets.code.expression_writer import read_nothing
 from robosc.targets.code.expressions import (
     FALSE_CODE,
@@ -43,7 +42,7 @@ from robosc.targets.code.statements import Block, codes
 from robosc.targets.code.templates import environment
 from robosc.targets.code.text import indent
 from robosc.targets.files import GeneratedFiles
-from robosc.targets.registry import GenerateOptions
+from robosc.targets.registry import GenerateOptions, SupervisedSystem
 
 _API_NAMES = """
     t EVENT_COUNT H enabled event_name event_t happened_t init inputs_t is_controllable is_marked run set_inputs state_t
@@ -239,15 +238,11 @@ def _definition(head: str, body: Block) -> list[str]:
     return [head, "{", *indent(statement_lines(body)), "}"]
 
 
-def generate(
-    system: System, added: Sequence[AddedCondition], initial: DecisionDiagram | None, options: GenerateOptions
-) -> GeneratedFiles:
+def generate(supervised: SupervisedSystem, options: GenerateOptions) -> GeneratedFiles:
     """The files for automata under their supervisor.
 
     Args:
-        system: The automata.
-        added: Conditions that the supervisor adds to events.
-        initial: Condition on the initial states in which it lets the system begin; None if in all.
+        supervised: The automata and their supervisor.
         options: Choices of the user: the name of the library, unless it is made from the system's.
 
     Raises:
@@ -255,10 +250,17 @@ def generate(
     """
     if options.package is not None:
         require_package_name(options.package)
-    automata = ControlledAutomata(system, added, initial)
-    names = Names(automata, prefix_for(options.package or system.name))
+    with shallow(supervised.system):
+        automata = ControlledAutomata(supervised)
+        files = _files(automata, Names(automata, prefix_for(options.package or supervised.system.name)))
+    if any(map(is_nested_too_deeply, files.values())):
+        raise UnsupportedModelError(f"{supervised.system.name} has an expression that is nested too deeply for C")
+    return GeneratedFiles(files)
+
+
+def _files(automata: ControlledAutomata, names: Names) -> dict[str, str]:
     before, after = _Reading(names, "s"), _Reading(names, "next")
-    diagrams = _Diagrams(system, before)
+    diagrams = _Diagrams(automata.system, before)
     writer = _Writer(automata, before, after, diagrams)
     used: set[str] = set()
 
@@ -289,7 +291,7 @@ def generate(
     needed = called(used, diagrams.uses)
     values = {
         "version": __version__,
-        "name": system.name,
+        "name": automata.system.name,
         "prefix": names.prefix,
         "upper": names.prefix.upper(),
         "events": [
@@ -306,7 +308,7 @@ def generate(
     templates = environment("robosc.targets.c99", filters={"c_text": string_literal, "c_safe": safe})
     files = {f"{names.prefix}.h": "automata.h", f"{names.prefix}.c": "automata.c"}
     files |= {name: f"automata_{name}" for name in ("main.c", "CMakeLists.txt", "README.md")}
-    return GeneratedFiles({file: templates.get_template(f"{name}.j2").render(values) for file, name in files.items()})
+    return {file: templates.get_template(f"{name}.j2").render(values) for file, name in files.items()}
 
 
 def _constant(names: Names, type_: Type, value: Value) -> Code:

@@ -13,14 +13,12 @@ from robosc.targets.c99.layout import event_data
 from robosc.targets.c99.naming import prefix_for
 from robosc.targets.c99.readme import readme_file
 from robosc.targets.c99.source import source_file
+from robosc.targets.c99.text import is_nested_too_deeply
 from robosc.targets.c99.unit import make_unit
 from robosc.targets.code.naming import package_name
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.paths import path_type
 from robosc.targets.registry import GenerateOptions
-
-_MAXIMUM_NESTING = 200
-"""Parentheses in each other; common compilers take at least 256."""
 
 _MAXIMUM_TEXT = 4095
 """Bytes of a string literal that every compiler takes (C99 5.2.4.1)."""
@@ -61,7 +59,7 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
         source = source_file(unit)
     except RecursionError as error:
         raise UnsupportedModelError(too_deep) from error
-    if any(line.count("(") > _MAXIMUM_NESTING and _nesting(line) > _MAXIMUM_NESTING for line in source.splitlines()):
+    if is_nested_too_deeply(source):
         raise UnsupportedModelError(too_deep)
     return GeneratedFiles(
         {
@@ -72,14 +70,6 @@ def generate(supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles
             "README.md": head(supervisor, "<!-- ", "     ", " -->") + "\n" + readme_file(unit),
         }
     )
-
-
-def _nesting(line: str) -> int:
-    depth = deepest = 0
-    for char in line:
-        depth += (char == "(") - (char == ")")
-        deepest = max(deepest, depth)
-    return deepest
 
 
 def _refuse(supervisor: Supervisor) -> None:

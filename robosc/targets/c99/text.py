@@ -7,6 +7,9 @@ from robosc.targets.code.text import printable
 
 _WIDTH = 105
 
+_MAXIMUM_NESTING = 200
+"""Parentheses in each other; common compilers take at least 256."""
+
 
 def safe(text: str) -> str:
     """A text for a comment: printable ASCII that neither ends the comment nor is a trigraph or a spliced line."""
@@ -41,3 +44,16 @@ def declared(c_type: str, name: str) -> str:
 def pointer_to(raw: str, name: str) -> str:
     """The declaration of a pointer to constant data."""
     return f"{raw}const *{name}" if raw.endswith("*") else f"const {raw} *{name}"
+
+
+def is_nested_too_deeply(source: str) -> bool:
+    """Return True if a line has more parentheses in each other than every compiler takes."""
+    return any(line.count("(") > _MAXIMUM_NESTING and _nesting(line) > _MAXIMUM_NESTING for line in source.splitlines())
+
+
+def _nesting(line: str) -> int:
+    depth = deepest = 0
+    for char in line:
+        depth += (char == "(") - (char == ")")
+        deepest = max(deepest, depth)
+    return deepest

@@ -45,7 +45,7 @@ from robosc.targets.cif import text
 from robosc.targets.cif.generate import SUPERVISED
 from robosc.targets.cif.text import Level, Text, all_of, any_of, chosen, comment, compared, escaped, implied, negated
 from robosc.targets.files import GeneratedFiles
-from robosc.targets.registry import GenerateOptions
+from robosc.targets.registry import GenerateOptions, SupervisedSystem
 
 FORMULA_LIMIT = 60
 """Operands beyond which a condition is written as a decision diagram."""
@@ -56,30 +56,21 @@ _NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _Path = tuple[str, ...]
 
 
-def controlled_system(
-    system: System, added: Sequence[AddedCondition] = (), initial: DecisionDiagram | None = None
-) -> str:
-    """A CIF model of a system under its supervisor.
-
-    Args:
-        system: The automata of a CIF model.
-        added: Conditions that the supervisor adds to events.
-        initial: Condition on the initial states in which it lets the system begin; None if in all.
+def controlled_system(supervised: SupervisedSystem) -> str:
+    """A CIF model of automata under their supervisor.
 
     Raises:
         UnsupportedModelError: The automata are none of a CIF model: a name is none of CIF, or an event carries data.
     """
     allow_depth(_LEVELS, _FRAMES)
-    return "".join(f"{line}\n" for line in _Writer(system).lines(added, initial))
+    return "".join(f"{line}\n" for line in _Writer(supervised.system).lines(supervised.added, supervised.initial))
 
 
-def generate(
-    system: System, added: Sequence[AddedCondition], initial: DecisionDiagram | None, options: GenerateOptions
-) -> GeneratedFiles:
-    """The one file of a system under its supervisor; parameters and errors as of `controlled_system`."""
+def generate(supervised: SupervisedSystem, options: GenerateOptions) -> GeneratedFiles:
+    """The one file of automata under their supervisor; raises UnsupportedModelError as `controlled_system`."""
     if options.package is not None:
         raise UnsupportedModelError("target cif: it makes one file and no package, so there is nothing to be named")
-    return GeneratedFiles({SUPERVISED: controlled_system(system, added, initial)})
+    return GeneratedFiles({SUPERVISED: controlled_system(supervised)})
 
 
 @dataclass(slots=True)

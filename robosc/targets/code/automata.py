@@ -6,7 +6,8 @@ cannot happen, and what it wrote until then counts for nothing.
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
 from itertools import product
@@ -20,7 +21,7 @@ from robosc.cif.typing import NAMELESS
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import TRUE, Binary, EnumType, Expression, IntegerType, Type, Value, conjuncts
 from robosc.expressions.text import expression_text
-from robosc.supervisor import AddedCondition, DecisionDiagram
+from robosc.supervisor import DecisionDiagram
 from robosc.supervisor.predicates import state_predicate
 from robosc.synthesis import edge_choices
 from robosc.targets.acceptance import StaysInRange
@@ -28,15 +29,14 @@ from robosc.targets.code.conditions import Diagrams
 from robosc.targets.code.expression_writer import ExpressionWriter
 from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code
 from robosc.targets.code.statements import Assign, Block, Comment, If, Return, Statement, when
+from robosc.targets.registry import SupervisedSystem
 
 
 class ControlledAutomata:
     """Automata under their supervisor, of which code can be made: in each state an event leads to one other.
 
     Args:
-        system: The automata.
-        added: Conditions that the supervisor adds to events.
-        initial: Condition on the initial states in which it lets the system begin; None if in all.
+        supervised: The automata and their supervisor.
 
     Attributes:
         system: The automata.
@@ -49,13 +49,12 @@ class ControlledAutomata:
         UnsupportedModelError: They leave open what happens, or an event carries data.
     """
 
-    def __init__(
-        self, system: System, added: Sequence[AddedCondition] = (), initial: DecisionDiagram | None = None
-    ) -> None:
+    def __init__(self, supervised: SupervisedSystem) -> None:
+        system = supervised.system
         _require_names(system)
         self.system = system = replace(system, automata=tuple(map(_merged, system.automata)))
-        self.added: Mapping[str, DecisionDiagram] = {item.event: item.condition for item in added}
-        self.initial = initial
+        self.added: Mapping[str, DecisionDiagram] = {item.event: item.condition for item in supervised.added}
+        self.initial = supervised.initial
         self.inputs = _inputs(system)
         known = frozenset[str]().union(*(item.alphabet for item in system.automata))
         self.events = tuple(item for item in system.events if item.name in known and item.name not in self.inputs)
@@ -108,13 +107,6 @@ class ControlledAutomata:
     def has_location(self, automaton: str) -> bool:
         """Return True if an automaton has several locations, of which the state says which it is in."""
         return len(self.system.automaton(automaton).locations) > 1
-
-    @property
-    def variables(self) -> Iterator[tuple[str, str, Type]]:
-        """The variables that are no input, each with its automaton and type."""
-        for automaton in self.system.automata:
-            if automaton.name not in self.inputs:
-                yield from ((automaton.name, item.name, item.type) for item in automaton.variables)
 
     @cached_property
     def _initial_values(self) -> tuple[tuple[Value, ...], ...]:
@@ -315,3 +307,16 @@ def _require_native(words: str, code: Code) -> None:
 def always(code: Code) -> Callable[[Path], Code]:
     """Return a function that reads all received data as one code."""
     return lambda path: code
+
+
+@contextmanager
+def shallow(system: System) -> Iterator[None]:
+    """Within the block an expression that is nested too deeply to become code is one that code cannot do.
+
+    Raises:
+        UnsupportedModelError: There is such an expression.
+    """
+    try:
+        yield
+    except (RecursionError, MemoryError) as error:
+        raise UnsupportedModelError(f"{system.name} has an expression that is nested too deeply for code") from error

@@ -8,7 +8,8 @@ from robosc.errors import UnsupportedModelError
 from robosc.supervisor import Supervisor
 from robosc.targets.registry import GenerateOptions
 
-_MAXIMUM_NAME = 100
+MAXIMUM_NAME = 100
+"""Characters of a robot's name that are taken for the name of its package."""
 
 
 class Namer:
@@ -54,7 +55,7 @@ def package_name(supervisor: Supervisor, options: GenerateOptions, suffix: str) 
         UnsupportedModelError: The chosen name is no name for a package.
     """
     if options.package is None:
-        return f"{snake_case(supervisor.model.name)[:_MAXIMUM_NAME].rstrip('_')}_{suffix}"
+        return f"{snake_case(supervisor.model.name)[:MAXIMUM_NAME].rstrip('_')}_{suffix}"
     require_package_name(options.package)
     return options.package
 
@@ -65,7 +66,7 @@ def require_package_name(name: str) -> None:
     Raises:
         UnsupportedModelError: It may not.
     """
-    if snake_case(name) != name or keyword.iskeyword(name) or len(name) > 2 * _MAXIMUM_NAME:
+    if snake_case(name) != name or keyword.iskeyword(name) or len(name) > 2 * MAXIMUM_NAME:
         raise UnsupportedModelError(
             f"'{name}' is no name for a package: lower-case letters, digits and single underscores, "
             "starting with a letter, and no keyword of Python"

@@ -1,19 +1,17 @@
 """Automata under their supervisor as a module in Python: a method that takes an event, and what can happen."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from robosc._version import __version__
 from robosc.automata.structure import Event, System
-from robosc.errors import UnsupportedModelError
 from robosc.expressions import EnumType, IntegerType, Type
 from robosc.model.received import Path
 from robosc.model.structure import Model
-from robosc.supervisor import AddedCondition, DecisionDiagram
-from robosc.targets.code.automata import AutomataWriter, ControlledAutomata, always
+from robosc.targets.code.automata import AutomataWriter, ControlledAutomata, always, shallow
 from robosc.targets.code.expression_writer import read_nothing
 from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, Sort, call, place, variable
-from robosc.targets.code.naming import require_package_name, snake_case
+from robosc.targets.code.naming import MAXIMUM_NAME, require_package_name, snake_case
 from robosc.targets.code.statements import Block
 from robosc.targets.code.templates import environment
 from robosc.targets.files import GeneratedFiles
@@ -22,7 +20,7 @@ from robosc.targets.python.expressions import Scope, constant
 from robosc.targets.python.folding import folded
 from robosc.targets.python.naming import PythonNamer
 from robosc.targets.python.statements import function
-from robosc.targets.registry import GenerateOptions
+from robosc.targets.registry import GenerateOptions, SupervisedSystem
 
 _NO_MODEL = Model("", (), (), (), (), (), (), ())
 _API_NAMES = ("EVENTS", "INPUTS", "State", "Supervisor", "copy", "div", "event", "first", "mod", "next_", "s", "value")
@@ -97,15 +95,11 @@ def _names(automata: ControlledAutomata) -> _Names:
     return found
 
 
-def generate(
-    system: System, added: Sequence[AddedCondition], initial: DecisionDiagram | None, options: GenerateOptions
-) -> GeneratedFiles:
+def generate(supervised: SupervisedSystem, options: GenerateOptions) -> GeneratedFiles:
     """The one file for automata under their supervisor.
 
     Args:
-        system: The automata.
-        added: Conditions that the supervisor adds to events.
-        initial: Condition on the initial states in which it lets the system begin; None if in all.
+        supervised: The automata and their supervisor.
         options: Choices of the user: the name of the module, unless it is made from the system's.
 
     Raises:
@@ -113,7 +107,14 @@ def generate(
     """
     if options.package is not None:
         require_package_name(options.package)
-    automata = ControlledAutomata(system, added, initial)
+    system = supervised.system
+    module = options.package or f"{snake_case(system.name)[:MAXIMUM_NAME].rstrip('_')}_supervisor"
+    with shallow(system):
+        text = folded(_text(ControlledAutomata(supervised), module))
+    return GeneratedFiles({f"{module}.py": text})
+
+
+def _text(automata: ControlledAutomata, module: str) -> str:
     names = _names(automata)
     used: set[str] = set()
 
@@ -128,7 +129,7 @@ def generate(
         return _Reading(used.add, _NO_MODEL, attribute, location, received)
 
     before, after = scope("s"), scope("next_")
-    diagrams = _Diagrams(system, before)
+    diagrams = _Diagrams(automata.system, before)
     writer = _Writer(automata, before, after, diagrams)
     namer = PythonNamer(_API_NAMES)
     functions: list[list[str]] = []
@@ -157,10 +158,9 @@ def generate(
     functions.append(function("_may_begin", "Return True if the system may begin so.", writer.may_begin(), both[:1]))
     functions.append(function("_is_marked", "Return True if the state is marked.", writer.is_marked(), both[:1]))
     begin = function("_begin", "Write the first state.", writer.begin(lambda type_, value: constant(value)), both[1:])
-    module = options.package or f"{snake_case(system.name)}_supervisor"
     values_of_template = {
         "version": __version__,
-        "name": system.name,
+        "name": automata.system.name,
         "module": module,
         "words": names.words,
         "events": events,
@@ -169,9 +169,9 @@ def generate(
         "functions": [*diagrams.nodes.values(), *functions, begin if len(begin) > 2 else [*begin, "    return"]],
     }
     text = environment("robosc.targets.python", filters={}).get_template("automata.py.j2").render(values_of_template)
-    too_deep = f"{system.name} has an expression that is nested too deeply for Python"
     try:
         compile(text, "supervisor.py", "exec", dont_inherit=True)
-    except (RecursionError, MemoryError, SyntaxError) as error:
-        raise UnsupportedModelError(too_deep) from error
-    return GeneratedFiles({f"{module}.py": folded(text)})
+    except SyntaxError as error:
+        # Names are checked: all that is left for the compiler to refuse are too many brackets in each other.
+        raise RecursionError from error
+    return text

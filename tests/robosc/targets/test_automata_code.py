@@ -18,13 +18,14 @@ from robosc.automata.state import subject_domain, subjects
 from robosc.automata.structure import DiscreteVariable, Edge
 from robosc.cif import check_cif
 from robosc.errors import UnsupportedModelError
-from robosc.expressions import Binary, BooleanType, Constant, IntegerType, VariableRead
+from robosc.expressions import Binary, BooleanType, Constant, Expression, IntegerType, VariableRead
+from robosc.recursion import allow_depth
 from robosc.source import Bundle, SourceFile
 from robosc.supervisor.predicates import state_predicates
 from robosc.targets import GenerateOptions, generate_automata
 from support.effort import examples
 from support.random_cif import random_controller
-from support.systems import automaton, system
+from support.systems import Unrestricted, automaton, system
 
 WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
 
@@ -160,7 +161,7 @@ def walk(reference: Reference, random: Random, count: int) -> tuple[str, list[st
 
 
 def in_c(supervisor: SystemSupervisor, folder: Path) -> list[str]:
-    files = generate_automata(supervisor.system, supervisor.added, supervisor.initial, "c99")
+    files = generate_automata(supervisor, "c99")
     for name, text in files.items():
         (folder / name).write_text(text)
     program = folder / "program"
@@ -169,7 +170,7 @@ def in_c(supervisor: SystemSupervisor, folder: Path) -> list[str]:
 
 
 def in_python(supervisor: SystemSupervisor, folder: Path) -> list[str]:
-    files = generate_automata(supervisor.system, supervisor.added, supervisor.initial, "python")
+    files = generate_automata(supervisor, "python")
     for name, text in files.items():
         (folder / name).write_text(text)
     return [sys.executable, "-I", "-W", "error", str(folder / next(iter(files)))]
@@ -259,7 +260,27 @@ CHOICE = automaton("A", ["a -go-> b", "a -go-> c", "b -back-> a", "c -back-> a"]
 @pytest.mark.parametrize("target", ["c99", "python"])
 def test_what_has_no_code(target: str, made: System, message: str) -> None:
     with pytest.raises(UnsupportedModelError, match=re.escape(message)):
-        generate_automata(made, (), None, target)
+        generate_automata(Unrestricted(made), target)
+
+
+@pytest.mark.parametrize("target", ["c99", "python"])
+def test_what_is_nested_too_deeply_has_no_code(target: str) -> None:
+    # As deep as a front end may let it become, and deeper than compilers take brackets.
+    allow_depth(5_000, 4)
+    deep: Expression = VariableRead("A", "x")
+    for number in range(500):
+        deep = Binary("and" if number % 2 else "or", VariableRead("A", "xyz"[number % 3]), deep)
+    variables = tuple(DiscreteVariable(name, BooleanType(), (False,)) for name in "xyz")
+    made = replace(WIDE, variables=variables, edges=(Edge("a", "go", "a", deep),))
+    with pytest.raises(UnsupportedModelError, match="nested too deeply"):
+        generate_automata(Unrestricted(system(made)), target)
+
+
+@pytest.mark.parametrize("kind", ["controllable", "uncontrollable"])
+def test_a_model_of_almost_nothing(kind: str, tmp_path: Path) -> None:
+    supervisor = supervisor_of(f"{kind} e; plant p: location: initial; marked; edge e; end")
+    assert supervisor is not None
+    require_equal(supervisor, {}, 1, 5, tmp_path)
 
 
 def test_edges_that_do_the_same_are_one_edge(tmp_path: Path) -> None:

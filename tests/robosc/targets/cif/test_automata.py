@@ -19,6 +19,7 @@ from robosc.supervisor.predicates import state_predicates
 from robosc.targets.cif import automata
 from support.effort import examples
 from support.random_cif import random_model
+from support.systems import Unrestricted
 
 HALL = """enum Mode = off, on;
 input bool sensor;
@@ -93,7 +94,7 @@ def runs(system: System, supervisor: SystemSupervisor | None = None) -> tuple[se
 
 
 def written(supervisor: SystemSupervisor) -> str:
-    return automata.controlled_system(supervisor.system, supervisor.added, supervisor.initial)
+    return automata.controlled_system(supervisor)
 
 
 def read_again(text: str) -> System:
@@ -187,4 +188,5 @@ def test_automata_that_are_none_of_cif(name: str, literal: str, data: str, messa
     )
     inputs = (InputVariable(data, (), BooleanType()),) if data else ()
     with pytest.raises(UnsupportedModelError, match=message):
-        automata.controlled_system(System("s", (Event("e", is_controllable=True),), (automaton,), inputs))
+        made = System("s", (Event("e", is_controllable=True),), (automaton,), inputs)
+        automata.controlled_system(Unrestricted(made))

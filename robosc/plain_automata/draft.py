@@ -56,6 +56,9 @@ def system_of(name: str, drafts: Sequence[Draft], events: Mapping[str, bool], fi
     """
     named = set[str]()
     for draft in drafts:
+        for item in (draft.name, *draft.states, *draft.events):
+            if not item.text:
+                findings.error("automata-name", "a name is empty", item.at, "Write one.")
         _check(draft, events, findings)
         if draft.name.text in named:
             message = f"there is another automaton '{draft.name.text}'"

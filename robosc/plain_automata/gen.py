@@ -30,6 +30,7 @@ _TOKEN = re.compile(
 _ATTRIBUTE = re.compile(r'([A-Za-z]\w*+)="([^"\n]*+)"')
 _SYMBOL = re.compile(r"[A-Za-z0-9_.:;,|+*/=!?$&@(){}\[\]^~-]+")
 _NUMBER = re.compile(r"[0-9]+")
+_COUNT = re.compile(r"[0-9]{1,9}")
 
 _FLAGS = frozenset("CcOoFfAa")
 _VECTOR = "Vector"
@@ -115,8 +116,8 @@ class _Reader:
         self._names = set[str]()
         self.drafts: list[Draft] = []
         self.types: list[str] = []
-        self.told: dict[str, tuple[bool, Location]] = {}
-        """For each event whether an alphabet says that it is controllable, and where."""
+        self.told: list[dict[str, bool]] = []
+        """For each generator the events of which its alphabet says whether they are controllable."""
 
     def read(self) -> None:
         """Read all generators."""
@@ -150,6 +151,7 @@ class _Reader:
         self._names.add(unique)
         draft = Draft(Named(unique, name.at))
         self.drafts.append(draft)
+        self.told.append({})
         self.types.append(token.attributes.get("ftype", "Generator"))
         sections = {
             "States": lambda: self._states(draft.states, "States"),
@@ -192,9 +194,9 @@ class _Reader:
         for token in self._names_until(section):
             if token.tag == "Consecutive":
                 first, last, close = self._take(), self._take(), self._take()
-                ends = [item.text for item in (first, last) if _NUMBER.fullmatch(item.text)]
+                ends = [item.text for item in (first, last) if _COUNT.fullmatch(item.text)]
                 if len(ends) < 2 or close.tag != "/Consecutive":
-                    self._refuse(first, "two numbers and </Consecutive>", "Write the first and the last number.")
+                    self._refuse(first, "two numbers of at most nine digits and </Consecutive>", "Write both.")
                 for number in range(int(ends[0]), int(ends[1]) + 1):
                     self._count(first.at)
                     found.append(Named(str(number), first.at))
@@ -223,12 +225,8 @@ class _Reader:
             message = f"the event '{event.text}' is not observable"
             fix = "Let it be observable: supervisors see all events here."
             self._findings.error("automata-unsupported", message, option.at, fix)
-        if letters.lower().find("c") >= 0:
-            is_controllable = "C" in letters
-            before = self.told.setdefault(event.text, (is_controllable, event.at))
-            if before[0] is not is_controllable:
-                message = f"the event '{event.text}' is controllable in one alphabet and not in another"
-                self._findings.error("automata-name", message, event.at, "Say the same in all of them.")
+        if "c" in letters.lower():
+            self.told[-1][event.text] = "C" in letters
 
     def _transitions(self, draft: Draft) -> None:
         found: list[_Token] = []
@@ -249,8 +247,8 @@ def read_gen(file: SourceFile, findings: Findings) -> System:
     """The system of a file; of use only if no error is found.
 
     A generator of the type `System` is a plant, every other one a requirement. Where no generator has that type, plants
-    are those whose alphabet tells of a controllable event. An event of which no alphabet says that it is controllable
-    is uncontrollable.
+    are those whose alphabet tells of a controllable event. An event of a plant is uncontrollable unless its alphabet
+    says otherwise; alphabets of requirements need not say it.
 
     Raises:
         LanguageError: It is no file of libFAUDES.
@@ -260,16 +258,28 @@ def read_gen(file: SourceFile, findings: Findings) -> System:
     at = Location(file.name, 1, 1, 1)
     if not reader.drafts:
         _fail("automata-syntax", "there is no generator in it", at, "Write <Generator>, or <Generator name=...>.")
-    controllable = {name for name, (is_controllable, _) in reader.told.items() if is_controllable}
     has_types = "System" in reader.types
-    for draft, type_ in zip(reader.drafts, reader.types, strict=True):
-        is_plant = type_ == "System" if has_types else any(item.text in controllable for item in draft.events)
+    for draft, type_, told in zip(reader.drafts, reader.types, reader.told, strict=True):
+        is_plant = type_ == "System" if has_types else any(told.values())
         draft.role = Role.PLANT if is_plant else Role.REQUIREMENT
     if all(draft.role is Role.REQUIREMENT for draft in reader.drafts):
         fix = 'Write ftype="System" at the plants, or +C+ behind their controllable events.'
         findings.error("automata-unsupported", "no generator is a plant", reader.drafts[0].name.at, fix)
-    events = {item.text: item.text in controllable for draft in reader.drafts for item in draft.events}
-    return system_of(PurePath(file.name).stem, reader.drafts, events, findings)
+    return system_of(PurePath(file.name).stem, reader.drafts, _events(reader, findings), findings)
+
+
+def _events(reader: _Reader, findings: Findings) -> dict[str, bool]:
+    """The events, and whether each is controllable, on which all alphabets that say it must agree."""
+    found: dict[str, bool] = {}
+    for draft, told in zip(reader.drafts, reader.told, strict=True):
+        for item in draft.events:
+            if item.text not in told and draft.role is Role.REQUIREMENT:
+                continue
+            is_controllable = told.get(item.text, False)
+            if found.setdefault(item.text, is_controllable) is not is_controllable:
+                message = f"the event '{item.text}' is controllable in one alphabet and not in another"
+                findings.error("automata-name", message, item.at, "Say the same in all of them.")
+    return {item.text: found.get(item.text, False) for draft in reader.drafts for item in draft.events}
 
 
 def write_gen(system: System) -> str:

@@ -59,7 +59,8 @@ def _tree(file: SourceFile) -> _Element:
     Raises:
         LanguageError: It is not XML, declares entities, or has too many elements.
     """
-    parser = expat.ParserCreate()
+    # The text is decoded already, whatever encoding its first line names.
+    parser = expat.ParserCreate("utf-8")
     stack: list[_Element] = [_Element("", {}, Location(file.name, 1, 1, 1))]
     count = 0
 
@@ -82,7 +83,7 @@ def _tree(file: SourceFile) -> _Element:
     parser.EndElementHandler = lambda tag: stack.pop()
     parser.StartDoctypeDeclHandler = refuse
     try:
-        parser.Parse(file.text.encode(), True)
+        parser.Parse(file.text.encode("utf-8", "surrogatepass"), True)
     except expat.ExpatError as error:
         at = Location(file.name, error.lineno, error.offset + 1, 1)
         _fail("automata-syntax", f"this is no XML: {expat.ErrorString(error.code)}", at, "Correct the file.")

@@ -129,6 +129,8 @@ def test_a_module() -> None:
         ("idle busy </States>", "idle <b> </States>", "automata-syntax", 3),
         ("idle busy", "<Consecutive> 1 x </Consecutive>", "automata-syntax", 3),
         ("idle busy", "<Consecutive> 1 99999999 </Consecutive>", "automata-unsupported", 3),
+        ("idle busy", f"<Consecutive> 1 {'9' * 5000} </Consecutive>", "automata-syntax", 3),
+        ("idle busy", 'idle busy ""', "automata-name", 3),
         ("+C+", "+X+", "automata-syntax", 2),
         ("+C+", '"', "automata-syntax", 2),
         ("stop idle", "stop", "automata-syntax", 4),
@@ -151,9 +153,13 @@ def test_wrong_generators(old: str, new: str, code: str | None, line: int) -> No
 
 def test_generators_that_do_not_agree() -> None:
     assert read("")[1][0].message == "there is no generator in it"
-    _, (finding,) = read(MACHINE + MACHINE.replace("+C+", "+c+"))
-    assert "controllable in one alphabet and not in another" in finding.message
-    _, (finding,) = read(MACHINE.replace(' ftype="System"', "").replace("+C+", ""))
+    for said in ("+c+", ""):
+        _, (finding,) = read(MACHINE + MACHINE.replace("+C+", said))
+        assert "controllable in one alphabet and not in another" in finding.message
+    # A requirement need not say it.
+    requirement = MACHINE.replace(' ftype="System"', "").replace("+C+", "")
+    assert [event.is_controllable for event in system_in(requirement + MACHINE).events] == [True, False]
+    _, (finding,) = read(requirement)
     assert finding.message == "no generator is a plant"
 
 
@@ -186,6 +192,12 @@ def test_wrong_modules(old: str, new: str, code: str) -> None:
     found, diagnostics = read(MODULE.replace(old, new), ".wmod")
     assert found is None
     assert diagnostics[0].code == code, diagnostics
+
+
+def test_a_module_in_another_encoding() -> None:
+    """The file is read as UTF-8, whatever its first line says."""
+    text = MODULE.replace('"UTF-8"', '"ISO-8859-1"').replace('Name="open"', 'Name="öffnen"')
+    assert "öffnen" in {event.name for event in system_in(text, ".wmod").events}
 
 
 def test_a_state_that_nobody_can_mark() -> None:

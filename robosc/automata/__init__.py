@@ -4,7 +4,7 @@ Between the checked model and synthesis: `to_automata` lowers a model, `Semantic
 means, one state at a time.
 """
 
-from robosc.automata.check import check_system
+from robosc.automata.check import CheckedSystem, check_system
 from robosc.automata.environment import EnvironmentVariable, environment_variable
 from robosc.automata.executable import ExecutableSystem
 from robosc.automata.lowering import to_automata
@@ -25,6 +25,7 @@ from robosc.automata.structure import (
 __all__ = [
     "Assignment",
     "Automaton",
+    "CheckedSystem",
     "DiscreteVariable",
     "Edge",
     "EnvironmentVariable",

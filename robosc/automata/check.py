@@ -4,9 +4,22 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from robosc.automata.structure import Automaton, Edge, System
-from robosc.errors import InvalidExpressionError, InvalidSystemError
+from robosc.errors import Diagnostic, InvalidExpressionError, InvalidSystemError
 from robosc.expressions import BooleanType, EnumType, Expression, IntegerType, PathStep, Type, is_finite, type_text
 from robosc.expressions.inference import Scope, has_type, is_assignable
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedSystem:
+    """Outcome of checking a file in which a front end finds automata.
+
+    Attributes:
+        system: The automata; None if there are errors.
+        diagnostics: Every finding, sorted by place.
+    """
+
+    system: System | None
+    diagnostics: tuple[Diagnostic, ...]
 
 
 def check_system(system: System) -> None:

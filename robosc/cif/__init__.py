@@ -5,6 +5,6 @@ Text -> syntax tree (`parser`) -> components with their names and types (`scopes
 it does not take with a finding for each place.
 """
 
-from robosc.cif.check import SUFFIX, CheckedCif, check_cif, load_cif
+from robosc.cif.check import SUFFIX, check_cif, load_cif
 
-__all__ = ["SUFFIX", "CheckedCif", "check_cif", "load_cif"]
+__all__ = ["SUFFIX", "check_cif", "load_cif"]

@@ -4,10 +4,9 @@ import os
 import posixpath
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
-from robosc.automata import System
+from robosc.automata import CheckedSystem
 from robosc.cif import syntax
 from robosc.cif.lowering import Lowering
 from robosc.cif.parser import parse
@@ -23,19 +22,6 @@ SUFFIX = ".cif"
 """Ending of a CIF model's file."""
 
 _LEVELS, _FRAMES = 5_000, 4
-
-
-@dataclass(frozen=True, slots=True)
-class CheckedCif:
-    """Result of checking.
-
-    Attributes:
-        system: The automata; None if there are errors.
-        diagnostics: Every finding, sorted by place.
-    """
-
-    system: System | None
-    diagnostics: tuple[Diagnostic, ...]
 
 
 def load_cif(path: Path) -> Bundle:
@@ -58,7 +44,7 @@ def load_cif(path: Path) -> Bundle:
     return Bundle(main, tuple(sorted((file for file, _ in files[1:]), key=lambda file: file.name)))
 
 
-def check_cif(bundle: Bundle) -> CheckedCif:
+def check_cif(bundle: Bundle) -> CheckedSystem:
     """Check a CIF model, and make its automata.
 
     Args:
@@ -76,7 +62,7 @@ def check_cif(bundle: Bundle) -> CheckedCif:
         except RecursionError:
             message = "expressions, or definitions in definitions, are nested too deeply"
             findings.error("cif-too-large", message, Location(bundle.main.name, 1, 1), "Split them.")
-    return CheckedCif(None if findings.has_errors else system, sorted_diagnostics(findings.diagnostics))
+    return CheckedSystem(None if findings.has_errors else system, sorted_diagnostics(findings.diagnostics))
 
 
 _Files = list[tuple[SourceFile, syntax.Specification | None]]

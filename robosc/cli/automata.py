@@ -23,7 +23,7 @@ from robosc.pipeline.automata_files import SUFFIXES, is_automata
 from robosc.source import Bundle
 
 if TYPE_CHECKING:
-    from robosc.pipeline.automata_files import CheckedFile
+    from robosc.automata import CheckedSystem
     from robosc.pipeline.options import SynthesisOptions
     from robosc.pipeline.results import SynthesisStatus
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
@@ -209,7 +209,7 @@ def verify(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.OK if has_passed else ExitCode.FAILED
 
 
-def _checked(arguments: argparse.Namespace) -> "tuple[Bundle, CheckedFile]":
+def _checked(arguments: argparse.Namespace) -> "tuple[Bundle, CheckedSystem]":
     from robosc.pipeline.automata_files import check_automata_file, load_automata_file
 
     refuse(bool(arguments.library_path), "-L: automata import no libraries, and CIF models files by their places")
@@ -242,7 +242,7 @@ def _options(arguments: argparse.Namespace) -> "SynthesisOptions":
     )
 
 
-def _synthesis(arguments: argparse.Namespace, found: "CheckedFile") -> "SystemSynthesis":
+def _synthesis(arguments: argparse.Namespace, found: "CheckedSystem") -> "SystemSynthesis":
     from robosc.pipeline.systems import synthesize_system
 
     assert found.system is not None  # noqa: S101 - asked only of models without errors

@@ -1,35 +1,17 @@
 """Files of automata (CIF, libFAUDES, Supremica), loaded: what `robosc.synthesize(system)` takes is made of them."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
-from robosc.errors import Diagnostic
 from robosc.source import Bundle
 
 if TYPE_CHECKING:
-    from robosc.automata import System
+    from robosc.automata import CheckedSystem
 
 _CIF = ".cif"
 
 SUFFIXES = frozenset({_CIF, ".gen", ".wmod"})
 """Endings of files of automata."""
-
-
-class CheckedFile(Protocol):
-    """Result of checking.
-
-    Attributes:
-        system: The automata; None if there are errors.
-        diagnostics: Every finding, sorted by place.
-    """
-
-    @property
-    def system(self) -> "System | None":
-        """The automata."""
-
-    @property
-    def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """Every finding."""
 
 
 def is_automata(path: Path) -> bool:
@@ -61,7 +43,7 @@ def load_automata_file(path: Path) -> Bundle:
         raise FileAccessError(f"cannot read {error.filename or path}: {error.strerror or error}") from error
 
 
-def check_automata_file(bundle: Bundle) -> CheckedFile:
+def check_automata_file(bundle: Bundle) -> "CheckedSystem":
     """Check a file of automata, as its ending says what it is."""
     from robosc.cif import check_cif
     from robosc.plain_automata import check_automata

@@ -3,11 +3,11 @@
 A reader makes a system of them, beside the front ends for RoboSC and CIF; a writer takes a system of plain automata.
 """
 
-from robosc.plain_automata.check import CheckedAutomata, check_automata
+from robosc.plain_automata.check import check_automata
 from robosc.plain_automata.gen import write_gen
 from robosc.plain_automata.wmod import write_wmod
 
 WRITERS = {".gen": write_gen, ".wmod": write_wmod}
 """The writer for each ending of a file."""
 
-__all__ = ["WRITERS", "CheckedAutomata", "check_automata", "write_gen", "write_wmod"]
+__all__ = ["WRITERS", "check_automata", "write_gen", "write_wmod"]

@@ -226,7 +226,7 @@ class Program:
             # Before the look: what it has told just before its end counts.
             has_ended = self.status is not None
             told = self.log.read_text(encoding="utf-8", errors="replace")
-            # Of a program that lives, the last line may be half of one.
+            # The last line may be half of one as long as the program lives.
             whole = told if has_ended else told[: told.rfind("\n") + 1]
             found = re.search(pattern, whole, re.MULTILINE)
             if found:

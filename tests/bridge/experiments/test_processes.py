@@ -52,18 +52,18 @@ def test_what_a_program_tells_is_waited_for(tmp_path: Path) -> None:
 
 def test_half_a_line_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = """
-        import pathlib, signal, sys, time
+        import signal, sys
         sys.stdout.write("port 1")
-        while not pathlib.Path("seen").exists():
-            time.sleep(0.001)
+        open("seen").read()
         sys.stdout.write("7\\n")
         signal.pause()
     """
+    os.mkfifo(tmp_path / "seen")
     sleep = time.sleep
 
     def look(duration_s: float) -> None:
         if (tmp_path / "teller.log").read_text() == "port 1":
-            (tmp_path / "seen").touch()
+            (tmp_path / "seen").write_text("")
         sleep(duration_s)
 
     with Program("teller", script(tmp_path, text), tmp_path) as program:

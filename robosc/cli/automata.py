@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robosc.cli.output import (
+    CommandError,
     ExitCode,
     ProgressLine,
     UsageError,
@@ -16,7 +17,7 @@ from robosc.cli.output import (
     require_other_file,
     write_bytes,
 )
-from robosc.errors import Diagnostic
+from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.json_documents import counts_text, diagnostics_json
 from robosc.model.structure import Deployment
 from robosc.pipeline.automata_files import SUFFIXES, is_automata
@@ -71,7 +72,12 @@ def synthesized(arguments: argparse.Namespace) -> Synthesized:
 
 
 def controlled_system(supervisor: "SystemSupervisor", suffix: str) -> str:
-    """The controlled system as the text of a file: a CIF model, or one automaton of libFAUDES or Supremica."""
+    """The controlled system as the text of a file: a CIF model, or one automaton of libFAUDES or Supremica.
+
+    Raises:
+        CommandError: It has too many states for one automaton.
+        UnsupportedModelError: A name in it is none of that format.
+    """
     from robosc.exploration import DEFAULT_LIMIT, graph_automaton
     from robosc.pipeline.exploring import graph_of
     from robosc.plain_automata import WRITERS
@@ -79,7 +85,12 @@ def controlled_system(supervisor: "SystemSupervisor", suffix: str) -> str:
 
     if suffix not in WRITERS:
         return automata.controlled_system(supervisor)
-    return WRITERS[suffix](graph_automaton(graph_of(supervisor, limit=DEFAULT_LIMIT), supervisor.system))
+    try:
+        graph = graph_of(supervisor, limit=DEFAULT_LIMIT)
+    except UnsupportedModelError as error:
+        problem = f"-o: the controlled system has more than {DEFAULT_LIMIT:,} states, or very many transitions"
+        raise CommandError(f"{problem}: write it to a file that ends in .cif", ExitCode.FAILED) from error
+    return WRITERS[suffix](graph_automaton(graph, supervisor.system))
 
 
 def check(arguments: argparse.Namespace) -> ExitCode:

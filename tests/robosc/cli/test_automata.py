@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from robosc import exploration
 from robosc.cli.main import main
 
 TANK = """plant tank:
@@ -91,6 +92,15 @@ def test_plain_automata_of_other_tools(tmp_path: Path, capsys: pytest.CaptureFix
         controlled.write_text("x")
         status, out, err = run(capsys, "check", str(controlled))
         assert (status, "[automata-syntax]" in out + err) == (1, True)
+
+
+def test_too_many_states_for_one_automaton(
+    model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(exploration, "DEFAULT_LIMIT", 2)
+    status, _, err = run(capsys, "synth", model, "-o", str(tmp_path / "controlled.gen"))
+    assert (status, "has more than 2 states" in err, "ends in .cif" in err) == (1, True, True)
+    assert not (tmp_path / "controlled.gen").exists()
 
 
 def test_no_file_of_the_model_is_written_over(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -63,7 +63,8 @@ def test_half_a_line_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
     def look(duration_s: float) -> None:
         if (tmp_path / "teller.log").read_text() == "port 1":
-            (tmp_path / "seen").write_text("")
+            # For writing and reading, so that it does not wait for a reader.
+            os.close(os.open(tmp_path / "seen", os.O_RDWR))
         sleep(duration_s)
 
     with Program("teller", script(tmp_path, text), tmp_path) as program:

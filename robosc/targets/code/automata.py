@@ -16,7 +16,7 @@ from math import prod
 from robosc.automata.compile import NO_DATA, Path, State, compile_expression, subjects_read
 from robosc.automata.semantics import MAXIMUM_CHOICES, plant_invariants_on
 from robosc.automata.state import Subject, initial_values, subject_type, subjects
-from robosc.automata.structure import Automaton, Edge, Event, InputVariable, Role, System
+from robosc.automata.structure import Automaton, Edge, Event, InputVariable, System
 from robosc.cif.typing import NAMELESS
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import TRUE, Binary, EnumType, Expression, IntegerType, Type, Value, conjuncts
@@ -253,9 +253,8 @@ class AutomataWriter(ABC):
             for edge in edges
         ]
         found: list[Statement] = []
-        # A requirement cannot forbid what nobody controls: synthesis has seen to it that it need not.
-        is_bound = automaton.role is Role.PLANT or event.is_controllable
-        if is_bound and event.name not in automaton.monitors:
+        # A requirement never stops what nobody controls: under its supervisor the system is in no state where it would.
+        if event.name not in automaton.monitors:
             possible = FALSE_CODE
             for test in tests:
                 possible = self._before.either(possible, test)

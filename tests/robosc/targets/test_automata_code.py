@@ -15,10 +15,10 @@ from robosc import SystemSupervisor
 from robosc.automata import InputVariable, Semantics, System
 from robosc.automata.compile import State
 from robosc.automata.state import subject_domain, subjects
-from robosc.automata.structure import DiscreteVariable, Edge
+from robosc.automata.structure import DiscreteVariable, Edge, EventCondition
 from robosc.cif import check_cif
 from robosc.errors import UnsupportedModelError
-from robosc.expressions import Binary, BooleanType, Constant, Expression, IntegerType, VariableRead
+from robosc.expressions import FALSE, Binary, BooleanType, Constant, Expression, IntegerType, Unary, VariableRead
 from robosc.recursion import allow_depth
 from robosc.source import Bundle, SourceFile
 from robosc.supervisor.predicates import state_predicates
@@ -210,6 +210,46 @@ def test_random_models(tmp_path: Path) -> None:
         compared += 1
     assert compared > examples(24) // 4
     assert happened > 5 * compared
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        # The plants cannot do it.
+        "input bool s; controllable c; plant p: location: initial; marked; edge c; end plant c needs s;",
+        # It may begin in two states, in one of which the supervisor lets it.
+        "input bool s; uncontrollable u; controllable c; plant p: disc int[0..1] x in any; location a: initial; marked;"
+        " edge u when x = 1 goto b; edge c; location b: marked; end requirement invariant p.a;",
+    ],
+)
+def test_small_models(text: str, tmp_path: Path) -> None:
+    supervisor = supervisor_of(text)
+    assert supervisor is not None
+    assert require_equal(supervisor, {"s": False}, 2, 40, tmp_path) > 5
+
+
+def test_where_the_supervisor_does_not_let_it_begin(tmp_path: Path) -> None:
+    """An input that stays as it is, and is bad if it is true."""
+    found = check_cif(Bundle(SourceFile("m.cif", "input bool hot; plant p: location a: initial; marked; end")))
+    assert found.system is not None
+    fixed = replace(
+        found.system,
+        plant_conditions=(EventCondition("hot", FALSE),),
+        invariants=(Unary("not", VariableRead("hot", "value")),),
+    )
+    supervisor = robosc.synthesize(fixed).supervisor
+    assert supervisor is not None
+    space: dict[str, Any] = {"__name__": "module"}
+    exec(Path(in_python(supervisor, tmp_path)[-1]).read_text(), space)
+    assert space["Supervisor"]({"hot": False}).told() == {"hot": False}
+    with pytest.raises(ValueError, match="may not begin so"):
+        space["Supervisor"]({"hot": True})
+    # The program in C begins with what is false.
+    turned = replace(fixed, invariants=(VariableRead("hot", "value"),))
+    supervisor = robosc.synthesize(turned).supervisor
+    assert supervisor is not None
+    done = subprocess.run(in_c(supervisor, tmp_path), input="", capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (1, "the system may not begin so\n")
 
 
 def test_where_the_system_may_not_begin(tmp_path: Path) -> None:

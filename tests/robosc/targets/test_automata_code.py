@@ -24,6 +24,7 @@ from robosc.source import Bundle, SourceFile
 from robosc.supervisor.predicates import state_predicates
 from robosc.targets import GenerateOptions, generate_automata
 from support.effort import examples
+from support.pythons import python_of
 from support.random_cif import random_controller
 from support.systems import Unrestricted, automaton, system
 
@@ -196,6 +197,14 @@ def test_a_model_with_everything(tmp_path: Path) -> None:
     assert "u_done" in str(supervisor.system.conditions)
     happened = require_equal(supervisor, {"m": "off", "heat": -2, "lid": False}, 1, 300, tmp_path)
     assert happened > 20
+
+
+def test_an_old_python(tmp_path: Path) -> None:
+    supervisor = supervisor_of(BAKERY)
+    assert supervisor is not None
+    _, *rest = in_python(supervisor, tmp_path)
+    lines, told = walk(Reference(supervisor, {"m": "off", "heat": -2, "lid": False}), Random(2), 100)
+    assert answers([str(python_of(8)), *rest], lines) == told
 
 
 @pytest.mark.random

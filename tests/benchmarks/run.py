@@ -1,6 +1,7 @@
 """Prints every benchmark table of the project, measured side by side in one run.
 
-Usage: run.py [NAME...]      (all of them without an argument)
+Usage: run.py [NAME...]                       (all of them without an argument)
+       run.py cif DIR [--against FILE]    (a folder of CIF models: see cif.py)
 
 Names: cold-start, conditions, editor, execution, language, synthesis; of the service: service-load, isolation; of
 the bridge: decoders, drive-bases, live-view, live-view-pixels, loop-period, maze, reaction, endurance, twin.
@@ -23,6 +24,7 @@ import maze
 import reaction
 import twin
 
+import cif
 import cold_start
 import conditions
 import editor
@@ -54,10 +56,13 @@ TABLES: dict[str, Callable[[], str]] = {
 
 def main() -> int:
     """Print the tables that were asked for."""
+    if sys.argv[1:2] == ["cif"]:
+        sys.stdout.write(cif.table(sys.argv[2:]) + "\n")
+        return 0
     names = sys.argv[1:] or list(TABLES)
     unknown = [name for name in names if name not in TABLES]
     if unknown:
-        sys.stderr.write(f"no benchmark {', '.join(unknown)}; there are {', '.join(TABLES)}\n")
+        sys.stderr.write(f"no benchmark {', '.join(unknown)}; there are cif DIR, {', '.join(TABLES)}\n")
         return 2
     for name in names:
         sys.stdout.write(TABLES[name]() + "\n\n")

@@ -2,6 +2,7 @@
 # Makes what is installed elsewhere: sh deploy/make_dist.sh DIRECTORY. PYTHON is that of the project's environment, EXTRAS
 # says for which extras there are to be wheels, MACHINE for which processor, as `uname -m` calls it there. DIRECTORY then has
 #   robosc-VERSION-py3-none-any.whl    RoboSC: one distribution, for every system; extras say what of it can be used
+#   robosc-VERSION-cp312-abi3-*.whl    the same for this processor alone, with the kernel of synthesis in C
 #   constraints.txt                    the versions of other packages that it is tested with
 #   wheels/                            all of it for a machine without network, of this Python and that processor
 #   udev/, systemd/                    rules for serial lines, units
@@ -19,9 +20,10 @@ trap 'rm -f "$lock"' EXIT
 # shellcheck disable=SC2086  # several words, as $quiet
 "$PYTHON" deploy/lock_images.py $EXTRAS >"$lock"
 
-"$PYTHON" -m pip wheel $quiet --no-deps --no-build-isolation --no-index --wheel-dir "$directory" .
+ROBOSC_KERNEL=0 "$PYTHON" -m pip wheel $quiet --no-deps --no-build-isolation --no-index --wheel-dir "$directory" .
 # Packages without a wheel are built by the locked tools of the environment.
 if [ "$MACHINE" = "$(uname -m)" ]; then
+    "$PYTHON" -m pip wheel $quiet --no-deps --no-build-isolation --no-index --wheel-dir "$directory" .
     "$PYTHON" -m pip wheel $quiet --no-deps --no-build-isolation --require-hashes --wheel-dir "$directory/wheels" -r "$lock"
 else
     # For systems with glibc 2.35 (Ubuntu 22.04) and later.

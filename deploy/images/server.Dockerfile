@@ -5,8 +5,10 @@
 #
 # A digest pins the base: --build-arg PYTHON_IMAGE=docker.io/library/python:3.12.12-slim-bookworm@sha256:...
 ARG PYTHON_IMAGE=docker.io/library/python:3.12.12-slim-bookworm
+# The same with a C compiler.
+ARG BUILD_IMAGE=docker.io/library/python:3.12.12-bookworm
 
-FROM ${PYTHON_IMAGE} AS build
+FROM ${BUILD_IMAGE} AS build
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_NO_INPUT=1
 WORKDIR /build
 COPY deploy/requirements-build.txt deploy/requirements-server.txt ./
@@ -18,6 +20,7 @@ RUN python -m venv /build/venv \
     && /build/venv/bin/pip --python /opt/robosc/bin/python install --no-index --no-deps wheels/*.whl \
     && /build/venv/bin/pip --python /opt/robosc/bin/python check
 COPY pyproject.toml README.md LICENSE ./
+COPY deploy/build_kernel.py deploy/
 COPY robosc robosc
 COPY proto/robosc_api proto/robosc_api
 COPY server server

@@ -8,6 +8,7 @@ from robosc.dd_modules import has_cudd
 from robosc.doctor.findings import Finding, Grade
 from robosc.doctor.machine import Machine
 from robosc.python_versions import FIX, unsupported
+from robosc.synthesis.kernel import kernel_problem
 
 _IMPORT_S = 30.0
 _SERVER_S = 20.0
@@ -111,6 +112,7 @@ def _packages(machine: Machine, needed: frozenset[Purpose], *, all_told: bool) -
     )
     if has_cudd():
         yield Finding("decision diagrams", Grade.OK, "the engine in C (cudd)")
+        yield _kernel()
     else:
         yield Finding(
             "decision diagrams",
@@ -125,6 +127,15 @@ def _packages(machine: Machine, needed: frozenset[Purpose], *, all_told: bool) -
             yield _extra(
                 machine, f"extra {extra}", parts, is_needed=extra in wanted, fix=f"pip install 'robosc[{extra}]'"
             )
+
+
+def _kernel() -> Finding:
+    problem = kernel_problem()
+    if not problem:
+        return Finding("kernel", Grade.OK, "the inner loops of synthesis are in C")
+    return Finding(
+        "kernel", Grade.NOTE, f"synthesis does without it, which is slower: {problem}", "docs/install.md, 'The kernel'"
+    )
 
 
 def _extra(machine: Machine, part: str, required: list[tuple[str, str]], *, is_needed: bool, fix: str) -> Finding:

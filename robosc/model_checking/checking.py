@@ -29,7 +29,6 @@ from robosc.model_checking.outcome import Verdict
 from robosc.supervisor import AddedCondition
 from robosc.synthesis import EngineOptions, SynthesisProgress
 from robosc.synthesis.expression_encoder import ExpressionEncoder
-from robosc.synthesis.step import never_done
 from robosc.synthesis.workspace import workspace
 
 
@@ -93,12 +92,12 @@ class _Checker:
 
     def _whole(self, formula: Formula) -> Any:
         """The same for a whole property, as far as it takes to tell where among the initial states it holds."""
-        initial, false = self._structure.initial, self._manager.false
+        initial = self._structure.initial
         match formula:
             case Finally(quantifier="E", operand=operand):
-                return self._leading_to(self.where(operand), lambda found: bool(initial & ~found == false))
+                return self._leading_to(self.where(operand), initial)
             case Globally(quantifier="A", operand=operand):
-                return ~self._leading_to(self._not(self.where(operand)), lambda found: bool(initial & ~found == false))
+                return ~self._leading_to(self._not(self.where(operand)), initial)
             case _:
                 return self.where(formula)
 
@@ -134,14 +133,14 @@ class _Checker:
                 late, never = self._not(second), self._not(first | second)
                 return self._not(self._until(late, never) | self._forever(late))
 
-    def _leading_to(self, states: Any, is_done: Callable[[Any], bool] = never_done) -> Any:
-        return self._until(self._structure.states, states, is_done)
+    def _leading_to(self, states: Any, until: Any = None) -> Any:
+        return self._until(self._structure.states, states, until)
 
-    def _until(self, through: Any, goal: Any, is_done: Callable[[Any], bool] = never_done) -> Any:
+    def _until(self, through: Any, goal: Any, until: Any = None) -> Any:
         """The least fixed point of `goal or (through and EX ...)`."""
         if goal == self._manager.false:
             return goal
-        return self._structure.leading_to(goal, through, is_done)
+        return self._structure.leading_to(goal, through, until)
 
     def _forever(self, states: Any) -> Any:
         """The greatest fixed point of `states and EX ...`."""

@@ -17,7 +17,7 @@ from robosc.synthesis.closure import closure_under
 from robosc.synthesis.encoding import Bits, Encoding
 from robosc.synthesis.fixed_point import initial_states
 from robosc.synthesis.nodes import cofactors, is_constant, support
-from robosc.synthesis.step import Step, never_done
+from robosc.synthesis.step import Step
 from robosc.synthesis.transitions import Steps, transition_of
 from robosc.synthesis.workspace import Workspace
 
@@ -80,31 +80,30 @@ class KripkeStructure:
         self.moves = (*moves, end)
 
     def _onwards(self, steps: Steps, allowed: Any) -> Step:
-        return Step(lambda states: steps.image(states & allowed), self._names(steps, allowed))
+        return Step(steps.forwards(allowed), self._names(steps, allowed))
 
     def _towards(self, steps: Steps, allowed: Any) -> Step:
-        return Step(lambda states: allowed & steps.some(states), self._names(steps, allowed))
+        return Step(steps.backwards(allowed), self._names(steps, allowed))
 
     def _names(self, steps: Steps, allowed: Any) -> frozenset[str]:
         return steps.names | support(self.manager, allowed)
 
-    def leading_to(self, goal: Any, through: Any, is_done: Callable[[Any], bool] = never_done) -> Any:
+    def leading_to(self, goal: Any, through: Any, until: Any = None) -> Any:
         """Return a goal, and the states from which runs through some states lead to it.
 
         Args:
             goal: States in which the runs end.
             through: States in which they may be before.
-            is_done: Function called again and again with what has been found; once it returns true, the rest is not
-                found.
+            until: States once all of which are found the rest is not; None to find everything.
         """
         closure = closure_under(self.encoding, self._backwards, goal | (through & self.states), self.monitor)
-        return closure.of(goal, "states that lead there", is_done)
+        return closure.of(goal, "states that lead there", until)
 
     def _move(self, steps: Steps, allowed: Any) -> Move:
         return Move(
             steps.event.name,
-            lambda states: steps.image(states & allowed),
-            lambda states: allowed & steps.some(states),
+            steps.forwards(allowed),
+            steps.backwards(allowed),
         )
 
     def enabled(self, event: str) -> Any:

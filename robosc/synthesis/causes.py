@@ -64,8 +64,7 @@ class Causes:
 
     def _reached(self, possible: Callable[[Steps], Any]) -> Any:
         def onwards(steps: Steps) -> Step:
-            source = possible(steps)
-            return Step(lambda states: steps.image(states & source), steps.names)
+            return Step(steps.forwards(possible(steps)), steps.names)
 
         steps = map(onwards, self._problem.steps)
         closure = closure_under(self._encoding, steps, self._encoding.manager.true, self._monitor)

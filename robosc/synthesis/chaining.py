@@ -10,11 +10,11 @@ they find in between depends on all of the parts together: on dining philosopher
 
 import heapq
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.step import Step, never_done
+from robosc.synthesis.step import Step, is_enough
 
 
 class Chaining:
@@ -41,14 +41,13 @@ class Chaining:
                 users[name].add(number)
         self._after = [sorted(set().union(*(users[name] for name in step.names))) for step in self._steps]
 
-    def of(self, states: Any, phase: str, is_done: Callable[[Any], bool] = never_done) -> Any:
+    def of(self, states: Any, phase: str, until: Any = None) -> Any:
         """Return `states` and all that steps from them add.
 
         Args:
             states: States to begin with; they satisfy the predicate for added states.
             phase: Phase for which progress is reported.
-            is_done: Function called with what has been found whenever that has grown; once it returns true, the
-                rest is not found.
+            until: States once all of which are found the rest is not; None to find everything.
         """
         if not self._steps:
             return states
@@ -67,7 +66,7 @@ class Chaining:
             while grown != states:
                 states = grown
                 work.add(self._after[number])
-                if is_done(states):
+                if is_enough(states, until):
                     self._monitor.tell(phase, told + 1, states)
                     return states
                 grown = self._grown(self._steps[number], states)

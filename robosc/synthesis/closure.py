@@ -12,13 +12,13 @@ from robosc.synthesis.chaining import Chaining
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import is_reordering
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.saturation import Saturation
+from robosc.synthesis.saturation import CompiledSaturation, Saturation, saturation
 from robosc.synthesis.step import Step
 
 
 def closure_under(
     encoding: Encoding, steps: Iterable[Step], within: Any, monitor: ProgressMonitor
-) -> Chaining | Saturation:
+) -> Chaining | Saturation | CompiledSaturation:
     """Return the closure of sets of states under some steps that suits its manager best.
 
     Args:
@@ -30,4 +30,4 @@ def closure_under(
     levels = {name: level for level, name in enumerate(encoding.order)}
     if is_reordering(encoding.manager):
         return Chaining(levels, tuple(steps), within, monitor)
-    return Saturation(encoding.manager, levels, tuple(steps), within, monitor)
+    return saturation(encoding.manager, levels, tuple(steps), within, monitor)

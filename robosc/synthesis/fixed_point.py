@@ -17,7 +17,7 @@ from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.nodes import support
-from robosc.synthesis.saturation import Saturation
+from robosc.synthesis.saturation import CompiledSaturation, Saturation
 from robosc.synthesis.step import Step
 from robosc.synthesis.transitions import Steps
 
@@ -126,20 +126,20 @@ class FixedPoint:
 
     def _towards(self, steps: Steps, good: Any) -> Step:
         source, names = self._source(steps, good)
-        return Step(lambda states: source & steps.some(states), names, source & steps.sources)
+        return Step(steps.backwards(source), names, source & steps.sources)
 
     def _controllable(self, problem: Problem, good: Any) -> Any:
         """The states of `good` that no run of uncontrollable events leaves."""
         closure = self._closure(
             (
-                Step(steps.some, steps.names, steps.sources)
+                Step(steps.backwards(), steps.names, steps.sources)
                 for steps in self._each(problem)
                 if not steps.event.is_controllable
             ),
             self._encoding.manager.true,
         )
         # Once the initial state is among them there is nothing left to find out.
-        return ~closure.of(~good, "controllability", lambda states: self._is_lost(~states))
+        return ~closure.of(~good, "controllability", until=self.initial)
 
     def reachable_states(self, problem: Problem, good: Any) -> Any:
         """Every state of the controlled system; it begins in those initial states that are good."""
@@ -152,7 +152,7 @@ class FixedPoint:
 
     def _onwards(self, steps: Steps, good: Any) -> Step:
         source, names = self._source(steps, good)
-        return Step(lambda states: steps.image(states & source), names, steps.arrival)
+        return Step(steps.forwards(source), names, steps.arrival)
 
     def _source(self, steps: Steps, good: Any) -> tuple[Any, frozenset[str]]:
         """Return the predicate of where an event may happen, and the variables that decide that.
@@ -168,7 +168,7 @@ class FixedPoint:
         source = source & steps.only(good)
         return source, steps.names | support(self._encoding.manager, source)
 
-    def _closure(self, steps: Iterable[Step], within: Any) -> Chaining | Saturation:
+    def _closure(self, steps: Iterable[Step], within: Any) -> Chaining | Saturation | CompiledSaturation:
         return closure_under(self._encoding, steps, within, self._monitor)
 
     def _each(self, problem: Problem) -> Iterator[Steps]:

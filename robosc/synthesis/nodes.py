@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from robosc.synthesis.engines import Manager, is_compiled, is_reordering
+from robosc.synthesis.kernel import kernel_of
 
 
 def cofactors(node: Any) -> tuple[Any, Any]:
@@ -108,7 +109,8 @@ class _Counter:
 
 def restrict(manager: Manager, node: Any, care: Any) -> Any:
     """A predicate that equals `node` wherever `care` is true, mostly a smaller one."""
-    return _Restrict(manager).walk(node, care)
+    kernel = kernel_of(manager)
+    return _Restrict(manager).walk(node, care) if kernel is None else kernel.restrict(node, care)
 
 
 class _Restrict:

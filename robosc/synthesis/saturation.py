@@ -13,13 +13,35 @@ saturation", TACAS 2019, LNCS 11428, pp. 58-75.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from robosc.synthesis.engines import Manager
+from robosc.synthesis.image import Image
+from robosc.synthesis.kernel import Kernel, kernel_of
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.nodes import cofactors
-from robosc.synthesis.step import Step, never_done
+from robosc.synthesis.step import Step, is_enough
+
+
+def saturation(
+    manager: Manager, levels: Mapping[str, int], steps: Sequence[Step], within: Any, monitor: ProgressMonitor
+) -> "Saturation | CompiledSaturation":
+    """Return the fastest saturation that a manager and some steps admit; the arguments are those of `Saturation`."""
+    kernel = kernel_of(manager)
+    if kernel is None or not all(isinstance(step.add, Image) for step in steps):
+        return Saturation(manager, levels, steps, within, monitor)
+    return CompiledSaturation(kernel, manager, levels, steps, within, monitor)
+
+
+def _grouped(levels: Mapping[str, int], steps: Sequence[Step]) -> list[tuple[int, list[Step]]]:
+    """Return the steps that begin at each level, topmost first."""
+    groups: defaultdict[int, list[Step]] = defaultdict(list)
+    for step in steps:
+        # One that neither reads nor changes anything leads nowhere.
+        if step.names:
+            groups[min(levels[name] for name in step.names)].append(step)
+    return sorted(groups.items())
 
 
 class Saturation:
@@ -41,41 +63,36 @@ class Saturation:
         self._variables = {level: manager.var(name) for name, level in levels.items()}
         self._within = within
         self._monitor = monitor
-        groups: defaultdict[int, list[Step]] = defaultdict(list)
-        for step in steps:
-            # One that neither reads nor changes anything leads nowhere.
-            if step.names:
-                groups[min(levels[name] for name in step.names)].append(step)
-        self._groups = sorted(groups.items())
-        self._count = sum(len(group) for group in groups.values())
+        self._groups = _grouped(levels, steps)
+        self._count = sum(len(group) for _, group in self._groups)
         self._known: dict[tuple[int, int, int], tuple[Any, Any, Any]] = {}
         self._phase = ""
         self._taken = self._told = 0
 
-    def of(self, states: Any, phase: str, is_done: Callable[[Any], bool] = never_done) -> Any:
+    def of(self, states: Any, phase: str, until: Any = None) -> Any:
         """Return `states` and all that steps from them add.
 
         Args:
             states: States to begin with; they satisfy the predicate for added states.
             phase: Phase for which progress is reported.
-            is_done: Function called with what has been found whenever the topmost steps have added to it; once it
-                returns true, the rest is not found.
+            until: States once all of which are found the rest is not; None to find everything. It is looked whenever
+                the topmost steps have been taken.
         """
         if not self._groups:
             return states
         self._taken = self._told = 0
         self._phase = phase
-        states = self._of_whole(states, is_done)
+        states = self._of_whole(states, until)
         self._tell(states)
         self._known.clear()
         return states
 
-    def _of_whole(self, states: Any, is_done: Callable[[Any], bool]) -> Any:
+    def _of_whole(self, states: Any, until: Any) -> Any:
         _, topmost = self._groups[0]
-        while not is_done(states):
+        while not is_enough(states, until):
             before = states = self._saturated(states, self._within, 1)
             for step in topmost:
-                if is_done(states):
+                if is_enough(states, until):
                     return states
                 states = self._grown(states, self._within, step, states)
             if states == before:
@@ -133,3 +150,90 @@ def _split(predicate: Any, level: int) -> tuple[Any, Any]:
     None of the predicate's own variables stands above that level.
     """
     return cofactors(predicate) if predicate.level == level else (predicate, predicate)
+
+
+class CompiledSaturation:
+    """The same by the kernel: every step's images are `Image`s.
+
+    Args:
+        kernel: The kernel.
+        manager: As of `Saturation`, with what follows.
+        levels: The level of each current-state variable.
+        steps: The steps.
+        within: Predicate that added states have to satisfy.
+        monitor: Monitor of the waiting caller.
+    """
+
+    def __init__(
+        self,
+        kernel: Kernel,
+        manager: Manager,
+        levels: Mapping[str, int],
+        steps: Sequence[Step],
+        within: Any,
+        monitor: ProgressMonitor,
+    ) -> None:
+        self._kernel = kernel
+        self._manager = manager
+        self._within = within
+        self._monitor = monitor
+        # Predicates whose addresses the kernel has.
+        self._kept: list[Any] = []
+        self._groups = tuple(
+            (top, tuple(self._passed(step, step.add) for step in group if isinstance(step.add, Image)))
+            for top, group in _grouped(levels, steps)
+        )
+
+    def of(self, states: Any, phase: str, until: Any = None) -> Any:
+        """Return `states` and all that steps from them add, as `Saturation.of` does."""
+        if not self._groups:
+            return states
+        rounds = 0
+
+        def tell(number: int, address: int) -> None:
+            nonlocal rounds
+            rounds = number
+            self._monitor.tell(phase, number, self._kernel.predicate(address))
+
+        states = self._kernel.closure(states, self._within, self._groups, until, self._monitor.check_stop, tell)
+        self._monitor.tell(phase, rounds + 1, states)
+        return states
+
+    def _passed(self, step: Step, image: Image) -> tuple[object, ...]:
+        manager = self._manager
+        constants = hidden = None
+        if image.constants:
+            constants = _all_of(manager, (self._literal(name, value) for name, value in image.constants.items()))
+        if image.hidden:
+            hidden = _all_of(manager, map(manager.var, image.hidden))
+        names = {name: manager.var(new) for name, new in image.names.items()}
+        return (
+            self._address(image.inside),
+            self._address(image.needed),
+            self._address(constants),
+            self._substitutions(image.functions),
+            self._address(image.relation),
+            self._address(hidden),
+            self._substitutions(names),
+            self._address(image.outside),
+            self._address(step.room),
+        )
+
+    def _literal(self, name: str, value: bool) -> Any:
+        variable = self._manager.var(name)
+        return variable if value else ~variable
+
+    def _substitutions(self, functions: Mapping[str, Any]) -> tuple[tuple[int, int], ...]:
+        pairs = ((self._manager.var(name), function) for name, function in functions.items())
+        return tuple((self._address(variable), self._address(function)) for variable, function in pairs)
+
+    def _address(self, predicate: Any) -> int:
+        self._kept.append(predicate)
+        return self._kernel.address(predicate)
+
+
+def _all_of(manager: Manager, predicates: Iterable[Any]) -> Any:
+    result = manager.true
+    for predicate in predicates:
+        result = result & predicate
+    return result

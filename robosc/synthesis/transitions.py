@@ -9,6 +9,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Self
 
 from robosc.automata.semantics import plant_invariants_on
@@ -17,7 +18,8 @@ from robosc.automata.structure import Automaton, Edge, Event, EventCondition, Ro
 from robosc.synthesis.changes import Leads, leads_of
 from robosc.synthesis.encoding import Bits, Encoding, next_name
 from robosc.synthesis.expression_encoder import ExpressionEncoder
-from robosc.synthesis.nodes import renamed, support
+from robosc.synthesis.image import Image
+from robosc.synthesis.nodes import support
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,7 +252,6 @@ class Steps:
 
     def __init__(self, encoding: Encoding, transition: Transition) -> None:
         self._manager = encoding.manager
-        self._false = encoding.manager.false
         self._transition = transition
         true, false = self._manager.true, self._manager.false
         self._constants = {name: f == true for name, f in transition.functions.items() if f in (true, false)}
@@ -281,7 +282,6 @@ class Steps:
             self._manager.var(name) if value else ~self._manager.var(name) for name, value in self._constants.items()
         )
         """States that have all that the event writes as a constant: it leads to no other ones."""
-        self._relation: Any = None
 
     @property
     def bad(self) -> Any:
@@ -306,11 +306,41 @@ class Steps:
             found = found | manager.ite(manager.var(name), ~function, function)
         return self._without_hidden(self._in_range & found)
 
+    def backwards(self, source: Any = None) -> Image:
+        """Return the image that leads from states to those of a source from which the event can lead to one of them.
+
+        Args:
+            source: States that count as such; None if all do.
+        """
+        return Image(
+            manager=self._manager,
+            needed=self.arrival,
+            constants=self._constants,
+            functions=self._composed,
+            relation=self._in_range,
+            hidden=self._transition.hidden,
+            outside=source,
+        )
+
+    def forwards(self, source: Any = None) -> Image:
+        """Return the image that leads from states to those to which the event can lead from one of them.
+
+        Args:
+            source: States from which the event may happen; None if from all.
+        """
+        # What is written as a constant needs no next-state variable: it is forgotten, and then known.
+        return Image(
+            manager=self._manager,
+            inside=source,
+            relation=self._relation,
+            hidden=self._changed,
+            names={next_name(name): name for name in self._composed},
+            outside=self.arrival,
+        )
+
     def some(self, predicate: Any) -> Any:
         """Return the states from which the event can lead into a predicate."""
-        if predicate & self.arrival == self._false:
-            return self._false
-        return self._without_hidden(self._in_range & self._after(predicate))
+        return self.backwards()(predicate)
 
     def only(self, predicate: Any) -> Any:
         """Return the states from which the event, if it happens, leads into a predicate for all data."""
@@ -318,18 +348,16 @@ class Steps:
 
     def image(self, states: Any) -> Any:
         """The states that the event leads to from `states`."""
-        manager = self._manager
-        if self._relation is None:
-            relation = self._in_range
-            for name, function in self._composed.items():
-                following = manager.var(next_name(name))
-                relation = relation & manager.ite(following, function, ~function)
-            self._relation = self._without_hidden(relation)
-        moved = self._exist(self._changed, states & self._relation)
-        if self._composed:
-            moved = renamed(manager, {next_name(name): name for name in self._composed}, moved)
-        # What is written as a constant needs no next-state variable: it is forgotten, and then known.
-        return moved & self.arrival
+        return self.forwards()(states)
+
+    @cached_property
+    def _relation(self) -> Any:
+        """The pairs of a state and one that the event leads to, without what it writes as a constant."""
+        relation = self._in_range
+        for name, function in self._composed.items():
+            following = self._manager.var(next_name(name))
+            relation = relation & self._manager.ite(following, function, ~function)
+        return self._without_hidden(relation)
 
     def _after(self, predicate: Any) -> Any:
         """Return the predicate that another will be true after the event, by substituting next-state functions."""
@@ -339,7 +367,5 @@ class Steps:
         return self._manager.let(self._composed, predicate) if self._composed else predicate
 
     def _without_hidden(self, predicate: Any) -> Any:
-        return self._exist(self._transition.hidden, predicate)
-
-    def _exist(self, names: Sequence[str], predicate: Any) -> Any:
-        return self._manager.exist(names, predicate) if names else predicate
+        hidden = self._transition.hidden
+        return self._manager.exist(hidden, predicate) if hidden else predicate

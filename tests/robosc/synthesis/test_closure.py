@@ -164,8 +164,7 @@ def counting(limit: int) -> tuple[Step, list[int]]:
 
 def test_enough_is_enough_for_chaining() -> None:
     step, asked = counting(1000)
-    enough: Callable[[Any], bool] = lambda states: len(states) == 5  # noqa: E731
-    found = chaining(step, silent()).of(States({(True,)}), "test", enough)
+    found = chaining(step, silent()).of(States({(True,)}), "test", States({(True,) * 5}))
     assert len(found) == 5
     assert asked == [1, 2, 3, 4]
 
@@ -185,7 +184,8 @@ def test_enough_is_enough_for_saturation(wanted: int) -> None:
     sets = Sets(make_manager("autoref"))
     saturation = Saturation(sets.manager, LEVELS, [counter(sets)], sets.manager.true, silent())
     begin = sets.predicate({(False,) * 5})
-    found = saturation.of(begin, "test", lambda states: len(sets.states(states)) >= wanted)
+    last = tuple(bool((wanted - 1) >> place & 1) for place in reversed(range(5)))
+    found = saturation.of(begin, "test", sets.predicate({last}))
     assert len(sets.states(found)) == wanted
 
 

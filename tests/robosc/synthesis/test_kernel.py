@@ -1,0 +1,317 @@
+"""The kernel does what its twins in Python do, operation by operation, and leaves nothing behind."""
+
+import gc
+import importlib.util
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+from types import ModuleType
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robosc.errors import NodeLimitError, SynthesisCancelled
+from robosc.synthesis import SynthesisProgress, kernel, nodes
+from robosc.synthesis.engines import Manager, limited, make_manager
+from robosc.synthesis.image import Image
+from robosc.synthesis.kernel import kernel_of, kernel_problem
+from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.saturation import CompiledSaturation, Saturation, saturation
+from robosc.synthesis.step import Step
+from support.effort import examples
+
+TOP = Path(__file__).parents[3]
+PLACES = ("a", "b", "c", "d", "e", "f")
+HIDDEN = ("h", "i")
+ORDER = (*(name for place in PLACES for name in (place, place + "'")), *HIDDEN)
+LEVELS = {name: level for level, name in enumerate(ORDER)}
+
+if shutil.which("cc") is None:
+    pytest.skip("there is no C compiler", allow_module_level=True)
+
+
+def test_it_is_there() -> None:
+    assert kernel_problem() == ""
+
+
+def manager_with(names: tuple[str, ...]) -> Manager:
+    manager = make_manager("cudd")
+    manager.declare(*names)
+    return manager
+
+
+def random_predicate(manager: Manager, dice: Random, names: tuple[str, ...], depth: int = 4) -> Any:
+    if depth == 0 or dice.random() < 0.1:
+        return dice.choice((manager.var(dice.choice(names)), ~manager.var(dice.choice(names)), manager.true))
+    left, right = (random_predicate(manager, dice, names, depth - 1) for _ in range(2))
+    return dice.choice((left & right, left | right, manager.ite(left, ~right, right)))
+
+
+def random_step(manager: Manager, dice: Random) -> Step:
+    """A step that leads forwards or backwards, with and without each of the parts of an image."""
+    names = tuple(dice.sample(PLACES, dice.randint(1, 3)))
+    changed = dice.sample(names, dice.randint(1, len(names)))
+    composed = dice.sample(changed, dice.randint(0, len(changed)))
+    constants = {name: dice.random() < 0.5 for name in changed if name not in composed}
+    arrival = manager.true
+    for name, value in constants.items():
+        arrival = arrival & (manager.var(name) if value else ~manager.var(name))
+    source = random_predicate(manager, dice, names) if dice.random() < 0.7 else None
+    room = arrival if dice.random() < 0.5 else None
+    if dice.random() < 0.5:
+        following = tuple(name + "'" for name in composed)
+        image = Image(
+            manager=manager,
+            inside=source,
+            relation=random_predicate(manager, dice, (*names, *following)),
+            hidden=tuple(changed),
+            names=dict(zip(following, composed, strict=True)),
+            outside=arrival if constants else None,
+        )
+        return Step(image, frozenset(names), room)
+    image = Image(
+        manager=manager,
+        needed=arrival,
+        constants=constants,
+        functions={name: random_predicate(manager, dice, (*names, *HIDDEN)) for name in composed},
+        relation=random_predicate(manager, dice, (*names, *HIDDEN)),
+        hidden=HIDDEN if dice.random() < 0.7 else (),
+        outside=source,
+    )
+    # Without hidden variables that are quantified, what comes of it would tell of them.
+    return Step(image, frozenset(names) | (frozenset() if image.hidden else frozenset(HIDDEN)))
+
+
+Told = list[tuple[int, int]]
+
+
+def monitor_of(told: Told) -> ProgressMonitor:
+    return ProgressMonitor(lambda: False, lambda progress: told.append((progress.iteration, progress.nodes)))
+
+
+@settings(max_examples=examples(150))
+@given(seed=st.integers(0, 2**32))
+def test_it_saturates_as_python_does(seed: int) -> None:
+    """The same states, the same progress after the same steps."""
+    dice = Random(seed)
+    manager = manager_with(ORDER)
+    steps = [random_step(manager, dice) for _ in range(dice.randint(1, 6))]
+    within = random_predicate(manager, dice, PLACES) if dice.random() < 0.7 else manager.true
+    begin = within & random_predicate(manager, dice, PLACES, 3)
+    until = random_predicate(manager, dice, PLACES, 2) if dice.random() < 0.3 else None
+    expected_told: Told = []
+    told: Told = []
+    expected = Saturation(manager, LEVELS, steps, within, monitor_of(expected_told)).of(begin, "test", until)
+    found = saturation(manager, LEVELS, steps, within, monitor_of(told))
+    assert isinstance(found, CompiledSaturation)
+    assert found.of(begin, "test", until) == expected
+    assert told == expected_told
+
+
+@settings(max_examples=examples(200))
+@given(seed=st.integers(0, 2**32))
+def test_it_restricts_as_python_does(seed: int) -> None:
+    dice = Random(seed)
+    manager = manager_with(PLACES)
+    predicate, care = (random_predicate(manager, dice, PLACES, 5) for _ in range(2))
+    found = kernel_of(manager)
+    assert found is not None
+    assert found.restrict(predicate, care) == nodes._Restrict(manager).walk(predicate, care)
+
+
+def counter(manager: Manager, bits: int) -> tuple[dict[str, int], Step]:
+    """Counts with some bits upwards: as many rounds as there are numbers."""
+    names = tuple(f"x{place}" for place in range(bits))
+    manager.declare(*(name for place in names for name in (place, place + "'")))
+    relation, carry = manager.true, manager.true
+    for name in reversed(names):
+        value, following = manager.var(name), manager.var(name + "'")
+        flipped = manager.ite(carry, ~value, value)
+        relation = relation & manager.ite(following, flipped, ~flipped)
+        carry = carry & value
+    image = Image(manager=manager, relation=relation, hidden=names, names={name + "'": name for name in names})
+    levels = {name: 2 * place for place, name in enumerate(names)}
+    return levels, Step(image, frozenset(names))
+
+
+def zero(manager: Manager, bits: int) -> Any:
+    found = manager.true
+    for place in range(bits):
+        found = found & ~manager.var(f"x{place}")
+    return found
+
+
+@pytest.fixture
+def manager() -> Iterator[Any]:
+    """A manager in which nothing that a test has dropped is left."""
+    found: Any = make_manager("cudd")
+    before = len(found)
+    yield found
+    # The variables stay.
+    assert len(found) - before <= len(found.vars)
+
+
+def closed(manager: Manager, monitor: ProgressMonitor, bits: int = 8) -> int:
+    levels, step = counter(manager, bits)
+    begin = zero(manager, bits)
+    found = saturation(manager, levels, [step], manager.true, monitor).of(begin, "test")
+    return nodes.count_models(manager, found, [f"x{place}" for place in range(bits)])
+
+
+def test_it_counts(manager: Manager) -> None:
+    told: list[SynthesisProgress] = []
+    assert closed(manager, ProgressMonitor(lambda: False, told.append)) == 256
+    assert {progress.phase for progress in told} == {"test"}
+    assert [progress.iteration for progress in told] == list(range(1, len(told) + 1))
+
+
+def test_it_stops_when_told(manager: Manager) -> None:
+    asked: list[None] = []
+
+    def should_stop() -> bool:
+        asked.append(None)
+        return len(asked) == 5
+
+    with pytest.raises(SynthesisCancelled):
+        closed(manager, ProgressMonitor(should_stop, lambda progress: None))
+    assert len(asked) == 5
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
+def test_what_progress_raises_ends_it(manager: Manager, error: type[BaseException]) -> None:
+    told: list[None] = []
+
+    def tell(progress: SynthesisProgress) -> None:
+        told.append(None)
+        if len(told) == 9:
+            raise error
+
+    with pytest.raises(error):
+        closed(manager, ProgressMonitor(lambda: False, tell))
+    assert len(told) == 9
+
+
+def test_an_operation_that_cudd_gives_up_is_a_limit_of_nodes() -> None:
+    """Pairs of equal bits, far from each other in the order, come of pairs of neighbours."""
+    manager, pairs = make_manager("cudd"), range(20)
+    near = [name for place in pairs for name in (f"x{place}", f"h{place}")]
+    far = [f"y{place}" for place in pairs]
+    manager.declare(*near, *far)
+    begin = manager.true
+    for place in pairs:
+        x, h = manager.var(f"x{place}"), manager.var(f"h{place}")
+        begin = begin & manager.ite(x, h, ~h)
+    names = {f"h{place}": f"y{place}" for place in reversed(pairs)}
+    image = Image(manager=manager, relation=manager.true, names=names)
+    levels = {name: level for level, name in enumerate((*near, *far))}
+    steps = [Step(image, frozenset(levels))]
+    silent = ProgressMonitor(lambda: False, lambda progress: None)
+    with pytest.raises(NodeLimitError), limited(manager, 20_000):
+        saturation(manager, levels, steps, manager.true, silent).of(begin, "test")
+    # The frames of the error hold predicates, and are to go before the manager does.
+    gc.collect()
+
+
+def test_other_steps_are_left_to_python(manager: Manager) -> None:
+    manager.declare("a")
+    step = Step(lambda states: manager.let({"a": ~manager.var("a")}, states), frozenset({"a"}))
+    found = saturation(manager, {"a": 0}, [step], manager.true, ProgressMonitor(lambda: False, lambda progress: None))
+    assert isinstance(found, Saturation)
+    assert found.of(manager.var("a"), "test") == manager.true
+
+
+# Where it is not
+
+
+def test_there_is_none_for_the_plain_engine() -> None:
+    assert kernel_of(make_manager("autoref")) is None
+
+
+@pytest.fixture
+def looked_for_anew() -> Iterator[None]:
+    kernel._found.cache_clear()
+    yield
+    kernel._found.cache_clear()
+
+
+@pytest.mark.usefixtures("looked_for_anew")
+class TestLeftAside:
+    def test_as_the_environment_says(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setenv("ROBOSC_KERNEL", "0")
+        assert kernel_problem() == "ROBOSC_KERNEL is 0"
+        assert kernel_of(make_manager("cudd")) is None
+
+    def test_of_another_source(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+        changed = tmp_path / "kernel.c"
+        changed.write_bytes(kernel.SOURCE.read_bytes() + b"\n")
+        monkeypatch.setattr(kernel, "SOURCE", changed)
+        assert kernel_problem() == "it was made from another kernel.c"
+
+    def test_of_another_dd(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(kernel, "_LAYOUT", (64, 64))
+        assert kernel_problem() == "this version of dd is not known to it"
+
+    def test_not_made(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setitem(sys.modules, "robosc.synthesis.kernel._kernel", None)
+        assert kernel_problem() == "it was not made: there was no C compiler"
+
+
+def test_a_library_without_cudd_is_refused() -> None:
+    module = kernel._found()[0]
+    assert module is not None
+    with pytest.raises(ImportError, match=r"has no Cudd_Ref"):
+        module.connect(module.__file__)
+    with pytest.raises(ImportError, match="cannot be opened"):
+        module.connect("/nowhere.so")
+    # What was connected before still is.
+    assert kernel_of(make_manager("cudd")) is not None
+
+
+# How it is made
+
+
+@pytest.fixture(scope="module")
+def build() -> ModuleType:
+    """The hook that makes it, which is no part of the package."""
+    spec = importlib.util.spec_from_file_location("build_kernel", TOP / "deploy" / "build_kernel.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_it_is_made_without_a_warning(build: ModuleType, tmp_path: Path) -> None:
+    compiler = shutil.which("cc")
+    assert compiler is not None
+    module = tmp_path / build.MODULE
+    assert build.make_kernel(kernel.SOURCE, module) == ""
+    assert module.exists()
+    warnings = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-fsyntax-only", "-std=c11")
+    include = build.include_folder()
+    subprocess.run([compiler, *warnings, f"-I{include}", str(kernel.SOURCE)], check=True)
+
+
+def test_what_does_not_compile_is_told(build: ModuleType, tmp_path: Path) -> None:
+    source = tmp_path / "kernel.c"
+    source.write_text("int main(void) { return nothing; }\n", "utf-8")
+    assert "nothing" in build.make_kernel(source, tmp_path / build.MODULE)
+    assert not (tmp_path / build.MODULE).exists()
+
+
+def test_without_a_compiler_it_is_told_which_package_has_one(
+    build: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert "apt install gcc" in build.make_kernel(kernel.SOURCE, tmp_path / build.MODULE)
+
+
+def test_without_the_headers_of_python_it_is_told_which_package_has_them(
+    build: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(build, "include_folder", lambda: tmp_path)
+    assert "apt install python3-dev" in build.make_kernel(kernel.SOURCE, tmp_path / build.MODULE)

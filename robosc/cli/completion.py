@@ -8,7 +8,6 @@ import argparse
 import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -127,6 +126,8 @@ def make_scripts(shell: str) -> dict[str, str]:
 
 def _parsers() -> Iterable[tuple[str, argparse.ArgumentParser]]:
     """The programs with their parsers, `robosc` first."""
+    from importlib.metadata import entry_points
+
     from robosc.cli.main import make_whole_parser
 
     yield "robosc", make_whole_parser()

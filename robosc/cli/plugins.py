@@ -8,11 +8,13 @@ is called or all of them are listed.
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robosc.cli.output import UsageError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 ENTRY_POINT_GROUP = "robosc.commands"
 
@@ -62,12 +64,14 @@ def wanted_plugins(argv: Sequence[str], built_in: Sequence[str]) -> tuple[Plugin
     is_help = word in _HELP or (len(word) > len("--") and "--help".startswith(word))
     if word in built_in or (word.startswith("-") and not is_help):
         return ()
+    from importlib.metadata import entry_points
+
     found = {item.name: item for item in entry_points(group=ENTRY_POINT_GROUP) if item.name not in built_in}
     chosen = [found[word]] if word in found else [found[name] for name in sorted(found)]
     return tuple(map(_loaded, chosen))
 
 
-def _loaded(item: EntryPoint) -> Plugin:
+def _loaded(item: "EntryPoint") -> Plugin:
     try:
         module = item.load()
     except ModuleNotFoundError as error:

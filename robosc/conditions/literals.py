@@ -66,14 +66,16 @@ class Vocabulary:
 
     Args:
         domains: Values that the places can hold.
+        components: Names of all components; needed where texts are shown.
 
     Attributes:
         domains: The same.
         ranks: Position of each place in the model's text.
     """
 
-    def __init__(self, domains: Domains) -> None:
+    def __init__(self, domains: Domains, components: Collection[str] = ()) -> None:
         self.domains = domains
+        self._components = components
         self.ranks: dict[Subject, int] = {subject: rank for rank, subject in enumerate(domains)}
         self._known: dict[tuple[Subject, Indices], Membership] = {}
 
@@ -81,7 +83,9 @@ class Vocabulary:
         """The shortest test whether a place holds one of some values: some, but not all that it can hold."""
         found = self._known.get((subject, indices))
         if found is None:
-            found = self._known[subject, indices] = membership(subject, self.domains[subject], indices)
+            found = self._known[subject, indices] = membership(
+                subject, self.domains[subject], indices, self._components
+            )
         return found
 
 

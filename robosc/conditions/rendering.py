@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from robosc.conditions.formula import OPERANDS, formula_in
-from robosc.conditions.literals import Indices, Membership, Vocabulary, membership, merged, operands
+from robosc.conditions.literals import Indices, Membership, Vocabulary, merged, operands
 from robosc.conditions.multivalued import Effort
 from robosc.expressions import Expression
 from robosc.expressions.text import expression_text
@@ -97,7 +97,7 @@ class Formulas:
         # Every line takes a test at least: those of very many need not be told to be counted.
         if most <= SHORT or len(_order(*_branches(diagram, self.domains), diagram.root)) >= most:
             return False
-        return most > sum(line.operands for line in diagram_lines(diagram, self.domains, ()))
+        return most > sum(line.operands for line in diagram_lines(diagram, self.vocabulary))
 
 
 def in_words(condition: Expression, components: Collection[str]) -> str:
@@ -121,20 +121,18 @@ def size_in_words(diagram: DecisionDiagram) -> str:
     return f"a decision diagram of {count} node{'s' if count != 1 else ''}"
 
 
-def diagram_lines(diagram: DecisionDiagram, domains: Domains, components: Collection[str]) -> tuple[Line, ...]:
+def diagram_lines(diagram: DecisionDiagram, vocabulary: Vocabulary) -> tuple[Line, ...]:
     """Return a diagram node by node, the root first; a node that decides nothing is left out for what it leads to.
 
     Args:
         diagram: The diagram.
-        domains: Values that the places of the state can hold.
-        components: Names of all components.
+        vocabulary: Vocabulary that puts its tests into words.
     """
-    branches, leads_to = _branches(diagram, domains)
+    branches, leads_to = _branches(diagram, vocabulary.domains)
     order = _order(branches, leads_to, diagram.root)
     numbers = {number: place for place, number in enumerate(order, start=1)}
     return tuple(
-        _line(diagram.nodes[number - 2], branches[number], numbers, numbers[number], domains, components)
-        for number in order
+        _line(diagram.nodes[number - 2], branches[number], numbers, numbers[number], vocabulary) for number in order
     )
 
 
@@ -171,11 +169,10 @@ def _line(
     branches: Branches,
     numbers: Mapping[int, int],
     number: int,
-    domains: Domains,
-    components: Collection[str],
+    vocabulary: Vocabulary,
 ) -> Line:
     subject = (node.automaton, node.variable)
-    tests = [(membership(subject, domains[subject], where, components), child) for child, where in branches.items()]
+    tests = [(vocabulary.test(subject, where), child) for child, where in branches.items()]
     # The longest test goes without saying; where all is decided, what it takes to be true is told.
     is_decided = all(child < 2 for child in branches)
     *cases, (_, last) = sorted(tests, key=lambda case: (-case[1] if is_decided else 0, case[0].size))

@@ -1,11 +1,12 @@
 """A supervisor in figures and words: what `synth` prints, on this machine or from a service."""
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import msgspec
 
 from robosc.automata import System
+from robosc.conditions.literals import Vocabulary
 from robosc.conditions.rendering import Formulas, diagram_lines, in_words, size_in_words
 from robosc.expressions import TRUE, Expression
 from robosc.model.structure import Model
@@ -15,8 +16,14 @@ from robosc.supervisor.diagram import diagram_domains
 _WIDTH = 100
 """Columns that a condition takes in the summary for people; it goes on in the next line."""
 
-_LINES = 300
-"""Tests that the diagrams in the summary for people may have together; what is beyond is told by its size."""
+_NODES = 150
+"""Nodes that the diagrams in a text for people may have together; what is beyond is told by its size."""
+
+FROM_THE_FIRST = ", to be read from [1] on:"
+"""Words between a diagram's size and its nodes."""
+
+ELSEWHERE = "; --json tells it node by node"
+"""Words after the size of a diagram that is not told node by node."""
 
 _TRUE = DecisionDiagram((), 1)
 
@@ -26,7 +33,8 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
     system = supervisor.executable.automata
     variables = _variables(supervisor.model)
     certificate = supervisor.certificate
-    domains, components = diagram_domains(system), _components(supervisor)
+    components = _components(supervisor)
+    vocabulary = Vocabulary(diagram_domains(system), components)
     added = added_formulas(supervisor.added, system)
     return {
         "model": supervisor.model.name,
@@ -44,7 +52,7 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
         "transitions": None if certificate.transitions is None else int(certificate.transitions),
         "added": {event: told(diagram, formula, components) for event, diagram, formula in added},
         "diagrams": {
-            event: [line.json() for line in diagram_lines(diagram, domains, components)]
+            event: [line.json() for line in diagram_lines(diagram, vocabulary)]
             for event, diagram, formula in added
             if formula is None
         },
@@ -128,22 +136,31 @@ def told(diagram: DecisionDiagram, formula: Expression | None, components: froze
 
 def added_lines(supervisor: Supervisor, system: System) -> list[str]:
     """Return the added conditions for people: formulas, and the lines of diagrams as long as they are few."""
-    domains, components = diagram_domains(system), _components(supervisor)
+    components = _components(supervisor)
+    vocabulary = Vocabulary(diagram_domains(system), components)
     added = added_formulas(supervisor.added, system)
     width = max((len(event) for event, _, _ in added), default=0)
     lines: list[str] = []
-    left = _LINES
+    short = short_diagrams(diagram for _, diagram, formula in added if formula is None)
     for event, diagram, formula in added:
-        nodes = [] if formula is not None else diagram_lines(diagram, domains, components)
-        left -= sum(1 + line.operands for line in nodes)
         parts = [told(diagram, formula, components) if formula != TRUE else "nothing"]
-        if nodes and left >= 0:
-            parts = [f"{parts[0]}, to be read from [1] on:", *map(str, nodes)]
-        elif nodes:
-            parts = [f"{parts[0]}; --json tells it node by node"]
+        if formula is None and diagram in short:
+            parts = [f"{parts[0]}{FROM_THE_FIRST}", *map(str, diagram_lines(diagram, vocabulary))]
+        elif formula is None:
+            parts = [f"{parts[0]}{ELSEWHERE}"]
         wrapped = [row for part in parts for row in _wrapped(part)]
         lines += [f"{name:<{width}}  {row}" for name, row in zip([event, *[""] * len(wrapped)], wrapped, strict=False)]
     return lines
+
+
+def short_diagrams(diagrams: Iterable[DecisionDiagram]) -> set[DecisionDiagram]:
+    """Return those of some diagrams that a text tells node by node: the first ones that have few nodes together."""
+    found, left = set(), _NODES
+    for diagram in diagrams:
+        if len(diagram.nodes) <= left:
+            left -= len(diagram.nodes)
+            found.add(diagram)
+    return found
 
 
 def _wrapped(text: str) -> list[str]:

@@ -16,7 +16,7 @@ from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.synthesis.closure import closure_under
 from robosc.synthesis.encoding import Bits, Encoding
 from robosc.synthesis.fixed_point import initial_states
-from robosc.synthesis.nodes import cofactors, is_constant, support
+from robosc.synthesis.nodes import cofactors, is_constant
 from robosc.synthesis.step import Step
 from robosc.synthesis.transitions import Steps, transition_of
 from robosc.synthesis.workspace import Workspace
@@ -86,7 +86,7 @@ class KripkeStructure:
         return Step(steps.backwards(allowed), self._names(steps, allowed))
 
     def _names(self, steps: Steps, allowed: Any) -> frozenset[str]:
-        return steps.names | support(self.manager, allowed)
+        return steps.names | self.manager.support(allowed)
 
     def leading_to(self, goal: Any, through: Any, until: Any = None) -> Any:
         """Return a goal, and the states from which runs through some states lead to it.

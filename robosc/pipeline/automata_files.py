@@ -45,7 +45,10 @@ def load_automata_file(path: Path) -> Bundle:
 
 def check_automata_file(bundle: Bundle) -> "CheckedSystem":
     """Check a file of automata, as its ending says what it is."""
-    from robosc.cif import check_cif
+    if bundle.main.name.endswith(_CIF):
+        from robosc.cif import check_cif
+
+        return check_cif(bundle)
     from robosc.plain_automata import check_automata
 
-    return (check_cif if bundle.main.name.endswith(_CIF) else check_automata)(bundle)
+    return check_automata(bundle)

@@ -4,8 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from robosc.automata import System
+from robosc.conditions.literals import Vocabulary
 from robosc.conditions.rendering import Line, diagram_lines
-from robosc.conditions.summary import added_formulas, told
+from robosc.conditions.summary import ELSEWHERE, FROM_THE_FIRST, added_formulas, short_diagrams, told
 from robosc.errors import UnknownNameError
 from robosc.expressions import TRUE, Expression
 from robosc.model.findings import did_you_mean
@@ -24,14 +25,19 @@ class Condition:
             a formula that reads well, the size of its diagram.
         formula: The condition as an expression, or None where none reads well.
         diagram: The condition as a decision diagram, which is what counts.
-        lines: The diagram's nodes in words, the root first; empty where there is a formula.
+        vocabulary: Vocabulary that puts the diagram's nodes into words.
     """
 
     event: str
     text: str
     formula: Expression | None = field(hash=False)
     diagram: DecisionDiagram
-    lines: tuple[Line, ...] = ()
+    vocabulary: Vocabulary = field(hash=False, compare=False)
+
+    @property
+    def lines(self) -> tuple[Line, ...]:
+        """The diagram's nodes in words, the root first; empty where there is a formula."""
+        return () if self.formula is not None else diagram_lines(self.diagram, self.vocabulary)
 
     @property
     def adds_nothing(self) -> bool:
@@ -42,9 +48,9 @@ class Condition:
         return f"<{self.event} needs {self.text}>"
 
     def __str__(self) -> str:
-        if not self.lines:
+        if self.formula is not None:
             return self.text
-        return "\n".join([f"{self.text}, to be read from [1] on:", *map(str, self.lines)])
+        return "\n".join([f"{self.text}{FROM_THE_FIRST}", *map(str, self.lines)])
 
     def _repr_html_(self) -> str:
         return html_text(str(self))
@@ -78,10 +84,18 @@ class Conditions(Mapping[str, Condition]):
         return f"<conditions of {len(self)} controllable events; something is added to {added}>"
 
     def __str__(self) -> str:
-        return "\n".join(f"{event} needs {condition}" for event, condition in self._conditions.items())
+        return "\n".join(f"{event} needs {text}" for event, text in self._texts())
 
     def _repr_html_(self) -> str:
-        return html_table(("event", "the supervisor adds"), self._conditions.items())
+        return html_table(("event", "the supervisor adds"), self._texts())
+
+    def _texts(self) -> list[tuple[str, str]]:
+        """Each event with its condition; diagrams node by node as long as they have few nodes together."""
+        short = short_diagrams(item.diagram for item in self._conditions.values() if item.formula is None)
+        return [
+            (event, str(item) if item.formula is not None or item.diagram in short else f"{item.text}{ELSEWHERE}")
+            for event, item in self._conditions.items()
+        ]
 
 
 def unknown_event(event: object, known: Sequence[str] | Mapping[str, object], what: str = "event") -> str:
@@ -100,7 +114,13 @@ def conditions_of(added: Sequence[AddedCondition], system: System, components: f
         components: Names of the automata that go by their own names in conditions.
     """
     found = added_formulas(added, system)
-    return Conditions([condition_of(event, diagram, formula, system, components) for event, diagram, formula in found])
+    vocabulary = Vocabulary(diagram_domains(system), components)
+    return Conditions(
+        [
+            Condition(event, told(diagram, formula, components), formula, diagram, vocabulary)
+            for event, diagram, formula in found
+        ]
+    )
 
 
 def condition_of(
@@ -115,5 +135,5 @@ def condition_of(
         system: Automata that it is about.
         components: Names of the automata that go by their own names in conditions.
     """
-    lines = () if formula is not None else diagram_lines(diagram, diagram_domains(system), components)
-    return Condition(event, told(diagram, formula, components), formula, diagram, lines)
+    vocabulary = Vocabulary(diagram_domains(system), components)
+    return Condition(event, told(diagram, formula, components), formula, diagram, vocabulary)

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import NoReturn
 from xml.parsers import expat
-from xml.sax.saxutils import quoteattr
 
 from robosc.automata import Role, System
 from robosc.errors import Diagnostic, LanguageError, Severity
@@ -240,17 +239,17 @@ def write_wmod(system: System) -> str:
     require_plain(system)
     lines = [
         '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>',
-        f'<Module Name={quoteattr(system.name)} xmlns="{_NAMESPACE}">',
+        f'<Module Name={_quoted(system.name)} xmlns="{_NAMESPACE}">',
         " <EventDeclList>",
         f'  <EventDecl Kind="PROPOSITION" Name="{_ACCEPTING}"/>',
     ]
     for event in system.events:
         kind = "CONTROLLABLE" if event.is_controllable else "UNCONTROLLABLE"
-        lines.append(f'  <EventDecl Kind="{kind}" Name={quoteattr(event.name)}/>')
+        lines.append(f'  <EventDecl Kind="{kind}" Name={_quoted(event.name)}/>')
     lines += [" </EventDeclList>", " <ComponentList>"]
     for automaton in system.automata:
         kind = "PLANT" if automaton.role is Role.PLANT else "SPEC"
-        lines.append(f'  <SimpleComponent Kind="{kind}" Name={quoteattr(automaton.name)}>')
+        lines.append(f'  <SimpleComponent Kind="{kind}" Name={_quoted(automaton.name)}>')
         lines.append("   <Graph>")
         silent = sorted(automaton.alphabet - {edge.event for edge in automaton.edges})
         # Without an accepting state all of them would be marked.
@@ -260,16 +259,23 @@ def write_wmod(system: System) -> str:
         lines.append("    <NodeList>")
         for location in automaton.locations:
             initial = ' Initial="true"' if location in automaton.initial else ""
-            head = f"     <SimpleNode{initial} Name={quoteattr(location)}"
+            head = f"     <SimpleNode{initial} Name={_quoted(location)}"
             marked = f"<EventList>{_identifier(_ACCEPTING)}</EventList></SimpleNode>"
             lines.append(f"{head}>{marked}" if location in automaton.marked else f"{head}/>")
         lines += ["    </NodeList>", "    <EdgeList>"]
         for edge in automaton.edges:
-            ends = f"Source={quoteattr(edge.source)} Target={quoteattr(edge.target)}"
+            ends = f"Source={_quoted(edge.source)} Target={_quoted(edge.target)}"
             lines.append(f"     <Edge {ends}><LabelBlock>{_identifier(edge.event)}</LabelBlock></Edge>")
         lines += ["    </EdgeList>", "   </Graph>", "  </SimpleComponent>"]
     return "\n".join([*lines, " </ComponentList>", "</Module>"]) + "\n"
 
 
 def _identifier(name: str) -> str:
-    return f"<SimpleIdentifier Name={quoteattr(name)}/>"
+    return f"<SimpleIdentifier Name={_quoted(name)}/>"
+
+
+def _quoted(text: str) -> str:
+    # Loaded where it is needed: half of urllib comes with it.
+    from xml.sax.saxutils import quoteattr
+
+    return quoteattr(text)

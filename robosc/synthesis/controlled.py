@@ -180,6 +180,8 @@ class ControlledSystem:
             prompts: The prompts.
             silent: Events that go before all others wherever they change anything.
         """
+        if not events:
+            return
         executed = self._executed(silent)
         inside = [steps for steps in self._problem.steps if steps.event.name not in prompts]
         runs = self._runs_from(self._start, self._problem.steps, executed)

@@ -65,6 +65,9 @@ class Manager(Protocol):
     def let(self, definitions: Mapping[str, Any], node: Any) -> Any:
         """Substitute variables at once: all by truth values, all by names, or all by predicates."""
 
+    def support(self, node: Any) -> set[str]:
+        """Return the variables that a predicate depends on."""
+
     def exist(self, names: Iterable[str], node: Any) -> Any:
         """Return the predicate that is true where some value of the variables makes a predicate true."""
 

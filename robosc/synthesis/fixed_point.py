@@ -16,7 +16,6 @@ from robosc.synthesis.closure import closure_under
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.nodes import support
 from robosc.synthesis.saturation import CompiledSaturation, Saturation
 from robosc.synthesis.step import Step
 from robosc.synthesis.transitions import Steps
@@ -166,7 +165,7 @@ class FixedPoint:
             # Its one target is good wherever one of its targets is.
             return source, steps.names
         source = source & steps.only(good)
-        return source, steps.names | support(self._encoding.manager, source)
+        return source, steps.names | self._encoding.manager.support(source)
 
     def _closure(self, steps: Iterable[Step], within: Any) -> Chaining | Saturation | CompiledSaturation:
         return closure_under(self._encoding, steps, within, self._monitor)

@@ -22,20 +22,6 @@ def is_constant(manager: Manager, node: Any) -> bool:
     return bool(node == manager.true or node == manager.false)
 
 
-def support(manager: Manager, node: Any) -> set[str]:
-    """The variables that a predicate depends on."""
-    found: set[str] = set()
-    seen: dict[int, Any] = {}
-    stack = [node]
-    while stack:
-        item = stack.pop()
-        if int(item) not in seen and not is_constant(manager, item):
-            seen[int(item)] = item
-            found.add(item.var)
-            stack += [item.low, item.high]
-    return found
-
-
 def renamed(manager: Manager, names: Mapping[str, str], node: Any) -> Any:
     """A predicate with variables called otherwise, no two alike.
 

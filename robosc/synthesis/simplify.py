@@ -27,7 +27,7 @@ from robosc.supervisor.diagram import Subject as Place
 from robosc.supervisor.diagram import diagram_domains
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.nodes import restrict, support
+from robosc.synthesis.nodes import restrict
 
 MAXIMUM_NODES = 20_000
 """Nodes of what matters up to which more than restricting is tried."""
@@ -83,7 +83,7 @@ class Simplifier:
         simple = restrict(self._manager, wanted, care)
         if simple.dag_size > plain.dag_size:
             simple = plain
-        places = {self._home[name] for name in support(self._manager, simple)}
+        places = {self._home[name] for name in self._manager.support(simple)}
         is_large = care.dag_size > MAXIMUM_NODES
         first = extract(self._encoding, simple) if is_large or len(places) == 1 else None
         if first is not None and (is_large or self._length(first) < _SHORT):

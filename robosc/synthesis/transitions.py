@@ -19,7 +19,6 @@ from robosc.synthesis.changes import Leads, leads_of
 from robosc.synthesis.encoding import Bits, Encoding, next_name
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.image import Image
-from robosc.synthesis.nodes import support
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,7 +237,7 @@ def _names(encoding: Encoding, transition: Transition) -> frozenset[str]:
         transition.lasting,
         *transition.functions.values(),
     )
-    read = set().union(*(support(encoding.manager, predicate) for predicate in predicates))
+    read = set().union(*(encoding.manager.support(predicate) for predicate in predicates))
     return frozenset(encoding.state_names) & (read | transition.functions.keys())
 
 
@@ -294,7 +293,7 @@ class Steps:
         """The same event under other event conditions."""
         other = copy(self)
         other.condition = condition & self._transition.watched
-        read = support(self._manager, other.condition)
+        read = self._manager.support(other.condition)
         other.names = self.names | (frozenset(self._state_names) & read)
         return other
 

@@ -10,13 +10,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from enum import StrEnum
-from importlib.metadata import entry_points
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from robosc.automata.structure import System
 from robosc.errors import RoboscError, UnsupportedModelError
 from robosc.supervisor import AddedCondition, DecisionDiagram, Supervisor
 from robosc.targets.files import GeneratedFiles
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoints
 
 ENTRY_POINT_GROUP = "robosc.targets"
 
@@ -237,7 +239,7 @@ def register(target: Target) -> None:
 def available_targets() -> tuple[TargetInfo, ...]:
     """Every target that can be generated, by name."""
     infos = {name: TargetInfo(name, description) for name, (description, _) in _BUILT_IN.items()}
-    for entry in entry_points(group=ENTRY_POINT_GROUP):
+    for entry in _offered():
         infos.setdefault(entry.name, TargetInfo(entry.name, f"plug-in {entry.value}"))
     infos.update((name, target.info) for name, target in _registered.items())
     return tuple(infos[name] for name in sorted(infos))
@@ -299,6 +301,13 @@ def errors_for(target: str) -> frozenset[str]:
     return _load(target).errors
 
 
+def _offered() -> "EntryPoints":
+    """The targets of other packages; what looks for them takes as long to load as a small synthesis takes."""
+    from importlib.metadata import entry_points
+
+    return entry_points(group=ENTRY_POINT_GROUP)
+
+
 def _load(name: str) -> Target:
     """The target itself; imports it."""
     if name in _registered:
@@ -307,7 +316,7 @@ def _load(name: str) -> Target:
         module, _, attribute = _BUILT_IN[name][1].partition(":")
         loaded = getattr(importlib.import_module(module), attribute)
     else:
-        loaded = next(iter(entry_points(group=ENTRY_POINT_GROUP, name=name))).load()
+        loaded = next(entry for entry in _offered() if entry.name == name).load()
     if not isinstance(loaded, Target):
         raise UnknownTargetError(f"the plug-in of target '{name}' is not a robosc.targets.registry.Target")
     return loaded

@@ -84,7 +84,9 @@ def test_a_program_without_its_packages_is_left_out(
         EntryPoint("other", "robosc_no_such_package.main:make_parser", completion.ENTRY_POINT_GROUP),
         EntryPoint("robosc-lsp", "robosc_lsp.command:parser", completion.ENTRY_POINT_GROUP),
     ]
-    monkeypatch.setattr(completion, "entry_points", lambda group: items)
+    monkeypatch.setattr(
+        "importlib.metadata.entry_points", lambda group: items if group == completion.ENTRY_POINT_GROUP else []
+    )
     assert list(make_scripts("bash")) == ["robosc", "robosc-lsp"]
     assert capsys.readouterr().err == "other is left out: the package robosc_no_such_package is not installed\n"
 

@@ -105,7 +105,7 @@ def test_who_calls_a_built_in_command_does_not_even_look(monkeypatch: pytest.Mon
     def refuse(group: str) -> None:
         raise AssertionError(group)
 
-    monkeypatch.setattr("robosc.cli.plugins.entry_points", refuse)
+    monkeypatch.setattr("importlib.metadata.entry_points", refuse)
     for argv in (["check", "x"], ["synth"], ["--version"], ["check-log", "--help"]):
         assert wanted_plugins(argv, main_module._NAMES) == ()
 

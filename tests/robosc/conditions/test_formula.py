@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.conditions.formula import STEPS, to_expression
-from robosc.conditions.literals import membership, operands
+from robosc.conditions.literals import Vocabulary, membership, operands
 from robosc.conditions.multivalued import Effort
 from robosc.conditions.rendering import Formulas, Line, diagram_lines, in_words
 from robosc.expressions import BooleanType, EnumType, Expression, IntegerType
@@ -86,7 +86,7 @@ def test_formulas_and_lines_mean_their_diagrams(seed: int, is_ordered: bool) -> 
     diagram = random_diagram(seed, is_ordered=is_ordered)
     formula = to_expression(diagram, DOMAINS, limit=1000)
     assert formula is not None
-    lines = {line.number: line for line in diagram_lines(diagram, DOMAINS, ())}
+    lines = {line.number: line for line in diagram_lines(diagram, Vocabulary(DOMAINS))}
     assert list(lines) == list(range(1, len(lines) + 1))
     for state in STATES:
         expected = holds(diagram, state)
@@ -194,7 +194,7 @@ def test_what_would_explode_is_given_up(places: int) -> None:
     assert effort.left >= 9 * STEPS - 1000
     formulas = Formulas(domains)
     assert formulas.formula(diagram) is None
-    assert len(diagram_lines(diagram, domains, ())) == len(diagram.nodes) - 1
+    assert len(diagram_lines(diagram, Vocabulary(domains))) == len(diagram.nodes) - 1
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 30))
@@ -228,7 +228,7 @@ def test_many_ranges_of_one_place_are_told_without_a_formula(
     diagram = DecisionDiagram((node(*subject, starts, tuple(index % 2 for index in starts)),), 2)
     assert to_expression(diagram, domains, limit=10**6) is None
     assert Formulas(domains).formula(diagram) is None
-    (line,) = diagram_lines(diagram, domains, ())
+    (line,) = diagram_lines(diagram, Vocabulary(domains))
     assert line.operands == count // 2
     assert str(line).startswith("[1] A.n = 1 or A.n = 3 or" if type_ else "[1] A.l1 or A.l3 or")
 
@@ -241,7 +241,7 @@ def test_a_diagram_line_by_line() -> None:
         node("A", None, (0, 1), (4, 2)),
     ]
     diagram = DecisionDiagram(tuple(nodes), 5)
-    lines = diagram_lines(diagram, DOMAINS, ())
+    lines = diagram_lines(diagram, Vocabulary(DOMAINS))
     assert [str(line) for line in lines] == [
         "[1] if A.on then [2] else [3]",
         "[2] if A.n >= 2 then false else if A.n <= -1 then [3] else true",
@@ -252,4 +252,4 @@ def test_a_diagram_line_by_line() -> None:
         "cases": [{"if": "A.n >= 2", "then": False}, {"if": "A.n <= -1", "then": 3}],
         "else": True,
     }
-    assert diagram_lines(DecisionDiagram((), 1), DOMAINS, ()) == ()
+    assert diagram_lines(DecisionDiagram((), 1), Vocabulary(DOMAINS)) == ()

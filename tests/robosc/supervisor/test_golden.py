@@ -98,7 +98,7 @@ def _holds(diagram: DecisionDiagram, state: dict[Subject, int]) -> bool:
 
 def test_only_so_many_lines_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     supervisor, system = made(FOLDER / "parity.rscd")
-    monkeypatch.setattr("robosc.conditions.summary._LINES", 10)
+    monkeypatch.setattr("robosc.conditions.summary._NODES", 10)
     assert words(supervisor, system).splitlines()[-1] == (
         "shut.request    a decision diagram of 11 nodes; --json tells it node by node"
     )

@@ -24,7 +24,7 @@ help:
 environment: $(READY) ## make .venv from the lock
 
 $(READY): requirements.lock deploy/requirements-build.txt pyproject.toml deploy/make_environment.sh deploy/install_lock.sh \
-		robosc/synthesis/kernel/kernel.c deploy/build_kernel.py
+		deploy/build_kernel.py $(wildcard robosc/kernel/*.[ch])
 	sh deploy/make_environment.sh $(VENV)
 	@touch $(READY)
 

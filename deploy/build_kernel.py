@@ -1,4 +1,4 @@
-"""Makes the kernel of synthesis where there is a C compiler: a hook of hatchling for wheels and editable installations.
+"""Makes the kernel where there is a C compiler: a hook of hatchling for wheels and editable installations.
 
 ROBOSC_KERNEL=0 makes a wheel for every system instead, without the kernel.
 """
@@ -15,8 +15,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-FOLDER = Path("robosc/synthesis/kernel")
-SOURCE = "kernel.c"
+FOLDER = Path("robosc/kernel")
 MODULE = "_kernel.abi3.so"
 
 _OPTIONS = ("-O2", "-std=c11", "-shared", "-fPIC")
@@ -40,7 +39,7 @@ class KernelHook(BuildHookInterface[Any]):
         folder = Path(self.root, FOLDER)
         # A wheel leaves the folder as it is: an editable installation may work with the one that is there.
         module = folder / MODULE if version == "editable" else Path(self._made_in(), MODULE)
-        problem = make_kernel(folder / SOURCE, module)
+        problem = make_kernel(folder, module)
         if problem:
             self.app.display_warning(f"synthesis will do without its kernel, which is slower: {problem}")
         elif version == "standard":
@@ -59,11 +58,11 @@ class KernelHook(BuildHookInterface[Any]):
         return self._temporary.name
 
 
-def make_kernel(source: Path, module: Path) -> str:
+def make_kernel(folder: Path, module: Path) -> str:
     """Compile the kernel; return the problem if that cannot be done, else an empty text.
 
     Args:
-        source: Its source.
+        folder: Folder of its sources.
         module: Path of the module that is to come of it.
     """
     # The compiler that Python was made with may not be there, another one may.
@@ -74,10 +73,14 @@ def make_kernel(source: Path, module: Path) -> str:
     include = include_folder()
     if not Path(include, "Python.h").exists():
         return f"{include} has no Python.h (Debian: apt install python3-dev)"
-    checksum = f"-DSOURCE_CHECKSUM={zlib.crc32(source.read_bytes())}u"
+    checksum = 0
+    for path in sorted(folder.glob("*.[ch]")):
+        checksum = zlib.crc32(path.read_bytes(), checksum)
+    sources = map(str, sorted(folder.glob("*.c")))
     # Named otherwise until it is whole: a process may be about to load it.
     unfinished = module.with_suffix(".unfinished")
-    command = [compiler, *_OPTIONS, checksum, f"-I{include}", str(source), "-o", str(unfinished)]
+    defined = f"-DSOURCE_CHECKSUM={checksum}u"
+    command = [compiler, *_OPTIONS, defined, f"-I{include}", *sources, "-o", str(unfinished)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         said = done.stderr.strip().splitlines() or ["no reason is told"]

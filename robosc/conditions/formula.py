@@ -14,7 +14,7 @@ from functools import partial
 
 from robosc.conditions.cover import MAXIMUM_CUBES, Words, cover
 from robosc.conditions.literals import Vocabulary, has_relation, joined, operands, size, spine
-from robosc.conditions.multivalued import Cube, Effort, EffortExceededError, Node, Space
+from robosc.conditions.multivalued import Cube, Effort, EffortExceededError, Node, Space, space_of
 from robosc.conditions.relations import Description, Relations
 from robosc.expressions import FALSE, TRUE, BinaryOperator, Conditional, Expression, Unary
 from robosc.supervisor import DecisionDiagram
@@ -86,7 +86,7 @@ def formula_in(vocabulary: Vocabulary, diagram: DecisionDiagram, *, limit: int, 
     if diagram.root < 2:
         return TRUE if diagram.root else FALSE
     try:
-        space = Space([diagram], vocabulary.domains, effort.part(STEPS))
+        space = space_of([diagram], vocabulary.domains, effort.part(STEPS))
         found = _Formulas(space, vocabulary, limit).shortest(space.of(diagram))
     except EffortExceededError:
         return None

@@ -12,10 +12,12 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
+from types import ModuleType
 from typing import Self
 
 from robosc.conditions.literals import Indices, merged
 from robosc.expressions import IntegerType
+from robosc.kernel import kernel_module
 from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import Domains, Subject
 
@@ -59,6 +61,11 @@ class Effort:
             self._whole.spend(steps)
         if self.left < 0:
             raise EffortExceededError
+
+    @property
+    def available(self) -> int:
+        """Steps that can be taken before there are no more."""
+        return self.left if self._whole is None else min(self.left, self._whole.available)
 
     def part(self, steps: int) -> "Effort":
         """A part of it for work of its own."""
@@ -131,11 +138,14 @@ class Space:
 
     def variable(self, node: Node) -> int:
         """The place that a node tests."""
-        return self._nodes[node][0]
+        return self._node(node)[0]
 
     def children(self, node: Node) -> tuple[Node, ...]:
         """Its child for each class."""
-        return self._nodes[node][1]
+        return self._node(node)[1]
+
+    def _node(self, node: Node) -> tuple[int, tuple[Node, ...]]:
+        return self._nodes[node]
 
     def make(self, variable: int, children: tuple[Node, ...]) -> Node:
         """The node with these children, which test later places; a child where all are equal."""
@@ -183,7 +193,7 @@ class Space:
         return found
 
     def _below(self, node: Node, variable: int) -> tuple[Node, ...]:
-        here, children = self._nodes[node]
+        here, children = self._node(node)
         return children if here == variable else (node,) * len(self.classes[variable])
 
     def fixed(self, node: Node, variable: int) -> tuple[Node, ...]:
@@ -191,7 +201,7 @@ class Space:
         known: dict[Node, tuple[Node, ...]] = {}
 
         def left(item: Node) -> tuple[Node, ...]:
-            here, children = self._nodes[item]
+            here, children = self._node(item)
             if here == variable:
                 return children
             if here > variable:
@@ -232,7 +242,7 @@ class Space:
                 continue
             seen.add(item)
             self.effort.spend()
-            variable, children = self._nodes[item]
+            variable, children = self._node(item)
             for place, child in enumerate(children):
                 if child:
                     masks[variable] |= 1 << place
@@ -242,7 +252,7 @@ class Space:
 
     def _untested(self, masks: list[int], first: int, node: Node) -> None:
         """Let places from one on up to a node's hold whatever they can."""
-        last = self._nodes[node][0]
+        last = self.variable(node)
         masks[first:last] = self.full[first:last]
 
     def all_of(self, nodes: Iterable[Node]) -> Node:
@@ -261,53 +271,55 @@ class Space:
 
     def meets(self, node: Node, cube: Cube) -> bool:
         """Return True if a node is true somewhere in a cube."""
-        if node == 1:
-            return True
-        seen, stack = {0, node}, [node] if node else []
-        while stack:
+        if node < 2:
+            return node == 1
+        seen, stack, found = {node}, [node], False
+        while stack and not found:
             variable, children = self._nodes[stack.pop()]
             mask = cube[variable]
-            below = set(children)
-            if mask != self.full[variable]:
-                below = {child for place, child in enumerate(children) if mask >> place & 1}
-            if 1 in below:
-                self.effort.spend(len(seen))
-                return True
-            below -= seen
-            seen |= below
-            stack += below
+            for place, child in enumerate(children):
+                if child == 0 or not mask >> place & 1 or child in seen:
+                    continue
+                if child == 1:
+                    found = True
+                    break
+                seen.add(child)
+                stack.append(child)
         self.effort.spend(len(seen))
-        return False
+        return found
 
     def meeting(self, node: Node, cube: Cube, variable: int) -> int:
         """The classes of one place, as bits, with which a node is true somewhere in a cube, whatever its own are."""
-        known: dict[Node, bool] = {0: False, 1: True}
-        seen, stack = {0, node}, [node] if node else []
+        known: dict[Node, bool] = {}
+        seen, stack = {node}, [node] if node else []
         found = 0
         while stack and found != self.full[variable]:
             item = stack.pop()
             here, children = self._nodes[item]
-            if here < variable:
-                below = {child for place, child in enumerate(children) if cube[here] >> place & 1} - seen
-                seen |= below
-                stack += below
-            elif here > variable:
+            if here > variable:
                 found = self.full[variable] if self._leads(item, cube, known) else found
-            else:
-                for place, child in enumerate(children):
+                continue
+            for place, child in enumerate(children):
+                if here == variable:
                     if child and not found >> place & 1 and self._leads(child, cube, known):
                         found |= 1 << place
+                elif child and cube[here] >> place & 1 and child not in seen:
+                    seen.add(child)
+                    stack.append(child)
         self.effort.spend(len(seen) + len(known))
         return found
 
     def _leads(self, node: Node, cube: Cube, known: dict[Node, bool]) -> bool:
         """Return True if a node is true somewhere in a cube."""
+        if node < 2:
+            return node == 1
         found = known.get(node)
         if found is None:
             variable, children = self._nodes[node]
             mask = cube[variable]
-            below = {child for place, child in enumerate(children) if mask >> place & 1}
-            found = known[node] = 1 in below or any(self._leads(child, cube, known) for child in below)
+            found = known[node] = any(
+                self._leads(child, cube, known) for place, child in enumerate(children) if mask >> place & 1
+            )
         return found
 
     def paths(self, node: Node) -> int:
@@ -372,7 +384,7 @@ class Space:
         def number(node: Node) -> int:
             if node not in numbers:
                 self.effort.spend()
-                variable, children = self._nodes[node]
+                variable, children = self._node(node)
                 runs = sorted(
                     (run.start, child)
                     for indices, child in zip(self.classes[variable], children, strict=True)
@@ -386,6 +398,81 @@ class Space:
 
         last = number(root)
         return DecisionDiagram(tuple(found), last)
+
+
+class CompiledSpace(Space):
+    """The same with the operations that take most of its time in the kernel: the same nodes after the same steps.
+
+    Args:
+        module: The kernel.
+        empty: A store without nodes, whose place it takes.
+    """
+
+    def __init__(self, module: ModuleType, empty: Space) -> None:
+        vars(self).update(vars(empty))
+        self._module = module
+        self._store = module.space(tuple(map(len, self.classes)))
+
+    def _node(self, node: Node) -> tuple[int, tuple[Node, ...]]:
+        if node >= len(self._nodes):
+            self._nodes += self._module.space_nodes(self._store, len(self._nodes))
+        return self._nodes[node]
+
+    def make(self, variable: int, children: tuple[Node, ...]) -> Node:
+        """The node with these children."""
+        return self._counted(self._module.space_make(self._store, variable, children, self.effort.available))
+
+    def _apply(self, operation: str, a: Node, b: Node) -> Node:
+        number = _OPERATIONS.index(operation)
+        return self._counted(self._module.space_apply(self._store, number, a, b, self.effort.available))
+
+    def meets(self, node: Node, cube: Cube) -> bool:
+        """Return True if a node is true somewhere in a cube."""
+        if node < 2:
+            return node == 1
+        return bool(self._counted(self._module.space_meets(self._store, node, cube)))
+
+    def meeting(self, node: Node, cube: Cube, variable: int) -> int:
+        """The classes of one place, as bits, with which a node is true somewhere in a cube, whatever its own are."""
+        return self._counted(self._module.space_meeting(self._store, node, cube, variable))
+
+    def shortest_path(self, node: Node) -> Cube:
+        """A largest cube among the paths to true of a node that is not false; the first of several."""
+        path, steps = self._module.space_shortest_path(self._store, node, self.effort.available)
+        self._spend(steps)
+        cube = list(self.full)
+        for variable, mask in path:
+            cube[variable] = mask
+        return tuple(cube)
+
+    def _counted(self, answer: tuple[int, int]) -> int:
+        """Return the number in an answer of the kernel; the other one are the steps that it took."""
+        found, steps = answer
+        self._spend(steps)
+        return found
+
+    def _spend(self, steps: int) -> None:
+        # Where no step was taken, Python would not have asked either.
+        if steps:
+            self.effort.spend(steps)
+
+
+_OPERATIONS = ("both", "either", "without")
+"""Operations, by their numbers in the kernel."""
+
+_MOST_CLASSES = 64
+"""Classes of one place that the kernel can tell apart."""
+
+
+def space_of(
+    diagrams: Sequence[DecisionDiagram], domains: Domains, effort: Effort, apart: Collection[Subject] = ()
+) -> Space:
+    """Return the fastest store for some diagrams; the arguments and errors are those of `Space`."""
+    module = kernel_module()
+    plain = Space(diagrams, domains, effort, apart)
+    if module is None or any(len(classes) > _MOST_CLASSES for classes in plain.classes):
+        return plain
+    return CompiledSpace(module, plain)
 
 
 def _ordered(diagrams: Sequence[DecisionDiagram]) -> tuple[Subject, ...]:

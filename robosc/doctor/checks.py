@@ -7,8 +7,8 @@ from enum import StrEnum
 from robosc.dd_modules import has_cudd
 from robosc.doctor.findings import Finding, Grade
 from robosc.doctor.machine import Machine
+from robosc.kernel import kernel_problem
 from robosc.python_versions import FIX, unsupported
-from robosc.synthesis.kernel import kernel_problem
 
 _IMPORT_S = 30.0
 _SERVER_S = 20.0

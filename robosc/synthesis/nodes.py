@@ -8,8 +8,8 @@ IEEE Trans. Computers C-35(8), 1986, pp. 677-691 (counting).
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from robosc.synthesis.compiled import kernel_of
 from robosc.synthesis.engines import Manager, is_compiled, is_reordering
-from robosc.synthesis.kernel import kernel_of
 
 
 def cofactors(node: Any) -> tuple[Any, Any]:

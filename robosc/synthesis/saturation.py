@@ -16,9 +16,9 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from robosc.synthesis.compiled import Kernel, kernel_of
 from robosc.synthesis.engines import Manager
 from robosc.synthesis.image import Image
-from robosc.synthesis.kernel import Kernel, kernel_of
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.nodes import cofactors
 from robosc.synthesis.step import Step, is_enough

@@ -17,7 +17,7 @@ from robosc.automata.state import Subject
 from robosc.conditions.cover import Words, cover
 from robosc.conditions.formula import OPERANDS, STEPS, length
 from robosc.conditions.literals import operands
-from robosc.conditions.multivalued import EffortExceededError, Space
+from robosc.conditions.multivalued import EffortExceededError, space_of
 from robosc.conditions.relations import MAXIMUM_PLACES, Relations
 from robosc.conditions.rendering import Formulas
 from robosc.errors import UnsupportedModelError
@@ -166,7 +166,7 @@ class Simplifier:
         if not 2 <= len(integers) <= MAXIMUM_PLACES:
             return
         try:
-            space = Space(diagrams, self._domains, self._formulas.effort.part(STEPS), apart=integers)
+            space = space_of(diagrams, self._domains, self._formulas.effort.part(STEPS), apart=integers)
             relations = Relations(space, Words(space, self._formulas.vocabulary), self._domains)
             sets = [space.of(diagram) for diagram in diagrams]
             places = relations.integers(range(len(space.subjects)))
@@ -186,7 +186,7 @@ class Simplifier:
     def _sums(self, diagrams: Sequence[DecisionDiagram]) -> Iterator[DecisionDiagram]:
         """The states that a short sum of products covers: one for the positive states, one for the negative."""
         try:
-            space = Space(diagrams, self._domains, self._formulas.effort.part(STEPS))
+            space = space_of(diagrams, self._domains, self._formulas.effort.part(STEPS))
             words = Words(space, self._formulas.vocabulary)
             sets = [space.of(diagram) for diagram in diagrams]
             # What has fewer ways to true mostly has the shorter sum.

@@ -60,7 +60,7 @@ def _row(family: str, size: int) -> list[str]:
     found = [formulas.formula(item.condition) for item in added]
     for item, formula in zip(added, found, strict=True):
         if formula is None:
-            "".join(map(str, diagram_lines(item.condition, domains, ())))
+            "".join(map(str, diagram_lines(item.condition, formulas.vocabulary)))
         else:
             in_words(formula, ())
     words = time.perf_counter() - begin

@@ -7,6 +7,7 @@ import pytest
 
 from robosc.automata import to_automata
 from robosc.cli.main import main
+from robosc.conditions.literals import Vocabulary
 from robosc.conditions.rendering import diagram_lines
 from robosc.explanation import RequestError
 from robosc.explanation.requests import asked_state
@@ -17,7 +18,7 @@ from robosc.model_checking import properties_of
 from robosc.model_checking.formulas import Condition
 from robosc.source import SourceFile
 from robosc.supervisor import DecisionDiagram, DecisionNode
-from robosc.supervisor.diagram import SubjectDomain
+from robosc.supervisor.diagram import Subject, SubjectDomain
 from support.models import model_of
 
 ROBOT = """robot R {
@@ -98,9 +99,8 @@ def test_the_conditions_of_the_supervisor(capsys: pytest.CaptureFixture[str], pa
 
 def test_the_lines_of_a_diagram() -> None:
     node = DecisionNode("service Drive", None, (0, 1), (0, 1))
-    (line,) = diagram_lines(
-        DecisionDiagram((node,), 2), {("service Drive", None): SubjectDomain(("idle", "waiting"), None)}, NAMES
-    )
+    domains: dict[Subject, SubjectDomain] = {("service Drive", None): SubjectDomain(("idle", "waiting"), None)}
+    (line,) = diagram_lines(DecisionDiagram((node,), 2), Vocabulary(domains, NAMES))
     assert "service Drive." in str(line)
 
 

@@ -80,7 +80,7 @@ def by_structure(diagram: DecisionDiagram) -> int:
     return sizes[diagram.root]
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.integers(0, 2**32 - 1), st.booleans())
 def test_formulas_and_lines_mean_their_diagrams(seed: int, is_ordered: bool) -> None:
     diagram = random_diagram(seed, is_ordered=is_ordered)
@@ -198,7 +198,7 @@ def test_what_would_explode_is_given_up(places: int) -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 30))
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 def test_a_formula_is_never_longer_than_the_limit(seed: int, limit: int) -> None:
     formula = to_expression(random_diagram(seed, is_ordered=True), DOMAINS, limit=limit)
     assert formula is None or operands(formula) <= limit

@@ -157,7 +157,7 @@ def shapes(draw: st.DrawFn, count: int, depth: int = 2) -> Predicate:
     return holds
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.data(), st.integers(2, 3))
 def test_predicates_with_relations_in_them(data: st.DataObject, count: int) -> None:
     ranges = {f"{name}n": data.draw(RANGES) for name in "ABC"[:count]}
@@ -168,7 +168,7 @@ def test_predicates_with_relations_in_them(data: st.DataObject, count: int) -> N
         same_everywhere(formula, domains, holds)
 
 
-@settings(max_examples=examples(30))
+@settings(max_examples=examples(20))
 @given(st.integers(0, 2**32 - 1))
 def test_any_predicate(seed: int) -> None:
     """Tables of dice: neighbours are often equal, so that values merge into ranges that relations cut through."""
@@ -200,7 +200,7 @@ def modes(draw: st.DrawFn) -> Predicate:
     return holds
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.data())
 def test_descriptions_between_what_must_be_and_what_must_not(data: st.DataObject) -> None:
     """With states that do not matter: true where wanted, false where forbidden, for merged values and single ones."""

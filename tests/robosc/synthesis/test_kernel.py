@@ -15,11 +15,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robosc import kernel
 from robosc.errors import NodeLimitError, SynthesisCancelled
-from robosc.synthesis import SynthesisProgress, kernel, nodes
+from robosc.kernel import kernel_module, kernel_problem
+from robosc.synthesis import SynthesisProgress, compiled, nodes
+from robosc.synthesis.compiled import kernel_of
 from robosc.synthesis.engines import Manager, limited, make_manager
 from robosc.synthesis.image import Image
-from robosc.synthesis.kernel import kernel_of, kernel_problem
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.saturation import CompiledSaturation, Saturation, saturation
 from robosc.synthesis.step import Step
@@ -94,7 +96,7 @@ def monitor_of(told: Told) -> ProgressMonitor:
     return ProgressMonitor(lambda: False, lambda progress: told.append((progress.iteration, progress.nodes)))
 
 
-@settings(max_examples=examples(150))
+@settings(max_examples=examples(90))
 @given(seed=st.integers(0, 2**32))
 def test_it_saturates_as_python_does(seed: int) -> None:
     """The same states, the same progress after the same steps."""
@@ -113,7 +115,7 @@ def test_it_saturates_as_python_does(seed: int) -> None:
     assert told == expected_told
 
 
-@settings(max_examples=examples(200))
+@settings(max_examples=examples(120))
 @given(seed=st.integers(0, 2**32))
 def test_it_restricts_as_python_does(seed: int) -> None:
     dice = Random(seed)
@@ -234,9 +236,11 @@ def test_there_is_none_for_the_plain_engine() -> None:
 
 @pytest.fixture
 def looked_for_anew() -> Iterator[None]:
-    kernel._found.cache_clear()
+    for found in (kernel._found, compiled._connected):
+        found.cache_clear()
     yield
-    kernel._found.cache_clear()
+    for found in (kernel._found, compiled._connected):
+        found.cache_clear()
 
 
 @pytest.mark.usefixtures("looked_for_anew")
@@ -247,22 +251,24 @@ class TestLeftAside:
         assert kernel_of(make_manager("cudd")) is None
 
     def test_of_another_source(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-        changed = tmp_path / "kernel.c"
-        changed.write_bytes(kernel.SOURCE.read_bytes() + b"\n")
-        monkeypatch.setattr(kernel, "SOURCE", changed)
-        assert kernel_problem() == "it was made from another kernel.c"
+        shutil.copytree(kernel.FOLDER, tmp_path / "kernel")
+        with (tmp_path / "kernel" / "spaces.c").open("a", encoding="utf-8") as file:
+            file.write("\n")
+        monkeypatch.setattr(kernel, "FOLDER", tmp_path / "kernel")
+        assert kernel_problem() == "it was made from other sources"
 
     def test_of_another_dd(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(kernel, "_LAYOUT", (64, 64))
-        assert kernel_problem() == "this version of dd is not known to it"
+        monkeypatch.setattr(compiled, "_LAYOUT", (64, 64))
+        assert kernel_problem() == ""
+        assert kernel_of(make_manager("cudd")) is None
 
     def test_not_made(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setitem(sys.modules, "robosc.synthesis.kernel._kernel", None)
+        monkeypatch.setitem(sys.modules, "robosc.kernel._kernel", None)
         assert kernel_problem() == "it was not made: there was no C compiler"
 
 
 def test_a_library_without_cudd_is_refused() -> None:
-    module = kernel._found()[0]
+    module = kernel_module()
     assert module is not None
     with pytest.raises(ImportError, match=r"has no Cudd_Ref"):
         module.connect(module.__file__)
@@ -289,17 +295,18 @@ def test_it_is_made_without_a_warning(build: ModuleType, tmp_path: Path) -> None
     compiler = shutil.which("cc")
     assert compiler is not None
     module = tmp_path / build.MODULE
-    assert build.make_kernel(kernel.SOURCE, module) == ""
+    assert build.make_kernel(kernel.FOLDER, module) == ""
     assert module.exists()
     warnings = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-fsyntax-only", "-std=c11")
     include = build.include_folder()
-    subprocess.run([compiler, *warnings, f"-I{include}", str(kernel.SOURCE)], check=True)
+    sources = map(str, kernel.FOLDER.glob("*.c"))
+    subprocess.run([compiler, *warnings, f"-I{include}", *sources], check=True)
 
 
 def test_what_does_not_compile_is_told(build: ModuleType, tmp_path: Path) -> None:
     source = tmp_path / "kernel.c"
     source.write_text("int main(void) { return nothing; }\n", "utf-8")
-    assert "nothing" in build.make_kernel(source, tmp_path / build.MODULE)
+    assert "nothing" in build.make_kernel(tmp_path, tmp_path / build.MODULE)
     assert not (tmp_path / build.MODULE).exists()
 
 
@@ -307,11 +314,11 @@ def test_without_a_compiler_it_is_told_which_package_has_one(
     build: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert "apt install gcc" in build.make_kernel(kernel.SOURCE, tmp_path / build.MODULE)
+    assert "apt install gcc" in build.make_kernel(kernel.FOLDER, tmp_path / build.MODULE)
 
 
 def test_without_the_headers_of_python_it_is_told_which_package_has_them(
     build: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(build, "include_folder", lambda: tmp_path)
-    assert "apt install python3-dev" in build.make_kernel(kernel.SOURCE, tmp_path / build.MODULE)
+    assert "apt install python3-dev" in build.make_kernel(kernel.FOLDER, tmp_path / build.MODULE)

@@ -1,7 +1,6 @@
 """The registry of targets."""
 
 import importlib.metadata
-from typing import Any
 
 import pytest
 
@@ -62,10 +61,7 @@ def test_a_plug_in_is_found_by_its_entry_point(monkeypatch: pytest.MonkeyPatch) 
         return importlib.metadata.EntryPoint("plug", value, registry.ENTRY_POINT_GROUP)
 
     def find(value: str) -> None:
-        def entry_points(group: str, **wanted: Any) -> importlib.metadata.EntryPoints:
-            return importlib.metadata.EntryPoints([entry(value)]).select(**wanted)
-
-        monkeypatch.setattr(registry, "entry_points", entry_points)
+        monkeypatch.setattr(registry, "_offered", lambda: importlib.metadata.EntryPoints([entry(value)]))
 
     find("robosc.targets.python:TARGET")
     assert TargetInfo("plug", "plug-in robosc.targets.python:TARGET") in available_targets()

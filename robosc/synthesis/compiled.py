@@ -1,25 +1,13 @@
-"""The kernel: the inner loops of synthesis in C, on the diagrams of CUDD inside dd.
+"""The kernel at work on predicates: the diagrams of CUDD inside dd."""
 
-It is there where RoboSC was installed with a C compiler at hand, or from a wheel that was made with one. Everything it
-does has a twin in Python, which takes its place where it is not: the same results, later.
-"""
-
-import importlib
-import os
-import zlib
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from robosc.dd_modules import load_dd
+from robosc.kernel import kernel_module
 from robosc.synthesis.engines import Manager, is_compiled
-
-UNWANTED = "ROBOSC_KERNEL"
-"""Environment variable: at 0 the kernel is left aside, and at the installation it is not made."""
-
-SOURCE = Path(__file__).with_name("kernel.c")
 
 _LAYOUT = (56, 64)
 """Bytes of a manager and of a predicate of dd.cudd as the kernel knows them: those of dd 0.6."""
@@ -28,35 +16,20 @@ _NODE_OFFSET = 2
 """The number of a predicate in dd is the address of its node and this; 0 and 1 are its constants."""
 
 
-def kernel_problem() -> str:
-    """Return the reason why there is no kernel; empty if there is one."""
-    return _found()[1]
-
-
 def kernel_of(manager: Manager) -> "Kernel | None":
     """Return the kernel for a manager, or None where only Python can work with it."""
-    module = _found()[0] if is_compiled(manager) else None
+    module = _connected() if is_compiled(manager) else None
     return None if module is None else Kernel(module, manager)
 
 
 @cache
-def _found() -> tuple[ModuleType | None, str]:
-    if os.environ.get(UNWANTED) == "0":
-        return None, f"{UNWANTED} is 0"
-    try:
-        module = importlib.import_module("robosc.synthesis.kernel._kernel")
-    except ImportError:
-        return None, "it was not made: there was no C compiler"
-    if zlib.crc32(SOURCE.read_bytes()) != module.SOURCE_CHECKSUM:
-        return None, "it was made from another kernel.c"
-    try:
-        cudd = load_dd("cudd")
-        if (cudd.BDD.__basicsize__, cudd.Function.__basicsize__) != _LAYOUT:
-            return None, "this version of dd is not known to it"
-        module.connect(cudd.__file__)
-    except ImportError as error:
-        return None, str(error)
-    return module, ""
+def _connected() -> ModuleType | None:
+    """The kernel with the CUDD inside dd; None where there is no kernel, or another dd than it knows."""
+    module, cudd = kernel_module(), load_dd("cudd")
+    if module is None or (cudd.BDD.__basicsize__, cudd.Function.__basicsize__) != _LAYOUT:
+        return None
+    module.connect(cudd.__file__)
+    return module
 
 
 class Kernel:

@@ -1,23 +1,16 @@
-/* Inner loops of synthesis over the decision diagrams of CUDD: saturation and restriction, without Python in between.
+/* Decision diagrams of CUDD: saturation and restriction, without Python in between.
  *
- * Each function here is the twin of one in Python, operation by operation: `closure` of saturation.py, `restrict` of
- * nodes.py. CUDD is the one inside dd.cudd, found when this module is connected with it, so that a diagram of dd is one
+ * Each function here is the twin of one in robosc/synthesis, operation by operation: `closure` of saturation.py,
+ * `restrict` of nodes.py. CUDD is the one inside dd.cudd, found when this module is connected with it, so that a diagram of dd is one
  * of this module. Python's lock is held all the time: whatever frees a predicate of the same manager waits.
  *
  * A node is passed as its address, 0 where there is none. Functions that return a node own one reference of it, unless
  * they say that it is borrowed; NULL is a failure, with Python's exception set or of CUDD itself.
  */
-#define Py_LIMITED_API 0x030C0000
-#define PY_SSIZE_T_CLEAN
-#include <Python.h>
+#include "kernel.h"
+
 #include <dlfcn.h>
 #include <limits.h>
-#include <stdint.h>
-#include <string.h>
-
-#ifndef SOURCE_CHECKSUM
-#define SOURCE_CHECKSUM 0
-#endif
 
 /* Steps between two questions of whether to go on. */
 enum { PAUSE = 16 };
@@ -558,7 +551,7 @@ static PyObject *passed(DdNode *found) {
     return NULL;
 }
 
-static PyObject *closure_function(PyObject *module, PyObject *arguments) {
+PyObject *diagram_closure(PyObject *module, PyObject *arguments) {
     (void)module;
     Closure closure = {0};
     PyObject *bdd, *groups;
@@ -614,7 +607,7 @@ static DdNode *restricted(DdManager *manager, Table *known, DdNode *f, DdNode *c
     return found;
 }
 
-static PyObject *restrict_function(PyObject *module, PyObject *arguments) {
+PyObject *diagram_restrict(PyObject *module, PyObject *arguments) {
     (void)module;
     PyObject *bdd;
     unsigned long long f, care;
@@ -628,7 +621,7 @@ static PyObject *restrict_function(PyObject *module, PyObject *arguments) {
     return passed(found);
 }
 
-static PyObject *release_function(PyObject *module, PyObject *arguments) {
+PyObject *diagram_release(PyObject *module, PyObject *arguments) {
     (void)module;
     PyObject *bdd;
     unsigned long long f;
@@ -639,7 +632,7 @@ static PyObject *release_function(PyObject *module, PyObject *arguments) {
     Py_RETURN_NONE;
 }
 
-static PyObject *connect_function(PyObject *module, PyObject *arguments) {
+PyObject *diagram_connect(PyObject *module, PyObject *arguments) {
     (void)module;
     const char *path;
     if (!PyArg_ParseTuple(arguments, "s", &path)) {
@@ -659,29 +652,4 @@ static PyObject *connect_function(PyObject *module, PyObject *arguments) {
         memcpy(NEEDED[place].place, &found, sizeof found);
     }
     Py_RETURN_NONE;
-}
-
-static PyMethodDef FUNCTIONS[] = {
-    {"connect", connect_function, METH_VARARGS, "Find the functions of CUDD in a library, given by its path."},
-    {"closure", closure_function, METH_VARARGS, "Return a set of states closed under steps: see saturation.py."},
-    {"restrict", restrict_function, METH_VARARGS, "Return a predicate that equals another where a third is true."},
-    {"release", release_function, METH_VARARGS, "Give back the reference of a node that was returned."},
-    {NULL, NULL, 0, NULL},
-};
-
-static struct PyModuleDef MODULE = {
-    PyModuleDef_HEAD_INIT, "_kernel", "Inner loops of synthesis over the diagrams of CUDD.", -1, FUNCTIONS,
-    NULL, NULL, NULL, NULL,
-};
-
-PyMODINIT_FUNC PyInit__kernel(void);
-
-PyMODINIT_FUNC PyInit__kernel(void) {
-    PyObject *module = PyModule_Create(&MODULE);
-    PyObject *checksum = PyLong_FromUnsignedLong(SOURCE_CHECKSUM);
-    if (module != NULL && PyModule_AddObjectRef(module, "SOURCE_CHECKSUM", checksum) < 0) {
-        Py_CLEAR(module);
-    }
-    Py_XDECREF(checksum);
-    return module;
 }

@@ -1,0 +1,38 @@
+/* The kernel as a module of Python. */
+#include "kernel.h"
+
+#ifndef SOURCE_CHECKSUM
+#define SOURCE_CHECKSUM 0
+#endif
+
+static PyMethodDef FUNCTIONS[] = {
+    {"connect", diagram_connect, METH_VARARGS, "Find the functions of CUDD in a library, given by its path."},
+    {"closure", diagram_closure, METH_VARARGS, "Return a set of states closed under steps: see synthesis/saturation.py."},
+    {"restrict", diagram_restrict, METH_VARARGS, "Return a predicate that equals another where a third is true."},
+    {"release", diagram_release, METH_VARARGS, "Give back the reference of a node that was returned."},
+    {"space", space_make_store, METH_VARARGS, "Return an empty store, for places with so many classes."},
+    {"space_make", space_make, METH_VARARGS, "Return the node with some children, and the steps it took."},
+    {"space_apply", space_apply, METH_VARARGS, "Return what an operation makes of two nodes, and the steps it took."},
+    {"space_meets", space_meets, METH_VARARGS, "Return whether a node meets a cube, and the steps it took."},
+    {"space_meeting", space_meeting, METH_VARARGS, "Return the classes with which it does, and the steps it took."},
+    {"space_shortest_path", space_shortest_path, METH_VARARGS, "Return the shortest path to true, and the steps it took."},
+    {"space_nodes", space_nodes, METH_VARARGS, "Return the nodes from a number on."},
+    {NULL, NULL, 0, NULL},
+};
+
+static struct PyModuleDef MODULE = {
+    PyModuleDef_HEAD_INIT, "_kernel", "Inner loops of synthesis and of its conditions.", -1, FUNCTIONS,
+    NULL, NULL, NULL, NULL,
+};
+
+PyMODINIT_FUNC PyInit__kernel(void);
+
+PyMODINIT_FUNC PyInit__kernel(void) {
+    PyObject *module = PyModule_Create(&MODULE);
+    PyObject *checksum = PyLong_FromUnsignedLong(SOURCE_CHECKSUM);
+    if (module != NULL && PyModule_AddObjectRef(module, "SOURCE_CHECKSUM", checksum) < 0) {
+        Py_CLEAR(module);
+    }
+    Py_XDECREF(checksum);
+    return module;
+}

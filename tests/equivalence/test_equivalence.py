@@ -87,7 +87,7 @@ def test_an_example_in_python(robot: str) -> None:
         compare(generated_python(supervisor, module), scenario, observe(supervisor, scenario))
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(st.integers(0, 2**32 - 1))
 def test_random_robots_in_python(seed: int) -> None:
     """With a log, and without one: whole messages are taken then, with the same effect."""

@@ -65,7 +65,7 @@ def test_a_known_key_makes_the_known_signature(tmp_path: Path) -> None:
     assert signer(b"robot", signature, [key]) == key
 
 
-@settings(max_examples=examples(100), suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(60), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(place=st.integers(0, 10**6), bit=st.integers(0, 7))
 def test_a_bit_that_is_changed_in_the_file_is_found(signed: tuple[bytes, PublicKey], place: int, bit: int) -> None:
     signature, key = signed
@@ -73,7 +73,7 @@ def test_a_bit_that_is_changed_in_the_file_is_found(signed: tuple[bytes, PublicK
         signer(_flipped(DATA, place, bit), signature, [key])
 
 
-@settings(max_examples=examples(100), suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(60), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(place=st.integers(0, 10**6), bit=st.integers(0, 7))
 def test_a_bit_that_is_changed_in_the_signature_is_found(signed: tuple[bytes, PublicKey], place: int, bit: int) -> None:
     signature, key = signed
@@ -87,7 +87,7 @@ def _flipped(data: bytes, place: int, bit: int) -> bytes:
     return data[:place] + bytes((data[place] ^ 1 << bit,)) + data[place + 1 :]
 
 
-@settings(max_examples=examples(100), suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(60), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(signature=st.one_of(st.binary(max_size=300), st.text(max_size=300).map(str.encode)))
 def test_what_is_no_signature_is_told(signed: tuple[bytes, PublicKey], signature: bytes) -> None:
     with pytest.raises(SignatureError, match=r"malformed|no public key"):

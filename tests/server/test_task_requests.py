@@ -245,7 +245,7 @@ class TestHostileBytes:
         library = pb.CheckRequest(bundle=pb.Bundle(libraries=[pb.SourceFile(name="a")])).SerializeToString()
         assert "two files" in refusal(TaskKind.CHECK, first + library + library).message
 
-    @settings(max_examples=examples(100))
+    @settings(max_examples=examples(60))
     @given(st.sampled_from(list(TaskKind)), st.binary(max_size=200), st.integers(0, 2**32))
     def test_any_bytes_are_accepted_or_refused(self, kind: TaskKind, noise: bytes, seed: int) -> None:
         broken = bytearray(small_request(kind, "robot R {}").SerializeToString())
@@ -400,7 +400,7 @@ def pairs(draw: Any) -> tuple[Any, Any]:
 
 
 class TestKeys:
-    @settings(max_examples=examples(100))
+    @settings(max_examples=examples(60))
     @given(st.sampled_from(list(TaskKind)), pairs(), st.integers(0, 1000))
     def test_equal_exactly_where_requests_mean_the_same(
         self, kind: TaskKind, both: tuple[dict[str, Any], dict[str, Any]], seed: int

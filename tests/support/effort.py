@@ -60,7 +60,7 @@ def load_profile() -> None:
     # Deadlines and health checks would judge the machine, which runs other tests beside.
     hypothesis.settings.register_profile(
         "robosc",
-        max_examples=examples(50),
+        max_examples=examples(30),
         derandomize=not EFFORT,
         database=None,
         deadline=None,

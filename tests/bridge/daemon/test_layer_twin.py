@@ -227,7 +227,7 @@ STEPS = st.one_of(
 )
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.lists(st.tuples(st.sampled_from([0.021, 0.021, 0.33]), STEPS), max_size=25))
 def test_the_layer_in_the_daemon_is_the_layer_by_itself(steps: list[tuple[float, tuple[Any, ...]]]) -> None:
     twins = Twins()

@@ -538,7 +538,7 @@ EVERYTHING = [
 ]
 
 
-@settings(max_examples=examples(40))
+@settings(max_examples=examples(25))
 @given(
     st.lists(
         st.tuples(

@@ -365,7 +365,7 @@ SAYINGS = st.one_of(
 )
 
 
-@settings(max_examples=examples(40))
+@settings(max_examples=examples(25))
 @given(st.lists(st.tuples(st.booleans(), SAYINGS), max_size=20))
 def test_whatever_programs_say_the_bridge_goes_on(sayings: list[tuple[bool, tuple[Any, ...]]]) -> None:
     scene = helped()

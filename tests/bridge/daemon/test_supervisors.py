@@ -297,7 +297,7 @@ def test_a_signature_that_is_not_trusted_is_none(signed: Signed, tmp_path: Path)
     assert obtain(signed.source(signed.ours)) == supervisor_of(tmp_path / "carrier.rscd")
 
 
-@settings(max_examples=examples(50), suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(30), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(place=st.integers(0, 10**6), change=st.integers(1, 255), is_file=st.booleans())
 def test_a_byte_that_is_changed_is_refused(signed: Signed, place: int, change: int, is_file: bool) -> None:
     target = signed.file if is_file else signed.signature

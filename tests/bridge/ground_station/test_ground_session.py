@@ -276,7 +276,7 @@ def test_the_worked_arming_is_answered_byte_for_byte() -> None:
     assert found[:22].hex(" ") == "fd 0a 00 00 07 01 bf 4d 00 00 90 01 00 00 00 00 00 00 ff be 90 1a"
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(st.lists(st.binary(max_size=300), max_size=8), st.booleans())
 def test_garbage_is_dropped(pieces: list[bytes], is_datagram: bool) -> None:
     talk = Talk()
@@ -292,7 +292,7 @@ def test_garbage_is_dropped(pieces: list[bytes], is_datagram: bool) -> None:
 _HEEDED = (0, 4, 11, 20, 21, 23, 43, 69, 75, 76, 84, 110, 111)
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.sampled_from(_HEEDED), st.binary(max_size=255), st.booleans())
 def test_any_contents_of_any_message_are_survived(number: int, payload: bytes, is_layer: bool) -> None:
     talk = Talk(PlayedDaemon(is_layer=is_layer))

@@ -12,7 +12,7 @@ from support.wire_decoders import SEEDS, TARGETS, judge
 
 
 @pytest.mark.parametrize("name", TARGETS)
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(data=st.data())
 def test_nothing_is_owed_for_any_bytes(name: str, data: st.DataObject) -> None:
     seed = data.draw(st.sampled_from(SEEDS[name]))

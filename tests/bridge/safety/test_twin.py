@@ -193,5 +193,5 @@ class Sequence(RuleBasedStateMachine):
         assert abs(w) <= abs(before.angular_rad_s) + self.limits.angular_acceleration_rad_s2 * step_s + 1e-12
 
 
-Sequence.TestCase.settings = settings(max_examples=examples(80), stateful_step_count=40)
+Sequence.TestCase.settings = settings(max_examples=examples(50), stateful_step_count=40)
 test_random_sequences = Sequence.TestCase

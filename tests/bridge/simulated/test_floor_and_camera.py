@@ -47,7 +47,7 @@ def test_a_track_of_any_direction_is_drawn_as_wide_as_it_is() -> None:
 PLACES = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(st.lists(PLACES, min_size=2, max_size=6), st.floats(0.005, 1.0), st.integers(0, 4))
 def test_a_track_is_drawn_as_a_slow_twin_draws_it(points: list[Point], width_m: float, repeats: int) -> None:
     # Also upright pieces, and such as are but a point.

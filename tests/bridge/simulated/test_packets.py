@@ -102,7 +102,7 @@ def bus() -> ServoBus:
     return ServoBus(wheel_servos(world))
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.lists(st.tuples(st.sampled_from([1, 2]), INSTRUCTIONS, PARAMETERS), max_size=12), st.integers(0, 200))
 def test_a_servo_answers_whatever_it_is_asked(requests: list[tuple[int, int, bytes]], pause_ms: int) -> None:
     servos = bus()
@@ -128,7 +128,7 @@ def test_a_servo_answers_whatever_it_is_asked(requests: list[tuple[int, int, byt
         assert servo.read(0, 2) == (0, b"\x06\x04")
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.lists(st.integers(0, 150), max_size=60), st.lists(TRICKY, max_size=20))
 def test_random_writes_never_leave_a_register_beyond_its_bounds(addresses: list[int], data: list[bytes]) -> None:
     servo = bus().servos[0]
@@ -139,7 +139,7 @@ def test_random_writes_never_leave_a_register_beyond_its_bounds(addresses: list[
                 assert item.lowest <= servo.table[item.name] <= item.highest, item.name
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.lists(st.tuples(st.sampled_from([200, 1, 254]), INSTRUCTIONS, PARAMETERS), max_size=12), st.integers(0, 200))
 def test_opencr_answers_three_instructions_and_no_others(requests: list[tuple[int, int, bytes]], pause_ms: int) -> None:
     world = World(BODIES["burger"], Walls(()), Timebase(ManualClock()))

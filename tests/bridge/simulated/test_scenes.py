@@ -113,7 +113,7 @@ def test_who_turns_round_the_mouth_of_the_spiral_is_at_its_goal() -> None:
     assert not goal.is_reached(2.0, 2.5)
 
 
-@settings(max_examples=examples(25))
+@settings(max_examples=examples(15))
 @given(st.integers(1, 6), st.integers(1, 6), st.integers(0, 1000))
 def test_a_maze_has_one_exit_and_its_goal_is_outside(columns: int, rows: int, seed: int) -> None:
     scene = maze_scene(columns, rows, seed=seed)

@@ -67,7 +67,7 @@ DISCS = st.lists(st.tuples(PLACES, PLACES, st.floats(0.005, 4.0)), max_size=3)
 HEADINGS = st.one_of(st.floats(-10.0, 10.0), st.integers(-8, 8).map(lambda eighths: eighths * math.pi / 4))
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(WALLS, DISCS, PLACES, PLACES, HEADINGS)
 def test_a_turn_is_its_rays(
     segments: list[tuple[float, float, float, float]],
@@ -168,7 +168,7 @@ def exact_ray(segments: list[tuple[int, int, int, int]], place: tuple[int, int],
     return float(min(found)) if found else math.inf
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.lists(st.tuples(WHOLE, WHOLE, WHOLE, WHOLE), max_size=8), WHOLE, WHOLE)
 def test_rays_on_a_grid_are_as_fractions_tell(segments: list[tuple[int, int, int, int]], x: int, y: int) -> None:
     walls = Walls(segments)

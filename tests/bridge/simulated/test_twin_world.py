@@ -97,7 +97,7 @@ def slow_disc(disc: tuple[float, float, float], x_m: float, y_m: float, angle: f
     return low
 
 
-@settings(max_examples=examples(15))
+@settings(max_examples=examples(10))
 @given(st.lists(st.tuples(SIZES, SIZES, st.floats(0.1, 2.0)), max_size=2), SIZES, SIZES, st.floats(-7, 7))
 def test_rays_meet_discs_as_a_slow_twin_does(
     discs: list[tuple[float, float, float]], x_m: float, y_m: float, angle: float
@@ -123,7 +123,7 @@ def test_discs_do_not_mind_how_long_a_direction_is(
     assert (np.isclose(many * length, one, rtol=1e-6, atol=1e-6) | grazes).all()
 
 
-@settings(max_examples=examples(15))
+@settings(max_examples=examples(10))
 @given(st.integers(0, 100), st.lists(st.tuples(st.floats(-8, 8), st.floats(-8, 8)), min_size=1, max_size=6))
 def test_a_world_that_measures_seldom_goes_where_one_goes_that_always_does(
     seed: int, speeds: list[tuple[float, float]]

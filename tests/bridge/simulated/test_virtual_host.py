@@ -15,7 +15,7 @@ from robosc_simulated import VirtualHost, VirtualTimeError
 from support.effort import examples
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(st.lists(st.lists(st.integers(0, 5), min_size=1, max_size=6), min_size=1, max_size=5))
 def test_whoever_sleeps_wakes_in_the_order_of_time(naps: list[list[int]]) -> None:
     """Compare with a twin that sorts: each thread's wake-ups, and of equal ones, the first to begin to sleep."""

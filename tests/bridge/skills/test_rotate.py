@@ -79,7 +79,7 @@ def test_a_body_that_obeys_turns_by_the_angle(start_deg: int, angle_deg: int) ->
     assert taken_s < abs(angle_rad) / USUAL.speed_rad_s + 3
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(
     start_rad=st.floats(-math.pi, math.pi),
     angle_rad=st.floats(-5 * math.pi, 5 * math.pi),
@@ -109,7 +109,7 @@ def test_any_turn_ends_within_the_tolerance(
     assert abs(body.heading_rad - start_rad - angle_rad) <= USUAL.tolerance_rad + 2 * noise_rad + 1e-9
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(
     angle_rad=st.floats(-3 * math.pi, 3 * math.pi),
     delay=st.integers(0, 60),

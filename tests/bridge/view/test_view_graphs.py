@@ -57,7 +57,7 @@ def boxes(graph: dict[str, Any]) -> list[tuple[float, float, float, float]]:
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 def test_states_and_labels_lie_inside_and_apart(seed: int) -> None:
     nodes, arrows = automaton(seed)
     graph = layout(nodes, arrows)
@@ -71,7 +71,7 @@ def test_states_and_labels_lie_inside_and_apart(seed: int) -> None:
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 def test_edges_go_from_border_to_border_over_their_label(seed: int) -> None:
     nodes, arrows = automaton(seed)
     graph = layout(nodes, arrows)

@@ -168,7 +168,7 @@ def _stands_at(time_s: float) -> Any:
         max_size=30,
     )
 )
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 def test_a_player_stays_within_the_log(commands: list[Any]) -> None:
     player = Player(RECORDING)
     expected_s = BEGIN_S
@@ -254,7 +254,7 @@ def test_what_is_back_ends_its_own_stop_alone(tmp_path: Path) -> None:
 
 
 @given(st.integers(0, 1000), st.lists(st.sampled_from([True, True, True, True, False]), min_size=1, max_size=60))
-@settings(max_examples=examples(40))
+@settings(max_examples=examples(25))
 def test_the_last_transitions_are_those_of_a_run_from_the_beginning(seed: int, happens: list[bool]) -> None:
     robot = LiveRobot(SUPERVISOR, seed)
     subscription = robot.feed.subscribe(lambda: None, len(happens))

@@ -150,6 +150,6 @@ def test_lowered_models_fit(name: str, deployment: Deployment) -> None:
 
 
 @given(system_seeds())
-@settings(max_examples=examples(30))
+@settings(max_examples=examples(20))
 def test_random_systems_fit(seed: int) -> None:
     check_system(wide_system(seed))

@@ -268,7 +268,7 @@ def _some_states(subject: Semantics, count: int) -> list[State]:
     return list(found)[:count]
 
 
-@settings(max_examples=examples(150))
+@settings(max_examples=examples(90))
 @given(st.one_of(any_systems(), any_wide_systems()))
 def test_agrees_with_the_naive_reading_of_the_definition(drawn: System) -> None:
     subject, naive = Semantics(drawn), NaiveSystem(drawn)
@@ -291,7 +291,7 @@ def test_agrees_with_the_naive_reading_of_the_definition(drawn: System) -> None:
         assert subject.bad(at) is is_bad
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(any_systems())
 def test_compiled_expressions_mean_the_same_as_evaluated_ones(drawn: System) -> None:
     places = {subject: place for place, subject in enumerate(subjects(drawn))}

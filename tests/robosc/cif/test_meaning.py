@@ -15,7 +15,7 @@ from support.random_cif import EVENTS, random_model
 
 
 @pytest.mark.random
-@pytest.mark.parametrize("seed", range(examples(40)))
+@pytest.mark.parametrize("seed", range(examples(25)))
 def test_steps_are_those_of_the_syntax_tree(seed: int) -> None:
     random = Random(seed)
     text = random_model(random)

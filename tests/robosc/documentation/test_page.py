@@ -144,7 +144,7 @@ def test_every_sound_model_of_the_corpus_has_a_page(case: str) -> None:
         agrees(found.model, page(found.model, found.diagnostics))
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(models())
 def test_hostile_names_and_texts_break_neither_table_nor_diagram(model: Model) -> None:
     text = page(model)

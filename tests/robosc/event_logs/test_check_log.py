@@ -35,7 +35,7 @@ def random_log(seed: int) -> tuple[Random, Supervisor, list[Entry]]:
     return dice, supervisor, World(supervisor, dice).run(STEPS)
 
 
-@settings(max_examples=examples(40))
+@settings(max_examples=examples(25))
 @given(seed=st.integers(0, 2**32))
 def test_logs_of_the_reference_executors_have_no_violation(seed: int, tmp_path_factory: pytest.TempPathFactory) -> None:
     _, supervisor, entries = random_log(seed)
@@ -47,7 +47,7 @@ def test_logs_of_the_reference_executors_have_no_violation(seed: int, tmp_path_f
     assert list(faults(supervisor, entries)) == []
 
 
-@settings(max_examples=examples(80))
+@settings(max_examples=examples(50))
 @given(seed=st.integers(0, 2**32))
 def test_a_mutated_log_is_found_where_the_interpreted_system_finds_it(
     seed: int, tmp_path_factory: pytest.TempPathFactory
@@ -77,7 +77,7 @@ def test_the_random_logs_show_everything(tmp_path: Path) -> None:
         assert total[what] >= 3, what
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(seed=st.integers(0, 2**32))
 def test_variables_that_synthesis_leaves_out_are_followed_too(
     seed: int, tmp_path_factory: pytest.TempPathFactory

@@ -212,7 +212,7 @@ class Pair:
         return "wait", bench.wait(0.25)
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.integers(0, 2**32))
 def test_the_layer_does_what_its_twin_does(seed: int) -> None:
     Pair(seed).run(STEPS)

@@ -363,7 +363,7 @@ def hostile() -> st.SearchStrategy[Any]:
     )
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.lists(st.tuples(st.sampled_from(["/scan", "level", "speed", "label"]), hostile()), max_size=6))
 def test_no_data_ever_raises_or_gets_through(messages: list[tuple[str, Any]]) -> None:
     b = Bench(RADAR_SYSTEM)
@@ -386,7 +386,7 @@ RADAR_SYSTEM = system_of(RADAR)
 
 
 @pytest.mark.parametrize("name", ["line_follower/line_follower", "maze_solver/maze_solver", "navigation/navigation"])
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(data=hostile())
 def test_the_examples_stand_hostile_data(name: str, data: Any) -> None:
     b = Bench(SYSTEMS[name])

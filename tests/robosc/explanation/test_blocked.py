@@ -58,7 +58,7 @@ def as_texts(components: Any) -> Any:
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 def test_a_request_has_a_reason_if_and_only_if_it_is_not_enabled(seed: int) -> None:
     supervisor, dice = random_supervisor(seed), Random(seed)
     requests = Requests(supervisor.executable, supervisor.added)
@@ -77,7 +77,7 @@ def test_a_request_has_a_reason_if_and_only_if_it_is_not_enabled(seed: int) -> N
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 def test_what_is_told_without_locations_holds_with_them(seed: int) -> None:
     supervisor, dice = random_supervisor(seed), Random(seed)
     requests = Requests(supervisor.executable, supervisor.added)

@@ -21,7 +21,7 @@ def subsets(things: range) -> list[frozenset[int]]:
 
 
 @given(SETS)
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 def test_against_all_subsets(conflicts: list[frozenset[int]]) -> None:
     is_empty, things = is_empty_by(conflicts), range(7)
     everything = subsets(things)

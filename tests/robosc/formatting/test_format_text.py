@@ -132,14 +132,14 @@ def test_files_keep_all_but_their_layout(name: str) -> None:
 
 
 @given(models())
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 def test_random_models_keep_all_but_their_layout(bundle: object) -> None:
     for file in bundle.files:  # type: ignore[attr-defined]
         assert_only_the_layout_changes(file.text)
 
 
 @given(seeds, st.integers(10, 300))
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 def test_random_texts_of_the_grammar_keep_all_but_their_layout(seed: int, size: int) -> None:
     random = Random(seed)
     text = joined(grammar_tokens(random, size), random)
@@ -148,7 +148,7 @@ def test_random_texts_of_the_grammar_keep_all_but_their_layout(seed: int, size: 
 
 
 @given(st.sampled_from(sorted(FILES)), seeds)
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 def test_comments_anywhere_keep_their_place(name: str, seed: int) -> None:
     assert_only_the_layout_changes(relaid(FILES[name], Random(seed)))
 
@@ -174,7 +174,7 @@ def with_other_blanks(text: str, random: Random) -> str:
 
 
 @given(st.sampled_from(sorted(FILES)), seeds)
-@settings(max_examples=examples(80))
+@settings(max_examples=examples(50))
 def test_blanks_and_line_breaks_do_not_matter(name: str, seed: int) -> None:
     text = re.sub(r"\r", "", FILES[name])
     other = with_other_blanks(text, Random(seed))
@@ -183,7 +183,7 @@ def test_blanks_and_line_breaks_do_not_matter(name: str, seed: int) -> None:
 
 
 @given(models(), seeds)
-@settings(max_examples=examples(30))
+@settings(max_examples=examples(20))
 def test_blanks_and_line_breaks_of_random_models_do_not_matter(bundle: object, seed: int) -> None:
     text = bundle.files[0].text.replace("\r", "")  # type: ignore[attr-defined]
     assert format_text(with_other_blanks(text, Random(seed))) == format_text(text)

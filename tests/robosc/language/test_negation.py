@@ -48,7 +48,7 @@ def renamed(text: str, old: str, new: str) -> str:
 
 
 @pytest.mark.random
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(seeds)
 def test_the_word_means_what_the_sign_means(seed: int) -> None:
     text = random_bundle(seed).main.text
@@ -64,7 +64,7 @@ def test_in_the_examples_too() -> None:
 
 
 @pytest.mark.random
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(seeds, st.data())
 def test_whatever_is_called_not_keeps_its_meaning(seed: int, data: st.DataObject) -> None:
     """A model with a name changed to `not` is the model with that name changed to `nought`."""

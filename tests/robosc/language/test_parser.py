@@ -151,7 +151,7 @@ trees = st.recursive(
 )
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(trees)
 def test_precedence_and_association_of_random_trees(tree: object) -> None:
     assert shape(expression(printed(tree))) == full(tree)  # type: ignore[arg-type]
@@ -325,7 +325,7 @@ def test_the_end_of_a_file_is_found_with_and_without_a_line_end(end: str) -> Non
     assert (found.location.line, found.location.column) == ((1, 10) if not end else (1 + len(end), 1))
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.text(alphabet=string.printable + "é\0→", max_size=200))
 @example('"')
 @example("/*")
@@ -334,7 +334,7 @@ def test_garbage_never_raises(text: str) -> None:
     parse(SourceFile("model.rscd", f"robot R {{ {text}"))
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(st.sampled_from(EXAMPLE_TEXTS), st.data())
 def test_mutated_models_never_raise(text: str, data: st.DataObject) -> None:
     begin = data.draw(st.integers(0, len(text)))

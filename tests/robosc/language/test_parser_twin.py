@@ -163,14 +163,14 @@ def test_random_texts() -> None:
     assert found >= ALL_KINDS
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.randoms(use_true_random=False))
 def test_texts_with_damaged_tokens(random: Random) -> None:
     tokens = grammar_tokens(random, 60)
     compare(joined(damaged_tokens(tokens, random), random))
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.randoms(use_true_random=False))
 def test_texts_with_damaged_characters(random: Random) -> None:
     compare(damaged_text(joined(grammar_tokens(random, 60), random), random))

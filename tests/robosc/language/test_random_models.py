@@ -20,19 +20,19 @@ TEXTS = [(EXAMPLES / f"{name}.rscd").read_text(encoding="utf-8") for name in EXA
 """Texts of the examples."""
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(models())
 def test_models_of_the_whole_language_have_no_errors(bundle: Bundle) -> None:
     assert [item for item in check(bundle).diagnostics if item.severity is Severity.ERROR] == []
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(models(part_b=False))
 def test_models_of_part_a_have_no_errors(bundle: Bundle) -> None:
     assert [item for item in check(bundle).diagnostics if item.severity is Severity.ERROR] == []
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(st.integers(0, 2**32 - 1))
 def test_blanks_and_comments_mean_nothing(seed: int) -> None:
     text = random_bundle(seed).main.text
@@ -63,14 +63,14 @@ def assert_told_well(bundle: Bundle) -> None:
         assert item.render(bundle)
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.sampled_from(TEXTS), st.integers(0, 2**32 - 1))
 def test_damaged_examples(text: str, seed: int) -> None:
     damaged = mutated(text, TEXTS, Random(seed))
     assert_told_well(Bundle(SourceFile("model.rscd", damaged)))
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.integers(0, 2**32 - 1))
 def test_damaged_random_models(seed: int) -> None:
     bundle, dice = random_bundle(seed), Random(seed)

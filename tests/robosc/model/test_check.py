@@ -412,7 +412,7 @@ def kind_of(token: str) -> str:
     return "name" if token.isidentifier() and token not in RESERVED_WORDS else token
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(st.sampled_from(EXAMPLE_NAMES), st.randoms(use_true_random=False))
 def test_models_with_swapped_words_never_raise(name: str, random: Random) -> None:
     tokens = TOKENS.findall(example_bundle(name).main.text)
@@ -505,7 +505,7 @@ def writable(expression: Expression) -> bool:
     return all(writable(child) for child in children(expression))
 
 
-@settings(max_examples=examples(80))
+@settings(max_examples=examples(50))
 @given(language_conditions)
 def test_a_printed_expression_reads_back_as_itself(condition: Expression) -> None:
     if not writable(condition):

@@ -135,7 +135,7 @@ _UPDATE = st.recursive(
 )
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(update=_UPDATE)
 def test_no_update_that_can_leave_the_range_goes_without_a_warning(update: str) -> None:
     if leaves_range(update):
@@ -146,7 +146,7 @@ def _n_compares(operator: str, constant: int) -> str:
     return f"n {operator} {constant}"
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(
     conditions=st.lists(st.builds(_n_compares, _OPERATOR, st.integers(-1, 6)), min_size=1, max_size=3),
     then=st.integers(-6, 6),

@@ -54,7 +54,7 @@ def verdict(given_system: System, formula: Formula, engine: str = "auto") -> Ver
     return found
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(system_seeds())
 def test_it_agrees_with_the_explicit_checker(seed: int) -> None:
     drawn = random_system(seed)
@@ -83,7 +83,7 @@ def test_both_engines_give_the_same(seed: int) -> None:
     assert first == second
 
 
-@settings(max_examples=examples(30))
+@settings(max_examples=examples(20))
 @given(system_seeds())
 def test_runs_to_a_state_are_shortest(seed: int) -> None:
     drawn = random_system(seed)

@@ -57,7 +57,7 @@ def test_there_and_back(tmp_path: Path) -> None:
     assert run.enabled == ("take",)
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(system_seeds())
 def test_random_automata_there_and_back(seed: int) -> None:
     supervisor = robosc.synthesize(any_system(seed)).supervisor
@@ -107,7 +107,7 @@ def test_damaged_values() -> None:
     print(f"accepted {accepted} of 300 changed supervisors")
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(seed=st.integers(0, 2**64))
 def test_damaged_bytes(seed: int) -> None:
     chance = random.Random(seed)

@@ -62,7 +62,7 @@ def by_name(told: Iterable[dict[str, Any]]) -> list[list[tuple[str, Any]]]:
     return sorted((list(state.items()) for state in told), key=repr)
 
 
-@settings(max_examples=examples(25))
+@settings(max_examples=examples(15))
 @given(system_seeds())
 def test_a_product_by_hand_enumerates_the_same_states_and_runs(seed: int) -> None:
     drawn = wide_system(seed)
@@ -174,7 +174,7 @@ def _lead(
     assert len(run) == 0
 
 
-@settings(max_examples=examples(15))
+@settings(max_examples=examples(10))
 @given(system_seeds())
 def test_walks_go_along_the_graph(seed: int) -> None:
     drawn = wide_system(seed)

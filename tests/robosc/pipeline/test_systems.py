@@ -49,7 +49,7 @@ def test_a_machine_and_a_buffer() -> None:
     assert "not nonblocking: " in str(broken)
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(system_seeds())
 def test_random_automata(seed: int) -> None:
     given_system = any_system(seed)

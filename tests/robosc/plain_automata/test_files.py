@@ -66,7 +66,7 @@ def system_in(text: str, ending: str = ".gen") -> System:
 @pytest.mark.random
 @pytest.mark.parametrize("ending", sorted(WRITERS))
 def test_what_is_written_is_read(ending: str) -> None:
-    for seed in range(examples(60)):
+    for seed in range(examples(40)):
         made = random_plain(Random(seed))
         found = system_in(WRITERS[ending](made), ending)
         events = sorted(found.events, key=lambda event: event.name)

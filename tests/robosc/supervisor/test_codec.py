@@ -341,7 +341,7 @@ def survives(data: bytes) -> bool:
     return True
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(seed=st.integers(0, 2**64))
 def test_mutated_bytes(seed: Any) -> None:
     chance = random.Random(seed)
@@ -360,7 +360,7 @@ def test_mutated_bytes(seed: Any) -> None:
     survives(bytes(data))
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(seed=st.integers(0, 2**64))
 def test_mutated_values(seed: Any) -> None:
     chance = random.Random(seed)

@@ -37,7 +37,7 @@ def plain(expression: Expression, state: tuple[Any, ...]) -> Any:
     return evaluate_expression(expression, lambda a, v: values[Subject(a, v)], lambda a: str(values[Subject(a)]))
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(conditions.filter(lambda condition: not any(isinstance(leaf, Received) for leaf in leaves(condition))))
 def test_a_diagram_means_the_predicate(condition: Expression) -> None:
     encoding = Encoding(SYSTEM, make_manager("autoref"))

@@ -177,7 +177,7 @@ def test_a_relation_that_no_list_of_values_can_tell_is_refused(monkeypatch: pyte
         synthesize(sensors(10**6, operation(a, "<=", b), is_late=True), engine="cudd")
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(systems())
 def test_among_each_other_or_not_the_supervisor_is_right(made: System) -> None:
     """Even the narrowest integers together: what comes out is the supervisor that is worked out state by state."""

@@ -36,7 +36,7 @@ def diagram_of(condition: Expression, engine: str) -> DecisionDiagram:
     return extract(encoding, ExpressionEncoder(encoding).holds(condition))
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(condition=_without_data)
 def test_diagrams_are_reduced_and_independent_of_the_engine(condition: Expression) -> None:
     pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
@@ -52,7 +52,7 @@ def test_diagrams_are_reduced_and_independent_of_the_engine(condition: Expressio
     assert met >= set(range(2, len(diagram.nodes) + 2))
 
 
-@settings(max_examples=examples(40))
+@settings(max_examples=examples(25))
 @given(condition=_without_data)
 def test_bits_among_each_other_give_the_same_values(condition: Expression) -> None:
     """All integers in one block: the diagram is reduced, in an order, and true where the condition is."""

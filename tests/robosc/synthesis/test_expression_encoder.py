@@ -73,7 +73,7 @@ def valuations(request: pytest.FixtureRequest) -> Valuations:
     return Valuations(request.param)
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(condition=conditions)
 def test_conditions(valuations: Valuations, condition: Expression) -> None:
     translated = valuations.encoder.translate(condition)
@@ -85,7 +85,7 @@ def test_conditions(valuations: Valuations, condition: Expression) -> None:
         assert valuations.holds(translated.false, assignment) == (value is False), valuation
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(number=numbers)
 def test_numbers(valuations: Valuations, number: Expression) -> None:
     translated = valuations.encoder.translate(number)

@@ -57,7 +57,7 @@ def with_names(formula: Any, names: dict[str, str]) -> Any:
     return (formula[0], *(with_names(part, names) for part in formula[1:]))
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(formula=formulas, places=st.sets(st.integers(0, 2)))
 def test_renaming(manager: Any, formula: Any, places: set[int]) -> None:
     """Each variable is called like its neighbour, which the predicate does not depend on."""
@@ -75,7 +75,7 @@ def _chosen(manager: Any, names: tuple[str, ...], table: int) -> Any:
     return manager.ite(manager.var(names[0]), high, low)
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(table=st.integers(0, 2**64 - 1), order=st.permutations([*NAMES, *(f"{name}'" for name in NAMES)]))
 @pytest.mark.parametrize("engine", ["cudd", "autoref"])
 def test_names_are_right_whatever_becomes_of_the_order_meanwhile(engine: str, table: int, order: list[str]) -> None:
@@ -96,21 +96,21 @@ def test_names_are_right_whatever_becomes_of_the_order_meanwhile(engine: str, ta
     assert len(others) == 3
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(formula=formulas)
 def test_counting(manager: Any, formula: Any) -> None:
     expected = sum(truth(formula, values) for values in VALUATIONS)
     assert count_models(manager, build(manager, formula), NAMES) == expected
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(formula=formulas, care=formulas)
 def test_restricting_keeps_what_matters(manager: Any, formula: Any, care: Any) -> None:
     node, cared = build(manager, formula), build(manager, care)
     assert restrict(manager, node, cared) & cared == node & cared
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(formula=formulas)
 def test_cofactors_are_the_branches_of_the_top_variable(manager: Any, formula: Any) -> None:
     node = build(manager, formula)

@@ -60,7 +60,7 @@ def check_conditions(system: System, added: tuple[AddedCondition, ...]) -> None:
                 assert plain(system, formula, state) is predicates[item.event](state), (item.event, state)
 
 
-@settings(max_examples=examples(15))
+@settings(max_examples=examples(10))
 @given(system_seeds())
 def test_random_systems(seed: int) -> None:
     system = random_system(seed)
@@ -128,7 +128,7 @@ def length(system: System, added: tuple[AddedCondition, ...]) -> int:
     return sum(len(str(formula)) for formula in found)
 
 
-@settings(max_examples=examples(15))
+@settings(max_examples=examples(10))
 @given(st.integers(0, 2**32 - 1))
 def test_formulas_are_never_longer_than_after_restricting_alone(seed: int) -> None:
     """The candidate that restricting gives is always among those that are compared."""

@@ -84,7 +84,7 @@ def assert_verified(system: System, result: SynthesisResult) -> None:
 @pytest.mark.parametrize("part", range(PARTS))
 @pytest.mark.parametrize("make", [random_system, wide_system])
 def test_random_systems(make: Callable[[int], System], part: int) -> None:
-    for seed in seeds(25):
+    for seed in seeds(15):
         # The seeds are the same in every part, the systems are not.
         system = make(seed * PARTS + part)
         # The plain engine is slow: every other time will do.

@@ -37,7 +37,7 @@ def states_of(encoding: Encoding, states: Iterable[State]) -> Any:
     )
 
 
-@settings(max_examples=examples(50))
+@settings(max_examples=examples(30))
 @given(source=st.one_of(any_systems(), any_wide_systems()))
 def test_steps_of_random_systems(engine: str, source: System) -> None:
     """From single states and into single states, reachable or not."""
@@ -66,7 +66,7 @@ def test_steps_of_random_systems(engine: str, source: System) -> None:
             ), where
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(drawn=st.one_of(any_systems(), any_wide_systems()))
 def test_bad_states_of_random_systems(engine: str, drawn: System) -> None:
     # Invariants are no event's business.

@@ -211,13 +211,13 @@ def test_an_old_python(tmp_path: Path) -> None:
 def test_random_models(tmp_path: Path) -> None:
     first: dict[str, Any] = {"s": False, "n": -1}
     compared = happened = 0
-    for seed in range(examples(24)):
+    for seed in range(examples(15)):
         supervisor = supervisor_of(random_controller(Random(seed)))
         if supervisor is None or not Reference(supervisor, first).begins:
             continue
         happened += require_equal(supervisor, first, seed, 60, tmp_path / str(seed))
         compared += 1
-    assert compared > examples(24) // 4
+    assert compared > examples(15) // 4
     assert happened > 5 * compared
 
 

@@ -153,14 +153,14 @@ class Twins:
         self.compare()
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.integers(0, 2**32))
 def test_a_random_supervisor_behaves_as_interpreted(seed: int) -> None:
     twins = Twins(random_supervisor(seed))
     twins.run(Random(seed), STEPS)
 
 
-@settings(max_examples=examples(50))
+@settings(max_examples=examples(30))
 @given(st.integers(0, 2**32 - 1))
 def test_the_supervisor_of_a_random_text_behaves_as_interpreted(seed: int) -> None:
     made = make_supervisor(random_bundle(seed)).supervisor
@@ -169,7 +169,7 @@ def test_the_supervisor_of_a_random_text_behaves_as_interpreted(seed: int) -> No
         Twins(made).run(Random(seed), 10)
 
 
-@settings(max_examples=examples(50))
+@settings(max_examples=examples(30))
 @given(st.integers(0, 2**32))
 def test_a_random_supervisor_that_asks_one_by_one_behaves_as_interpreted(seed: int) -> None:
     """As a model with many requests does."""

@@ -1,6 +1,6 @@
-"""Generated Python packages under other Pythons: the oldest that is promised, those of ROS distributions, and newer.
+"""Generated Python packages under other Pythons: the oldest that is promised, and the newest that RoboSC runs on.
 
-Nodes run with rclpy in acceptance/equivalence/test_other_pythons.py.
+Nodes run with rclpy, also under the one between, in acceptance/equivalence/test_other_pythons.py.
 """
 
 import json
@@ -31,8 +31,7 @@ from support.random_layers import random_layer
 from support.random_supervisors import random_supervisor
 
 LIMIT_S = 300.0
-MINORS = (8, 10, 12, 13)
-"""The oldest that is promised, those of Humble and of Jazzy, and the newest that RoboSC itself runs on."""
+MINORS = (8, 13)
 ROBOTS = sorted(WORLDS)
 OPTIONS = GenerateOptions(publish_state=True, state_message=StateMessage.BOTH)
 SEEDS = range(4)

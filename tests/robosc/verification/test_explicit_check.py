@@ -172,7 +172,7 @@ def _added(made: System, supervisor: ExplicitSupervisor) -> dict[str, Callable[[
     return {event.name: condition(event.name) for event in made.events if event.is_controllable}
 
 
-@settings(max_examples=examples(80))
+@settings(max_examples=examples(50))
 @given(systems())
 def test_what_is_synthesized_passes(drawn: System) -> None:
     supervisor = explicit_supervisor(drawn)
@@ -196,7 +196,7 @@ def _mutant(
     return added
 
 
-@settings(max_examples=examples(80))
+@settings(max_examples=examples(50))
 @given(systems(), st.data())
 def test_every_mutant_is_caught_with_a_trace_that_replays(drawn: System, data: st.DataObject) -> None:
     supervisor = explicit_supervisor(drawn)

@@ -165,7 +165,7 @@ def _supports(semantics: Semantics, kept: frozenset[State]) -> bool:
         reach |= more
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(any_systems())
 def test_agrees_with_the_largest_subset_that_meets_the_definition(drawn: System) -> None:
     supervisor = _synthesize(drawn)

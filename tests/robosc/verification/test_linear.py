@@ -126,7 +126,7 @@ def no_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(expressions, "MAXIMUM_VALUATIONS", 0)
 
 
-@settings(max_examples=examples(80))
+@settings(max_examples=examples(50))
 @given(st.integers(0, 2**32))
 def test_comparisons_are_true_false_and_unknown_where_they_are(seed: int) -> None:
     dice = Dice(seed)
@@ -143,7 +143,7 @@ def test_comparisons_are_true_false_and_unknown_where_they_are(seed: int) -> Non
         assert is_true(variables, truth.false, held) == (expected is False), (condition, state, datum)
 
 
-@settings(max_examples=examples(80))
+@settings(max_examples=examples(50))
 @given(st.integers(0, 2**32))
 def test_updates_write_what_they_should_or_leave_the_range(seed: int) -> None:
     dice = Dice(seed)

@@ -52,7 +52,7 @@ def _allowed(made: System) -> tuple[Packing, Allowed]:
     return packing, found
 
 
-@settings(max_examples=examples(25))
+@settings(max_examples=examples(15))
 @given(systems(), st.integers(0, 10**6))
 def test_the_search_finds_the_graph(made: System, seed: int) -> None:
     added = random_conditions(made, seed)
@@ -92,7 +92,7 @@ def test_blocking_states_are_those_from_which_no_marked_one_is_reachable(made: S
     assert blocking_state(found) == min({*range(len(found.codes))} - reaching, default=None)
 
 
-@settings(max_examples=examples(25))
+@settings(max_examples=examples(15))
 @given(systems())
 def test_the_recomputed_supervisor_is_the_explicit_one(made: System) -> None:
     explicit = synthesize_explicit(made, limit=20_000)

@@ -83,7 +83,7 @@ def _conditions(made: System, seed: int) -> dict[str, Decision]:
     )
 
 
-@settings(max_examples=examples(40))
+@settings(max_examples=examples(25))
 @given(systems(), st.integers(0, 10**6))
 def test_on_any_supervisor_it_agrees_with_the_explicit_search(made: System, seed: int) -> None:
     _agrees(made, {})
@@ -101,7 +101,7 @@ def test_both_engines_find_the_same_with_the_same_work(made: System, seed: int) 
         assert ends[0] == ends[1]
 
 
-@settings(max_examples=examples(15))
+@settings(max_examples=examples(10))
 @given(systems())
 def test_right_supervisors_pass_and_freed_ones_fail(made: System) -> None:
     result = synthesize(made)
@@ -211,7 +211,7 @@ def test_a_million_values_are_copied_compared_and_computed_with() -> None:
     assert verify_symbolically(_measured(update=product), {}).safe is NOT_CHECKED
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(systems(), st.integers(0, 10**6))
 def test_linear_forms_agree_with_the_explicit_search(made: System, seed: int) -> None:
     """The same with the smallest integers as with wide ones, whose values cannot be gone through."""

@@ -35,7 +35,7 @@ NOWHERE = Decision((), 0, ())
 def test_systems_may_not_begin_where_no_supervisor_can_go_on(record_property: Callable[[str, object], None]) -> None:
     """Check the report if a supervisor's initial states are forgotten, or if it lets the system begin nowhere."""
     met: Counter[str] = Counter()
-    for seed in seeds(40):
+    for seed in seeds(25):
         made = wide_system(seed)
         result = synthesize(made)
         explicit = synthesize_explicit(made, limit=LIMIT)

@@ -279,7 +279,7 @@ _STEP = st.one_of(
 )
 
 
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 @given(st.lists(_STEP, max_size=60), st.integers(1, 3), st.integers(1, 8), st.integers(1, 4), st.integers(0, 2))
 def test_whatever_happens_it_does_as_the_twin(
     steps: list[tuple[str, str | int]], capacity: int, waiting: int, per_caller: int, reserved: int

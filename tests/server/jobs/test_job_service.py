@@ -240,7 +240,7 @@ def test_others_have_their_turn_while_a_long_list_is_made(size: int) -> None:
     asyncio.run(test())
 
 
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 @given(st.one_of(st.text(max_size=60), st.binary(max_size=40).map(lambda raw: base64.urlsafe_b64encode(raw).decode())))
 def test_no_page_token_is_taken_that_was_not_given(token: str) -> None:
     if token:

@@ -67,7 +67,7 @@ _RESULTS = st.lists(st.tuples(_OWNERS, st.integers(1, 9), st.integers(1, 5)), mi
 _JOBS = st.lists(st.tuples(_OWNERS, st.integers(0, 13)), max_size=14)
 
 
-@settings(max_examples=examples(30))
+@settings(max_examples=examples(20))
 @given(_RESULTS, _JOBS, st.integers(1, 40), st.integers(1, 4))
 def test_what_is_swept_is_what_the_twin_sweeps(
     tmp_path_factory: pytest.TempPathFactory,

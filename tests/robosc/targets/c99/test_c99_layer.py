@@ -148,7 +148,7 @@ def test_requests_of_every_kind_behave_as_the_reference(everything: Path) -> Non
 
 
 @needs_gcc
-@settings(max_examples=examples(20))
+@settings(max_examples=examples(12))
 @given(st.integers(0, 2**32))
 def test_any_sequence_behaves_as_the_reference(everything: Path, seed: int) -> None:
     compare_layer(layer_of_text(EVERYTHING), everything, Random(seed), 2, 100)

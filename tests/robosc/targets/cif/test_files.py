@@ -73,7 +73,7 @@ def test_relations_between_integers(name: str, test: str) -> None:
     assert assert_same_control(supervisor, reachable=100, others=50) >= 100
 
 
-@settings(max_examples=examples(25))
+@settings(max_examples=examples(15))
 @given(st.integers(0, 2**32 - 1), st.booleans())
 def test_random_supervisors(seed: int, is_layer: bool) -> None:
     supervisor = layered(random_supervisor(seed)) if is_layer else random_supervisor(seed)

@@ -195,7 +195,7 @@ def try_one(text: str) -> str:
     from robosc.formatting import format_text
     from robosc.language import parse
     from robosc.language.tokens import tokenize
-    from robosc.model import check
+    from robosc.model.check import check
     from robosc.source import Bundle, SourceFile
 
     bundle = Bundle(SourceFile("model.rscd", text))

@@ -18,7 +18,7 @@ from robosc.cli.running import Parser
 from robosc.errors import LanguageError, RoboscError
 from robosc.execution.runtime.event_log import EventLog, NullLog, open_event_log
 from robosc.language import load_bundle
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.layers import layer_findings
 from robosc.model.structure import Deployment, Model
 from robosc_api.security.addresses import SYNTHESIS_PORT, with_port

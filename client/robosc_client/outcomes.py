@@ -13,7 +13,7 @@ from robosc.certification import OutcomeStatus, SynthesisOutcome
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.exploration import Graph, GraphState, graph_columns, marks
 from robosc.expressions import Value
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.structure import Deployment, Model
 from robosc.model_checking import Property, Verdict, properties_of
 from robosc.model_checking.outcome import EvidenceRun, Remainder, RunKind

@@ -17,7 +17,7 @@ from robosc.automata import ExecutableSystem, Semantics
 from robosc.certification.certify import certify
 from robosc.controller_properties import check_controller, controller_findings
 from robosc.errors import Diagnostic, NodeLimitError, sorted_diagnostics
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.layers import layer_findings, without_controller_findings
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model

@@ -18,7 +18,7 @@ from robosc.controller_properties import check_controller
 from robosc.errors import Diagnostic, sorted_diagnostics
 from robosc.expressions import Value
 from robosc.expressions.text import automaton_text
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.layers import layer_findings
 from robosc.model.structure import CommunicationKind, Deployment, Model
 from robosc.source import Bundle

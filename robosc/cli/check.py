@@ -94,7 +94,7 @@ def _require_synthesis(arguments: argparse.Namespace) -> None:
 
 
 def _checked(bundle: Bundle) -> tuple[Diagnostic, ...]:
-    from robosc.model import check
+    from robosc.model.check import check
 
     return check(bundle).diagnostics
 

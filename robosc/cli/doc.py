@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Check the model and write its page; 0 with a page, 1 if the model has errors or is a library."""
     from robosc.documentation import page
     from robosc.errors import LanguageError
-    from robosc.model import check
+    from robosc.model.check import check
 
     bundle, text = None, None
     try:

@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize and verify; 0 if every property holds, 1 if one fails or there is no supervisor, 2 for wrong ones."""
-    from robosc.model import check
+    from robosc.model.check import check
 
     bundle = read_bundle(arguments)
     # Errors of properties are reported before the synthesis, which may take long.

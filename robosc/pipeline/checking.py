@@ -14,7 +14,7 @@ def check(model: ModelLike) -> Findings:
         FileAccessError: The file is not there or cannot be read.
         LanguageError: A file is too large or not UTF-8.
     """
-    from robosc.model import check as check_bundle
+    from robosc.model.check import check as check_bundle
 
     bundle = loaded(model)
     return Findings(check_bundle(bundle).diagnostics, bundle)

@@ -41,7 +41,7 @@ class LoadedModel(Bundle):
     def _repr_markdown_(self) -> str:
         """Return the page that `robosc doc` writes; of a text that holds no robot without errors, the text."""
         from robosc.documentation import page
-        from robosc.model import check
+        from robosc.model.check import check
 
         checked = check(self)
         if checked.model is None:

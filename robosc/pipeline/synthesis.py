@@ -8,7 +8,7 @@ from robosc.automata import System
 from robosc.certification import Progress, SynthesisOutcome, make_supervisor
 from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.explanation import EmptyExplanation
-from robosc.model import check
+from robosc.model.check import check
 from robosc.pipeline.findings import Findings
 from robosc.pipeline.loading import LoadedModel, ModelLike, loaded
 from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions

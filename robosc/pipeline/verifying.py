@@ -9,7 +9,7 @@ from robosc.certification.file_report import file_verification_json, file_verifi
 from robosc.certification.supervisor_file import verify_supervisor_file
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.json_documents import diagnostics_json
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.structure import Model
 from robosc.model_checking import (
     Property,

@@ -33,7 +33,7 @@ def measured(lines: int) -> dict[str, float]:
     """Lines, seconds of each step and the memory that they take on top, in this process."""
     from robosc.formatting import format_text
     from robosc.language import parse
-    from robosc.model import check
+    from robosc.model.check import check
     from robosc.source import Bundle, SourceFile
 
     bundle = Bundle(SourceFile("model.rscd", model_of(lines)))

@@ -30,7 +30,7 @@ from robosc.expressions import (
     Type,
     leaves,
 )
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.structure import CommunicationKind, EnumDefinition, Model
 from support.corpus import Run, Stimulus, bundle_of_case, cases, differences, outcome, recorded, recording_path, written
 

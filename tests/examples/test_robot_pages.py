@@ -10,7 +10,7 @@ import pytest
 
 from robosc.cli.main import make_parser
 from robosc.language import load_bundle
-from robosc.model import check
+from robosc.model.check import check
 from support.launch_stub import Recorded, launch_actions
 from support.models import EXAMPLES
 

@@ -23,7 +23,7 @@ from robosc.execution.runtime.executor import Executor
 from robosc.execution.runtime.settings import Settings
 from robosc.exploration import explore, graph_json
 from robosc.language import load_bundle
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.structure import CommunicationKind, Deployment, Model
 from robosc.source import Bundle
 from robosc.supervisor import Supervisor

@@ -9,7 +9,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from robosc.execution.runtime.event_log import Entry
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc_bridge.configuration import map_channels, parse

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from robosc.language import load_bundle
-from robosc.model import Checked, check
+from robosc.model.check import Checked, check
 from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle, SourceFile
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import grpc
 
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.structure import Deployment, Model
 from robosc.supervisor import Supervisor
 from robosc_api.security import Credentials, open_channel

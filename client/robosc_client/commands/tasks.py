@@ -341,7 +341,7 @@ def _verify_properties(arguments: argparse.Namespace, client: Client) -> int:
 
 def are_understood(arguments: argparse.Namespace, bundle: Bundle) -> bool:
     """Return True if the properties can be understood; errors of one are reported before the server is asked."""
-    from robosc.model import check
+    from robosc.model.check import check
 
     model = check(bundle).model
     return model is None or properties.read_properties(arguments, model) is not None

@@ -15,7 +15,7 @@ from robosc.errors import LanguageError, NodeLimitError
 from robosc.exploration import DEFAULT_LIMIT, Graph, explore, graph_json
 from robosc.formatting import format_text
 from robosc.json_documents import json_pieces
-from robosc.model import check
+from robosc.model.check import check
 from robosc.supervisor import Supervisor, encode
 from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import UnknownEngineError

@@ -8,7 +8,7 @@ from robosc.certification.file_report import file_verification_json, has_passed,
 from robosc.certification.supervisor_file import FileVerification, verify_supervisor_file
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.json_documents import diagnostics_json, json_text
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.structure import Model
 from robosc.model_checking import Property, properties_of, property_errors_json, verdicts_json, verify_properties
 from robosc.source import SourceFile

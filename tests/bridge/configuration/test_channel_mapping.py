@@ -1,7 +1,7 @@
 import pytest
 
 from robosc.language import load_bundle
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.structure import Model
 from robosc_bridge import driver_registry
 from robosc_bridge.configuration import ChannelMapping, ConfigurationError, map_channels, parse, unsuitable_because

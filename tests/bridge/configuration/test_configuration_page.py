@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from robosc.language import load_bundle
-from robosc.model import check
+from robosc.model.check import check
 from robosc_bridge.configuration import map_channels, parse, reference
 from robosc_bridge.configuration.document import MAXIMUM_BYTES, MAXIMUM_DEPTH, MAXIMUM_ENTRIES, MAXIMUM_SCALAR
 

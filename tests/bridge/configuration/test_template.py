@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc.language import load_bundle
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.structure import Model
 from robosc_bridge.configuration import Configuration, ConfigurationError, init, map_channels, parse
 from robosc_bridge.configuration import template as template_module

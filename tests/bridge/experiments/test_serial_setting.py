@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from robosc.language import load_bundle
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.structure import Deployment
 from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.daemon.assembly import check_settings

@@ -14,7 +14,7 @@ from robosc.certification.differences import MAXIMUM_DIFFERENCES, model_differen
 from robosc.certification.supervisor_file import PROPERTIES, FileVerification, verify_supervisor_file
 from robosc.errors import InvalidSupervisorError
 from robosc.expressions import Binary, Constant
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
 from robosc.supervisor import Supervisor, decode, encode

@@ -19,7 +19,7 @@ from robosc.explanation import explain_synthesis
 from robosc.language import parse
 from robosc.language.bundle import MAXIMUM_BYTES, decode_source
 from robosc.language.interfaces import find_interfaces, interface_folders
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.structure import Deployment
 from robosc.plain_automata import check_automata
 from robosc.source import Bundle, SourceFile

@@ -13,7 +13,7 @@ from robosc.errors import Diagnostic, LanguageError, Severity
 from robosc.expressions import Constant, EnumType
 from robosc.expressions.text import expression_text
 from robosc.language import load_bundle
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.structure import Behaviour, Model, Variable
 from robosc.source import Location, visible
 from support.corpus import bundle_of_case, cases

@@ -14,7 +14,7 @@ from robosc.errors import UnsupportedModelError
 from robosc.explanation import Explanation, RequestError, explain_synthesis, explanation_text
 from robosc.explanation.constraints import ConstraintKind, relaxable_constraints, without_ranges
 from robosc.explanation.explanations import EventReport, document
-from robosc.model import Places
+from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model, is_tau
 from robosc.source import Location
 from robosc.verification import ExplicitSupervisor, synthesize_explicit

@@ -7,7 +7,7 @@ import pytest
 
 from robosc.errors import LanguageError
 from robosc.language import load_bundle
-from robosc.model import check
+from robosc.model.check import check
 
 LIBRARY = "library {name} {{ component {component} {{ incoming message {message} with type: none }} }}"
 ROBOT = "robot R {{ component C from {library} import {component} }}"

@@ -9,7 +9,7 @@ from robosc.cli.main import main
 from robosc.errors import LanguageError
 from robosc.language import decode_source
 from robosc.language.bundle import MAXIMUM_BYTES
-from robosc.model import check
+from robosc.model.check import check
 from robosc.source import Bundle, SourceFile
 
 

@@ -11,7 +11,7 @@ from robosc.formatting import format_text
 from robosc.language import parse
 from robosc.language.negation import is_negation
 from robosc.language.tokens import Kind, tokenize
-from robosc.model import check
+from robosc.model.check import check
 from robosc.model.structure import Model
 from robosc.source import Bundle, SourceFile
 from support.effort import examples

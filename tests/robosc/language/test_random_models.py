@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from robosc.errors import Severity
 from robosc.language import parse
-from robosc.model import check
+from robosc.model.check import check
 from robosc.source import Bundle, SourceFile
 from support.effort import examples
 from support.models import EXAMPLE_NAMES, EXAMPLES

@@ -2,7 +2,7 @@
 
 import pytest
 
-from robosc.model import check
+from robosc.model.check import check
 from robosc.source import Bundle, SourceFile
 from support.models import checked, marked_place
 

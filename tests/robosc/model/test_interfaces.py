@@ -13,7 +13,8 @@ from robosc.interfaces import DISTRIBUTIONS, Field, Part
 from robosc.interfaces.catalogue import Catalogue, FoundInterfaces
 from robosc.language import load_bundle
 from robosc.language.interfaces import find_interfaces, interface_folders
-from robosc.model import check, message_fields
+from robosc.model import message_fields
+from robosc.model.check import check
 from robosc.model.interfaces import headers_of as known_headers
 from robosc.model.message_fields import Fault
 from robosc.source import Bundle, SourceFile

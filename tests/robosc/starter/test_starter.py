@@ -7,7 +7,7 @@ import pytest
 from robosc.certification import OutcomeStatus, make_supervisor
 from robosc.formatting import format_text
 from robosc.language.words import RESERVED_WORDS
-from robosc.model import check
+from robosc.model.check import check
 from robosc.source import Bundle, SourceFile
 from robosc.starter import MAXIMUM_STEM, InvalidNameError, Starter, make_starter
 from robosc.targets import generate

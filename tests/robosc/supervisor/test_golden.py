@@ -20,7 +20,7 @@ from robosc.conditions.rendering import Formulas, in_words
 from robosc.conditions.summary import added_lines, added_texts, summary_json
 from robosc.expressions import Expression, StateTest, Value, VariableRead, leaves
 from robosc.expressions.evaluate import evaluate as evaluate_expression
-from robosc.model import check
+from robosc.model.check import check
 from robosc.supervisor import DecisionDiagram, Supervisor
 from robosc.supervisor.diagram import Domains, Subject, diagram_domains, evaluate
 from robosc.synthesis import synthesize

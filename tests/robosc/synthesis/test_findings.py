@@ -14,7 +14,7 @@ from robosc.automata.state import subjects
 from robosc.certification import OutcomeStatus, make_supervisor
 from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.exploration import explore
-from robosc.model import Places
+from robosc.model.places import Places
 from robosc.model.structure import CommunicationKind, Deployment, EventKind, Model, is_tau
 from robosc.source import Location
 from robosc.supervisor.predicates import state_predicates

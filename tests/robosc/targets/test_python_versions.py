@@ -1,6 +1,6 @@
-"""Generated Python packages under other Pythons: the oldest that is promised, and the newest that RoboSC runs on.
+"""Generated Python packages under other Pythons: the oldest and the newest, and with more effort those between.
 
-Nodes run with rclpy, also under the one between, in acceptance/equivalence/test_other_pythons.py.
+Nodes run with rclpy in acceptance/equivalence/test_other_pythons.py.
 """
 
 import json
@@ -18,6 +18,7 @@ from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets import GenerateOptions, StateMessage, generate, write_files
 from support import package_check
+from support.effort import EFFORT
 from support.equivalence.observation import FULL, Observation
 from support.equivalence.python_targets import arguments_of, observation, observe, shown
 from support.equivalence.random_scenarios import random_scenario
@@ -31,7 +32,8 @@ from support.random_layers import random_layer
 from support.random_supervisors import random_supervisor
 
 LIMIT_S = 300.0
-MINORS = (8, 13)
+MINORS = (8, 10, 12, 13) if EFFORT else (8, 13)
+"""The oldest that is promised, those of Humble and of Jazzy, and the newest that RoboSC itself runs on."""
 ROBOTS = sorted(WORLDS)
 OPTIONS = GenerateOptions(publish_state=True, state_message=StateMessage.BOTH)
 SEEDS = range(4)
@@ -106,6 +108,7 @@ def same_text(state: Any) -> Any:
     return json.loads(json.dumps(state), parse_constant=str)
 
 
+@pytest.mark.random
 @pytest.mark.parametrize("minor", MINORS)
 def test_packages_do_the_same_under_another_python(minor: int, tmp_path: Path) -> None:
     python = python_of(minor)

@@ -8,6 +8,7 @@ import argparse
 import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -153,7 +154,9 @@ def _prepare_value(action: Any, shtab: Any) -> None:
     known = getattr(action, "suggestions", None)
     placeholder = action.metavar[0] if isinstance(action.metavar, tuple) else action.metavar or ""
     if known is not None:
-        action.choices = tuple(known())
+        # What tells the values may need an extra that is not installed: then none is offered.
+        with suppress(ModuleNotFoundError):
+            action.choices = tuple(known())
     elif "|" in placeholder and placeholder.islower():
         action.choices = placeholder.split("|")
     else:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from robosc.cli import completion
+from robosc.cli.arguments import suggest
 from robosc.cli.completion import make_scripts, script_folder
 from robosc.cli.main import main
 from robosc.diagnostics import pages
@@ -89,6 +90,18 @@ def test_a_program_without_its_packages_is_left_out(
     )
     assert list(make_scripts("bash")) == ["robosc", "robosc-lsp"]
     assert capsys.readouterr().err == "other is left out: the package robosc_no_such_package is not installed\n"
+
+
+def test_values_that_need_a_missing_package_are_not_offered(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown() -> tuple[str, ...]:
+        raise ModuleNotFoundError("No module named 'numpy'")
+
+    parser = argparse.ArgumentParser(prog="robosc")
+    suggest(parser.add_argument("--scene"), unknown)
+    suggest(parser.add_argument("--robot"), lambda: ("line_follower",))
+    monkeypatch.setattr(completion, "_parsers", lambda: [("robosc", parser)])
+    script = make_scripts("bash")["robosc"]
+    assert "--scene" in script and "line_follower" in script
 
 
 def test_other_commands_load_no_maker_of_scripts() -> None:

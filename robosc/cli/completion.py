@@ -154,7 +154,7 @@ def _prepare_value(action: Any, shtab: Any) -> None:
     known = getattr(action, "suggestions", None)
     placeholder = action.metavar[0] if isinstance(action.metavar, tuple) else action.metavar or ""
     if known is not None:
-        # What tells the values may need an extra that is not installed: then none is offered.
+        # Listing the values may need an extra that is not installed: then none is offered.
         with suppress(ModuleNotFoundError):
             action.choices = tuple(known())
     elif "|" in placeholder and placeholder.islower():

@@ -452,7 +452,7 @@ class CompiledSpace(Space):
         return found
 
     def _spend(self, steps: int) -> None:
-        # Where no step was taken, Python would not have asked either.
+        # An answer without a step is one that Python gives without asking, however little is left.
         if steps:
             self.effort.spend(steps)
 

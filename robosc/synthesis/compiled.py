@@ -24,11 +24,15 @@ def kernel_of(manager: Manager) -> "Kernel | None":
 
 @cache
 def _connected() -> ModuleType | None:
-    """The kernel with the CUDD inside dd; None where there is no kernel, or another dd than it knows."""
+    """Return the kernel with the CUDD inside dd; None where there is no kernel, or another dd than it knows."""
     module, cudd = kernel_module(), load_dd("cudd")
     if module is None or (cudd.BDD.__basicsize__, cudd.Function.__basicsize__) != _LAYOUT:
         return None
-    module.connect(cudd.__file__)
+    try:
+        module.connect(cudd.__file__)
+    except ImportError:
+        # This build of dd keeps the functions of CUDD to itself.
+        return None
     return module
 
 

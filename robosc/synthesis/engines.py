@@ -65,6 +65,9 @@ class Manager(Protocol):
     def let(self, definitions: Mapping[str, Any], node: Any) -> Any:
         """Substitute variables at once: all by truth values, all by names, or all by predicates."""
 
+    def cube(self, values: Mapping[str, bool]) -> Any:
+        """Return the predicate that some variables have some values."""
+
     def support(self, node: Any) -> set[str]:
         """Return the variables that a predicate depends on."""
 

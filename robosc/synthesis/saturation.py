@@ -13,7 +13,7 @@ saturation", TACAS 2019, LNCS 11428, pp. 58-75.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from robosc.synthesis.compiled import Kernel, kernel_of
@@ -201,11 +201,8 @@ class CompiledSaturation:
 
     def _passed(self, step: Step, image: Image) -> tuple[object, ...]:
         manager = self._manager
-        constants = hidden = None
-        if image.constants:
-            constants = _all_of(manager, (self._literal(name, value) for name, value in image.constants.items()))
-        if image.hidden:
-            hidden = _all_of(manager, map(manager.var, image.hidden))
+        constants = manager.cube(image.constants) if image.constants else None
+        hidden = manager.cube(dict.fromkeys(image.hidden, True)) if image.hidden else None
         names = {name: manager.var(new) for name, new in image.names.items()}
         return (
             self._address(image.inside),
@@ -219,10 +216,6 @@ class CompiledSaturation:
             self._address(step.room),
         )
 
-    def _literal(self, name: str, value: bool) -> Any:
-        variable = self._manager.var(name)
-        return variable if value else ~variable
-
     def _substitutions(self, functions: Mapping[str, Any]) -> tuple[tuple[int, int], ...]:
         pairs = ((self._manager.var(name), function) for name, function in functions.items())
         return tuple((self._address(variable), self._address(function)) for variable, function in pairs)
@@ -230,10 +223,3 @@ class CompiledSaturation:
     def _address(self, predicate: Any) -> int:
         self._kept.append(predicate)
         return self._kernel.address(predicate)
-
-
-def _all_of(manager: Manager, predicates: Iterable[Any]) -> Any:
-    result = manager.true
-    for predicate in predicates:
-        result = result & predicate
-    return result

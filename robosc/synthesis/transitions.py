@@ -327,7 +327,7 @@ class Steps:
         Args:
             source: States from which the event may happen; None if from all.
         """
-        # What is written as a constant needs no next-state variable: it is forgotten, and then known.
+        # A bit that is written as a constant needs no next-state variable: it is forgotten, and then known.
         return Image(
             manager=self._manager,
             inside=source,

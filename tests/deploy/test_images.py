@@ -44,7 +44,7 @@ def test_hadolint_would_find_something(tmp_path: Path) -> None:
 def test_an_image_is_as_it_should_be(file: Path) -> None:
     stages = parse_dockerfile(file.read_text())
     last = stages[-1]
-    # What is built with a compiler runs on the same system without one.
+    # The stage that builds has a compiler; the image is the same system without one.
     assert len(stages) == 2 and stages[0].base == last.base.replace("-slim", "")
     # A version of the base in full, not whatever is the latest.
     assert re.fullmatch(r"docker\.io/library/python:3\.12\.\d+-slim-\w+", last.base)

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 from random import Random
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc import kernel
+from robosc.dd_modules import load_dd
 from robosc.errors import NodeLimitError, SynthesisCancelled
 from robosc.kernel import kernel_module, kernel_problem
 from robosc.synthesis import SynthesisProgress, compiled, nodes
@@ -227,7 +228,7 @@ def test_other_steps_are_left_to_python(manager: Manager) -> None:
     assert found.of(manager.var("a"), "test") == manager.true
 
 
-# Where it is not
+# Reasons for having none
 
 
 def test_there_is_none_for_the_plain_engine() -> None:
@@ -267,6 +268,16 @@ class TestLeftAside:
         assert kernel_problem() == "it was not made: there was no C compiler"
 
 
+@pytest.mark.usefixtures("looked_for_anew")
+def test_a_dd_that_keeps_cudd_to_itself_is_left_to_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = kernel_module()
+    assert module is not None
+    cudd = load_dd("cudd")
+    hiding = SimpleNamespace(BDD=cudd.BDD, Function=cudd.Function, __file__=module.__file__)
+    monkeypatch.setattr(compiled, "load_dd", lambda name: hiding)
+    assert kernel_of(make_manager("cudd")) is None
+
+
 def test_a_library_without_cudd_is_refused() -> None:
     module = kernel_module()
     assert module is not None
@@ -274,11 +285,11 @@ def test_a_library_without_cudd_is_refused() -> None:
         module.connect(module.__file__)
     with pytest.raises(ImportError, match="cannot be opened"):
         module.connect("/nowhere.so")
-    # What was connected before still is.
+    # The connection that was there before still is.
     assert kernel_of(make_manager("cudd")) is not None
 
 
-# How it is made
+# Making it
 
 
 @pytest.fixture(scope="module")

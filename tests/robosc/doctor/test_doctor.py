@@ -101,7 +101,8 @@ class MadeUp(Machine):
 
 
 @pytest.fixture
-def machine() -> MadeUp:
+def machine(monkeypatch: pytest.MonkeyPatch) -> MadeUp:
+    monkeypatch.setattr("robosc.doctor.checks.kernel_problem", lambda: "")
     return MadeUp()
 
 
@@ -154,6 +155,15 @@ def test_what_is_missing_comes_with_a_fix(
     if purpose is not Purpose.SYNTH:
         assert is_ready(examine(machine))
         assert problems(machine)[part].grade is Grade.NOTE
+
+
+def test_without_the_kernel_it_is_told_where_to_read_about_it(machine: MadeUp, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "kernel" not in problems(machine, Purpose.SYNTH)
+    monkeypatch.setattr("robosc.doctor.checks.kernel_problem", lambda: "it was not made")
+    found = problems(machine, Purpose.SYNTH)["kernel"]
+    assert (found.grade, found.fix) == (Grade.NOTE, "docs/install.md, 'The kernel'")
+    assert found.message.endswith("it was not made")
+    assert is_ready(examine(machine, [Purpose.SYNTH]))
 
 
 def test_ros_that_is_not_sourced(machine: MadeUp) -> None:
@@ -273,7 +283,8 @@ class TestThisMachine:
         assert machine.version("robosc-no-such-package") is None
         requirements = machine.requirements()
         assert requirements is not None and any(text.startswith("dd") for text in requirements)
-        assert problems(machine, Purpose.SYNTH) == {}
+        # A machine without a C compiler has no kernel.
+        assert set(problems(machine, Purpose.SYNTH)) <= {"kernel"}
 
 
 def test_the_command_prints_findings(

@@ -1,13 +1,19 @@
 """The core's second door: automata that a program has built."""
 
 from dataclasses import replace
+from unittest.mock import patch
 
 import pytest
 from hypothesis import given, settings
 
 import robosc
 from robosc.automata import Automaton, Edge, Event, System
+from robosc.conditions import summary
+from robosc.conditions.literals import Vocabulary
 from robosc.expressions import Constant, StateTest
+from robosc.pipeline.conditions import Condition, Conditions
+from robosc.supervisor import DecisionDiagram, DecisionNode
+from robosc.supervisor.diagram import Subject, SubjectDomain
 from robosc.supervisor.predicates import state_predicate
 from robosc.synthesis import synthesize
 from robosc.verification import Limits, verify
@@ -67,6 +73,31 @@ def test_random_automata(seed: int) -> None:
     assert (result.supervisor.initial is None) == (result.supervisor.initial_condition is None)
     few = robosc.verify(result.supervisor, maximum_states=0)
     assert few.status in (robosc.VerificationStatus.NOT_CHECKED, robosc.VerificationStatus.PASSED)
+
+
+def test_of_long_diagrams_the_size_is_told() -> None:
+    domains: dict[Subject, SubjectDomain] = {(name, None): SubjectDomain(("off", "on"), None) for name in "ABCDEFG"}
+    # An odd number of them is on: a chain of two nodes a place.
+    nodes = [DecisionNode("G", None, (0, 1), (0, 1)), DecisionNode("G", None, (0, 1), (1, 0))]
+    for name in "FEDCBA":
+        even, odd = len(nodes), len(nodes) + 1
+        nodes += [DecisionNode(name, None, (0, 1), (even, odd)), DecisionNode(name, None, (0, 1), (odd, even))]
+    diagram, vocabulary = DecisionDiagram(tuple(nodes), len(nodes)), Vocabulary(domains)
+    few = DecisionDiagram(tuple(nodes[:2]), 2)
+    size = "a decision diagram of 14 nodes"
+    conditions = Conditions(
+        [
+            Condition(f"e{number}", size if item is diagram else "one of 2", None, item, vocabulary)
+            for number, item in enumerate([diagram, *[few] * 2])
+        ]
+    )
+    whole = str(conditions).splitlines()
+    assert whole[0] == f"e0 needs {size}, to be read from [1] on:" and len(whole) > 14
+    with patch.object(summary, "_NODES", 10):
+        short = str(conditions)
+    assert f"e0 needs {size}; --json tells it node by node\ne1 needs one of 2, to be read from [1] on:\n[1]" in short
+    # Asked for by itself it is told whole.
+    assert str(conditions["e0"]).startswith(f"{size}, to be read from [1] on:\n[1]")
 
 
 def test_no_supervisor_and_automata_that_do_not_fit() -> None:

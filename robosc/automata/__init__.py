@@ -4,7 +4,7 @@ Between the checked model and synthesis: `to_automata` lowers a model, `Semantic
 means, one state at a time.
 """
 
-from robosc.automata.check import CheckedSystem, check_system
+from robosc.automata.check import CheckedSystem, SystemPlaces, check_system
 from robosc.automata.environment import EnvironmentVariable, environment_variable
 from robosc.automata.executable import ExecutableSystem
 from robosc.automata.lowering import to_automata
@@ -36,6 +36,7 @@ __all__ = [
     "Role",
     "Semantics",
     "System",
+    "SystemPlaces",
     "check_system",
     "disables",
     "environment_variable",

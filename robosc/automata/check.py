@@ -1,12 +1,30 @@
 """Check whether the parts of a system fit together, which a front end may run before it hands a system on."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 from robosc.automata.structure import Automaton, Edge, System
 from robosc.errors import Diagnostic, InvalidExpressionError, InvalidSystemError
 from robosc.expressions import BooleanType, EnumType, Expression, IntegerType, PathStep, Type, is_finite, type_text
 from robosc.expressions.inference import Scope, has_type, is_assignable
+from robosc.source import Location
+
+
+@dataclass(frozen=True, slots=True)
+class SystemPlaces:
+    """Places of the parts of a system in the files that it was read from; of parts that no file has, none.
+
+    Attributes:
+        automata: Place of each automaton, by its name.
+        conditions: Places of `System.conditions`, in their order.
+        invariants: Places of `System.invariants`.
+        plant_conditions: Places of `System.plant_conditions`.
+    """
+
+    automata: Mapping[str, Location] = field(default_factory=dict)
+    conditions: tuple[Location, ...] = ()
+    invariants: tuple[Location, ...] = ()
+    plant_conditions: tuple[Location, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,10 +34,12 @@ class CheckedSystem:
     Attributes:
         system: The automata; None if there are errors.
         diagnostics: Every finding, sorted by place.
+        places: Places of the parts of the automata.
     """
 
     system: System | None
     diagnostics: tuple[Diagnostic, ...]
+    places: SystemPlaces = field(default_factory=SystemPlaces)
 
 
 def check_system(system: System) -> None:

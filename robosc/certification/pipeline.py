@@ -172,10 +172,7 @@ def make_supervisor(
         # Whatever the limit of nodes, that there is no supervisor is known.
         with suppress(NodeLimitError):
             explanation = explanations.explain_empty(
-                model,
-                places,
-                system,
-                deployment=deployment,
+                explanations.ModelWords(model, places, system, deployment),
                 engine=engine,
                 should_stop=should_stop,
                 on_progress=report,

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
-from robosc.automata import CheckedSystem
+from robosc.automata import CheckedSystem, SystemPlaces
 from robosc.cif import syntax
 from robosc.cif.lowering import Lowering
 from robosc.cif.parser import parse
@@ -53,16 +53,16 @@ def check_cif(bundle: Bundle) -> CheckedSystem:
     findings = Findings()
     files, has_all = _imported(bundle.main, bundle.file, findings)
     trees = tuple(tree for _, tree in files if tree is not None)
-    system = None
+    system, places = None, SystemPlaces()
     if has_all and not findings.has_errors:
         allow_depth(_LEVELS, _FRAMES)
         try:
             scopes = Scopes(trees, findings)
-            system = Lowering(scopes, Typing(scopes)).lowered(Path(bundle.main.name).stem)
+            system, places = Lowering(scopes, Typing(scopes)).lowered(Path(bundle.main.name).stem)
         except RecursionError:
             message = "expressions, or definitions in definitions, are nested too deeply"
             findings.error("cif-too-large", message, Location(bundle.main.name, 1, 1), "Split them.")
-    return CheckedSystem(None if findings.has_errors else system, sorted_diagnostics(findings.diagnostics))
+    return CheckedSystem(None if findings.has_errors else system, sorted_diagnostics(findings.diagnostics), places)
 
 
 _Files = list[tuple[SourceFile, syntax.Specification | None]]

@@ -6,7 +6,17 @@ implication; algebraic variables and constants are written out where they are us
 
 from dataclasses import dataclass, field, replace
 
-from robosc.automata import Assignment, Automaton, DiscreteVariable, Edge, Event, EventCondition, Role, System
+from robosc.automata import (
+    Assignment,
+    Automaton,
+    DiscreteVariable,
+    Edge,
+    Event,
+    EventCondition,
+    Role,
+    System,
+    SystemPlaces,
+)
 from robosc.automata.environment import environment_variable
 from robosc.automata.structure import InputVariable
 from robosc.cif import syntax
@@ -54,9 +64,10 @@ class Lowering:
         typing: Meaning of their expressions.
         events: Events with their names.
         automata: Automata.
+        places: Places of the automata, by their names.
         inputs: Values that the environment gives to input variables.
         exclusions: Event exclusions of plants and requirements.
-        invariants: State invariants of requirements.
+        invariants: State invariants of requirements, with their places.
         plant_invariants: State invariants of plants.
         initial: Predicates on the initial states.
         marker: Predicates on the marked states.
@@ -67,9 +78,10 @@ class Lowering:
     typing: Typing
     events: list[Event] = field(default_factory=list)
     automata: list[Automaton] = field(default_factory=list)
+    places: dict[str, Location] = field(default_factory=dict)
     inputs: list[InputVariable] = field(default_factory=list)
     exclusions: list[Exclusion] = field(default_factory=list)
-    invariants: list[Expression] = field(default_factory=list)
+    invariants: list[tuple[Expression, Location]] = field(default_factory=list)
     plant_invariants: list[Expression] = field(default_factory=list)
     initial: list[Expression] = field(default_factory=list)
     marker: list[Expression] = field(default_factory=list)
@@ -94,8 +106,8 @@ class Lowering:
 
     # The whole
 
-    def lowered(self, name: str) -> System:
-        """The system; of use only if no error is found."""
+    def lowered(self, name: str) -> tuple[System, SystemPlaces]:
+        """The system, with the places of its parts; of use only if no error is found."""
         for scope in self.scopes.scopes():
             self.scopes.check_arguments(scope)
             for entry in list(scope.entries.values()):
@@ -108,30 +120,37 @@ class Lowering:
         self._check_initial_values()
         return self._system(name)
 
-    def _system(self, name: str) -> System:
+    def _system(self, name: str) -> tuple[System, SystemPlaces]:
         alphabet = frozenset[str]().union(*(item.alphabet for item in self.automata))
-        conditions: dict[str, list[EventCondition]] = {"plant": [], "requirement": []}
+        conditions: dict[str, list[tuple[EventCondition, Location]]] = {"plant": [], "requirement": []}
         for item in self.exclusions:
             event = item.event.name
             if event not in alphabet:
                 message = f"no automaton has '{event}' in its alphabet, so this excludes nothing"
                 self.typing.findings.warning("cif-no-effect", message, item.at, "Remove it, or use the event.")
             elif item.condition != TRUE:
-                conditions[item.role].append(EventCondition(event, item.condition))
+                conditions[item.role].append((EventCondition(event, item.condition), item.at))
         if not any(item.role is Role.PLANT for item in self.automata) and not self.typing.findings.has_errors:
             self.error("cif-unsupported", "there is no plant automaton", self.scopes.root.at, "Add one.")
-        return System(
+        system = System(
             name=name,
             events=tuple(self.events),
             automata=tuple(self.automata),
             inputs=tuple(self.inputs),
-            conditions=tuple(conditions["requirement"]),
-            invariants=tuple(self.invariants),
+            conditions=tuple(item for item, _ in conditions["requirement"]),
+            invariants=tuple(item for item, _ in self.invariants),
             initial=conjunction(*self.initial),
             marker=conjunction(*self.marker),
-            plant_conditions=tuple(conditions["plant"]),
+            plant_conditions=tuple(item for item, _ in conditions["plant"]),
             plant_invariants=tuple(self.plant_invariants),
         )
+        places = SystemPlaces(
+            automata=self.places,
+            conditions=tuple(at for _, at in conditions["requirement"]),
+            invariants=tuple(at for _, at in self.invariants),
+            plant_conditions=tuple(at for _, at in conditions["plant"]),
+        )
+        return system, places
 
     # Declarations
 
@@ -169,6 +188,7 @@ class Lowering:
             made = environment_variable(name, type_)
             edges = tuple(replace(edge, event=name) for edge in made.automaton.edges)
             self.automata.append(replace(made.automaton, alphabet=frozenset({name}), edges=edges))
+            self.places[name] = item.name.at
             self.events.append(Event(name, is_controllable=False))
             self.inputs.append(replace(made.received, event=name))
 
@@ -213,7 +233,10 @@ class Lowering:
         if not scope.is_real:
             return
         if item.form is syntax.InvariantForm.STATE:
-            (self.plant_invariants if item.role == "plant" else self.invariants).append(condition)
+            if item.role == "plant":
+                self.plant_invariants.append(condition)
+            else:
+                self.invariants.append((condition, item.at))
             return
         for event in events:
             if event is not None:
@@ -253,6 +276,7 @@ class Lowering:
         alphabet, monitors = self._alphabets(scope, edges)
         if not scope.is_real:
             return
+        self.places[scope.path] = scope.at
         self.automata.append(
             Automaton(
                 name=scope.path,

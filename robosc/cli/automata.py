@@ -1,4 +1,4 @@
-"""Automata without a text of RoboSC in `check`, `synth`, `explore` and `verify`: CIF, libFAUDES and Supremica."""
+"""Automata without a text of RoboSC in the commands that take them: CIF, libFAUDES and Supremica."""
 
 import argparse
 import sys
@@ -24,9 +24,13 @@ from robosc.pipeline.automata_files import SUFFIXES, is_automata
 from robosc.source import Bundle
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from robosc.automata import CheckedSystem
+    from robosc.explanation import EmptyExplanation
     from robosc.pipeline.options import SynthesisOptions
     from robosc.pipeline.results import SynthesisStatus
+    from robosc.pipeline.synthesis import OnProgress
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
 
 
@@ -45,7 +49,7 @@ class Synthesized:
         diagnostics: Every finding.
         reason: Reason why there is no supervisor; empty if there is one, or the findings tell.
         supervisor: The supervisor, or None.
-        explanation: Always None: what is to blame is told of RoboSC's models alone.
+        explanation: Explanation of what is to blame if no supervisor exists.
     """
 
     bundle: Bundle
@@ -53,7 +57,7 @@ class Synthesized:
     diagnostics: tuple[Diagnostic, ...]
     reason: str
     supervisor: "SystemSupervisor | None"
-    explanation: None = None
+    explanation: "EmptyExplanation | None" = None
 
 
 def synthesized(arguments: argparse.Namespace) -> Synthesized:
@@ -62,13 +66,15 @@ def synthesized(arguments: argparse.Namespace) -> Synthesized:
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
     """
+    from robosc.explanation import EmptyExplanation
     from robosc.pipeline.results import SynthesisStatus
 
     bundle, found = _checked(arguments)
     if found.system is None:
         return Synthesized(bundle, SynthesisStatus.MODEL_ERRORS, found.diagnostics, "", None)
     made = _synthesis(arguments, found)
-    return Synthesized(bundle, made.status, found.diagnostics, made.reason, made.supervisor)
+    explanation = made.explanation if isinstance(made.explanation, EmptyExplanation) else None
+    return Synthesized(bundle, made.status, found.diagnostics, made.reason, made.supervisor, explanation)
 
 
 def controlled_system(supervisor: "SystemSupervisor", suffix: str) -> str:
@@ -198,18 +204,12 @@ def verify(arguments: argparse.Namespace) -> ExitCode:
     made = synthesized(arguments)
     if made.supervisor is None:
         return report_none(arguments, made)
-    progress = ProgressLine()
-    try:
-        result = verify_system(
-            made.supervisor,
-            _options(arguments),
-            Limits.of(arguments.limit),
-            lambda step: progress.show(f"{step.stage}: {step.message}"),
-            lambda: False,
-            is_strict=arguments.strict,
+    supervisor, options, limits = made.supervisor, _options(arguments), Limits.of(arguments.limit)
+    result = _watched(
+        lambda on_progress: verify_system(
+            supervisor, options, limits, on_progress, lambda: False, is_strict=arguments.strict
         )
-    finally:
-        progress.clear()
+    )
     has_passed = result.status is VerificationStatus.PASSED
     if arguments.json:
         print_json({**result.report, **diagnostics_json(made.diagnostics)})
@@ -218,6 +218,36 @@ def verify(arguments: argparse.Namespace) -> ExitCode:
         if not (has_passed and arguments.quiet):
             sys.stdout.write(str(result) if str(result).endswith("\n") else f"{result}\n")
     return ExitCode.OK if has_passed else ExitCode.FAILED
+
+
+def explain_synthesis(arguments: argparse.Namespace) -> ExitCode:
+    """Explain what synthesis did to automata; 0 with a supervisor, 1 without.
+
+    Raises:
+        UsageError: An argument means nothing for it, or it cannot be read.
+    """
+    from robosc.explanation import Explanation, SystemWords, document, explanation_text
+    from robosc.pipeline.explaining import Asked, explained_system
+    from robosc.pipeline.results import SynthesisStatus
+
+    bundle, found = _checked(arguments)
+    if found.system is None:
+        return report_none(arguments, Synthesized(bundle, SynthesisStatus.MODEL_ERRORS, found.diagnostics, "", None))
+    words, engine = SystemWords(found.system, found.places), _options(arguments).engine_options()
+    asked = Asked(arguments.event, arguments.state, arguments.after)
+    made = _watched(lambda on_progress: explained_system(words, engine, asked, on_progress))
+    if not isinstance(made.explanation, Explanation):
+        return report_none(arguments, Synthesized(bundle, made.status, found.diagnostics, made.reason, None))
+    is_empty = made.explanation.empty is not None
+    if arguments.json:
+        explanation = document(made.explanation)
+        print_json({"status": str(made.status), "explanation": explanation, **diagnostics_json(found.diagnostics)})
+    else:
+        print_diagnostics(found.diagnostics, bundle)
+        if is_empty:
+            sys.stdout.write(f"{arguments.model}: no supervisor exists\n")
+        sys.stdout.write(explanation_text(made.explanation))
+    return ExitCode.FAILED if is_empty else ExitCode.OK
 
 
 def _checked(arguments: argparse.Namespace) -> "tuple[Bundle, CheckedSystem]":
@@ -256,25 +286,32 @@ def _options(arguments: argparse.Namespace) -> "SynthesisOptions":
 def _synthesis(arguments: argparse.Namespace, found: "CheckedSystem") -> "SystemSynthesis":
     from robosc.pipeline.systems import synthesize_system
 
-    assert found.system is not None  # noqa: S101 - asked only of models without errors
+    system, options = found.system, _options(arguments)
+    assert system is not None  # noqa: S101 - asked only of models without errors
+    return _watched(lambda on_progress: synthesize_system(system, options, on_progress, lambda: False, found.places))
+
+
+def _watched[T](work: "Callable[[OnProgress], T]") -> T:
+    """Return the result of some work, with a progress line on a terminal meanwhile."""
     progress = ProgressLine()
     try:
-        return synthesize_system(
-            found.system,
-            _options(arguments),
-            lambda step: progress.show(f"{step.stage}: {step.message}"),
-            lambda: False,
-        )
+        return work(lambda step: progress.show(f"{step.stage}: {step.message}"))
     finally:
         progress.clear()
 
 
 def report_none(arguments: argparse.Namespace, made: Synthesized) -> ExitCode:
-    """Report that there is no supervisor."""
+    """Report that there is no supervisor, and what is to blame."""
+    from robosc.explanation import document, empty_text
+
     if arguments.json:
-        print_json({"status": str(made.status), "reason": made.reason, **diagnostics_json(made.diagnostics)})
+        explanation = document(made.explanation) if made.explanation else None
+        told = {"status": str(made.status), "reason": made.reason, "explanation": explanation}
+        print_json({**told, **diagnostics_json(made.diagnostics)})
     else:
         print_diagnostics(made.diagnostics, made.bundle)
         if made.reason:
             sys.stderr.write(f"{arguments.model}: {made.reason}\n")
+        if made.explanation is not None:
+            sys.stderr.write(empty_text(made.explanation))
     return ExitCode.FAILED

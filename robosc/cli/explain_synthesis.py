@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from robosc.cli import synth
+from robosc.cli import automata, synth
 from robosc.cli.arguments import (
     add_deployment_argument,
     add_engine_options,
@@ -21,6 +21,7 @@ examples:
   robosc explain-synthesis robot.rscd --event move                    why move.request is restricted, or never happens
   robosc explain-synthesis robot.rscd --event move --state "Door.closed, Lift.n = 2"
   robosc explain-synthesis robot.rscd --after "up, Lift.tau_1"        what can happen then, and why the rest cannot
+  robosc explain-synthesis plant.cif --event lane.start               the same for CIF models (.gen, .wmod)
 """
 
 
@@ -31,7 +32,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="explain what synthesis did to a model",
         description="Explain the result of synthesis. Without a supervisor: a shortest run into trouble, and what is "
         "to blame. With one: what restricts each controllable event, why an event can never happen or cannot happen "
-        "in a state, and warnings about what never restricts, never happens, is never reached or only waits.",
+        "in a state, and warnings about what never restricts, never happens, is never reached or only waits. Takes "
+        "automata (FILE.cif, .gen, .wmod), too.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -46,7 +48,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--at",
         metavar="STATE",
         help="explain what can happen in a state of the controlled system that fits: Component.state, "
-        "Component.variable = value, !Component.flag, service.waiting, separated by commas",
+        "Component.variable = value, !Component.flag, service.waiting, separated by commas; of automata "
+        "Automaton.location, Automaton.variable = value",
     )
     parser.add_argument(
         "--after", metavar="EVENTS", help="explain what can happen after this run: events separated by commas"
@@ -58,9 +61,11 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize and explain; 0 with a supervisor, 1 without."""
+    if automata.is_given(arguments):
+        return automata.explain_synthesis(arguments)
     from robosc.certification import SynthesisOutcome
     from robosc.explanation import document, explanation_text
-    from robosc.pipeline.explaining import explained
+    from robosc.pipeline.explaining import Asked, explained
 
     bundle = read_bundle(arguments)
     progress = ProgressLine()
@@ -69,10 +74,8 @@ def run(arguments: argparse.Namespace) -> int:
             bundle,
             Deployment(arguments.deployment),
             engine_options(arguments),
-            event=arguments.event,
-            state=arguments.state,
-            after=arguments.after,
-            on_progress=lambda step: progress.show(step.message),
+            Asked(arguments.event, arguments.state, arguments.after),
+            lambda step: progress.show(step.message),
         )
     finally:
         progress.clear()

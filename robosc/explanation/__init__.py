@@ -12,11 +12,14 @@ if TYPE_CHECKING:
     from robosc.explanation.explanations import EmptyExplanation, Explanation, document, from_text, to_text
     from robosc.explanation.requests import RequestError
     from robosc.explanation.text import empty_text, explanation_text
+    from robosc.explanation.words import ModelWords, SystemWords
 
 _HOMES = {
     "EmptyExplanation": "explanations",
     "Explanation": "explanations",
+    "ModelWords": "words",
     "RequestError": "requests",
+    "SystemWords": "words",
     "document": "explanations",
     "empty_text": "text",
     "explain_empty": "blame",
@@ -29,7 +32,9 @@ _HOMES = {
 __all__ = [
     "EmptyExplanation",
     "Explanation",
+    "ModelWords",
     "RequestError",
+    "SystemWords",
     "document",
     "empty_text",
     "explain_empty",

@@ -8,16 +8,16 @@ nonblocking and closed under uncontrollable events, so the state were good.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
 from robosc.automata.compile import State
 from robosc.automata.state import subjects
+from robosc.automata.structure import Automaton
 from robosc.errors import InternalError
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, without_marks
 from robosc.explanation.problems import Problems
-from robosc.model.structure import is_tau
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import allowed
@@ -30,7 +30,7 @@ class HindranceKind(StrEnum):
     """Kind of cause that keeps an event from happening."""
 
     BEHAVIOUR = "behaviour"
-    """An automaton has no edge for it there whose guard is true."""
+    """The plants cannot do it: for the most part, one has no edge for it there whose guard is true."""
     RANGE = "range"
     """An update would leave a variable's range."""
     REQUIREMENT = "requirement"
@@ -48,6 +48,8 @@ class Hindrance:
         event: The event.
         where: Those of the states in which it does.
         automaton: The one without an edge.
+        plant_condition: Place in `System.plant_conditions` of the one that is not true.
+        is_impossible: True if every step would lead to states that are against the plant invariants.
         range: The range.
         condition: Place in `System.conditions`.
     """
@@ -56,6 +58,8 @@ class Hindrance:
     event: str
     where: Any
     automaton: str | None = None
+    plant_condition: int | None = None
+    is_impossible: bool = False
     range: RelaxableConstraint | None = None
     condition: int | None = None
 
@@ -73,6 +77,7 @@ class Counterexample:
         detour: Way that the plants by themselves would have to a marked state, where the state is not bad, but
             blocks; None where the plants have none either.
         unmarked: Automata that are in no marked location, where the state blocks.
+        is_marker_missed: True if the marker is not true there, where the state blocks.
     """
 
     run: SystemRun
@@ -82,6 +87,7 @@ class Counterexample:
     forbidden: tuple[tuple[str, int], ...]
     detour: "Detour | None"
     unmarked: tuple[str, ...]
+    is_marker_missed: bool
 
     @property
     def is_blocking(self) -> bool:
@@ -137,7 +143,8 @@ class Analysis:
         self._dropped_conditions = {place for item in dropped for place in item.conditions}
         self._dropped_invariants = {place for item in dropped for place in item.invariants}
         self._dropped_ranges = tuple(item for item in dropped if item.range is not None)
-        self._automata = without_marks(encoding.system, dropped).automata
+        left = without_marks(encoding.system, dropped)
+        self._automata, self._marker = left.automata, left.marker
         self._ranges = tuple(item for item in constraints if item.kind is ConstraintKind.RANGE)
         self._encoder = ExpressionEncoder(encoding)
         self._fixed_point, self._problem = problems.without(dropped)
@@ -152,26 +159,41 @@ class Analysis:
         """The states that a supervisor may be in."""
         free = (*dropped, *(item for item in constraints if item.kind is not ConstraintKind.MARKING))
         _, self._free = problems.without(free)
-        self._participants: dict[str, tuple[tuple[str, Any], ...]] = {}
+        self._enabling: dict[str, tuple[Hindrance, ...]] = {}
 
     # Why events cannot happen
 
-    def behaviours(self, event: str) -> tuple[tuple[str, Any], ...]:
-        """The automata that take part in an event, and where each has an edge for it whose guard is true."""
-        if event not in self._participants:
-            self._participants[event] = tuple(
-                (
-                    automaton.name,
-                    self._encoding.any_of(
-                        self._encoding.in_location(automaton.name, edge.source) & self._encoder.holds(edge.guard)
-                        for edge in automaton.edges
-                        if edge.event == event
-                    ),
-                )
-                for automaton in self._encoding.system.automata
-                if event in automaton.alphabet
-            )
-        return self._participants[event]
+    def _behaviours(self, event: str) -> tuple[Hindrance, ...]:
+        """Return all that could keep the plants from doing an event, each with the states where it does."""
+        if event not in self._enabling:
+            system = self._encoding.system
+            plants = [item for item in system.automata if event in item.alphabet]
+            found = [
+                Hindrance(HindranceKind.BEHAVIOUR, event, ~self._has_edge(item, event), automaton=item.name)
+                for item in plants
+                if event not in item.monitors
+            ]
+            found += [
+                Hindrance(HindranceKind.BEHAVIOUR, event, ~self._encoder.holds(item.condition), plant_condition=place)
+                for place, item in enumerate(system.plant_conditions)
+                if item.event == event
+            ]
+            if not plants:
+                found.append(Hindrance(HindranceKind.BEHAVIOUR, event, self._manager.true))
+            if system.plant_invariants:
+                able = self._encoding.all_of(~item.where for item in found)
+                where = able & ~self.wanted(event)
+                found.append(Hindrance(HindranceKind.BEHAVIOUR, event, where, is_impossible=True))
+            self._enabling[event] = tuple(found)
+        return self._enabling[event]
+
+    def _has_edge(self, automaton: Automaton, event: str) -> Any:
+        """Return the states where an automaton has an edge for an event whose guard is true."""
+        return self._encoding.any_of(
+            self._encoding.in_location(automaton.name, edge.source) & self._encoder.holds(edge.guard)
+            for edge in automaton.edges
+            if edge.event == event
+        )
 
     def wanted(self, event: str) -> Any:
         """Return the states where the plants would let an event happen if variables had no ranges."""
@@ -187,11 +209,8 @@ class Analysis:
         return good & steps.plant & allowed(steps, good)
 
     def moving(self, event: str) -> Any:
-        """Return the states where an event is more than a silent step that changes nothing.
-
-        Such a step is never taken.
-        """
-        return self._steps[event].moving() if is_tau(event) else self._manager.true
+        """Return the states where an event is more than a step that changes nothing."""
+        return self._steps[event].moving()
 
     def hindrances(self, event: str, states: Any, good: Any | None = None) -> tuple[Hindrance, ...]:
         """Return the hindrances that keep an event from happening in some of the states, whatever else does.
@@ -203,10 +222,7 @@ class Analysis:
         """
         good = self.good if good is None else good
         steps = self._steps[event]
-        found = [
-            Hindrance(HindranceKind.BEHAVIOUR, event, states & ~enabled, automaton=automaton)
-            for automaton, enabled in self.behaviours(event)
-        ]
+        found = [replace(item, where=states & item.where) for item in self._behaviours(event)]
         if steps.event.is_controllable:
             wanted = states & self.wanted(event)
             found += [
@@ -303,6 +319,7 @@ class Analysis:
             forbidden,
             self.detour(state, self._fixed_point.marked, self.safe) if is_blocking else None,
             self._unmarked(state) if is_blocking else (),
+            is_blocking and self._encoder.holds(self._marker) & state == false,
         )
 
     def _unmarked(self, state: Any) -> tuple[str, ...]:

@@ -4,18 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from robosc.automata.structure import System
 from robosc.explanation.analysis import Analysis
 from robosc.explanation.conflict import minimal_conflict, minimal_removal
-from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, relaxable_constraints
-from robosc.explanation.explanations import Blamed, EmptyExplanation
+from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
+from robosc.explanation.explanations import Blamed, CounterexampleReport, EmptyExplanation, Path, StateValues
 from robosc.explanation.problems import BoundedMonitor, EffortSpentError, Problems
 from robosc.explanation.reports import Reporter
-from robosc.explanation.terms import Terms
-from robosc.model.places import Places
-from robosc.model.structure import Deployment, Model
+from robosc.explanation.words import Words
 from robosc.synthesis.engines import EngineOptions
-from robosc.synthesis.findings import questions_about
 from robosc.synthesis.result import SynthesisProgress
 from robosc.synthesis.workspace import Workspace, workspace
 
@@ -30,6 +26,15 @@ MAXIMUM_PARTS = 200
 
 _ASKED = (ConstraintKind.REQUIREMENT, ConstraintKind.INVARIANT)
 """Kinds of constraints that are asked of the robot; the others are what it is."""
+
+
+_NOWHERE = CounterexampleReport(
+    kind="nowhere",
+    way=Path((), is_shortest=True, state=StateValues({}, {}, {})),
+    is_forced=True,
+    messages=("there is no initial state: initial locations, values and predicates, or plant invariants, exclude it",),
+    parts=(),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,22 +124,16 @@ class _Search:
 
 
 def explain_empty(
-    model: Model,
-    places: Places,
-    system: System,
+    words: Words,
     *,
-    deployment: Deployment,
     engine: str | EngineOptions = "auto",
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[SynthesisProgress], None] = lambda progress: None,
 ) -> EmptyExplanation:
-    """Explain why a model has no supervisor.
+    """Explain why a model, or automata, have no supervisor.
 
     Args:
-        model: The model.
-        places: Places of its parts.
-        system: Its automata, for which synthesis has found no supervisor.
-        deployment: Deployment of the supervisor that was to be made.
+        words: The automata, for which synthesis has found no supervisor, with the words for them.
         engine: Name of the engine for decision diagrams, or more about it.
         should_stop: Function called before each step; once true, the work ends.
         on_progress: Function called with the progress of the work.
@@ -142,23 +141,18 @@ def explain_empty(
     Raises:
         SynthesisCancelled: `should_stop` became true.
     """
-    with workspace(system, engine, should_stop, on_progress) as place:
+    with workspace(words.system, engine, should_stop, on_progress) as place:
         monitor = BoundedMonitor(place.monitor)
-        constraints = relaxable_constraints(system, questions_about(model, system, deployment).restrictions)
-        problems = Problems(place.encoding, monitor)
-        return explain_lost(place, monitor, problems, constraints, Terms(model, places, system, constraints))
+        return explain_lost(place, monitor, Problems(place.encoding, monitor), words)
 
 
-def explain_lost(
-    place: Workspace,
-    monitor: BoundedMonitor,
-    problems: Problems,
-    constraints: Sequence[RelaxableConstraint],
-    terms: Terms,
-) -> EmptyExplanation:
-    """Explain why a problem has no supervisor, in the words of its model."""
+def explain_lost(place: Workspace, monitor: BoundedMonitor, problems: Problems, words: Words) -> EmptyExplanation:
+    """Explain why a problem has no supervisor."""
     encoding, false = place.encoding, place.encoding.manager.false
+    constraints, terms = words.terms.constraints, words.terms
     fixed_point, problem = problems.without(())
+    if fixed_point.initial == false:
+        return EmptyExplanation(_NOWHERE, (), is_minimal=True, removal=(), is_of_automata=words.is_of_automata)
     fixed_point.good_states(problem, false)
     # What one synthesis takes, encoding and all, tells how large the problem is.
     monitor.limit = max(LEAST_EFFORT, EFFORT * monitor.steps)
@@ -180,4 +174,5 @@ def explain_lost(
         is_minimal=blame.is_minimal,
         removal=tuple(terms.part(constraints[item]) for item in removal) if len(removal) <= MAXIMUM_PARTS else (),
         left_out=max(0, len(blame.conflict) - MAXIMUM_PARTS),
+        is_of_automata=words.is_of_automata,
     )

@@ -4,7 +4,8 @@ Leaving a constraint out never takes anything from a supervisor: where one keeps
 still does. A condition or an invariant less forbids less, and a location more that is marked is one more to get to.
 A range counts as left out when an update beyond it stops at its end, as `clamp` does: in a state from which the
 variable is not led out of its range nothing changes, and the others become safe. So emptiness is monotone, which is
-all that finding a minimal set needs (see `conflict`), and without any constraint every system has a supervisor.
+all that finding a minimal set needs (see `conflict`), and without any constraint every system that can begin has a
+supervisor.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -13,7 +14,7 @@ from enum import StrEnum
 
 from robosc.automata.state import Subject
 from robosc.automata.structure import Assignment, Automaton, System
-from robosc.expressions import Call, Constant, Expression, IntegerType
+from robosc.expressions import TRUE, Call, Constant, Expression, IntegerType
 from robosc.synthesis.questions import Restriction
 
 
@@ -29,7 +30,7 @@ class ConstraintKind(StrEnum):
     RANGE = "range"
     """Range of a variable."""
     MARKING = "marking"
-    """Need of an automaton to get back to its marked locations."""
+    """Need of an automaton to get back to its marked locations, or of the system to where its marker holds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +43,7 @@ class RelaxableConstraint:
         invariants: Places in `System.invariants`.
         range: The variable whose range it is.
         marking: The automaton whose marking it is.
+        is_marker: True if it is the condition that all marked states have in common (`System.marker`).
     """
 
     kind: ConstraintKind
@@ -49,6 +51,7 @@ class RelaxableConstraint:
     invariants: tuple[int, ...] = ()
     range: Subject | None = None
     marking: str | None = None
+    is_marker: bool = False
 
 
 def relaxable_constraints(system: System, restrictions: Sequence[Restriction] = ()) -> tuple[RelaxableConstraint, ...]:
@@ -84,6 +87,8 @@ def relaxable_constraints(system: System, restrictions: Sequence[Restriction] = 
         for item in system.automata
         if not item.marked.issuperset(item.locations)
     ]
+    if system.marker != TRUE:
+        found.append(RelaxableConstraint(ConstraintKind.MARKING, is_marker=True))
     ranks = list(ConstraintKind)
     return tuple(sorted(found, key=lambda item: ranks.index(item.kind)))
 
@@ -115,12 +120,14 @@ def without(system: System, constraints: Iterable[RelaxableConstraint]) -> Syste
 
 
 def without_marks(system: System, constraints: Iterable[RelaxableConstraint]) -> System:
-    """The system in which every location of some automata is marked."""
-    dropped = {item.marking for item in constraints}
+    """The system in which every location of some automata is marked, or which needs no marker."""
+    chosen = tuple(constraints)
+    dropped = {item.marking for item in chosen}
     automata = (
         replace(item, marked=frozenset(item.locations)) if item.name in dropped else item for item in system.automata
     )
-    return replace(system, automata=tuple(automata))
+    marker = TRUE if any(item.is_marker for item in chosen) else system.marker
+    return replace(system, automata=tuple(automata), marker=marker)
 
 
 def without_ranges(system: System, constraints: Iterable[RelaxableConstraint]) -> System:

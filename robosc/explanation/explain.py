@@ -7,26 +7,21 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from robosc.automata.state import subjects
-from robosc.automata.structure import System
-from robosc.errors import Diagnostic, InternalError
+from robosc.errors import InternalError
 from robosc.explanation.analysis import Analysis, Detour, Hindrance, HindranceKind
 from robosc.explanation.blame import explain_lost
 from robosc.explanation.conflict import minimal_conflict
-from robosc.explanation.constraints import relaxable_constraints
 from robosc.explanation.explanations import EventHere, EventReport, Explanation, Reason, Remark, StateReport
 from robosc.explanation.notation import events_text
 from robosc.explanation.problems import BoundedMonitor, Problems
 from robosc.explanation.reports import Reporter
-from robosc.explanation.requests import MAXIMUM_SHOWN, RequestError, asked_event, asked_run, asked_state
-from robosc.explanation.terms import Terms
-from robosc.model.places import Places
-from robosc.model.structure import Deployment, EventKind, Model
+from robosc.explanation.requests import MAXIMUM_SHOWN, RequestError
+from robosc.explanation.words import Words
 from robosc.source import visible
 from robosc.synthesis.controlled import ControlledSystem
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.expression_encoder import ExpressionEncoder
-from robosc.synthesis.findings import findings, questions_about
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.nodes import count_models
 from robosc.synthesis.result import SynthesisProgress
@@ -36,16 +31,10 @@ from robosc.synthesis.workspace import workspace
 MAXIMUM_STATES = 5
 """States of one kind that warnings show: all of them could be too many to read."""
 
-_TOLD = frozenset({"never-enabled", "unused-requirement"})
-"""The findings of `robosc synth` that belong to an explanation."""
-
 
 def explain_synthesis(
-    model: Model,
-    places: Places,
-    system: System,
+    words: Words,
     *,
-    deployment: Deployment,
     engine: str | EngineOptions = "auto",
     event: str | None = None,
     state: str | None = None,
@@ -53,13 +42,10 @@ def explain_synthesis(
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[SynthesisProgress], None] = lambda progress: None,
 ) -> Explanation:
-    """Explain what synthesis did to a model.
+    """Explain what synthesis did to a model or to automata.
 
     Args:
-        model: The checked model.
-        places: Places of its parts.
-        system: Its automata.
-        deployment: Deployment of the supervisor.
+        words: The automata, with the words for them.
         engine: Name of the engine for decision diagrams, or more about it.
         event: The event to explain; none: all of them, and warnings.
         state: Description of a state in which to explain what can happen, such as `Door.closed, Lift.n = 2`.
@@ -74,49 +60,42 @@ def explain_synthesis(
         UnknownEngineError: There is no such engine.
         UnsupportedModelError: The model is outside what synthesis handles.
     """
-    name = None if event is None else asked_event(system, model, event)
-    condition = None if state is None else asked_state(system, model, state)
-    run = None if after is None else asked_run(system, model, after)
-    with workspace(system, engine, should_stop, on_progress) as place:
+    requests = words.requests
+    name = None if event is None else requests.event(event)
+    condition = None if state is None else requests.state(state)
+    run = None if after is None else requests.run(after)
+    with workspace(words.system, engine, should_stop, on_progress) as place:
         encoding, monitor = place.encoding, BoundedMonitor(place.monitor)
-        constraints = relaxable_constraints(system, questions_about(model, system, deployment).restrictions)
         problems = Problems(encoding, monitor)
-        terms = Terms(model, places, system, constraints)
         fixed_point, problem = problems.without(())
         with place.reordering():
             good = fixed_point.good_states(problem, encoding.manager.false)
             reachable = None if good.reason else fixed_point.reachable_states(problem, good.states)
         if good.reason:
-            return Explanation(empty=explain_lost(place, monitor, problems, constraints, terms))
-        analysis = Analysis(encoding, monitor, problems, constraints, good.states)
-        explainer = _Explainer(
-            encoding, monitor, system, analysis, Reporter(analysis, terms), reachable, fixed_point.initial
-        )
+            empty = explain_lost(place, monitor, problems, words)
+            return Explanation(empty=empty, is_of_automata=words.is_of_automata)
+        analysis = Analysis(encoding, monitor, problems, words.terms.constraints, good.states)
+        explainer = _Explainer(encoding, monitor, words, analysis, reachable, fixed_point.initial & good.states)
         if condition is not None or run is not None:
             fitting = reachable
             if run is not None:
                 fitting = explainer.after(run)
             if condition is not None:
                 fitting = explainer.fitting(fitting, ExpressionEncoder(encoding).holds(condition), str(state))
-            return Explanation(state=explainer.state(fitting, name, run))
+            return Explanation(state=explainer.state(fitting, name, run), is_of_automata=words.is_of_automata)
         if name is not None:
-            return Explanation(events=(explainer.event(name, has_behaviours=True),))
+            report = explainer.event(name, has_behaviours=True)
+            return Explanation(events=(report,), is_of_automata=words.is_of_automata)
         controlled = ControlledSystem(encoding, monitor, problem, good.states, reachable)
-        diagnostics = findings(model, places, controlled.answers(questions_about(model, system, deployment)))
         return Explanation(
-            events=tuple(explainer.event(item.name) for item in system.events if item.is_controllable),
+            events=tuple(explainer.event(item.name) for item in words.system.events if item.is_controllable),
             remarks=(
-                *_found(diagnostics),
-                *explainer.unreachable_states(model, places),
+                *words.remarks(controlled.answers(words.questions)),
+                *explainer.unreachable_states(),
                 *explainer.left_to_the_environment(),
             ),
+            is_of_automata=words.is_of_automata,
         )
-
-
-def _found(diagnostics: tuple[Diagnostic, ...]) -> Iterator[Remark]:
-    for item in diagnostics:
-        if item.code in _TOLD:
-            yield Remark(item.code, item.message, item.location)
 
 
 class _Explainer:
@@ -126,21 +105,21 @@ class _Explainer:
         self,
         encoding: Encoding,
         monitor: ProgressMonitor,
-        system: System,
+        words: Words,
         analysis: Analysis,
-        reporter: Reporter,
         reachable: Any,
         initial: Any,
     ) -> None:
         self._encoding = encoding
         self._monitor = monitor
         self._false = encoding.manager.false
-        self._system = system
+        self._words = words
+        self._system = words.system
         self._analysis = analysis
-        self._reporter = reporter
+        self._reporter = Reporter(analysis, words.terms)
         self._reachable = reachable
         self._initial = initial
-        self._possible = {event.name: reachable & analysis.possible(event.name) for event in system.events}
+        self._possible = {event.name: reachable & analysis.possible(event.name) for event in words.system.events}
         self._runs = analysis.runs(initial, self._possible)
 
     def _run_to(self, states: Any) -> SystemRun:
@@ -234,7 +213,8 @@ class _Explainer:
             stopped = self._reporter.stopped(detour, self._analysis.good)
             event = stopped.events[stopped.stopped_at]
             problem += (
-                f": the behaviours would have the way {events_text(stopped.events)}, but {event} must not happen: "
+                f": the {self._words.terms.plants} would have the way {events_text(stopped.events)}, but {event} must "
+                "not happen: "
                 f"{_messages(stopped.reasons) or 'it leads into trouble'}"
             )
         raise RequestError(problem)
@@ -274,39 +254,43 @@ class _Explainer:
 
     # Warnings
 
-    def unreachable_states(self, model: Model, places: Places) -> Iterator[Remark]:
-        """States of components that the controlled system never gets to."""
-        for component in model.components:
-            for location in component.behaviour.states if component.behaviour else ():
-                self._monitor.check_stop()
-                goal = self._encoding.in_location(component.name, location.name)
-                if goal & self._reachable != self._false:
-                    continue
-                detour = self._detour(goal)
-                yield Remark(
-                    "unreachable-state",
-                    f"{component.name} never gets to '{location.name}'"
-                    + ("" if detour else ": its behaviour has no way there"),
-                    places.states[component.name, location.name],
-                    stopped=None if detour is None else self._reporter.stopped(detour, self._analysis.good),
-                )
+    def unreachable_states(self) -> Iterator[Remark]:
+        """Locations that the controlled system never gets to."""
+        for automaton, location, place in self._words.locations():
+            self._monitor.check_stop()
+            goal = self._encoding.in_location(automaton, location)
+            if goal & self._reachable != self._false:
+                continue
+            detour = self._detour(goal)
+            plants = self._words.terms.plants
+            whose = "its behaviour has" if plants == "behaviours" else f"the {plants} have"
+            yield Remark(
+                "unreachable-state",
+                f"{self._words.terms.automaton(automaton)} never gets to '{location}'"
+                + ("" if detour else f": {whose} no way there"),
+                place,
+                stopped=None if detour is None else self._reporter.stopped(detour, self._analysis.good),
+            )
 
     def left_to_the_environment(self) -> Iterator[Remark]:
-        """States from which no controllable event can move on, by the states of components and communications."""
-        # An action's cancel is the executor's own in the layer, too, where the caller may cancel as well; and a step
-        # that changes nothing is none.
-        own = [event.is_controllable or event.name.endswith(f".{EventKind.CANCEL}") for event in self._system.events]
+        """States from which no event that is a controller's own can move on, by the locations of automata."""
         controllable, uncontrollable = (
             self._encoding.any_of(
-                self._possible[event.name] & self._analysis.moving(event.name)
-                for event, is_own in zip(self._system.events, own, strict=True)
-                if is_own is kind
+                self._possible[event.name] & self._moving(event.name)
+                for event in self._system.events
+                if self._words.terms.is_own(event.name) is kind
             )
             for kind in (True, False)
         )
         waiting = self._reachable & ~controllable
         yield from self._shown("only-uncontrollable", waiting & uncontrollable, "only the environment can move on")
         yield from self._shown("deadlock", waiting & ~uncontrollable, "nothing at all can happen")
+
+    def _moving(self, event: str) -> Any:
+        """Return the states where an event counts as a step: a silent one that changes nothing is never taken."""
+        if self._words.terms.is_silent(event):
+            return self._analysis.moving(event)
+        return self._encoding.manager.true
 
     def _shown(self, kind: str, states: Any, what: str) -> Iterator[Remark]:
         count = count_models(self._encoding.manager, states, self._encoding.state_names)

@@ -18,7 +18,8 @@ class Part:
     """A part of the model.
 
     Attributes:
-        kind: `requirement`, `invariant`, `condition`, `range`, `marking`; `component`, `communication`, `state`.
+        kind: `requirement`, `invariant`, `condition`, `range`, `marking`; `component`, `communication`, `state`; of
+            automata that are no model's also `plant`.
         text: Description of the part, in the model's words.
         location: Place of the part.
     """
@@ -100,8 +101,8 @@ class CounterexampleReport:
     """A run into trouble.
 
     Attributes:
-        kind: `bad`, where an invariant, a range or a condition is broken at the end, or `blocking`, where no marked
-            state can be reached from there.
+        kind: `bad`, where an invariant, a range or a condition is broken at the end; `blocking`, where no marked state
+            can be reached from there; `nowhere`, where no run begins, since there is no initial state.
         way: The run.
         is_forced: True if nothing can prevent it: all of its events are uncontrollable.
         messages: Sentences that say what the trouble is.
@@ -142,6 +143,7 @@ class EmptyExplanation:
         removal: The fewest parts, in the sense that none of them can stay, without which there is a supervisor; empty
             where that was not found out, or there are very many.
         left_out: Number of blamed parts that are not listed.
+        is_of_automata: True if it is about automata that are no model's: their plants are no behaviours.
     """
 
     trouble: CounterexampleReport
@@ -149,6 +151,7 @@ class EmptyExplanation:
     is_minimal: bool
     removal: tuple[Part, ...]
     left_out: int = 0
+    is_of_automata: bool = False
 
     def __repr__(self) -> str:
         return f"<no supervisor: {len(self.blamed) + self.left_out} parts of the model are to blame>"
@@ -236,12 +239,14 @@ class Explanation:
         events: The events asked for; where none was, every controllable event. Empty where a state was asked for.
         state: Report on what can happen in the state asked for.
         remarks: Warnings, where neither an event nor a state was asked for.
+        is_of_automata: True if it is about automata that are no model's: their plants are no behaviours.
     """
 
     empty: EmptyExplanation | None = None
     events: tuple[EventReport, ...] = ()
     state: StateReport | None = None
     remarks: tuple[Remark, ...] = ()
+    is_of_automata: bool = False
 
     def __repr__(self) -> str:
         if self.empty is not None:

@@ -4,6 +4,7 @@ from typing import Any
 
 from robosc.automata.compile import State
 from robosc.explanation.analysis import Analysis, Counterexample, Detour, Hindrance, HindranceKind
+from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
 from robosc.explanation.explanations import CounterexampleReport, Path, Reason, Stopped
 from robosc.explanation.notation import value_text
 from robosc.explanation.terms import Terms
@@ -11,6 +12,9 @@ from robosc.synthesis.runs import SystemRun
 
 MAXIMUM_REASONS = 20
 """Reasons, and parts that are broken, that are told of one state: thousands would tell nothing more."""
+
+
+_MARKER = RelaxableConstraint(ConstraintKind.MARKING, is_marker=True)
 
 
 class Reporter:
@@ -66,8 +70,11 @@ class Reporter:
             parts += [self._terms.automaton_part(name) for name in unmarked]
             whose = f"; not marked now: {', '.join(names)}" if names else ""
             messages.append(f"no marked state can be reached from there{whose}")
+            if item.is_marker_missed:
+                parts.append(self._terms.part(_MARKER))
+                messages.append(f"'{parts[-1].text}' is not so there")
             if item.detour is None:
-                messages.append("the behaviours by themselves have no way to one")
+                messages.append(f"the {self._terms.plants} by themselves have no way to one")
             else:
                 stopped = self.stopped(item.detour, self._analysis.safe)
         return CounterexampleReport(

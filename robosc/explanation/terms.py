@@ -1,6 +1,11 @@
-"""Automata in the model's words: states, parts with their places, and why events cannot happen."""
+"""Automata in words: states, parts with their places, and why events cannot happen.
 
-from collections.abc import Sequence
+`Terms` is what is said of automata of any origin; `ModelTerms` has the words of a robot's model, and
+`system_terms.SystemTerms` those of automata that come from elsewhere.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Sequence
 
 from robosc.automata.compile import NO_DATA, State, compile_expression, subjects_read
 from robosc.automata.plants import communication_plant_name
@@ -9,21 +14,171 @@ from robosc.automata.structure import System
 from robosc.explanation.analysis import Hindrance, HindranceKind
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
 from robosc.explanation.explanations import Part, StateValues
-from robosc.explanation.notation import requirement_text, value_text
+from robosc.explanation.notation import MAXIMUM_NAMES, cut, requirement_text, value_text
 from robosc.expressions import TRUE, Expression, Value, type_text
 from robosc.expressions.text import automaton_text, expression_text
 from robosc.model.places import Places
-from robosc.model.structure import CommunicationKind, Model
+from robosc.model.structure import CommunicationKind, EventKind, Model, is_tau
 from robosc.source import Location
 
-MAXIMUM_TEXT = 300
-"""Characters of a text of the model that are shown."""
 
-MAXIMUM_NAMES = 8
-"""Names, and values, that a sentence lists."""
+class Terms(ABC):
+    """The words of one system.
+
+    Args:
+        system: Its automata, all of them plants.
+        constraints: Constraints that its problem could be without.
+        whole_names: Names that keep those of automata whole in texts; see `automaton_text`.
+
+    Attributes:
+        plants: Word for what can happen when nothing is forbidden.
+    """
+
+    plants: str
+
+    def __init__(
+        self, system: System, constraints: Sequence[RelaxableConstraint], whole_names: Collection[str]
+    ) -> None:
+        self._system = system
+        self._constraints = tuple(constraints)
+        self._whole_names = whole_names
+        self._subjects = {subject: place for place, subject in enumerate(subjects(system))}
+        self._by_condition = {place: item for item in constraints for place in item.conditions}
+        self._by_invariant = {place: item for item in constraints for place in item.invariants}
+
+    @property
+    def constraints(self) -> tuple[RelaxableConstraint, ...]:
+        """The constraints that the problem could be without."""
+        return self._constraints
+
+    # States
+
+    @abstractmethod
+    def state(self, state: State) -> StateValues:
+        """A state, as `robosc explore` names it."""
+
+    def _values_read(self, expression: Expression, state: State) -> str:
+        """Return what a condition reads, with its values in a state; empty if it reads nothing."""
+        read = sorted(subjects_read(expression), key=self._subjects.__getitem__)
+        found = [self._value(subject, state[self._subjects[subject]]) for subject in read[:MAXIMUM_NAMES]]
+        return ", ".join(found) + (", ..." if len(read) > MAXIMUM_NAMES else "")
+
+    def _value(self, subject: Subject, value: Value) -> str:
+        if subject.variable is None:
+            return f"{self.automaton(subject.automaton)} is {value}"
+        return f"{subject} is {value_text(value)}"
+
+    def _read(self, expression: Expression, state: State) -> str:
+        """Return the end of a sentence about a condition that is not true: why, and the values that it reads."""
+        values = self._values_read(expression, state)
+        is_unknown = compile_expression(expression, self._subjects)(state, NO_DATA) is None
+        return (", for its value is unknown" if is_unknown else "") + (f": {values}" if values else "")
+
+    def automaton(self, name: str) -> str:
+        """Return the name of an automaton in a text."""
+        return automaton_text(name, self._whole_names)
+
+    def _text(self, expression: Expression) -> str:
+        return expression_text(expression, self._whole_names)
+
+    # Events
+
+    @abstractmethod
+    def is_own(self, event: str) -> bool:
+        """Return True if a controller takes an event of its own accord, and need not wait for it."""
+
+    @abstractmethod
+    def is_silent(self, event: str) -> bool:
+        """Return True if an event is never taken where it changes nothing."""
+
+    # Parts
+
+    def part(self, constraint: RelaxableConstraint) -> Part:
+        """Return the part that a constraint is."""
+        if constraint.range is not None:
+            text = f"the range of {constraint.range}: {type_text(subject_type(self._system, constraint.range))}"
+            location = self._variable_place(constraint.range)
+        elif constraint.marking is not None:
+            text, location = self._marking(constraint.marking)
+        else:
+            text, location = self._described(constraint)
+        return Part(str(constraint.kind), cut(text), location)
+
+    @abstractmethod
+    def _described(self, item: RelaxableConstraint) -> tuple[str, Location | None]:
+        """The text and the place of conditions, an invariant or the marker."""
+
+    @abstractmethod
+    def _variable_place(self, variable: Subject) -> Location | None: ...
+
+    def _marking(self, automaton: str) -> tuple[str, Location | None]:
+        """The text and the place of an automaton's need to be marked."""
+        marked = sorted(self._system.automaton(automaton).marked)
+        shown = ", ".join(marked[:MAXIMUM_NAMES]) + (", ..." if len(marked) > MAXIMUM_NAMES else "")
+        return f"that {automaton} gets to a marked state ({shown or 'none'})", self.automaton_part(automaton).location
+
+    def condition_part(self, place: int) -> Part:
+        """The part that brings an event condition."""
+        return self.part(self._by_condition[place])
+
+    def invariant_part(self, place: int) -> Part:
+        """The part that brings an invariant."""
+        return self.part(self._by_invariant[place])
+
+    @abstractmethod
+    def automaton_part(self, name: str) -> Part:
+        """The part that an automaton stands for."""
+
+    # Sentences
+
+    def hindered(self, item: Hindrance, state: State) -> tuple[str, Part | None]:
+        """Return the reason why an event cannot happen in a state, and the part that is the cause."""
+        match item.kind:
+            case HindranceKind.BEHAVIOUR:
+                return self._behaviour(item, state)
+            case HindranceKind.RANGE if item.range is not None and item.range.range is not None:
+                subject = item.range.range
+                now = value_text(state[self._subjects[subject]])
+                return f"it would take {subject}, which is {now}, out of its range", self.part(item.range)
+            case HindranceKind.REQUIREMENT if item.condition is not None:
+                part = self.condition_part(item.condition)
+                return f"'{part.text}' forbids it{self._forbidding(item.condition, state)}", part
+            case _:
+                return "synthesis forbids it, because of what can follow", None
+
+    def _forbidding(self, place: int, state: State) -> str:
+        """Return the end of a sentence about an event condition that is not true."""
+        return self._read(self._system.conditions[place].condition, state)
+
+    def _behaviour(self, item: Hindrance, state: State) -> tuple[str, Part | None]:
+        if item.automaton is not None:
+            return self._without_edge(item.automaton, item.event, state), self.automaton_part(item.automaton)
+        if item.plant_condition is not None:
+            return self._impossible(item.plant_condition, state)
+        if item.is_impossible:
+            return f"it would lead the {self.plants} only to what their invariants exclude", None
+        return "no automaton has it in its alphabet", None
+
+    def _impossible(self, place: int, state: State) -> tuple[str, Part | None]:
+        """The sentence about a plant's event condition that is not true, and its part."""
+        condition = self._system.plant_conditions[place].condition
+        return f"'{cut(self._text(condition))}' is not true{self._read(condition, state)}", None
+
+    def _without_edge(self, name: str, event: str, state: State) -> str:
+        location = state[self._subjects[Subject(name)]]
+        edges = [edge for edge in self._system.automaton(name).edges if edge.event == event and edge.source == location]
+        where = self._where(name, str(location))
+        if not edges:
+            return f"{where} it has no transition on {event}"
+        guards = [cut(self._text(edge.guard)) for edge in edges if edge.guard != TRUE]
+        return f"{where} {' and '.join(guards[:MAXIMUM_NAMES])} is not true"
+
+    def _where(self, automaton: str, location: str) -> str:
+        """Return the beginning of a sentence about a location of an automaton."""
+        return f"{self.automaton(automaton)} is {location}, where"
 
 
-class Terms:
+class ModelTerms(Terms):
     """The words of one model.
 
     Args:
@@ -33,22 +188,17 @@ class Terms:
         constraints: Constraints that its problem could be without; requirements and invariants in the model's order.
     """
 
+    plants = "behaviours"
+
     def __init__(
         self, model: Model, places: Places, system: System, constraints: Sequence[RelaxableConstraint]
     ) -> None:
+        super().__init__(system, constraints, frozenset(item.name for item in model.components))
         self._model = model
-        self._components = frozenset(item.name for item in model.components)
         self._places = places
-        self._system = system
-        self._constraints = tuple(constraints)
-        self._subjects = {subject: place for place, subject in enumerate(subjects(system))}
-        self._plants = {communication_plant_name(item): item for item in model.communications}
+        self._communications = {communication_plant_name(item): item for item in model.communications}
         requirements = [item for item in constraints if item.kind is ConstraintKind.REQUIREMENT]
         self._requirements = {item: number for number, item in enumerate(requirements)}
-        self._by_condition = {place: item for item in constraints for place in item.conditions}
-        self._by_invariant = {place: item for item in constraints for place in item.invariants}
-
-    # States
 
     def state(self, state: State) -> StateValues:
         """A state, as `robosc explore` names it."""
@@ -60,112 +210,49 @@ class Terms:
             variables={str(subject): value for subject, value in values.items() if subject.variable is not None},
             communications={
                 self.automaton(name): str(values[Subject(name)])
-                for name, item in self._plants.items()
+                for name, item in self._communications.items()
                 if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
             },
         )
 
-    def values_read(self, expression: Expression, state: State) -> str:
-        """Return what a condition reads, with its values in a state; empty if it reads nothing."""
-        read = sorted(subjects_read(expression), key=self._subjects.__getitem__)
-        found = [self._value(subject, state[self._subjects[subject]]) for subject in read[:MAXIMUM_NAMES]]
-        return ", ".join(found) + (", ..." if len(read) > MAXIMUM_NAMES else "")
+    def is_own(self, event: str) -> bool:
+        """Return True if the executor takes an event of its own accord.
 
-    def _value(self, subject: Subject, value: Value) -> str:
-        if subject.variable is None:
-            return f"{self.automaton(subject.automaton)} is {value}"
-        return f"{subject} is {value_text(value)}"
+        An action's cancel is its own in the layer, too, where the caller may cancel as well.
+        """
+        return self._system.event(event).is_controllable or event.endswith(f".{EventKind.CANCEL}")
 
-    def automaton(self, name: str) -> str:
-        """Return the name of an automaton in the model."""
-        return automaton_text(name, self._components)
+    def is_silent(self, event: str) -> bool:
+        """Return True for a silent step of a behaviour."""
+        return is_tau(event)
 
-    def _text(self, expression: Expression) -> str:
-        return expression_text(expression, self._components)
-
-    # Parts
-
-    def part(self, constraint: RelaxableConstraint) -> Part:
-        """Return the part of the model that a constraint is."""
-        text, location = self._described(constraint)
-        return Part(str(constraint.kind), _cut(text), location)
-
-    def _described(self, item: RelaxableConstraint) -> tuple[str, Location]:
+    def _described(self, item: RelaxableConstraint) -> tuple[str, Location | None]:
         if item.kind is ConstraintKind.REQUIREMENT:
             number = self._requirements[item]
-            return requirement_text(self._model.requirements[number], self._components), self._places.requirements[
-                number
-            ]
+            text = requirement_text(self._model.requirements[number], self._whole_names)
+            return text, self._places.requirements[number]
         if item.invariants:
             (place,) = item.invariants
             invariant = self._model.invariants[place]
             word = "never" if invariant.is_never else "always"
             return f"requirement {word} {self._text(invariant.expression)}", self._places.invariants[place]
-        if item.conditions:
-            (place,) = item.conditions
-            event = self._system.conditions[place].event
-            name = event.rpartition(".")[0]
-            return f"{event} only where a requirement on {name} does not hold", self._places.communications[name]
-        if item.range is not None:
-            component, variable = item.range.automaton, item.range.variable or ""
-            text = f"the range of {item.range}: {type_text(subject_type(self._system, item.range))}"
-            return text, self._places.variables[component, variable]
-        return self._marking(str(item.marking))
+        (place,) = item.conditions
+        event = self._system.conditions[place].event
+        name = event.rpartition(".")[0]
+        return f"{event} only where a requirement on {name} does not hold", self._places.communications[name]
 
-    def _marking(self, automaton: str) -> tuple[str, Location]:
-        if automaton in self._plants:
-            location = self._places.communications[self._plants[automaton].name]
+    def _variable_place(self, variable: Subject) -> Location:
+        return self._places.variables[variable.automaton, variable.variable or ""]
+
+    def _marking(self, automaton: str) -> tuple[str, Location | None]:
+        if automaton in self._communications:
+            location = self._places.communications[self._communications[automaton].name]
             return f"that {self.automaton(automaton)} gets back to idle", location
-        marked = sorted(self._system.automaton(automaton).marked)
-        shown = ", ".join(marked[:MAXIMUM_NAMES]) + (", ..." if len(marked) > MAXIMUM_NAMES else "")
-        return f"that {automaton} gets to a marked state ({shown or 'none'})", self._places.components[automaton]
-
-    def condition_part(self, place: int) -> Part:
-        """The part of the model that brings an event condition."""
-        return self.part(self._by_condition[place])
-
-    def invariant_part(self, place: int) -> Part:
-        """The part of the model that brings an invariant."""
-        return self.part(self._by_invariant[place])
+        return super()._marking(automaton)
 
     def automaton_part(self, name: str) -> Part:
         """The component or communication that an automaton stands for."""
-        if name in self._plants:
-            communication = self._plants[name].name
+        if name in self._communications:
+            communication = self._communications[name].name
             return Part("communication", communication, self._places.communications[communication])
         return Part("component", name, self._places.components[name])
-
-    # Sentences
-
-    def hindered(self, item: Hindrance, state: State) -> tuple[str, Part | None]:
-        """Return the reason why an event cannot happen in a state, and the part of the model that is the cause."""
-        match item.kind:
-            case HindranceKind.BEHAVIOUR:
-                name = str(item.automaton)
-                return self._behaviour(name, item.event, state), self.automaton_part(name)
-            case HindranceKind.RANGE if item.range is not None and item.range.range is not None:
-                subject = item.range.range
-                now = value_text(state[self._subjects[subject]])
-                return f"it would take {subject}, which is {now}, out of its range", self.part(item.range)
-            case HindranceKind.REQUIREMENT if item.condition is not None:
-                part = self.condition_part(item.condition)
-                condition = self._system.conditions[item.condition].condition
-                values = self.values_read(condition, state)
-                is_unknown = compile_expression(condition, self._subjects)(state, NO_DATA) is None
-                why = ", for its value is unknown" if is_unknown else ""
-                return f"'{part.text}' forbids it{why}" + (f": {values}" if values else ""), part
-            case _:
-                return "synthesis forbids it, because of what can follow", None
-
-    def _behaviour(self, name: str, event: str, state: State) -> str:
-        location = state[self._subjects[Subject(name)]]
-        edges = [edge for edge in self._system.automaton(name).edges if edge.event == event and edge.source == location]
-        where = f"{self.automaton(name)} is {location}"
-        if not edges:
-            return f"{where}, where it has no transition on {event}"
-        guards = [_cut(self._text(edge.guard)) for edge in edges if edge.guard != TRUE]
-        return f"{where}, where {' and '.join(guards[:MAXIMUM_NAMES])} is not true"
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= MAXIMUM_TEXT else text[: MAXIMUM_TEXT - 4] + " ..."

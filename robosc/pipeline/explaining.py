@@ -3,10 +3,16 @@
 from dataclasses import dataclass
 from typing import overload
 
+from robosc.automata import System, check_system
 from robosc.certification import Progress, SynthesisOutcome, SynthesisProblem, prepare
 from robosc.diagnostics import Page, page
 from robosc.errors import Diagnostic, UnsupportedModelError
-from robosc.explanation import Explanation, explain_synthesis
+from robosc.explanation import (
+    Explanation,
+    ModelWords,
+    SystemWords,
+    explain_synthesis,
+)
 from robosc.model.structure import Deployment
 from robosc.pipeline.findings import Findings
 from robosc.pipeline.loading import ModelLike, loaded
@@ -47,7 +53,7 @@ def explain(*, code: str) -> Page: ...
 
 @overload
 def explain(
-    model: ModelLike,
+    model: ModelLike | System,
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     event: str | None = None,
@@ -59,7 +65,7 @@ def explain(
 
 
 def explain(
-    model: ModelLike | Diagnostic | None = None,
+    model: ModelLike | System | Diagnostic | None = None,
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     code: str | None = None,
@@ -72,7 +78,8 @@ def explain(
     """Explain what synthesis did to a model: what restricts its events, or what is to blame; or explain a finding.
 
     Args:
-        model: The model, as `load` returns it, or the path of one; or a finding, whose code is explained.
+        model: The model, as `load` returns it, the path of one, or a `robosc.automata.System`; or a finding, whose code
+            is explained.
         options: Options for making the supervisor.
         code: Code of a finding to explain, such as `unknown-name`, instead of a model.
         event: The event to explain; None: all of them, and warnings.
@@ -87,6 +94,7 @@ def explain(
         RequestError: Something that is asked about is not there: an event, a part of the model, a state, a run.
         FileAccessError: The file is not there or cannot be read.
         LanguageError: A file is too large or not UTF-8.
+        InvalidSystemError: The automata do not fit together.
         NodeLimitError: Decision diagrams became larger than the options allow.
         UnknownEngineError: There is no such engine.
         SynthesisCancelled: `should_stop` became true.
@@ -97,18 +105,13 @@ def explain(
         return page(model.code)
     if model is None:
         return page(str(code))
+    asked = Asked(event, state, after)
+    if isinstance(model, System):
+        check_system(model)
+        return explained_system(SystemWords(model), options.engine_options(), asked, on_progress, should_stop)
     bundle = loaded(model)
     try:
-        found = explained(
-            bundle,
-            options.deployment,
-            options.engine_options(),
-            event=event,
-            state=state,
-            after=after,
-            on_progress=on_progress,
-            should_stop=should_stop,
-        )
+        found = explained(bundle, options.deployment, options.engine_options(), asked, on_progress, should_stop)
     except UnsupportedModelError as error:
         attempt = Unsupported(str(error))
         diagnostics = findings_of(attempt, bundle)
@@ -121,18 +124,33 @@ def explain(
             SynthesisStatus.MODEL_ERRORS, diagnostics, found.reason, NoSupervisor(found.reason, diagnostics)
         )
     problem, explanation = found
-    status = SynthesisStatus.SUPERVISOR if explanation.empty is None else SynthesisStatus.EMPTY
-    return Explained(status, Findings(problem.diagnostics, bundle), "", explanation)
+    return Explained(_status(explanation), Findings(problem.diagnostics, bundle), "", explanation)
+
+
+def _status(explanation: Explanation) -> SynthesisStatus:
+    return SynthesisStatus.SUPERVISOR if explanation.empty is None else SynthesisStatus.EMPTY
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Subject of an explanation; without any, all controllable events and warnings.
+
+    Attributes:
+        event: The event to explain.
+        state: Description of a state in which to explain what can happen.
+        after: Run after which to explain what can happen.
+    """
+
+    event: str | None = None
+    state: str | None = None
+    after: str | None = None
 
 
 def explained(
     bundle: Bundle,
     deployment: Deployment,
     engine: EngineOptions,
-    *,
-    event: str | None = None,
-    state: str | None = None,
-    after: str | None = None,
+    asked: Asked,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> SynthesisOutcome | tuple[SynthesisProblem, Explanation]:
@@ -140,16 +158,39 @@ def explained(
     problem = prepare(bundle, deployment)
     if isinstance(problem, SynthesisOutcome):
         return problem
-    explanation = explain_synthesis(
-        problem.model,
-        problem.places,
-        problem.system.automata,
-        deployment=deployment,
+    words = ModelWords(problem.model, problem.places, problem.system.automata, deployment)
+    return problem, _explanation(words, engine, asked, on_progress, should_stop)
+
+
+def explained_system(
+    words: SystemWords,
+    engine: EngineOptions,
+    asked: Asked,
+    on_progress: OnProgress = ignored,
+    should_stop: ShouldStop = never,
+) -> Explained:
+    """Return what synthesis did to automata that fit together."""
+    try:
+        explanation = _explanation(words, engine, asked, on_progress, should_stop)
+    except UnsupportedModelError as error:
+        reason = str(error)
+        return Explained(SynthesisStatus.UNSUPPORTED_MODEL, Findings(), reason, NoSupervisor(reason, ()))
+    return Explained(_status(explanation), Findings(), "", explanation)
+
+
+def _explanation(
+    words: ModelWords | SystemWords,
+    engine: EngineOptions,
+    asked: Asked,
+    on_progress: OnProgress,
+    should_stop: ShouldStop,
+) -> Explanation:
+    return explain_synthesis(
+        words,
         engine=engine,
-        event=event,
-        state=state,
-        after=after,
+        event=asked.event,
+        state=asked.state,
+        after=asked.after,
         should_stop=should_stop,
         on_progress=lambda step: on_progress(Progress("synthesis", str(step))),
     )
-    return problem, explanation

@@ -116,7 +116,7 @@ def explore(
     if isinstance(model, System):
         made = synthesize_system(model, options, on_progress, should_stop)
         if made.supervisor is None:
-            return Exploration(made.status, Findings(), made.reason, None, NoSupervisor(made.reason, Findings()))
+            return Exploration(made.status, Findings(), made.reason, None, made.explanation)
         model = made.supervisor
     if isinstance(model, SystemSupervisor):
         return _explored(model, limit, Findings(), on_progress, should_stop)

@@ -109,7 +109,7 @@ def loaded(model: ModelLike) -> LoadedModel:
         raise TypeError(
             f"this takes a RoboSC model, not automata ({model.name if isinstance(model, System) else repr(model)}), "
             "which have no text to find faults in, and no messages or ROS interfaces: write the robot as a model, or "
-            "use synthesize, verify, explore, simulate or generate"
+            "use synthesize, explain, verify, explore, simulate or generate"
         )
     raise TypeError(
         f"a model is the path of a file or what robosc.load returns, not {type(model).__name__}: {model!r:.80}"
@@ -136,8 +136,8 @@ def read_model(
 
     if is_automata(model):
         raise FileAccessError(
-            f"{model} holds automata, which check, synth, explore, verify, simulate and generate take; this is for "
-            "RoboSC's own models"
+            f"{model} holds automata, which check, synth, explain-synthesis, explore, verify, simulate and generate "
+            "take; this is for RoboSC's own models"
         )
     try:
         if text is None:

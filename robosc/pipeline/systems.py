@@ -1,6 +1,7 @@
 """The core's second door: supervisors of automata that a program has built, without a RoboSC text."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -8,18 +9,19 @@ from typing import Any
 
 import msgspec
 
-from robosc.automata import System, check_system
+from robosc.automata import System, SystemPlaces, check_system
 from robosc.automata.compile import State
 from robosc.automata.decision import Decision
 from robosc.automata.state import subjects, whole_names
 from robosc.certification import Progress
 from robosc.conditions.rendering import Formulas
-from robosc.errors import InvalidSupervisorError, InvalidSystemError, UnsupportedModelError
+from robosc.errors import InvalidSupervisorError, InvalidSystemError, NodeLimitError, UnsupportedModelError
+from robosc.explanation import EmptyExplanation, SystemWords, explain_empty
 from robosc.pipeline.conditions import Condition, Conditions, condition_of, conditions_of
 from robosc.pipeline.files import given_path, read_bounded, write_whole
 from robosc.pipeline.loading import FileName
 from robosc.pipeline.options import SynthesisOptions
-from robosc.pipeline.results import Outcome, SynthesisStatus, Verification, VerificationStatus
+from robosc.pipeline.results import NoSupervisor, Outcome, SynthesisStatus, Verification, VerificationStatus
 from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.supervisor.codec import MAXIMUM_BYTES, decode_document, encode_document, one_line
 from robosc.supervisor.diagram import diagram_domains
@@ -163,6 +165,7 @@ class SystemSynthesis(Outcome):
         supervisor: The supervisor, or None.
         statistics: Figures of the work; None where the automata cannot be handled.
         diagnostics: Always empty: automata have no text that findings could be about.
+        explanation: Explanation of why there is no supervisor, or None where there is one.
     """
 
     status: SynthesisStatus
@@ -170,11 +173,7 @@ class SystemSynthesis(Outcome):
     supervisor: SystemSupervisor | None
     statistics: Statistics | None
     diagnostics: tuple[()] = ()
-
-    @property
-    def explanation(self) -> str | None:
-        """Reason why there is no supervisor, or None."""
-        return self.reason or None
+    explanation: EmptyExplanation | NoSupervisor | None = None
 
     def _made(self) -> object:
         return self.supervisor
@@ -185,20 +184,38 @@ def synthesize_system(
     options: SynthesisOptions,
     on_progress: Callable[[Progress], None],
     should_stop: Callable[[], bool],
+    places: SystemPlaces | None = None,
 ) -> SystemSynthesis:
-    """Synthesize the supervisor of automata; parameters and errors as of `robosc.synthesize`."""
+    """Synthesize the supervisor of automata; parameters and errors as of `robosc.synthesize`.
+
+    Args:
+        system: The automata.
+        options: Options for making the supervisor.
+        on_progress: Function called with the progress of the work.
+        should_stop: Function called again and again; once it returns true, the work ends.
+        places: Places of the parts of the automata, for the explanation.
+    """
     check_system(system)
+    engine = options.engine_options()
 
     def report(progress: SynthesisProgress) -> None:
         on_progress(Progress("synthesis", str(progress)))
 
     try:
-        found = synthesize(system, engine=options.engine_options(), should_stop=should_stop, on_progress=report)
+        found = synthesize(system, engine=engine, should_stop=should_stop, on_progress=report)
     except UnsupportedModelError as error:
-        return SystemSynthesis(SynthesisStatus.UNSUPPORTED_MODEL, str(error), None, None)
+        reason = str(error)
+        return SystemSynthesis(
+            SynthesisStatus.UNSUPPORTED_MODEL, reason, None, None, explanation=NoSupervisor(reason, ())
+        )
     if found.status is CoreStatus.EMPTY:
         reason = f"no supervisor exists: {found.reason}"
-        return SystemSynthesis(SynthesisStatus.EMPTY, reason, None, found.statistics)
+        explanation: EmptyExplanation | NoSupervisor = NoSupervisor(reason, ())
+        # Whatever the limit of nodes, that there is no supervisor is known.
+        with suppress(NodeLimitError):
+            words = SystemWords(system, places or SystemPlaces())
+            explanation = explain_empty(words, engine=engine, should_stop=should_stop, on_progress=report)
+        return SystemSynthesis(SynthesisStatus.EMPTY, reason, None, found.statistics, explanation=explanation)
     supervisor = SystemSupervisor(system, found.added, found.initial, found.statistics)
     return SystemSynthesis(SynthesisStatus.SUPERVISOR, "", supervisor, found.statistics)
 

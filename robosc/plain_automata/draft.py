@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from robosc.automata import Automaton, Edge, Event, Role, System
+from robosc.automata import Automaton, Edge, Event, Role, System, SystemPlaces
 from robosc.expressions import StateTest, Unary
 from robosc.model.findings import Findings
 from robosc.source import Location
@@ -45,8 +45,10 @@ class Draft:
     forbidden: list[Named] = field(default_factory=list)
 
 
-def system_of(name: str, drafts: Sequence[Draft], events: Mapping[str, bool], findings: Findings) -> System:
-    """The system of some automata; of use only if no error is found.
+def system_of(
+    name: str, drafts: Sequence[Draft], events: Mapping[str, bool], findings: Findings
+) -> tuple[System, SystemPlaces]:
+    """The system of some automata, with the places of its parts; of use only if no error is found.
 
     Args:
         name: Name of the system.
@@ -65,14 +67,15 @@ def system_of(name: str, drafts: Sequence[Draft], events: Mapping[str, bool], fi
             findings.error("automata-name", message, draft.name.at, "Give one of them another name.")
         named.add(draft.name.text)
     used = {event.text for draft in drafts for event in draft.events}
-    return System(
+    forbidden = [(draft, state) for draft in drafts for state in draft.forbidden]
+    system = System(
         name=name,
         events=tuple(Event(event, is_controllable) for event, is_controllable in events.items() if event in used),
         automata=tuple(map(_automaton, drafts)),
-        invariants=tuple(
-            Unary("not", StateTest(draft.name.text, state.text)) for draft in drafts for state in draft.forbidden
-        ),
+        invariants=tuple(Unary("not", StateTest(draft.name.text, state.text)) for draft, state in forbidden),
     )
+    places = {draft.name.text: draft.name.at for draft in drafts}
+    return system, SystemPlaces(automata=places, invariants=tuple(state.at for _, state in forbidden))
 
 
 def _check(draft: Draft, events: Mapping[str, bool], findings: Findings) -> None:

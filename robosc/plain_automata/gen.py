@@ -11,7 +11,7 @@ from itertools import count
 from pathlib import PurePath
 from typing import NoReturn
 
-from robosc.automata import Role, System
+from robosc.automata import Role, System, SystemPlaces
 from robosc.errors import Diagnostic, LanguageError, Severity, UnsupportedModelError
 from robosc.model.findings import Findings
 from robosc.plain_automata.draft import MAXIMUM_PARTS, Draft, Named, system_of
@@ -243,7 +243,7 @@ class _Reader:
             self._refuse(found[-1], "state, event and state", "Write the rest of the transition.")
 
 
-def read_gen(file: SourceFile, findings: Findings) -> System:
+def read_gen(file: SourceFile, findings: Findings) -> tuple[System, SystemPlaces]:
     """The system of a file; of use only if no error is found.
 
     A generator of the type `System` is a plant, every other one a requirement. Where no generator has that type, plants

@@ -11,7 +11,7 @@ from pathlib import PurePath
 from typing import NoReturn
 from xml.parsers import expat
 
-from robosc.automata import Role, System
+from robosc.automata import Role, System, SystemPlaces
 from robosc.errors import Diagnostic, LanguageError, Severity
 from robosc.model.findings import Findings
 from robosc.plain_automata.draft import MAXIMUM_PARTS, Draft, Named, system_of
@@ -211,7 +211,7 @@ def _names(block: _Element) -> set[str]:
     return {item.attributes.get("Name", "") for item in block.all("SimpleIdentifier")}
 
 
-def read_wmod(file: SourceFile, findings: Findings) -> System:
+def read_wmod(file: SourceFile, findings: Findings) -> tuple[System, SystemPlaces]:
     """The system of a module; of use only if no error is found.
 
     Raises:

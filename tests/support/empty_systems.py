@@ -13,16 +13,19 @@ LIMIT = 2_000
 
 
 @lru_cache(maxsize=4096)
-def empty_system(seed: int) -> System:
-    """The first of some systems without a supervisor; of every other seed, all locations are marked."""
+def empty_system(seed: int, *, is_wide: bool = False) -> System:
+    """The first of some systems without a supervisor; of every other seed, all locations are marked.
+
+    Those that are wide have all that automata offer beyond RoboSC, and some initial state.
+    """
     random = Random(seed)
     while True:
-        system = _with_invariants(_Builder(random, is_wide=False).system(), random)
-        if seed % 2:
+        system = _with_invariants(_Builder(random, is_wide=is_wide).system(), random)
+        if seed % 2 and not is_wide:
             automata = (replace(item, marked=frozenset(item.locations)) for item in system.automata)
             system = replace(system, automata=tuple(automata))
         supervisor = synthesize_explicit(system, limit=LIMIT)
-        if supervisor is not None and supervisor.is_empty:
+        if supervisor is not None and supervisor.is_empty and supervisor.explored:
             return system
 
 

@@ -55,6 +55,51 @@ def test_a_model_without_a_supervisor(model: str, capsys: pytest.CaptureFixture[
         assert (status, json.loads(out)["status"]) == (1, "empty")
 
 
+def test_what_is_to_blame_is_told(model: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path(model).write_text(TANK.replace("when level > 1", "").replace("level in any", "level = 1"))
+    told = [
+        "trouble:",
+        "  from an initial state tank.u_drain, tank.u_drain can follow, and nothing can prevent it",
+    ]
+    for command in ("synth", "explain-synthesis"):
+        status, out, err = run(capsys, command, model)
+        assert (status, "no supervisor exists" in out + err) == (1, True)
+        lines = (out + err).splitlines()
+        assert lines[-4:] == [
+            "    tank.u_drain can take tank.level, which is 0, out of its range",
+            "to blame: this alone leaves no supervisor",
+            f"  {model}:1:7: the range of tank.level: integer(0..3)",
+            "there is a supervisor without it",
+        ]
+    assert told[0] in lines
+    document = json.loads(run(capsys, "synth", model, "--json")[1])
+    assert document["explanation"]["blamed"][0]["part"]["location"]["line"] == 1
+    document = json.loads(run(capsys, "explain-synthesis", model, "--json")[1])
+    assert (document["status"], document["explanation"]["empty"]["is_minimal"]) == ("empty", True)
+
+
+def test_what_restricts_events_is_explained(model: str, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, err = run(capsys, "explain-synthesis", model, "--event", "tank.c_fill")
+    assert (status, err) == (0, "")
+    assert out.splitlines() == [
+        "tank.c_fill: restricted",
+        "  synthesis forbids it, because of what can follow; for instance in an initial state",
+        "    it leads into trouble at once:",
+        "      there: tank.level = 3",
+        "      tank.u_drain cannot be prevented, against 'requirement tank.u_drain needs tank.level != 3'",
+    ]
+    status, out, _ = run(capsys, "explain-synthesis", model, "--state", "tank.level = 0")
+    assert out.splitlines()[-2:] == [
+        "tank.u_drain (uncontrollable): cannot happen",
+        f"  in tank tank.level > 1 is not true ({model}:1:7)",
+    ]
+    document = json.loads(run(capsys, "explain-synthesis", model, "--json")[1])
+    assert (document["status"], document["explanation"]["is_of_automata"]) == ("supervisor", True)
+    assert run(capsys, "explain-synthesis", model, "--event", "x")[0] == 2
+    Path(model).write_text(f"{TANK}marked x;\n")
+    assert json.loads(run(capsys, "explain-synthesis", model, "--json")[1])["status"] == "model errors"
+
+
 def test_synth(model: str, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, err = run(capsys, "synth", model)
     assert (status, err) == (0, "")
@@ -246,7 +291,7 @@ def test_simulate_begins_as_it_is_told(model: str, tmp_path: Path, capsys: pytes
         ["simulate", "--random", "3", "--save", "run.jsonl"],
         ["simulate", "--deployment", "layer"],
         ["doc"],
-        ["explain-synthesis"],
+        ["explain-synthesis", "--deployment", "layer"],
         ["format"],
         ["view"],
     ],

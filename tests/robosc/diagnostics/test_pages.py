@@ -15,7 +15,7 @@ from robosc.cif import check_cif
 from robosc.diagnostics import Block, Page, Stage, codes, document, page, pages, parse_page
 from robosc.editing.findings import no_supervisor
 from robosc.errors import Diagnostic, InternalError, LanguageError, Severity
-from robosc.explanation import explain_synthesis
+from robosc.explanation import ModelWords, explain_synthesis
 from robosc.language import parse
 from robosc.language.bundle import MAXIMUM_BYTES, decode_source
 from robosc.language.interfaces import find_interfaces, interface_folders
@@ -79,7 +79,7 @@ def remarks(bundle: Bundle) -> tuple[Diagnostic, ...]:
     assert checked.places is not None
     system = to_automata(model, Deployment.CONTROLLER)
     assert checked.places is not None
-    explanation = explain_synthesis(model, checked.places, system, deployment=Deployment.CONTROLLER)
+    explanation = explain_synthesis(ModelWords(model, checked.places, system, Deployment.CONTROLLER))
     return tuple(
         Diagnostic(Severity.WARNING, remark.kind, remark.message, remark.location, "") for remark in explanation.remarks
     )

@@ -4,19 +4,22 @@ from collections import Counter
 
 import pytest
 
-from robosc.automata import Semantics
+from robosc.automata import Semantics, System
 from robosc.automata.compile import NO_DATA, State, compile_expression
 from robosc.automata.state import Subject, subjects
 from robosc.explanation.analysis import Analysis, Hindrance, HindranceKind
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, relaxable_constraints, without_ranges
 from robosc.explanation.problems import BoundedMonitor, Problems
+from robosc.explanation.requirement_automata import as_conditions
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.monitor import ProgressMonitor
 from support.effort import seeds
-from support.random_systems import explicit_supervisor, random_system
+from support.random_systems import explicit_supervisor, random_system, wide_system
 
 EXAMPLES = 40
+WIDE = ("plant condition", "nobody's", "impossible")
+"""Behaviours that no model has."""
 STATES = 6
 """States of a system that are looked at."""
 
@@ -29,8 +32,8 @@ def _needs_cudd() -> None:
 class Twin:
     """One system, symbolic and state by state."""
 
-    def __init__(self, seed: int) -> None:
-        self.system = random_system(seed)
+    def __init__(self, system: System) -> None:
+        self.system = system
         supervisor = explicit_supervisor(self.system)
         assert supervisor is not None
         self.supervisor = supervisor
@@ -62,6 +65,7 @@ class Twin:
                 assert self.supervisor.allows(state, event) == (not is_lost)
         assert [(item.kind, _cause(item)) for item in found] == expected
         met.update(str(kind) for kind, _ in expected)
+        met.update(name for _, cause in expected for name in WIDE if isinstance(cause, str) and cause.startswith(name))
         met["several ranges"] += sum(kind is HindranceKind.RANGE for kind, _ in expected) > 1
         # Whatever keeps it from happening is named, and nothing where it can happen.
         can_happen = here & self.analysis.possible(event) != self.false
@@ -71,10 +75,10 @@ class Twin:
         met["can happen"] += can_happen
 
     def _behaviours(self, state: State, event: str) -> list[tuple[HindranceKind, object]]:
-        return [
-            (HindranceKind.BEHAVIOUR, item.name)
+        found = [
+            item.name
             for item in self.system.automata
-            if event in item.alphabet
+            if event in item.alphabet - item.monitors
             and not any(
                 edge.event == event
                 and edge.source == state[self.places[Subject(item.name)]]
@@ -82,6 +86,17 @@ class Twin:
                 for edge in item.edges
             )
         ]
+        found += [
+            f"plant condition {place}"
+            for place, item in enumerate(self.system.plant_conditions)
+            if item.event == event and compile_expression(item.condition, self.places)(state, NO_DATA) is not True
+        ]
+        if not any(event in item.alphabet for item in self.system.automata):
+            found.append("nobody's")
+        if not found and not self.unbounded.enabled(state, event):
+            assert self.system.plant_invariants
+            found.append("impossible")
+        return [(HindranceKind.BEHAVIOUR, item) for item in found]
 
     def _ranges(self, state: State, event: str) -> list[tuple[HindranceKind, object]]:
         """The ranges each of which alone, the others left out, keeps the event from happening."""
@@ -104,23 +119,29 @@ class Twin:
 
 
 def _cause(item: Hindrance) -> str | RelaxableConstraint | int | None:
+    condition = "nobody's" if item.plant_condition is None else f"plant condition {item.plant_condition}"
     return {
-        HindranceKind.BEHAVIOUR: item.automaton,
+        HindranceKind.BEHAVIOUR: item.automaton or ("impossible" if item.is_impossible else condition),
         HindranceKind.RANGE: item.range,
         HindranceKind.REQUIREMENT: item.condition,
         HindranceKind.SUPERVISOR: None,
     }[item.kind]
 
 
+def system_of(seed: int) -> System:
+    """One of a model's kind, or of what automata offer beyond it."""
+    return as_conditions(wide_system(seed))[0] if seed % 2 else random_system(seed)
+
+
 @pytest.mark.random
 def test_hindrances_in_reachable_states() -> None:
     met: Counter[str] = Counter()
-    for seed in seeds(EXAMPLES):
-        twin = Twin(seed)
+    for seed in seeds(2 * EXAMPLES):
+        twin = Twin(system_of(seed))
         for state in sorted(twin.supervisor.reachable)[:STATES]:
             for event in twin.system.events:
                 twin.check(state, event.name, met)
-    assert all(met[name] for name in (*map(str, HindranceKind), "can happen")), met
+    assert all(met[name] for name in (*map(str, HindranceKind), "can happen", *WIDE)), met
 
 
 @pytest.mark.random
@@ -128,7 +149,7 @@ def test_what_would_follow_runs_into_trouble() -> None:
     """Check for every event that the supervisor forbids the states that it would lead to, and that they are lost."""
     met: Counter[str] = Counter()
     for seed in seeds(EXAMPLES):
-        twin = Twin(seed)
+        twin = Twin(system_of(seed))
         for state in sorted(twin.supervisor.reachable)[:STATES]:
             here = twin.analysis.predicate(state)
             for event in twin.system.events:

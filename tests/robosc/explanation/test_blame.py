@@ -15,6 +15,7 @@ from robosc.explanation.analysis import Analysis, Counterexample, HindranceKind
 from robosc.explanation.blame import find_blame
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, relaxable_constraints, without
 from robosc.explanation.problems import BoundedMonitor, Problems
+from robosc.explanation.requirement_automata import as_conditions
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.fixed_point import initial_states
@@ -31,6 +32,11 @@ LIMIT = 50_000
 @pytest.fixture(scope="module", autouse=True)
 def _needs_cudd() -> None:
     pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+
+
+def empty(seed: int) -> System:
+    """A system without a supervisor; every third has all that automata offer beyond RoboSC."""
+    return empty_system(seed) if seed % 3 else as_conditions(empty_system(seed, is_wide=True))[0]
 
 
 class Symbolic:
@@ -59,7 +65,7 @@ def test_the_blamed_set_is_minimal_and_the_removal_too() -> None:
     """Check by explicit synthesis: the set alone leaves no supervisor, and with any one less there is one."""
     met: Counter[object] = Counter()
     for seed in seeds(EXAMPLES):
-        system = empty_system(seed)
+        system = empty(seed)
         symbolic = [Symbolic(system, engine) for engine in ENGINES]
         blames = [find_blame(item.problems, item.constraints, item.manager.false, item.monitor) for item in symbolic]
         assert blames[0] == blames[1]
@@ -90,10 +96,12 @@ def test_the_blamed_set_is_minimal_and_the_removal_too() -> None:
         met[len(conflict)] += 1
         met[f"removal of {len(blame.removal)}"] += 1
         met.update(constraints[item].kind for item in conflict)
+        met["marker"] += any(constraints[item].is_marker for item in conflict)
     assert met[1] and met[2] + met[3] >= EXAMPLES // 20, met
     assert met["removal of 2"], met
     assert met["lattice"] >= EXAMPLES // 10
     assert all(met[kind] for kind in ConstraintKind if kind is not ConstraintKind.REQUIREMENT), met
+    assert met["marker"], met
 
 
 class Search:
@@ -102,7 +110,7 @@ class Search:
     def __init__(self, system: System) -> None:
         self.semantics = Semantics(system)
         self.system = system
-        self.states = self._reached([self.semantics.initial])
+        self.states = self._reached(list(self.semantics.initial_states))
         coreachable = {state for state in self.states if self.semantics.is_marked(state) and not self.bad(state)}
         grown = True
         while grown:
@@ -160,7 +168,7 @@ class Search:
 
     def distance(self, *, uncontrollable_only: bool) -> int | None:
         """Length of a shortest run into trouble."""
-        distances = {self.semantics.initial: 0}
+        distances = dict.fromkeys(self.semantics.initial_states, 0)
         queue = deque(distances)
         while queue:
             state = queue.popleft()
@@ -179,13 +187,13 @@ class Search:
 def test_trouble_is_real_and_the_run_is_shortest() -> None:
     met: Counter[str] = Counter()
     for seed in seeds(2 * EXAMPLES):
-        system = empty_system(seed)
+        system = empty(seed)
         counterexample, other = (Symbolic(system, engine).counterexample() for engine in ENGINES)
         assert counterexample.run == other.run
         search = Search(system)
         run = counterexample.run
         assert run.is_shortest
-        assert run.states[0] == search.semantics.initial
+        assert run.states[0] in search.semantics.initial_states
         for event, (before, after) in zip(run.events, pairwise(run.states), strict=True):
             assert (event, after) in list(search.steps(before))
         last = run.states[-1]
@@ -209,7 +217,7 @@ def test_trouble_without_some_obstacles_speaks_of_the_others_alone() -> None:
     """Check the blamed constraints alone: the run is one of the system that is left, and complete in what it names."""
     met: Counter[str] = Counter()
     for seed in seeds(3 * EXAMPLES):
-        system = empty_system(seed)
+        system = empty(seed)
         symbolic = [Symbolic(system, engine) for engine in ENGINES]
         blame = find_blame(
             symbolic[0].problems, symbolic[0].constraints, symbolic[0].manager.false, symbolic[0].monitor
@@ -236,6 +244,7 @@ def test_trouble_without_some_obstacles_speaks_of_the_others_alone() -> None:
         assert {item for _, item in counterexample.leaving} <= set(kept)
         assert {item.range for item in hindrances if item.range is not None} <= set(kept)
         assert set(counterexample.unmarked) <= {item.marking for item in kept}
+        assert not counterexample.is_marker_missed or any(item.is_marker for item in kept)
         met["another story"] += counterexample.run != symbolic[0].counterexample().run
     assert all(met[name] for name in ("another story", "real", "range dropped", "shortest")), met
 
@@ -253,7 +262,7 @@ def _check_run_of_the_robot(system: System, search: Search, counterexample: Coun
 
     def distance(is_forced: bool) -> int | None:
         return _distance(
-            {search.semantics.initial},
+            set(search.semantics.initial_states),
             lambda state: (target for _, target in really(state, is_forced=is_forced)),
             lambda state: state in search.troubled,
         )

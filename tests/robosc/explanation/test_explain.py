@@ -11,7 +11,7 @@ from robosc.automata import Semantics, System, to_automata
 from robosc.automata.compile import NO_DATA, State, compile_expression
 from robosc.automata.state import Subject, subjects
 from robosc.errors import UnsupportedModelError
-from robosc.explanation import Explanation, RequestError, explain_synthesis, explanation_text
+from robosc.explanation import Explanation, ModelWords, RequestError, explain_synthesis, explanation_text
 from robosc.explanation.constraints import ConstraintKind, relaxable_constraints, without_ranges
 from robosc.explanation.explanations import EventReport, document
 from robosc.model.places import Places
@@ -64,7 +64,7 @@ def explained(text: str, **asked: Any) -> Explanation:
     assert found.places is not None
     system = to_automata(found.model, Deployment.CONTROLLER)
     results = [
-        explain_synthesis(found.model, found.places, system, deployment=Deployment.CONTROLLER, engine=engine, **asked)
+        explain_synthesis(ModelWords(found.model, found.places, system, Deployment.CONTROLLER), engine=engine, **asked)
         for engine in ("cudd", "autoref")
     ]
     assert results[0] == results[1]
@@ -437,7 +437,7 @@ def test_a_state_in_which_nothing_can_happen() -> None:
 
 def test_texts_are_on_one_line_and_the_document_has_every_attribute() -> None:
     explanation = explained(robot(DOOR, LIFT))
-    assert list(document(explanation)) == ["empty", "events", "state", "remarks"]
+    assert list(document(explanation)) == ["empty", "events", "state", "remarks", "is_of_automata"]
     assert msgspec.convert(document(explanation), Explanation) == explanation
 
 
@@ -560,7 +560,7 @@ def test_random_models() -> None:
             continue
         places = places_of(model)
         found = [
-            explain_synthesis(model, places, system, deployment=Deployment.CONTROLLER, engine=engine)
+            explain_synthesis(ModelWords(model, places, system, Deployment.CONTROLLER), engine=engine)
             for engine in (("cudd", "autoref") if seed % 8 == 0 else ("cudd",))
         ]
         assert found[-1] == found[0]

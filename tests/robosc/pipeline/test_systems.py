@@ -10,6 +10,7 @@ import robosc
 from robosc.automata import Automaton, Edge, Event, System
 from robosc.conditions import summary
 from robosc.conditions.literals import Vocabulary
+from robosc.explanation import EmptyExplanation, Explanation
 from robosc.expressions import Constant, StateTest
 from robosc.pipeline.conditions import Condition, Conditions
 from robosc.supervisor import DecisionDiagram, DecisionNode
@@ -63,7 +64,8 @@ def test_random_automata(seed: int) -> None:
     assert str(result.status) == str(core.status)
     explicit = explicit_supervisor(given_system)
     if result.supervisor is None:
-        assert result.reason == f"no supervisor exists: {core.reason}" == result.explanation
+        assert result.reason == f"no supervisor exists: {core.reason}"
+        assert isinstance(result.explanation, EmptyExplanation)
         return
     assert (result.supervisor.added, result.supervisor.initial) == (core.added, core.initial)
     assert explicit is not None
@@ -107,8 +109,10 @@ def test_no_supervisor_and_automata_that_do_not_fit() -> None:
     result = robosc.synthesize(blocked)
     assert result.status is robosc.SynthesisStatus.EMPTY
     assert result.supervisor is None
-    assert result.explanation is not None
-    assert str(result) == result.explanation
+    assert isinstance(result.explanation, EmptyExplanation)
+    assert str(result) == f"{result.reason}\n{result.explanation}"
+    assert "that A gets to a marked state (a)" in str(result)
+    assert robosc.explain(blocked).explanation == Explanation(empty=result.explanation, is_of_automata=True)
     with pytest.raises(robosc.InvalidSystemError, match="A: a -u_gone-> b: "):
         robosc.synthesize(replace(blocked, automata=(replace(blocked.automata[0], edges=(Edge("a", "u_gone", "b"),)),)))
 

@@ -151,7 +151,11 @@ def synth(arguments: argparse.Namespace) -> ExitCode:
                 "reason": "",
                 "file": None if output is None else str(output),
                 "system": made.supervisor.system.name,
-                "states": made.supervisor.states,
+                "states": made.supervisor.states or None,
+                "modules": [
+                    {"automata": list(item.automata), "states": item.states, "group": item.group}
+                    for item in made.supervisor.modules
+                ],
                 "conditions": {name: str(item) for name, item in made.supervisor.conditions.items()},
                 "initial": None if initial is None else str(initial),
                 **diagnostics_json(made.diagnostics),
@@ -288,7 +292,12 @@ def _synthesis(arguments: argparse.Namespace, found: "CheckedSystem") -> "System
 
     system, options = found.system, _options(arguments)
     assert system is not None  # noqa: S101 - asked only of models without errors
-    return _watched(lambda on_progress: synthesize_system(system, options, on_progress, lambda: False, found.places))
+    is_modular = getattr(arguments, "modular", False)
+    return _watched(
+        lambda on_progress: synthesize_system(
+            system, options, on_progress, lambda: False, found.places, is_modular=is_modular
+        )
+    )
 
 
 def _watched[T](work: "Callable[[OnProgress], T]") -> T:

@@ -17,7 +17,15 @@ from robosc.cli.arguments import (
     given_path,
     read_bundle,
 )
-from robosc.cli.output import ExitCode, ProgressLine, print_diagnostics, print_json, require_other_file, write_bytes
+from robosc.cli.output import (
+    ExitCode,
+    ProgressLine,
+    UsageError,
+    print_diagnostics,
+    print_json,
+    require_other_file,
+    write_bytes,
+)
 from robosc.errors import Diagnostic
 from robosc.json_documents import diagnostics_json
 from robosc.model.structure import Deployment
@@ -67,6 +75,11 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_engine_options(parser)
     add_verify_limit_argument(parser, "--verify-limit", SYNTHESIS_STATES)
     add_livelock_argument(parser)
+    parser.add_argument(
+        "--modular",
+        action="store_true",
+        help="synthesize automata in modules: for systems of many parts, of which one diagram cannot hold the states",
+    )
     parser.set_defaults(run=run)
 
 
@@ -81,6 +94,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Synthesize; 0 with a supervisor, 1 without."""
     if automata.is_given(arguments):
         return automata.synth(arguments)
+    if arguments.modular:
+        raise UsageError("--modular is for automata (FILE.cif, .gen, .wmod): a robot's model is synthesized as a whole")
     require_other_file(arguments.output, arguments.model)
     bundle = read_bundle(arguments)
     allow_livelock, verify_limit = arguments.allow_livelock, arguments.verify_limit

@@ -66,6 +66,7 @@ def synthesize(
     model: System,
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
+    is_modular: bool = False,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> SystemSynthesis: ...
@@ -85,6 +86,7 @@ def synthesize(
     model: ModelLike | System,
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
+    is_modular: bool = False,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Synthesis | SystemSynthesis:
@@ -93,10 +95,13 @@ def synthesize(
     Args:
         model: The model, as `load` returns it, the path of one, or a `robosc.automata.System`.
         options: Options for making the supervisor. Of automata, those about the engine count.
+        is_modular: True if automata are to be synthesized in modules: for systems of many parts, of which one diagram
+            cannot hold the states.
         on_progress: Function called with the progress of the work.
         should_stop: Function called again and again; once it returns true, the work ends.
 
     Raises:
+        TypeError: `is_modular` is given for a model.
         FileAccessError: The file is not there or cannot be read.
         LanguageError: A file is too large or not UTF-8.
         InvalidSystemError: The automata do not fit together.
@@ -105,7 +110,9 @@ def synthesize(
         SynthesisCancelled: `should_stop` became true.
     """
     if isinstance(model, System):
-        return synthesize_system(model, options, on_progress, should_stop)
+        return synthesize_system(model, options, on_progress, should_stop, is_modular=is_modular)
+    if is_modular:
+        raise TypeError("is_modular is for automata: a model of a robot is synthesized as a whole")
     bundle = loaded(model)
     attempt = make(bundle, options, on_progress, should_stop, allow_livelock=options.allow_livelock)
     return _result(attempt, bundle)

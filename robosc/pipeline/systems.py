@@ -1,6 +1,6 @@
 """The core's second door: supervisors of automata that a program has built, without a RoboSC text."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -28,7 +28,7 @@ from robosc.supervisor.diagram import diagram_domains
 from robosc.supervisor.predicates import state_predicate, state_predicates
 from robosc.supervisor.structure import FORMAT, FORMAT_VERSION
 from robosc.supervisor.validation import validate_added, validate_condition
-from robosc.synthesis import Statistics, SynthesisProgress, synthesize
+from robosc.synthesis import EngineOptions, Statistics, SynthesisProgress, synthesize
 from robosc.synthesis import SynthesisStatus as CoreStatus
 from robosc.tables import html_table
 from robosc.verification import CheckOutcome, Limits, VerificationReport, verify
@@ -36,6 +36,22 @@ from robosc.verification import CheckOutcome, Limits, VerificationReport, verify
 _CHECKS = ("safe", "controllable", "nonblocking", "maximally_permissive")
 INITIALLY = "the initial state"
 """Name of what a condition is about that is about no event."""
+
+
+@dataclass(frozen=True, slots=True)
+class SupervisedModule:
+    """A module of automata that were synthesized in modules: it is safe, controllable and nonblocking by itself.
+
+    Attributes:
+        automata: Names of its automata.
+        states: Reachable states under the module's own supervisor.
+        group: Number of its group: modules of different groups share nothing, and those of one group were found not to
+            block each other.
+    """
+
+    automata: tuple[str, ...]
+    states: int
+    group: int
 
 
 @dataclass(frozen=True, repr=False)
@@ -46,13 +62,15 @@ class SystemSupervisor:
         system: The automata that it supervises.
         added: Decision diagrams that it adds to events; `conditions` has them in words.
         initial: Condition on the initial states in which it lets the system begin; None if in all.
-        statistics: Figures of the synthesis.
+        statistics: Figures of the synthesis; of one in modules the sums, or largest, of those of the modules.
+        modules: Modules of a synthesis in modules; else none.
     """
 
     system: System
     added: tuple[AddedCondition, ...]
     initial: DecisionDiagram | None
     statistics: Statistics = field(compare=False)
+    modules: tuple[SupervisedModule, ...] = field(default=(), compare=False)
 
     @cached_property
     def conditions(self) -> Conditions:
@@ -77,8 +95,14 @@ class SystemSupervisor:
 
     @property
     def states(self) -> int:
-        """Reachable states of the controlled system."""
+        """Reachable states of the controlled system; 0 where modules share something, whose states nobody counts."""
         return self.statistics.states
+
+    @property
+    def _size(self) -> str:
+        sizes = [f"{self.states} states"] if self.states else []
+        modules = f"{len(self.modules)} module{'s' if len(self.modules) != 1 else ''}"
+        return ", ".join([*sizes, *([modules] if self.modules else [])])
 
     @classmethod
     def read(cls, file: FileName) -> "SystemSupervisor":
@@ -113,15 +137,26 @@ class SystemSupervisor:
 
     def __repr__(self) -> str:
         events = f"{len(self.added)} event{'s' if len(self.added) != 1 else ''}"
-        return f"<supervisor of {self.system.name}: {self.states} states, conditions added to {events}>"
+        return f"<supervisor of {self.system.name}: {self._size}, conditions added to {events}>"
 
     def __str__(self) -> str:
-        return f"{self.system.name}: a supervisor exists ({self.states} states)\n{self.conditions}"
+        return (
+            f"{self.system.name}: a supervisor exists ({self._size})\n{self.conditions}{''.join(self._modules_told())}"
+        )
+
+    def _modules_told(self) -> Iterator[str]:
+        """Lines about the modules."""
+        for number, module in enumerate(self.modules, start=1):
+            yield f"\nmodule {number}, {module.states} states: {', '.join(module.automata)}"
+        for group in sorted({module.group for module in self.modules}):
+            members = [str(number) for number, module in enumerate(self.modules, start=1) if module.group == group]
+            if len(members) > 1:
+                yield f"\nnonblocking together, as found on abstractions: modules {', '.join(members)}"
 
     def _repr_html_(self) -> str:
-        return html_table(("figure", "value"), [("states", self.states)], caption=repr(self).strip("<>")) + (
-            self.conditions._repr_html_()
-        )
+        rows = [("states", self.states)] if self.states else []
+        rows += [(f"states of module {number}", item.states) for number, item in enumerate(self.modules, start=1)]
+        return html_table(("figure", "value"), rows, caption=repr(self).strip("<>")) + (self.conditions._repr_html_())
 
 
 class _Document(msgspec.Struct, frozen=True):
@@ -149,8 +184,11 @@ def decode_system(data: bytes) -> SystemSupervisor:
             validate_condition(supervisor.initial, diagram_domains(supervisor.system))
     except (InvalidSystemError, InvalidSupervisorError) as error:
         raise InvalidSupervisorError(f"the supervisor file is inconsistent: {one_line(error)}") from None
+    names = {automaton.name for automaton in supervisor.system.automata}
+    if any(min(item.states, item.group) < 1 or not names.issuperset(item.automata) for item in supervisor.modules):
+        raise InvalidSupervisorError("the supervisor file is inconsistent: a module is none of its automata")
     figures = supervisor.statistics
-    if min(figures.state_bits, figures.iterations, figures.peak_nodes) < 0 or figures.states < 1:
+    if min(figures.state_bits, figures.iterations, figures.peak_nodes) < 0 or figures.states < (not supervisor.modules):
         raise InvalidSupervisorError("the supervisor file is inconsistent: a figure of the synthesis is too small")
     return supervisor
 
@@ -185,6 +223,8 @@ def synthesize_system(
     on_progress: Callable[[Progress], None],
     should_stop: Callable[[], bool],
     places: SystemPlaces | None = None,
+    *,
+    is_modular: bool = False,
 ) -> SystemSynthesis:
     """Synthesize the supervisor of automata; parameters and errors as of `robosc.synthesize`.
 
@@ -194,8 +234,11 @@ def synthesize_system(
         on_progress: Function called with the progress of the work.
         should_stop: Function called again and again; once it returns true, the work ends.
         places: Places of the parts of the automata, for the explanation.
+        is_modular: True if it is to be synthesized in modules.
     """
     check_system(system)
+    if is_modular:
+        return _synthesized_in_modules(system, options, on_progress, should_stop, places or SystemPlaces())
     engine = options.engine_options()
 
     def report(progress: SynthesisProgress) -> None:
@@ -204,20 +247,78 @@ def synthesize_system(
     try:
         found = synthesize(system, engine=engine, should_stop=should_stop, on_progress=report)
     except UnsupportedModelError as error:
-        reason = str(error)
-        return SystemSynthesis(
-            SynthesisStatus.UNSUPPORTED_MODEL, reason, None, None, explanation=NoSupervisor(reason, ())
-        )
+        return _unsupported(error)
     if found.status is CoreStatus.EMPTY:
-        reason = f"no supervisor exists: {found.reason}"
-        explanation: EmptyExplanation | NoSupervisor = NoSupervisor(reason, ())
-        # Whatever the limit of nodes, that there is no supervisor is known.
-        with suppress(NodeLimitError):
-            words = SystemWords(system, places or SystemPlaces())
-            explanation = explain_empty(words, engine=engine, should_stop=should_stop, on_progress=report)
-        return SystemSynthesis(SynthesisStatus.EMPTY, reason, None, found.statistics, explanation=explanation)
+        words, reason = SystemWords(system, places or SystemPlaces()), f"no supervisor exists: {found.reason}"
+        return _empty(words, reason, found.statistics, engine, on_progress, should_stop)
     supervisor = SystemSupervisor(system, found.added, found.initial, found.statistics)
     return SystemSynthesis(SynthesisStatus.SUPERVISOR, "", supervisor, found.statistics)
+
+
+def _synthesized_in_modules(
+    system: System,
+    options: SynthesisOptions,
+    on_progress: Callable[[Progress], None],
+    should_stop: Callable[[], bool],
+    places: SystemPlaces,
+) -> SystemSynthesis:
+    from robosc.modular.synthesize import synthesize_modular
+
+    engine = options.engine_options()
+    try:
+        found = synthesize_modular(
+            system,
+            engine=engine,
+            should_stop=should_stop,
+            on_progress=lambda message: on_progress(Progress("synthesis", message)),
+        )
+    except UnsupportedModelError as error:
+        return _unsupported(error)
+    if found.lost is not None:
+        reason = f"no supervisor exists: {', '.join(found.lost.automata)}: {found.lost.result.reason}"
+        words = SystemWords(*found.partition.problem_of(found.lost.module, places))
+        return _empty(words, reason, found.lost.result.statistics, engine, on_progress, should_stop)
+    figures = [item.result.statistics for item in found.modules]
+    statistics = Statistics(
+        engine=figures[0].engine,
+        state_bits=sum(item.state_bits for item in figures),
+        iterations=max(item.iterations for item in figures),
+        peak_nodes=max(item.peak_nodes for item in figures),
+        states=found.states or 0,
+    )
+    group_of = {place: number for number, group in enumerate(found.groups, start=1) for place in group}
+    modules = tuple(
+        SupervisedModule(item.automata, item.result.statistics.states, group_of[place])
+        for place, item in enumerate(found.modules)
+    )
+    supervisor = SystemSupervisor(system, found.added, found.initial, statistics, modules)
+    return SystemSynthesis(SynthesisStatus.SUPERVISOR, "", supervisor, statistics)
+
+
+def _unsupported(error: UnsupportedModelError) -> SystemSynthesis:
+    reason = str(error)
+    explanation = NoSupervisor(reason, ())
+    return SystemSynthesis(SynthesisStatus.UNSUPPORTED_MODEL, reason, None, None, explanation=explanation)
+
+
+def _empty(
+    words: SystemWords,
+    reason: str,
+    statistics: Statistics,
+    engine: EngineOptions,
+    on_progress: Callable[[Progress], None],
+    should_stop: Callable[[], bool],
+) -> SystemSynthesis:
+    explanation: EmptyExplanation | NoSupervisor = NoSupervisor(reason, ())
+    # Whatever the limit of nodes, that there is no supervisor is known.
+    with suppress(NodeLimitError):
+        explanation = explain_empty(
+            words,
+            engine=engine,
+            should_stop=should_stop,
+            on_progress=lambda step: on_progress(Progress("synthesis", str(step))),
+        )
+    return SystemSynthesis(SynthesisStatus.EMPTY, reason, None, statistics, explanation=explanation)
 
 
 def verify_system(

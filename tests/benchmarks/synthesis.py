@@ -1,4 +1,4 @@
-"""Time, size and memory of synthesis on families of systems of growing size, both engines side by side.
+"""Time, size and memory of synthesis on families of systems of growing size: both engines, and in modules.
 
 Each size runs in a process of its own with a limit of time; what does not end in it is told as such, and larger sizes
 of that family are left out for that engine.
@@ -28,28 +28,45 @@ SIZES: dict[str, tuple[int, ...]] = {
     "random robot": (5, 20, 40, 60),
 }
 
+IN_MODULES = "in modules"
+
+MODULAR_SIZES: dict[str, tuple[int, ...]] = {
+    "machines in a row": (10, 50, 100, 200, 500, 1000),
+    "assembly tree": (15, 63, 127, 255, 511, 1023),
+}
+
 HEADER = ("family, size", "engine", "states", "rounds", "peak nodes", "adds to", "time, s", "grows as", "memory, MB")
 
 
 def measured(family: str, size: int, engine: str) -> dict[str, object]:
     """Figures of one synthesis, in this process; the system is built before the clock starts."""
     from robosc.errors import SynthesisCancelled
+    from robosc.modular.synthesize import synthesize_modular
     from robosc.synthesis import synthesize
     from support.families import FAMILIES
 
     system = FAMILIES[family](size)
-    synthesize(FAMILIES["token ring"](2), engine=engine)  # What is imported on first use is no part of it.
+    synthesize(FAMILIES["token ring"](2))  # What is imported on first use is no part of it.
     begin = time.perf_counter()
+
+    def is_late() -> bool:
+        return time.perf_counter() - begin > LIMIT_S
+
     try:
-        found = synthesize(system, engine=engine, should_stop=lambda: time.perf_counter() - begin > LIMIT_S)
+        if engine == IN_MODULES:
+            whole = synthesize_modular(system, should_stop=is_late)
+            figures, added = [item.result.statistics for item in whole.modules], whole.added
+        else:
+            found = synthesize(system, engine=engine, should_stop=is_late)
+            figures, added = [found.statistics], found.added
     except SynthesisCancelled:
         return {}
     return {
         "seconds": time.perf_counter() - begin,
-        "states": str(found.statistics.states),
-        "rounds": found.statistics.iterations,
-        "peak_nodes": found.statistics.peak_nodes,
-        "added": len(found.added),
+        "states": str(figures[0].states) if len(figures) == 1 else f"{len(figures)} modules",
+        "rounds": max(item.iterations for item in figures),
+        "peak_nodes": max(item.peak_nodes for item in figures),
+        "added": len(added),
         "memory_kib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
     }
 
@@ -73,7 +90,9 @@ def _row(family: str, size: int, engine: str, before: tuple[int, float] | None) 
     found = json.loads(done.stdout)
     if not found:
         return None
-    states = found["states"] if len(found["states"]) < 10 else f"{float(found['states']):.2e}"
+    states = found["states"]
+    if states.isdecimal() and len(states) >= 10:
+        states = f"{float(states):.2e}"
     figures = (states, f"{found['rounds']}", f"{found['peak_nodes']:,}", f"{found['added']}")
     seconds, memory = found["seconds"], f"{found['memory_kib'] / 1024:.0f}"
     growth = f"n^{log(seconds / before[1]) / log(size / before[0]):.1f}" if before else ""
@@ -83,8 +102,8 @@ def _row(family: str, size: int, engine: str, before: tuple[int, float] | None) 
 def table() -> str:
     """One line a size and engine."""
     rows = []
-    for family, sizes in SIZES.items():
-        engines = ["cudd", "autoref"]
+    for family, sizes in (*SIZES.items(), *MODULAR_SIZES.items()):
+        engines = ["cudd", IN_MODULES if family in MODULAR_SIZES else "autoref"]
         last: dict[str, tuple[int, float]] = {}
         for size in sizes:
             for engine in tuple(engines):

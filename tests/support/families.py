@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from random import Random
 
-from robosc.automata import Automaton, DiscreteVariable, Edge, Event, EventCondition, System
+from robosc.automata import Automaton, DiscreteVariable, Edge, Event, EventCondition, Role, System
 from robosc.expressions import Binary, BooleanType, Expression, IntegerType, StateTest, Unary
 from support.systems import automaton, edge, operation, read, system
 
@@ -174,6 +174,51 @@ def random_robot(components: int, seed: int = 1) -> System:
     return System(f"robot of {components}", tuple(events), tuple(automata), conditions=tuple(conditions))
 
 
+def machines_in_a_row(count: int) -> System:
+    """Machines with a buffer of one place, a requirement, between each and the next: neighbours share them."""
+    automata = [
+        automaton(f"M{number}", [f"idle -start{number}-> busy", f"busy -u_done{number}-> idle"], marked=["idle"])
+        for number in range(count)
+    ]
+    automata += [
+        replace(
+            automaton(
+                f"B{number}", [f"empty -u_done{number}-> full", f"full -start{number + 1}-> empty"], marked=["empty"]
+            ),
+            role=Role.REQUIREMENT,
+        )
+        for number in range(count - 1)
+    ]
+    return _of(automata)
+
+
+def assembly_tree(count: int) -> System:
+    """Machines in a binary tree, each of which assembles what the two below it have made and put into its buffers."""
+    automata = [
+        automaton(f"M{number}", [f"idle -start{number}-> busy", f"busy -u_done{number}-> idle"], marked=["idle"])
+        for number in range(count)
+    ]
+    automata += [
+        replace(
+            automaton(
+                f"B{number}",
+                [f"empty -u_done{number}-> full", f"full -start{(number - 1) // 2}-> empty"],
+                marked=["empty"],
+            ),
+            role=Role.REQUIREMENT,
+        )
+        for number in range(1, count)
+    ]
+    return _of(automata)
+
+
+def _of(automata: list[Automaton]) -> System:
+    """The system of some automata; events are uncontrollable if they are called so."""
+    names = dict.fromkeys(edge.event for item in automata for edge in item.edges)
+    events = tuple(Event(name, is_controllable=not name.startswith("u_")) for name in names)
+    return System("family", events, tuple(automata))
+
+
 FAMILIES: dict[str, Callable[[int], System]] = {
     "dining philosophers": dining_philosophers,
     "transfer line": transfer_line,
@@ -182,5 +227,7 @@ FAMILIES: dict[str, Callable[[int], System]] = {
     "cat and mouse, 2 pairs": lambda floors: cat_and_mouse(floors, 2),
     "counter": bounded_counters,
     "random robot": random_robot,
+    "machines in a row": machines_in_a_row,
+    "assembly tree": assembly_tree,
 }
 """Systems by family; the argument is how large."""

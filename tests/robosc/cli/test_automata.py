@@ -110,6 +110,23 @@ def test_synth(model: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert (document["states"], list(document["conditions"])) == (3, ["tank.c_fill"])
 
 
+def test_synth_in_modules(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = tmp_path / "two.cif"
+    model.write_text(TANK.replace("level in any", "level = 1") + TANK.replace("tank", "tub").replace(" in any", " = 1"))
+    controlled = str(tmp_path / "controlled.cif")
+    status, out, err = run(capsys, "synth", str(model), "--modular", "-o", controlled)
+    assert (status, err) == (0, "")
+    assert out.splitlines()[0] == "two: a supervisor exists (4 states, 2 modules)"
+    assert "module 2, 2 states: tub" in out.splitlines()
+    assert "supervisor automaton sup:" in Path(controlled).read_text()
+    document = json.loads(run(capsys, "synth", str(model), "--modular", "--json")[1])
+    assert [item["automata"] for item in document["modules"]] == [["tank"], ["tub"]]
+    robot = tmp_path / "robot.rscd"
+    robot.write_text("robot R { component C { incoming message m with type: none } }")
+    status, _, err = run(capsys, "synth", str(robot), "--modular")
+    assert (status, err.count("\n"), "--modular is for automata" in err) == (2, 1, True)
+
+
 def test_the_controlled_system_is_written(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / "controlled.cif"
     assert run(capsys, "synth", model, "-o", str(output))[1].splitlines()[-1] == f"written to {output}"

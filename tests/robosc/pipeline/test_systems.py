@@ -1,6 +1,8 @@
 """The core's second door: automata that a program has built."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 from unittest.mock import patch
 
 import pytest
@@ -11,14 +13,16 @@ from robosc.automata import Automaton, Edge, Event, System
 from robosc.conditions import summary
 from robosc.conditions.literals import Vocabulary
 from robosc.explanation import EmptyExplanation, Explanation
-from robosc.expressions import Constant, StateTest
+from robosc.expressions import Constant, StateTest, Unary
 from robosc.pipeline.conditions import Condition, Conditions
+from robosc.pipeline.systems import decode_system
 from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import Subject, SubjectDomain
 from robosc.supervisor.predicates import state_predicate
 from robosc.synthesis import synthesize
 from robosc.verification import Limits, verify
 from support.effort import examples
+from support.families import FAMILIES
 from support.random_systems import any_system, explicit_supervisor, system_seeds
 from support.systems import automaton, system
 
@@ -100,6 +104,51 @@ def test_of_long_diagrams_the_size_is_told() -> None:
     assert f"e0 needs {size}; --json tells it node by node\ne1 needs one of 2, to be read from [1] on:\n[1]" in short
     # Asked for by itself it is told whole.
     assert str(conditions["e0"]).startswith(f"{size}, to be read from [1] on:\n[1]")
+
+
+def test_a_synthesis_in_modules(tmp_path: Path) -> None:
+    row = FAMILIES["machines in a row"](6)
+    result, whole = robosc.synthesize(row, is_modular=True), robosc.synthesize(row)
+    supervisor = result.supervisor
+    assert supervisor is not None
+    assert whole.supervisor is not None
+    assert (supervisor.states, len(supervisor.modules), {item.group for item in supervisor.modules}) == (0, 3, {1})
+    assert repr(supervisor) == "<supervisor of family: 3 modules, conditions added to 5 events>"
+    told = str(result).splitlines()
+    assert told[0] == "family: a supervisor exists (3 modules)"
+    assert told[-2:] == [
+        "module 3, 18 states: M3, M4, M5, B3, B4",
+        "nonblocking together, as found on abstractions: modules 1, 2, 3",
+    ]
+    assert "states of module 3" in supervisor._repr_html_()
+    # What they allow together is what the supervisor of the whole allows.
+    graphs = [robosc.explore(item).graph for item in (supervisor, whole.supervisor)]
+    assert graphs[0] == graphs[1]
+    read = robosc.SystemSupervisor.read(supervisor.write(tmp_path / "row.rsup"))
+    assert (read, read.modules) == (supervisor, supervisor.modules)
+    for change in ({"states": 0}, {"group": 0}, {"automata": ["M9"]}):
+        document = json.loads(supervisor.encode())
+        document["system_supervisor"]["modules"][1].update(change)
+        with pytest.raises(robosc.InvalidSupervisorError, match="a module is none of its automata"):
+            decode_system(json.dumps(document).encode())
+    # Modules that share nothing are counted.
+    apart = robosc.synthesize(replace(row, automata=row.automata[:6]), is_modular=True).supervisor
+    assert apart is not None
+    assert (apart.states, str(apart).splitlines()[0]) == (64, "family: a supervisor exists (64 states, 6 modules)")
+
+
+def test_no_supervisor_in_modules() -> None:
+    row = FAMILIES["machines in a row"](8)
+    lost = replace(row, invariants=(Unary("not", StateTest("M7", "idle")),))
+    result = robosc.synthesize(lost, is_modular=True)
+    assert result.status is robosc.SynthesisStatus.EMPTY
+    assert "M7" in result.reason
+    assert "M0" not in result.reason
+    assert isinstance(result.explanation, EmptyExplanation)
+    assert "requirement invariant !M7.idle" in str(result)
+    model = robosc.load(text="robot R { component C { incoming message m with type: none } }")
+    with pytest.raises(TypeError, match="is_modular is for automata"):
+        robosc.synthesize(model, is_modular=True)  # type: ignore[call-overload]
 
 
 def test_no_supervisor_and_automata_that_do_not_fit() -> None:

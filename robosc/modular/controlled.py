@@ -1,0 +1,158 @@
+"""Modules under their supervisors, as automata that are composed: with one label for each thing that parts can do."""
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from robosc.automata.compile import State
+from robosc.automata.controlled import ControlledGraph, controlled_graph
+from robosc.automata.semantics import Semantics
+from robosc.automata.state import subjects
+from robosc.automata.structure import System
+from robosc.modular.nonconflict import SILENT, Edges, Graph, Label
+from robosc.modular.partition import Module, Partition
+from robosc.supervisor import AddedCondition, DecisionDiagram
+from robosc.supervisor.predicates import state_predicate, state_predicates
+
+
+@dataclass(frozen=True, slots=True)
+class ControlledModule:
+    """A module under its supervisor, state by state.
+
+    Attributes:
+        module: The module.
+        graph: Its states and steps.
+        marked: Numbers of the marked states.
+        places: For each of its parts the places of a state that belong to it.
+        events: Its events.
+    """
+
+    module: Module
+    graph: ControlledGraph
+    marked: frozenset[int]
+    places: dict[int, tuple[int, ...]]
+    events: frozenset[str]
+
+    def values(self, part: int, number: int) -> tuple[object, ...]:
+        """The values of a part in a state."""
+        state = self.graph.states[number]
+        return tuple(state[place] for place in self.places[part])
+
+
+def controlled_module(
+    partition: Partition,
+    module: Module,
+    system: System,
+    added: Sequence[AddedCondition],
+    initial: DecisionDiagram | None,
+    *,
+    limit: int,
+    should_stop: Callable[[], bool],
+) -> ControlledModule | None:
+    """Return a module under its supervisor; None if it has more than `limit` states."""
+    semantics = Semantics(system)
+    predicates = state_predicates(system, added)
+    may_begin = _anywhere if initial is None else state_predicate(system, initial)
+    graph = controlled_graph(semantics, predicates, limit=limit, initial=may_begin, should_stop=should_stop)
+    if graph is None:
+        return None
+    order = subjects(system)
+    return ControlledModule(
+        module,
+        graph,
+        frozenset(number for number, state in enumerate(graph.states) if semantics.is_marked(state)),
+        {
+            part: tuple(place for place, item in enumerate(order) if item.automaton in partition.parts[part])
+            for part in module.parts
+        },
+        frozenset(event.name for event in system.events),
+    )
+
+
+def _anywhere(state: State) -> bool:
+    return True
+
+
+def graphs_of(modules: Sequence[ControlledModule], part_of: dict[str, int]) -> list[Graph]:
+    """The automata of modules, to be composed.
+
+    A part that several modules have is in the same state in each of them: where an event, or the beginning, leaves open
+    what it does, each outcome has a label of its own.
+
+    Args:
+        modules: The modules.
+        part_of: The part of each event that one has.
+    """
+    count = Counter(part for item in modules for part in item.module.parts)
+    shared = {part for part in count if count[part] > 1}
+    open_events = {event for item in modules for event in _open_events(item, shared, part_of)}
+    labels = defaultdict[str, set[Label]](set)
+    for item in modules:
+        for steps in item.graph.steps:
+            for event, targets in steps:
+                labels[event].update(_label(item, event, target, open_events, part_of) for target in targets)
+    begins = {
+        part: {
+            ("begin", part, item.values(part, number))
+            for item in modules
+            if part in item.module.parts
+            for number in _initial(item)
+        }
+        for part in sorted(shared)
+    }
+    # Each module may leave one beginning, and another module another one.
+    begins = {part: found for part, found in begins.items() if len(found) > 1}
+    return [_graph(item, labels, open_events, part_of, begins) for item in modules]
+
+
+def _initial(item: ControlledModule) -> list[int]:
+    return [number for number, parent in enumerate(item.graph.parents) if parent is None]
+
+
+def _open_events(item: ControlledModule, shared: set[int], part_of: dict[str, int]) -> Iterable[str]:
+    """The events of shared parts that can lead to several states of their part."""
+    for steps in item.graph.steps:
+        for event, targets in steps:
+            part = part_of.get(event)
+            if part in shared and len(targets) > 1 and len({item.values(part, target) for target in targets}) > 1:
+                yield event
+
+
+def _label(item: ControlledModule, event: str, target: int, open_events: set[str], part_of: dict[str, int]) -> Label:
+    return (event, item.values(part_of[event], target)) if event in open_events else event
+
+
+def _graph(
+    item: ControlledModule,
+    labels: dict[str, set[Label]],
+    open_events: set[str],
+    part_of: dict[str, int],
+    begins: dict[int, set[tuple[str, int, tuple[object, ...]]]],
+) -> Graph:
+    edges: Edges = [
+        [(_label(item, event, target, open_events, part_of), target) for event, targets in steps for target in targets]
+        for steps in item.graph.steps
+    ]
+    alphabet: set[Label] = {
+        label for event in item.events for label in (labels[event] if event in open_events else {event})
+    }
+    mine = [part for part in begins if part in item.module.parts]
+    alphabet.update(label for part in mine for label in begins[part])
+    if not mine:
+        return Graph(frozenset(alphabet), _initial(item), edges, set(item.marked))
+    # A tree of choices, one for each open part, in an order that all modules have in common.
+    root = len(edges)
+    edges.append([])
+    reached: dict[tuple[object, ...], int] = {(): root}
+    for number in _initial(item):
+        path: tuple[object, ...] = ()
+        for part in mine:
+            values = item.values(part, number)
+            longer = (*path, values)
+            if longer not in reached:
+                reached[longer] = len(edges)
+                edges.append([])
+                edges[reached[path]].append((("begin", part, values), reached[longer]))
+            path = longer
+        edges[reached[path]].append((SILENT, number))
+    return Graph(frozenset(alphabet), [root], edges, set(item.marked))

@@ -1,0 +1,260 @@
+"""Parts of a system that nothing but requirements connects, and what each requirement is about.
+
+Source: M. Goorden, J. van de Mortel-Fronczak, M. Reniers, W. Fokkink and J. Rooda, "Structuring multilevel
+discrete-event systems with dependence structure matrices", IEEE TAC 65(4), 2020, pp. 1625-1639: product systems, and
+the mapping of requirements to them.
+"""
+
+from collections.abc import Hashable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+
+from robosc.automata.check import SystemPlaces
+from robosc.automata.compile import subjects_read
+from robosc.automata.structure import Automaton, Role, System
+from robosc.expressions import TRUE, Expression
+from robosc.expressions.tree import conjunction, conjuncts
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """Requirements that stand together, since one reads what another one says.
+
+    Attributes:
+        parts: Parts that they are about.
+        automata: Names of requirement automata.
+        conditions: Places in `System.conditions`.
+        invariants: Places in `System.invariants`.
+        initial: Places among the conjuncts of `System.initial`.
+        marker: Places among the conjuncts of `System.marker`.
+    """
+
+    parts: frozenset[int]
+    automata: frozenset[str] = frozenset()
+    conditions: frozenset[int] = frozenset()
+    invariants: frozenset[int] = frozenset()
+    initial: frozenset[int] = frozenset()
+    marker: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Module:
+    """Parts with the demands that are made on them together.
+
+    Attributes:
+        parts: Places in `Partition.parts`.
+        demands: Places in `Partition.demands`.
+    """
+
+    parts: frozenset[int]
+    demands: frozenset[int]
+
+    def __or__(self, other: "Module") -> "Module":
+        return Module(self.parts | other.parts, self.demands | other.demands)
+
+
+@dataclass(frozen=True, slots=True)
+class Partition:
+    """A system in parts.
+
+    Attributes:
+        system: The system.
+        parts: Names of the automata of each part: no two parts share an event, and none reads another one.
+        demands: All that connects parts.
+    """
+
+    system: System
+    parts: tuple[frozenset[str], ...]
+    demands: tuple[Demand, ...]
+
+    def system_of(self, module: Module) -> System:
+        """The synthesis problem of a module."""
+        return self.problem_of(module, SystemPlaces())[0]
+
+    def problem_of(self, module: Module, places: SystemPlaces) -> tuple[System, SystemPlaces]:
+        """The synthesis problem of a module, with the places of its parts, as far as those of the whole are known."""
+        demands = [self.demands[place] for place in sorted(module.demands)]
+        names = {name for place in module.parts for name in self.parts[place]}
+        names |= {name for demand in demands for name in demand.automata}
+        system = self.system
+        automata = tuple(item for item in system.automata if item.name in names)
+        events = {event for item in automata for event in item.alphabet}
+        conditions = sorted(place for demand in demands for place in demand.conditions)
+        conditions = [place for place in conditions if system.conditions[place].event in events]
+        plant_conditions = [place for place, item in enumerate(system.plant_conditions) if item.event in events]
+        invariants = sorted(place for demand in demands for place in demand.invariants)
+        problem = replace(
+            system,
+            events=tuple(item for item in system.events if item.name in events),
+            automata=automata,
+            inputs=tuple(item for item in system.inputs if item.event in events),
+            conditions=tuple(system.conditions[place] for place in conditions),
+            invariants=tuple(system.invariants[place] for place in invariants),
+            initial=_chosen(system.initial, {place for demand in demands for place in demand.initial}),
+            marker=_chosen(system.marker, {place for demand in demands for place in demand.marker}),
+            plant_conditions=tuple(system.plant_conditions[place] for place in plant_conditions),
+            plant_invariants=tuple(item for item in system.plant_invariants if _read(item) <= names),
+        )
+        return problem, SystemPlaces(
+            places.automata,
+            tuple(places.conditions[place] for place in conditions if places.conditions),
+            tuple(places.invariants[place] for place in invariants if places.invariants),
+            tuple(places.plant_conditions[place] for place in plant_conditions if places.plant_conditions),
+        )
+
+
+def _chosen(condition: Expression, places: set[int]) -> Expression:
+    return conjunction(*(item for place, item in enumerate(conjuncts(condition)) if place in places))
+
+
+def _read(expression: Expression) -> frozenset[str]:
+    """Names of the automata that an expression reads."""
+    return frozenset(subject.automaton for subject in subjects_read(expression))
+
+
+def _read_by(automaton: Automaton) -> frozenset[str]:
+    """Names of the automata that an automaton's edges read."""
+    expressions = (
+        item for edge in automaton.edges for item in (edge.guard, *(update.expression for update in edge.updates))
+    )
+    return frozenset().union(*map(_read, expressions))
+
+
+class Groups[T: Hashable]:
+    """Disjoint sets that grow together.
+
+    Args:
+        items: The members, each alone at first.
+    """
+
+    def __init__(self, items: Iterable[T]) -> None:
+        self._above = {item: item for item in items}
+
+    def first(self, item: T) -> T:
+        """Return the member that stands for a member's set."""
+        while self._above[item] != item:
+            self._above[item] = self._above[self._above[item]]
+            item = self._above[item]
+        return item
+
+    def join(self, items: Iterable[T]) -> None:
+        """Let the sets of some members be one."""
+        first, *others = map(self.first, items)
+        for other in others:
+            self._above[self.first(other)] = self.first(first)
+
+    def __iter__(self) -> Iterator[list[T]]:
+        """The sets, in the order of their earliest members."""
+        found: dict[T, list[T]] = {}
+        for item in self._above:
+            found.setdefault(self.first(item), []).append(item)
+        return iter(found.values())
+
+
+@dataclass(slots=True)
+class _Element:
+    """One requirement: what it is, and the automata and events that it is about."""
+
+    demand: Demand
+    reads: frozenset[str] = frozenset()
+    events: frozenset[str] = frozenset()
+    parts: set[int] = field(default_factory=set)
+
+
+def partition(system: System) -> Partition:
+    """Return the parts of a system, as small as can be, and the demands on them."""
+    plants = _Plants(system)
+    place_of = {name: place for place, part in enumerate(plants.parts) for name in part}
+    part_of = {event: place_of[name] for event, name in plants.owners.items()}
+    elements = [
+        *(
+            _Element(Demand(frozenset(), automata=frozenset({item.name})), _read_by(item) | {item.name}, item.alphabet)
+            for item in system.automata
+            if item.name not in plants.names
+        ),
+        *(
+            _Element(Demand(frozenset(), conditions=frozenset({place})), _read(item.condition), frozenset({item.event}))
+            for place, item in enumerate(system.conditions)
+        ),
+        *(
+            _Element(Demand(frozenset(), invariants=frozenset({place})), _read(item))
+            for place, item in enumerate(system.invariants)
+        ),
+        *(
+            _Element(Demand(frozenset(), initial=frozenset({place})), _read(item))
+            for place, item in enumerate(conjuncts(system.initial))
+            if item != TRUE
+        ),
+        *(
+            _Element(Demand(frozenset(), marker=frozenset({place})), _read(item))
+            for place, item in enumerate(conjuncts(system.marker))
+            if item != TRUE
+        ),
+    ]
+    groups = Groups(range(len(elements)))
+    # Elements about a requirement automaton, or an event of no part, belong together.
+    first: dict[tuple[str, str], int] = {}
+    for number, element in enumerate(elements):
+        for kind, names, known in (("automaton", element.reads, place_of), ("event", element.events, part_of)):
+            for name in names:
+                if name in known:
+                    element.parts.add(known[name])
+                else:
+                    groups.join((first.setdefault((kind, name), number), number))
+    demands = tuple(_joined([elements[number] for number in group], plants.parts) for group in groups)
+    return Partition(system, plants.parts, demands)
+
+
+def _joined(elements: list[_Element], parts: tuple[frozenset[str], ...]) -> Demand:
+    demands = [element.demand for element in elements]
+    places = frozenset(place for element in elements for place in element.parts)
+    return Demand(
+        # What is about no part, such as `marked false`, may be put to any.
+        parts=places if places or not parts else frozenset({0}),
+        automata=frozenset().union(*(item.automata for item in demands)),
+        conditions=frozenset().union(*(item.conditions for item in demands)),
+        invariants=frozenset().union(*(item.invariants for item in demands)),
+        initial=frozenset().union(*(item.initial for item in demands)),
+        marker=frozenset().union(*(item.marker for item in demands)),
+    )
+
+
+class _Plants:
+    """Plants, and the requirement automata that they read, in groups that share events or read each other.
+
+    Attributes:
+        names: Names of all of them.
+        parts: The groups.
+        owners: One of them for each event that any has.
+    """
+
+    def __init__(self, system: System) -> None:
+        self._automata = {item.name: item for item in system.automata}
+        conditions = [(item.event, _read(item.condition)) for item in system.plant_conditions]
+        invariants = [_read(item) for item in system.plant_invariants]
+        self.names = {item.name for item in system.automata if item.role is Role.PLANT}
+        plain = {event for name in self.names for event in self._automata[name].alphabet}
+        # Of an event that no plant has, requirement automata are all that a condition of plants could restrict.
+        restricted = {event for event, _ in conditions if event not in plain}
+        waiting = [item.name for item in system.automata if item.alphabet & restricted]
+        waiting += [name for _, names in conditions for name in names]
+        waiting += [name for names in invariants for name in names]
+        waiting += [name for plant in self.names for name in _read_by(self._automata[plant])]
+        while waiting:
+            name = waiting.pop()
+            if name not in self.names:
+                self.names.add(name)
+                waiting += _read_by(self._automata[name])
+        groups = Groups(item.name for item in system.automata if item.name in self.names)
+        self.owners: dict[str, str] = {}
+        for name in (item.name for item in system.automata if item.name in self.names):
+            groups.join((name, *_read_by(self._automata[name])))
+            for event in self._automata[name].alphabet:
+                groups.join((name, self.owners.setdefault(event, name)))
+        for event, names in conditions:
+            owner = self.owners.get(event)
+            if owner is not None or names:
+                groups.join((*names, *(() if owner is None else (owner,))))
+        for names in invariants:
+            if names:
+                groups.join(names)
+        self.parts = tuple(frozenset(group) for group in groups)

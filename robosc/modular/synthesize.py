@@ -1,0 +1,267 @@
+"""Synthesis module by module, until the modules do not block each other.
+
+Modules are right by construction: parts share nothing but requirements, so what the supervisor of the whole allows is
+allowed by the supervisor of each module, and where these together are nonblocking, they allow exactly that. Where they
+are not, two of them become one module; where that takes too much to find out, all that share something do.
+
+Source: W. M. Wonham and P. J. Ramadge, "Modular supervisory control of discrete-event systems", Mathematics of Control,
+Signals and Systems 1, 1988, pp. 13-30.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from itertools import combinations
+from math import prod
+from operator import or_
+
+from robosc.automata.structure import System
+from robosc.conditions.multivalued import Effort, EffortExceededError, space_of
+from robosc.errors import UnsupportedModelError
+from robosc.modular.clusters import MAXIMUM_BITS, modules_of
+from robosc.modular.controlled import ControlledModule, controlled_module, graphs_of
+from robosc.modular.nonconflict import TooLargeError, is_nonconflicting
+from robosc.modular.partition import Groups, Module, Partition, partition
+from robosc.supervisor import AddedCondition, DecisionDiagram
+from robosc.supervisor.diagram import diagram_domains
+from robosc.synthesis import SynthesisProgress, SynthesisResult, SynthesisStatus, synthesize
+from robosc.synthesis.engines import EngineOptions
+
+STATES = 10_000
+"""States of a module, and of a composition, up to which it is found out whether modules block each other."""
+
+JOINING_STEPS = 1_000_000
+"""Steps that joining the conditions of several modules on one event may take."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModuleSupervisor:
+    """Supervisor of one module.
+
+    Attributes:
+        module: The module.
+        system: Its synthesis problem.
+        result: The supervisor, or the reason why there is none.
+    """
+
+    module: Module
+    system: System
+    result: SynthesisResult
+
+    @property
+    def automata(self) -> tuple[str, ...]:
+        """Names of its automata."""
+        return tuple(item.name for item in self.system.automata)
+
+
+@dataclass(frozen=True, slots=True)
+class ModularResult:
+    """Outcome of a modular synthesis.
+
+    Attributes:
+        partition: The system in parts.
+        modules: The modules with their supervisors; without a supervisor the first one that has none.
+        groups: Places of modules that share parts or events, and were found not to block each other.
+        added: Conditions that the supervisors together add to events, in the system's order.
+        initial: Condition on the initial states; None if the system may begin in all of them.
+        states: Reachable states of the controlled system where each group is one module; else None, for these states
+            are never all at hand.
+    """
+
+    partition: Partition
+    modules: tuple[ModuleSupervisor, ...]
+    groups: tuple[tuple[int, ...], ...] = ()
+    added: tuple[AddedCondition, ...] = ()
+    initial: DecisionDiagram | None = None
+    states: int | None = None
+
+    @property
+    def lost(self) -> ModuleSupervisor | None:
+        """The module without a supervisor; None where there is none."""
+        return next((item for item in self.modules if item.result.status is SynthesisStatus.EMPTY), None)
+
+
+def synthesize_modular(
+    system: System,
+    *,
+    engine: str | EngineOptions = "auto",
+    limit: int = STATES,
+    module_bits: float = MAXIMUM_BITS,
+    should_stop: Callable[[], bool] = lambda: False,
+    on_progress: Callable[[str], None] = lambda message: None,
+) -> ModularResult:
+    """Synthesize the supervisor of a system module by module.
+
+    Args:
+        system: The system.
+        engine: Name of the engine for decision diagrams, or its options.
+        limit: States of a module, or of a composition, up to which it is found out whether modules block each other.
+        module_bits: Logarithm of the combinations of values up to which requirements share a module.
+        should_stop: Function called before each step of the work; once it returns true, the work ends.
+        on_progress: Function called with the progress of the work, in words.
+
+    Raises:
+        SynthesisCancelled: `should_stop` became true.
+        NodeLimitError: Diagrams of a module became larger than the options allow.
+        UnknownEngineError: There is no such engine.
+        UnsupportedModelError: A module, or the conditions of several together, are outside what synthesis handles.
+    """
+    parts = partition(system)
+    return _Synthesis(parts, engine, limit, should_stop, on_progress).result(modules_of(parts, module_bits))
+
+
+class _Synthesis:
+    def __init__(
+        self,
+        parts: Partition,
+        engine: str | EngineOptions,
+        limit: int,
+        should_stop: Callable[[], bool],
+        on_progress: Callable[[str], None],
+    ) -> None:
+        self._partition = parts
+        self._engine = engine
+        self._limit = limit
+        self._should_stop = should_stop
+        self._on_progress = on_progress
+        self._made: dict[Module, ModuleSupervisor] = {}
+        self._controlled: dict[Module, ControlledModule | None] = {}
+        self._part_of = {
+            event: place
+            for place, names in enumerate(parts.parts)
+            for item in parts.system.automata
+            if item.name in names
+            for event in item.alphabet
+        }
+
+    def result(self, first: Sequence[Module]) -> ModularResult:
+        """The supervisors of all modules, or the first module without one; of some modules to begin with."""
+        modules = list(first)
+        fine: set[frozenset[Module]] = set()
+        while True:
+            for number, module in enumerate(modules):
+                made = self._supervisor(module, f"module {number + 1} of {len(modules)}")
+                if made.result.status is SynthesisStatus.EMPTY:
+                    return ModularResult(self._partition, (made,))
+            groups = self._groups(modules)
+            merged: Sequence[Module] = ()
+            for group in groups:
+                members = [modules[place] for place in group]
+                is_nonblocking = frozenset(members) in fine or self._is_nonblocking(members)
+                if not is_nonblocking:
+                    merged = members if is_nonblocking is None else self._blocking_pair(members)
+                    break
+                fine.add(frozenset(members))
+            if not merged:
+                return self._joined(modules, groups)
+            whole = reduce(or_, merged)
+            self._on_progress(f"{len(merged)} modules become one, of {len(whole.parts)} parts")
+            modules = [item for item in modules if item not in merged]
+            inside = [item for item in modules if item.parts <= whole.parts]
+            for item in inside:
+                whole |= item
+            modules = [*(item for item in modules if item not in inside), whole]
+
+    def _supervisor(self, module: Module, what: str) -> ModuleSupervisor:
+        if module not in self._made:
+            system = self._partition.system_of(module)
+
+            def report(progress: SynthesisProgress) -> None:
+                self._on_progress(f"{what}: {progress}")
+
+            found = synthesize(system, engine=self._engine, should_stop=self._should_stop, on_progress=report)
+            self._made[module] = ModuleSupervisor(module, system, found)
+        return self._made[module]
+
+    def _groups(self, modules: Sequence[Module]) -> list[tuple[int, ...]]:
+        """Places of modules that share parts or events, directly or by others."""
+        groups = Groups(range(len(modules)))
+        first: dict[object, int] = {}
+        for place, module in enumerate(modules):
+            for thing in (*module.parts, *(event.name for event in self._made[module].system.events)):
+                groups.join((first.setdefault(thing, place), place))
+        return [tuple(group) for group in groups]
+
+    # Blocking
+
+    def _is_nonblocking(self, modules: Sequence[Module]) -> bool | None:
+        """Return True if modules do not block each other; None where that takes too many states to find out."""
+        if len(modules) == 1:
+            return True
+        self._on_progress(f"nonblocking: {len(modules)} modules together")
+        controlled = [self._states(module) for module in modules]
+        known = [item for item in controlled if item is not None]
+        if len(known) < len(controlled):
+            return None
+        try:
+            graphs = graphs_of(known, self._part_of)
+            return is_nonconflicting(graphs, limit=self._limit, should_stop=self._should_stop)
+        except TooLargeError:
+            return None
+
+    def _states(self, module: Module) -> ControlledModule | None:
+        if module not in self._controlled:
+            made = self._made[module]
+            self._controlled[module] = controlled_module(
+                self._partition,
+                module,
+                made.system,
+                made.result.added,
+                made.result.initial,
+                limit=self._limit,
+                should_stop=self._should_stop,
+            )
+        return self._controlled[module]
+
+    def _blocking_pair(self, modules: Sequence[Module]) -> tuple[Module, Module]:
+        """Two of some modules that block each other: two that do so by themselves, if there are."""
+
+        def shared(pair: tuple[Module, Module]) -> tuple[int, int]:
+            one, other = pair
+            return -len(one.parts & other.parts), len(one.parts | other.parts)
+
+        pairs = sorted(combinations(modules, 2), key=shared)
+        close = [pair for pair in pairs if len(self._groups(pair)) == 1] or pairs
+        return next((pair for pair in close if self._is_nonblocking(pair) is False), close[0])
+
+    # The whole
+
+    def _joined(self, modules: Sequence[Module], groups: Sequence[tuple[int, ...]]) -> ModularResult:
+        made = tuple(self._made[module] for module in modules)
+        by_event: dict[str, list[DecisionDiagram]] = {}
+        for item in made:
+            for added in item.result.added:
+                by_event.setdefault(added.event, []).append(added.condition)
+        initial = [item.result.initial for item in made if item.result.initial is not None]
+        is_counted = all(len(group) == 1 for group in groups)
+        return ModularResult(
+            self._partition,
+            made,
+            tuple(groups),
+            tuple(
+                AddedCondition(event.name, self._all_of(by_event[event.name], event.name))
+                for event in self._partition.system.events
+                if event.name in by_event
+            ),
+            self._all_of(initial, "the initial state") if initial else None,
+            prod(item.result.statistics.states for item in made) if is_counted else None,
+        )
+
+    def _all_of(self, diagrams: Sequence[DecisionDiagram], what: str) -> DecisionDiagram:
+        """Return the diagram that is true where all of some are.
+
+        Raises:
+            UnsupportedModelError: It becomes too large.
+        """
+        if len(diagrams) == 1:
+            return diagrams[0]
+        names = {node.automaton for diagram in diagrams for node in diagram.nodes}
+        automata = tuple(item for item in self._partition.system.automata if item.name in names)
+        domains = diagram_domains(System("", (), automata))
+        try:
+            space = space_of(list(diagrams), domains, Effort(JOINING_STEPS))
+            return space.diagram(space.all_of(map(space.of, diagrams)))
+        except EffortExceededError:
+            raise UnsupportedModelError(
+                f"{what}: the conditions that {len(diagrams)} modules add are too large as one"
+            ) from None

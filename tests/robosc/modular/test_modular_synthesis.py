@@ -1,0 +1,169 @@
+"""Tests of modular synthesis, against explicit synthesis of the whole on random systems."""
+
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+
+from robosc.automata import Automaton, Edge, Event, Role, Semantics, System
+from robosc.automata.controlled import controlled_graph
+from robosc.expressions import Binary, StateTest, Unary
+from robosc.modular.clusters import MAXIMUM_BITS, modules_of
+from robosc.modular.partition import partition
+from robosc.modular.synthesize import ModularResult, synthesize_modular
+from robosc.supervisor.predicates import state_predicate, state_predicates
+from robosc.supervisor.validation import validate_added
+from support.effort import seeds
+from support.families import FAMILIES
+from support.random_parts import system_in_parts
+from support.random_systems import explicit_supervisor, wide_system
+from support.systems import automaton
+
+EXAMPLES = 120
+
+
+def check(system: System, result: ModularResult) -> bool:
+    """Compare with the supervisor of the whole; returns whether there is one."""
+    expected = explicit_supervisor(system)
+    assert expected is not None
+    assert (result.lost is not None) == expected.is_empty
+    if expected.is_empty:
+        return False
+    validate_added(result.added, system)
+    begins = {} if result.initial is None else {"initial": state_predicate(system, result.initial)}
+    graph = controlled_graph(
+        Semantics(system),
+        state_predicates(system, result.added),
+        limit=50_000,
+        **begins,  # type: ignore[arg-type]
+    )
+    assert graph is not None
+    assert frozenset(graph.states) == expected.reachable
+    controllable = {item.name for item in system.events if item.is_controllable}
+    for state, steps in zip(graph.states, graph.steps, strict=True):
+        allowed = {event for event in controllable if expected.allows(state, event)}
+        assert {event for event, _ in steps} & controllable == allowed
+    assert result.states in (None, len(graph.states))
+    return True
+
+
+@pytest.mark.random
+def test_modules_together_are_the_supervisor_of_the_whole() -> None:
+    met: Counter[str] = Counter()
+    for seed in seeds(EXAMPLES):
+        system = system_in_parts(seed)
+        # Every other system in the smallest modules that there could be.
+        bits = MAXIMUM_BITS if seed % 2 else 0.0
+        result = synthesize_modular(system, module_bits=bits)
+        if check(system, result):
+            met["several modules"] += len(result.modules) > 1
+            met["counted"] += result.states is not None and len(result.modules) > 1
+            met["a group"] += any(len(group) > 1 for group in result.groups)
+        else:
+            met["empty"] += 1
+    assert all(met[name] for name in ("several modules", "counted", "a group", "empty")), met
+
+
+def philosophers(count: int) -> System:
+    """Philosophers as plants, who take the left fork first, and forks as requirements: two neighbours never block."""
+    events: list[Event] = []
+    automata: list[Automaton] = []
+    for place in range(count):
+        left, right, free = (f"{what}{place}" for what in ("left", "right", "free"))
+        events += [Event(name, is_controllable=True) for name in (left, right, free)]
+        edges = (Edge("t", left, "l"), Edge("l", right, "e"), Edge("e", free, "t"))
+        automata.append(
+            Automaton(f"P{place}", ("t", "l", "e"), ("t",), frozenset({"t"}), frozenset((left, right, free)), edges)
+        )
+    for place in range(count):
+        after = (place + 1) % count
+        taking, giving = (f"left{after}", f"right{place}"), (f"free{place}", f"free{after}")
+        moves = (*(Edge("here", name, "away") for name in taking), *(Edge("away", name, "here") for name in giving))
+        automata.append(Automaton(f"F{place}", ("here", "away"), ("here",), frozenset({"here"}),
+                                  frozenset((*taking, *giving)), moves, role=Role.REQUIREMENT))  # fmt: skip
+    return System("philosophers", tuple(events), tuple(automata))
+
+
+@pytest.mark.parametrize("count", [3, 4])
+def test_modules_that_block_each_other_become_one(count: int) -> None:
+    system = philosophers(count)
+    assert len(modules_of(partition(system), 0.0)) == count
+    told: list[str] = []
+    result = synthesize_modular(system, module_bits=0.0, on_progress=told.append)
+    assert check(system, result)
+    assert len(result.modules) == 1
+    assert any(text.startswith("2 modules become one") for text in told)
+
+
+def test_modules_that_are_too_large_to_tell_become_one() -> None:
+    system = philosophers(3)
+    result = synthesize_modular(system, module_bits=0.0, limit=2)
+    assert len(result.modules) == 1
+    assert check(system, result)
+
+
+def test_modules_that_leave_no_common_beginning_are_found_out() -> None:
+    """Of two beginnings of a part one module allows this one, and another module the other one."""
+    trap = ("a -u_leave-> b", "b -u_leave-> a")
+    shared = replace(automaton("S", ["x -stay-> x", "y -stay-> y"]), initial=("x", "y"))
+    sides = [automaton(name, [edge.replace("leave", f"leave_{name}") for edge in trap]) for name in ("L", "R")]
+    events = tuple(
+        Event(name, is_controllable=not name.startswith("u_")) for name in ("stay", "u_leave_L", "u_leave_R")
+    )
+    never = tuple(
+        Unary("not", Binary("and", StateTest("S", where), StateTest(name, "b")))
+        for where, name in (("x", "L"), ("y", "R"))
+    )
+    system = System("beginnings", events, (shared, *sides), invariants=never)
+    assert not check(system, synthesize_modular(system, module_bits=0.0))
+
+
+def test_a_system_of_nothing_is_one_module() -> None:
+    result = synthesize_modular(System("nothing", (), ()))
+    assert (len(result.modules), result.states) == (1, 1)
+
+
+def test_the_module_to_blame_is_told() -> None:
+    system = philosophers(3)
+    never = replace(system, invariants=(Unary("not", StateTest("P1", "t")),))
+    lost = synthesize_modular(never, module_bits=0.0).lost
+    assert lost is not None
+    assert "P1" in lost.automata
+    assert len(lost.automata) < len(system.automata)
+
+
+@pytest.mark.parametrize("family", ["machines in a row", "assembly tree"])
+def test_families_in_modules(family: str) -> None:
+    system = FAMILIES[family](4)
+    result = synthesize_modular(system, module_bits=0.0)
+    assert check(system, result)
+    assert len(result.modules) == len(result.groups[0]) == 3
+
+
+@pytest.mark.random
+def test_any_system_can_be_taken_apart() -> None:
+    for seed in seeds(40):
+        check(wide_system(seed), synthesize_modular(wide_system(seed)))
+
+
+@pytest.mark.random
+def test_parts_and_demands_are_the_whole() -> None:
+    """Each automaton, condition and invariant is in a part or a demand, once, and each of these in a module."""
+    for seed in seeds(EXAMPLES):
+        system = system_in_parts(seed)
+        found = partition(system)
+        names = [name for part in found.parts for name in part]
+        names += [name for demand in found.demands for name in demand.automata]
+        assert sorted(names) == sorted(item.name for item in system.automata)
+        assert sorted(place for item in found.demands for place in item.conditions) == list(
+            range(len(system.conditions))
+        )
+        assert sorted(place for item in found.demands for place in item.invariants) == list(
+            range(len(system.invariants))
+        )
+        modules = modules_of(found)
+        assert sorted(place for item in modules for place in item.demands) == list(range(len(found.demands)))
+        assert {place for item in modules for place in item.parts} == set(range(len(found.parts)))
+        for module in modules:
+            for place in module.demands:
+                assert found.demands[place].parts <= module.parts

@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -60,11 +60,15 @@ class Synthesized:
     explanation: "EmptyExplanation | None" = None
 
 
-def synthesized(arguments: argparse.Namespace) -> Synthesized:
+def synthesized(arguments: argparse.Namespace, initial: str | None = None) -> Synthesized:
     """Check the model of a command, and synthesize if it has no errors.
 
+    Args:
+        arguments: Arguments of the command.
+        initial: Description of the states in which automata begin, such as `tank.level = 1`; None: as the model says.
+
     Raises:
-        UsageError: An argument means nothing for it, or it cannot be read.
+        UsageError: An argument means nothing for it, it cannot be read, or the initial states name what is not there.
     """
     from robosc.explanation import EmptyExplanation
     from robosc.pipeline.results import SynthesisStatus
@@ -72,9 +76,25 @@ def synthesized(arguments: argparse.Namespace) -> Synthesized:
     bundle, found = _checked(arguments)
     if found.system is None:
         return Synthesized(bundle, SynthesisStatus.MODEL_ERRORS, found.diagnostics, "", None)
+    if initial is not None:
+        found = _beginning(found, initial)
     made = _synthesis(arguments, found)
     explanation = made.explanation if isinstance(made.explanation, EmptyExplanation) else None
     return Synthesized(bundle, made.status, found.diagnostics, made.reason, made.supervisor, explanation)
+
+
+def _beginning(found: "CheckedSystem", initial: str) -> "CheckedSystem":
+    from robosc.explanation import RequestError
+    from robosc.explanation.requests import SystemRequests
+    from robosc.expressions import conjunction
+
+    system = found.system
+    assert system is not None  # noqa: S101 - asked only of models without errors
+    try:
+        condition = SystemRequests(system).state(initial)
+    except RequestError as error:
+        raise UsageError(f"--initial: {error}") from error
+    return replace(found, system=replace(system, initial=conjunction(system.initial, condition)))
 
 
 def controlled_system(supervisor: "SystemSupervisor", suffix: str) -> str:

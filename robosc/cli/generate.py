@@ -89,6 +89,11 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_deployment_argument(parser)
     add_engine_options(parser)
     add_livelock_argument(parser)
+    parser.add_argument(
+        "--initial",
+        metavar="STATE",
+        help="state in which automata begin that may begin in several: 'p.x = 1, q = on'",
+    )
     parser.set_defaults(run=run)
 
 
@@ -150,6 +155,8 @@ def run(arguments: argparse.Namespace) -> int:
     require_generatable(arguments.target)
     if automata.is_given(arguments):
         return _generate_automata(arguments)
+    if arguments.initial is not None:
+        raise UsageError("--initial chooses where automata begin: a robot begins in one state")
     options = generate_options(arguments)
     bundle = read_bundle(arguments)
     outcome = synth.make(arguments, bundle, allow_livelock=arguments.allow_livelock)
@@ -172,7 +179,7 @@ def _generate_automata(arguments: argparse.Namespace) -> ExitCode:
     )
     automata.refuse(arguments.allow_livelock, "--allow-livelock: automata have no silent steps of a controller")
     options = generate_options(arguments)
-    made = automata.synthesized(arguments)
+    made = automata.synthesized(arguments, arguments.initial)
     files = None
     if (found := made.supervisor) is not None:
         files = generate_automata(found, arguments.target, options)

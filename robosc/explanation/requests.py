@@ -218,9 +218,15 @@ class SystemRequests(Requests):
                     return StateTest(item.automaton, location)
         # A name may hold what looks like an operator, so each place where one could be is tried.
         for found in _COMPARISON.finditer(text):
-            name = text[: found.start()].strip()
+            name, value = text[: found.start()].strip(), text[found.end() :].strip()
             if name in variables:
-                return self._test(variables[name], found[0], text[found.end() :].strip())
+                return self._test(variables[name], found[0], value)
+            if Subject(name) in self._known and found[0] in ("=", "!="):
+                locations = [str(item) for item in subject_domain(self._system, Subject(name))]
+                if value not in locations:
+                    raise _unknown(f"location of {name}", value, locations)
+                test = StateTest(name, value)
+                return test if found[0] == "=" else Unary("not", test)
         return None
 
 

@@ -65,7 +65,7 @@ def generate(
     if isinstance(model, System):
         made = synthesize_system(model, options, on_progress, should_stop)
         if made.supervisor is None:
-            return Generation(made.status, (), made.reason, None, target=target)
+            return Generation(made.status, (), made.reason, None, made.explanation, target)
         model = made.supervisor
     if isinstance(model, SystemSupervisor):
         on_progress(Progress("generation", target))

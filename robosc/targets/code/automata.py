@@ -95,7 +95,7 @@ class ControlledAutomata:
             count = "too many states to count" if ways > MAXIMUM_CHOICES else f"{len(found)} states"
             raise UnsupportedModelError(
                 f"{self.system.name} may begin in {count}, and code begins in one: give each variable one initial "
-                "value, and each automaton one initial location"
+                "value and each automaton one initial location, or choose with --initial of robosc generate"
             )
         return dict(zip(subjects(self.system), found[0], strict=True))
 

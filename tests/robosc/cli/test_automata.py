@@ -178,6 +178,16 @@ def test_code_is_generated(model: str, tmp_path: Path, capsys: pytest.CaptureFix
     folder = tmp_path / "out"
     status, _, err = run(capsys, "generate", model, "--target", "c99", "-o", str(folder))
     assert (status, "tank may begin in 3 states, and code begins in one" in err) == (1, True)
+    arguments = ["generate", model, "--target", "python", "-o", str(tmp_path / "begun"), "--initial"]
+    assert run(capsys, *arguments, "tank.level = 1")[0] == 0
+    assert run(capsys, *arguments, "tank = *, tank.level = 2")[0] == 0
+    status, _, err = run(capsys, *arguments, "tank.level = 3")
+    assert (status, "no supervisor exists" in err) == (1, True)
+    for text, message in (
+        ("tank.levl = 1", "unknown location or variable 'tank.levl'; did you mean 'tank.level'?"),
+        ("tank = open", "unknown location of tank 'open'; there is *"),
+    ):
+        assert run(capsys, *arguments, text) == (2, "", f"robosc: --initial: {message}\n")
     status, _, err = run(capsys, "generate", model, "--target", "ros2", "-o", str(folder))
     assert (status, "the target ros2 needs a model of a robot" in err) == (1, True)
     Path(model).write_text(TANK.replace("level in any", "level = 1"))

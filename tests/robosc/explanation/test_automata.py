@@ -216,6 +216,8 @@ ASKED = SystemRequests(System("s", (GO, STOP), (PLANT, ODD)))
         ("p.q.b", StateTest("p.q", "b")),
         ("!p.q.b", Unary("not", StateTest("p.q", "b"))),
         ("not p.q.n >= 2", Unary("not", Binary(">=", VariableRead("p.q", "n"), Constant(2)))),
+        ("p.q = b", StateTest("p.q", "b")),
+        ("p.q != b", Unary("not", StateTest("p.q", "b"))),
         ("p.q.n=0", Binary("=", VariableRead("p.q", "n"), Constant(0))),
         ("odd = 1.< 2", StateTest("odd = 1", "< 2")),
     ],
@@ -228,6 +230,8 @@ def test_states_are_asked_for_by_the_names_of_automata(text: str, condition: obj
     ("text", "problem"),
     [
         ("p.q.m = 1", "unknown location or variable 'p.q.m'; did you mean 'p.q.n'?"),
+        ("p.q = c", "unknown location of p.q 'c'; there is a, b"),
+        ("p.q < a", "unknown location or variable 'p.q'; did you mean 'p.q.n'?"),
         ("p.q.n", "p.q.n needs a value: p.q.n = 0"),
         ("p.q.n = x", "'x' is no value of p.q.n; there is a whole number"),
         ("", 'no state is asked for: write for instance "Door.closed, Lift.n = 2"'),

@@ -21,7 +21,7 @@ from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.json_documents import counts_text, diagnostics_json
 from robosc.model.structure import Deployment
 from robosc.pipeline.automata_files import SUFFIXES, is_automata
-from robosc.source import Bundle
+from robosc.source import Bundle, visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -183,9 +183,9 @@ def synth(arguments: argparse.Namespace) -> ExitCode:
         )
         return ExitCode.OK
     print_diagnostics(made.diagnostics, made.bundle)
-    sys.stdout.write(f"{made.supervisor}\n")
-    if initial is not None:
-        sys.stdout.write(f"it begins only where {initial}\n")
+    told = [str(made.supervisor)] if initial is None else [str(made.supervisor), f"it begins only where {initial}"]
+    # Names of plain automata may be anything.
+    sys.stdout.write("".join(f"{visible(line)}\n" for text in told for line in text.split("\n")))
     if output is not None:
         sys.stdout.write(f"written to {output}\n")
     return ExitCode.OK
@@ -340,7 +340,7 @@ def report_none(arguments: argparse.Namespace, made: Synthesized) -> ExitCode:
     else:
         print_diagnostics(made.diagnostics, made.bundle)
         if made.reason:
-            sys.stderr.write(f"{arguments.model}: {made.reason}\n")
+            sys.stderr.write(f"{arguments.model}: {visible(made.reason)}\n")
         if made.explanation is not None:
             sys.stderr.write(empty_text(made.explanation))
     return ExitCode.FAILED

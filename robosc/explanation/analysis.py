@@ -197,7 +197,8 @@ class Analysis:
 
     def wanted(self, event: str) -> Any:
         """Return the states where the plants would let an event happen if variables had no ranges."""
-        return self._problems.steps(event, self._ranges).plant
+        steps = self._problems.steps(event)
+        return steps.plant | steps.leaving
 
     def possible(self, event: str, good: Any | None = None) -> Any:
         """Return the states where an event may happen and stays in good states.
@@ -245,7 +246,7 @@ class Analysis:
                 continue
             others = self._problems.steps(event, [other for other in mine if other != item])
             if others.event.is_controllable:
-                yield item, self.wanted(event) & ~others.plant
+                yield item, self.wanted(event) & others.leaving
             else:
                 yield item, others.under(self._manager.true).bad
 

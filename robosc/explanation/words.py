@@ -167,8 +167,17 @@ class SystemWords:
         """Warnings that follow from the answers."""
         for never in answers.never:
             yield Remark("never-enabled", f"{never.event} can never happen", None)
+        # These restrict by what they mark and by their ranges, too.
+        more = {
+            place
+            for automaton in self.given.automata
+            if not automaton.marked.issuperset(automaton.locations) or automaton.variables
+            for place in self._conditions[1].get(automaton.name, ())
+        }
         for number in answers.unused:
             item = self._restrictions[number]
+            if more.intersection(item.conditions):
+                continue
             part = (
                 self.terms.invariant_part(item.invariants[0])
                 if item.invariants

@@ -21,6 +21,9 @@ SMALLEST_FLOW = 1e-3
 MAXIMUM_ROUNDS = 20
 """Rounds that flows are given to settle; symmetric graphs may never."""
 
+MAXIMUM_NODES = 30
+"""Nodes that a demand may connect: one on more of them says little about which belong together."""
+
 MAXIMUM_BITS = 14.0
 """Logarithm of the combinations of values up to which requirements of one cluster share a module."""
 
@@ -72,6 +75,8 @@ def _by_cluster(partition: Partition) -> list[list[int]]:
                 here[touched[0]].append(place)
                 continue
             waiting.append(place)
+            if len(touched) > MAXIMUM_NODES:
+                continue
             for pair in combinations(touched, 2):
                 weights[pair] += 1.0 / (len(touched) - 1)
         found += here.values()
@@ -121,7 +126,9 @@ def _expanded(columns: list[_Column], column: _Column) -> _Column:
 
 def _inflated(column: _Column) -> _Column:
     whole = _normalized({node: flow**INFLATION for node, flow in column.items()})
-    kept = {node: flow for node, flow in whole.items() if flow >= SMALLEST_FLOW}
+    # Of very many equal flows each is small: the largest stay.
+    smallest = min(SMALLEST_FLOW, max(whole.values()))
+    kept = {node: flow for node, flow in whole.items() if flow >= smallest}
     return _normalized(kept)
 
 

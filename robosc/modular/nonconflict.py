@@ -22,6 +22,10 @@ SILENT: Label = None
 """Label of a step that no other automaton takes part in."""
 
 
+MAXIMUM_WORK = 3_000_000
+"""Parts of signatures that are made for one abstraction, beyond which it is left as it is."""
+
+
 class TooLargeError(Exception):
     """A composition has too many states."""
 
@@ -157,7 +161,8 @@ def reduced(graph: Graph) -> Graph:
     """Return a smaller automaton that blocks the same others: weakly bisimilar, what is lost being one state."""
     graph = _quotient(graph, _with_lost_as_one(graph))
     graph = _quotient(graph, _silent_circles(graph))
-    return _quotient(graph, _weak_blocks(graph))
+    blocks = _weak_blocks(graph)
+    return graph if blocks is None else _quotient(graph, blocks)
 
 
 def _with_lost_as_one(graph: Graph) -> list[int]:
@@ -245,9 +250,12 @@ def _components(following: Sequence[Sequence[int]]) -> list[int]:
     return component
 
 
-def _weak_blocks(graph: Graph) -> list[int]:
-    """For each state the number of its class of weak bisimulation; there are no circles of silent steps."""
-    count = len(graph.edges)
+def _weak_blocks(graph: Graph) -> list[int] | None:
+    """For each state the number of its class of weak bisimulation; None where that takes too much work.
+
+    There are no circles of silent steps.
+    """
+    work, count = 0, len(graph.edges)
     silent = [[target for label, target in steps if label is SILENT] for steps in graph.edges]
     # A component has a larger number than those that it leads to, so that all that follows a state is known before it.
     order = sorted(range(count), key=_components(silent).__getitem__)
@@ -259,6 +267,7 @@ def _weak_blocks(graph: Graph) -> list[int]:
             for target in silent[state]:
                 ends |= reached[target]
             reached[state] = frozenset(ends)
+            work += len(ends)
         signatures: list[frozenset[object]] = [frozenset()] * count
         for state in order:
             found: set[object] = {("marked",)} if state in graph.marked else set()
@@ -269,6 +278,9 @@ def _weak_blocks(graph: Graph) -> list[int]:
                     found.update((label, end) for end in reached[target])
             found.update((SILENT, end) for end in reached[state])
             signatures[state] = frozenset(found)
+            work += len(found)
+            if work > MAXIMUM_WORK:
+                return None
         numbers: dict[tuple[int, frozenset[object]], int] = {}
         blocks = [numbers.setdefault((blocks[state], signatures[state]), len(numbers)) for state in range(count)]
         if len(numbers) == blocks_count:

@@ -9,8 +9,8 @@ from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from robosc.automata.check import SystemPlaces
-from robosc.automata.compile import subjects_read
-from robosc.automata.structure import Automaton, Role, System
+from robosc.automata.compile import paths_read, subjects_read
+from robosc.automata.structure import Automaton, Edge, Role, System
 from robosc.expressions import TRUE, Expression
 from robosc.expressions.tree import conjunction, conjuncts
 
@@ -113,10 +113,12 @@ def _read(expression: Expression) -> frozenset[str]:
 
 def _read_by(automaton: Automaton) -> frozenset[str]:
     """Names of the automata that an automaton's edges read."""
-    expressions = (
-        item for edge in automaton.edges for item in (edge.guard, *(update.expression for update in edge.updates))
-    )
-    return frozenset().union(*map(_read, expressions))
+    return frozenset().union(*(_read(item) for edge in automaton.edges for item in _expressions(edge)))
+
+
+def _expressions(edge: Edge) -> Iterator[Expression]:
+    yield edge.guard
+    yield from (update.expression for update in edge.updates)
 
 
 class Groups[T: Hashable]:
@@ -152,11 +154,12 @@ class Groups[T: Hashable]:
 
 @dataclass(slots=True)
 class _Element:
-    """One requirement: what it is, and the automata and events that it is about."""
+    """One requirement: what it is, the automata and events that it is about, and events whose data it reads."""
 
     demand: Demand
     reads: frozenset[str] = frozenset()
     events: frozenset[str] = frozenset()
+    data: frozenset[str] = frozenset()
     parts: set[int] = field(default_factory=set)
 
 
@@ -167,7 +170,12 @@ def partition(system: System) -> Partition:
     part_of = {event: place_of[name] for event, name in plants.owners.items()}
     elements = [
         *(
-            _Element(Demand(frozenset(), automata=frozenset({item.name})), _read_by(item) | {item.name}, item.alphabet)
+            _Element(
+                Demand(frozenset(), automata=frozenset({item.name})),
+                _read_by(item) | {item.name},
+                item.alphabet,
+                frozenset(edge.event for edge in item.edges if any(map(paths_read, _expressions(edge)))),
+            )
             for item in system.automata
             if item.name not in plants.names
         ),
@@ -200,6 +208,9 @@ def partition(system: System) -> Partition:
                     element.parts.add(known[name])
                 else:
                     groups.join((first.setdefault((kind, name), number), number))
+        # Data that an event carries is the same for all that read it.
+        for name in sorted(element.data):
+            groups.join((first.setdefault(("data", name), number), number))
     demands = tuple(_joined([elements[number] for number in group], plants.parts) for group in groups)
     return Partition(system, plants.parts, demands)
 

@@ -11,7 +11,6 @@ Signals and Systems 1, 1988, pp. 13-30.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from itertools import combinations
 from math import prod
 from operator import or_
 
@@ -126,6 +125,8 @@ class _Synthesis:
         self._on_progress = on_progress
         self._made: dict[Module, ModuleSupervisor] = {}
         self._controlled: dict[Module, ControlledModule | None] = {}
+        # Modules of which it is known that they do not block each other.
+        self._fine: set[frozenset[Module]] = set()
         self._part_of = {
             event: place
             for place, names in enumerate(parts.parts)
@@ -137,30 +138,28 @@ class _Synthesis:
     def result(self, first: Sequence[Module]) -> ModularResult:
         """The supervisors of all modules, or the first module without one; of some modules to begin with."""
         modules = list(first)
-        fine: set[frozenset[Module]] = set()
         while True:
             for number, module in enumerate(modules):
                 made = self._supervisor(module, f"module {number + 1} of {len(modules)}")
                 if made.result.status is SynthesisStatus.EMPTY:
                     return ModularResult(self._partition, (made,))
             groups = self._groups(modules)
-            merged: Sequence[Module] = ()
+            merged: Sequence[Sequence[Module]] = ()
             for group in groups:
                 members = [modules[place] for place in group]
-                is_nonblocking = frozenset(members) in fine or self._is_nonblocking(members)
+                is_nonblocking = frozenset(members) in self._fine or self._is_nonblocking(members)
                 if not is_nonblocking:
-                    merged = members if is_nonblocking is None else self._blocking_pair(members)
+                    merged = [members] if is_nonblocking is None else self._blocking_pairs(members)
                     break
-                fine.add(frozenset(members))
+                self._fine.add(frozenset(members))
             if not merged:
                 return self._joined(modules, groups)
-            whole = reduce(or_, merged)
-            self._on_progress(f"{len(merged)} modules become one, of {len(whole.parts)} parts")
-            modules = [item for item in modules if item not in merged]
-            inside = [item for item in modules if item.parts <= whole.parts]
-            for item in inside:
-                whole |= item
-            modules = [*(item for item in modules if item not in inside), whole]
+            for together in merged:
+                whole = reduce(or_, together)
+                self._on_progress(f"{len(together)} modules become one, of {len(whole.parts)} parts")
+                modules = [item for item in modules if item not in together]
+                inside = [item for item in modules if item.parts <= whole.parts]
+                modules = [*(item for item in modules if item not in inside), reduce(or_, inside, whole)]
 
     def _supervisor(self, module: Module, what: str) -> ModuleSupervisor:
         if module not in self._made:
@@ -213,16 +212,31 @@ class _Synthesis:
             )
         return self._controlled[module]
 
-    def _blocking_pair(self, modules: Sequence[Module]) -> tuple[Module, Module]:
-        """Two of some modules that block each other: two that do so by themselves, if there are."""
-
-        def shared(pair: tuple[Module, Module]) -> tuple[int, int]:
-            one, other = pair
-            return -len(one.parts & other.parts), len(one.parts | other.parts)
-
-        pairs = sorted(combinations(modules, 2), key=shared)
-        close = [pair for pair in pairs if len(self._groups(pair)) == 1] or pairs
-        return next((pair for pair in close if self._is_nonblocking(pair) is False), close[0])
+    def _blocking_pairs(self, modules: Sequence[Module]) -> list[tuple[Module, Module]]:
+        """Pairs of modules that share something, no two of one: those that block each other; else any."""
+        pairs: list[tuple[Module, Module]] = []
+        users: dict[object, list[Module]] = {}
+        for module in modules:
+            things = (*module.parts, *(event.name for event in self._made[module].system.events))
+            others = dict.fromkeys(other for thing in things for other in users.get(thing, ()))
+            pairs += [(other, module) for other in others]
+            for thing in things:
+                users.setdefault(thing, []).append(module)
+        pairs.sort(key=lambda pair: (-len(pair[0].parts & pair[1].parts), len(pair[0].parts | pair[1].parts)))
+        blocking = []
+        for pair in pairs:
+            if frozenset(pair) not in self._fine:
+                if self._is_nonblocking(pair) is False:
+                    blocking.append(pair)
+                else:
+                    self._fine.add(frozenset(pair))
+        found: list[tuple[Module, Module]] = []
+        taken: set[Module] = set()
+        for pair in blocking or pairs:
+            if taken.isdisjoint(pair):
+                found.append(pair)
+                taken.update(pair)
+        return found
 
     # The whole
 

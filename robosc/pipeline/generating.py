@@ -5,6 +5,7 @@ from dataclasses import replace
 from robosc.automata import System
 from robosc.certification import OutcomeStatus, Progress, SynthesisOutcome
 from robosc.errors import UnsupportedModelError
+from robosc.explanation import EmptyExplanation
 from robosc.pipeline.findings import Findings
 from robosc.pipeline.loading import ModelLike, loaded
 from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
@@ -65,7 +66,8 @@ def generate(
     if isinstance(model, System):
         made = synthesize_system(model, options, on_progress, should_stop)
         if made.supervisor is None:
-            return Generation(made.status, (), made.reason, None, made.explanation, target)
+            explanation = made.explanation if isinstance(made.explanation, EmptyExplanation) else None
+            return Generation(made.status, (), made.reason, None, explanation, target)
         model = made.supervisor
     if isinstance(model, SystemSupervisor):
         on_progress(Progress("generation", target))

@@ -22,6 +22,7 @@ from robosc.pipeline.files import given_path, read_bounded, write_whole
 from robosc.pipeline.loading import FileName
 from robosc.pipeline.options import SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, Outcome, SynthesisStatus, Verification, VerificationStatus
+from robosc.source import visible
 from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.supervisor.codec import MAXIMUM_BYTES, decode_document, encode_document, one_line
 from robosc.supervisor.diagram import diagram_domains
@@ -34,6 +35,9 @@ from robosc.tables import html_table
 from robosc.verification import CheckOutcome, Limits, VerificationReport, verify
 
 _CHECKS = ("safe", "controllable", "nonblocking", "maximally_permissive")
+MAXIMUM_NAMES = 20
+"""Automata of a module without a supervisor that are named."""
+
 INITIALLY = "the initial state"
 """Name of what a condition is about that is about no event."""
 
@@ -147,7 +151,7 @@ class SystemSupervisor:
     def _modules_told(self) -> Iterator[str]:
         """Lines about the modules."""
         for number, module in enumerate(self.modules, start=1):
-            yield f"\nmodule {number}, {module.states} states: {', '.join(module.automata)}"
+            yield f"\nmodule {number}, {module.states} states: {visible(', '.join(module.automata))}"
         for group in sorted({module.group for module in self.modules}):
             members = [str(number) for number, module in enumerate(self.modules, start=1) if module.group == group]
             if len(members) > 1:
@@ -275,7 +279,8 @@ def _synthesized_in_modules(
     except UnsupportedModelError as error:
         return _unsupported(error)
     if found.lost is not None:
-        reason = f"no supervisor exists: {', '.join(found.lost.automata)}: {found.lost.result.reason}"
+        names = ", ".join(found.lost.automata[:MAXIMUM_NAMES]) + ", ..." * (len(found.lost.automata) > MAXIMUM_NAMES)
+        reason = f"no supervisor exists: {names}: {found.lost.result.reason}"
         words = SystemWords(*found.partition.problem_of(found.lost.module, places))
         return _empty(words, reason, found.lost.result.statistics, engine, on_progress, should_stop)
     figures = [item.result.statistics for item in found.modules]

@@ -255,14 +255,15 @@ class Steps:
         true, false = self._manager.true, self._manager.false
         self._constants = {name: f == true for name, f in transition.functions.items() if f in (true, false)}
         self._composed = {name: f for name, f in transition.functions.items() if name not in self._constants}
-        self._leaving = self._without_hidden(transition.possible & transition.out_of_range)
+        self.leaving = self._without_hidden(transition.possible & transition.out_of_range)
+        """States in which the event can take a variable out of its range."""
         self._in_range = transition.possible & ~transition.out_of_range
         enabled = self._without_hidden(transition.possible)
         if transition.lasting != true:
             self._in_range = self._in_range & self._after(transition.lasting)
-            enabled = self._without_hidden(self._in_range) | self._leaving
+            enabled = self._without_hidden(self._in_range) | self.leaving
         self.event = transition.event
-        self.plant = enabled & ~self._leaving if self.event.is_controllable else enabled
+        self.plant = enabled & ~self.leaving if self.event.is_controllable else enabled
         """States in which the plant enables the event; a controllable one must stay in every range.
 
         States in which a plant invariant is not true do not count: there are none.
@@ -287,7 +288,7 @@ class Steps:
         """States in which the event, uncontrollable, can do harm at once."""
         if self.event.is_controllable:
             return self._manager.false
-        return self._leaving | (self.plant & ~self.condition)
+        return self.leaving | (self.plant & ~self.condition)
 
     def under(self, condition: Any) -> Self:
         """The same event under other event conditions."""

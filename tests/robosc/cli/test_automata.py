@@ -156,6 +156,17 @@ def test_plain_automata_of_other_tools(tmp_path: Path, capsys: pytest.CaptureFix
         assert (status, "[automata-syntax]" in out + err) == (1, True)
 
 
+def test_names_do_not_move_the_cursor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = tmp_path / "odd.gen"
+    model.write_text(
+        '<Generator name="a\x1b[2Jb" ftype="System"><Alphabet>go +C+</Alphabet><States>x</States>'
+        "<TransRel>x go x</TransRel><InitStates>x</InitStates><MarkedStates>x</MarkedStates></Generator>"
+    )
+    for arguments in (["synth"], ["synth", "--modular"], ["explain-synthesis"]):
+        status, out, err = run(capsys, *arguments, str(model))
+        assert (status, "\x1b" in out + err) == (0, False), out + err
+
+
 def test_too_many_states_for_one_automaton(
     model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,6 +1,7 @@
 """Tests of the reasons why events cannot happen in the states of random systems, against their explicit meaning."""
 
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 
@@ -40,7 +41,10 @@ class Twin:
         self.semantics = Semantics(self.system)
         self.constraints = relaxable_constraints(self.system)
         self.ranges = [item for item in self.constraints if item.kind is ConstraintKind.RANGE]
-        self.unbounded = Semantics(without_ranges(self.system, self.ranges))
+        # As if the environment did it: no range holds it back.
+        events = tuple(replace(event, is_controllable=False) for event in system.events)
+        self.wanted = Semantics(replace(system, events=events))
+        self.unrestricted = replace(system, plant_invariants=())
         self.places = {subject: place for place, subject in enumerate(subjects(self.system))}
         manager = make_manager("cudd")
         monitor = BoundedMonitor(ProgressMonitor(lambda: False, lambda progress: None))
@@ -93,23 +97,25 @@ class Twin:
         ]
         if not any(event in item.alphabet for item in self.system.automata):
             found.append("nobody's")
-        if not found and not self.unbounded.enabled(state, event):
+        if not found and not self.wanted.enabled(state, event):
             assert self.system.plant_invariants
             found.append("impossible")
         return [(HindranceKind.BEHAVIOUR, item) for item in found]
 
     def _ranges(self, state: State, event: str) -> list[tuple[HindranceKind, object]]:
         """The ranges each of which alone, the others left out, keeps the event from happening."""
-        if not self.unbounded.enabled(state, event):
+        if not self.wanted.enabled(state, event):
             return []
         return [
             (HindranceKind.RANGE, item)
             for item in self.ranges
-            if not Semantics(without_ranges(self.system, [r for r in self.ranges if r != item])).enabled(state, event)
+            if not Semantics(without_ranges(self.unrestricted, [r for r in self.ranges if r != item])).enabled(
+                state, event
+            )
         ]
 
     def _conditions(self, state: State, event: str) -> list[tuple[HindranceKind, object]]:
-        if not self.unbounded.enabled(state, event):
+        if not self.wanted.enabled(state, event):
             return []
         return [
             (HindranceKind.REQUIREMENT, place)

@@ -1,11 +1,13 @@
 """Tests of explanations of automata that are no model's, against explicit synthesis on random systems."""
 
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 
 from robosc.automata import (
+    Assignment,
     Automaton,
     DiscreteVariable,
     Edge,
@@ -25,6 +27,7 @@ from robosc.expressions import Binary, Constant, IntegerType, StateTest, Unary, 
 from robosc.source import Location
 from support.effort import seeds
 from support.random_systems import any_wide_systems, explicit_supervisor, wide_system
+from support.systems import automaton
 
 EXAMPLES = 40
 STATES = 60
@@ -196,6 +199,29 @@ def test_what_one_invariant_says_of_several_events_is_blamed_together() -> None:
     assert empty is not None
     assert empty.blamed[0].part.text == "requirement {go, stop} needs p.q.b"
     assert empty.blamed[0].part.location == AT
+
+
+def test_a_range_is_no_plant_invariant() -> None:
+    counter = replace(PLANT, edges=(Edge("a", "go", "a", updates=(
+        Assignment("n", Binary("+", VariableRead("p.q", "n"), Constant(2))),)),))  # fmt: skip
+    never = Unary("not", Binary("=", VariableRead("p.q", "n"), Constant(3)))
+    system = System("s", (GO, STOP), (counter,), plant_invariants=(never,))
+    assert explanation_text(explained(system, state="p.q.n = 2")).splitlines()[2:4] == [
+        "go: cannot happen",
+        "  it would take p.q.n, which is 2, out of its range",
+    ]
+
+
+def test_a_requirement_that_restricts_by_what_it_marks_is_not_called_unused() -> None:
+    plant = automaton("P", ["p0 -go-> p1", "p1 -x-> p1", "p0 -off-> p2"])
+    watching = replace(
+        automaton("R", ["a -go-> b", "b -x-> b", "a -off-> a", "b -off-> b"], marked=["b"]), role=Role.REQUIREMENT
+    )
+    events = tuple(Event(name, is_controllable=True) for name in ("go", "x", "off"))
+    for requirement, expected in ((watching, []), (replace(watching, marked=frozenset({"a", "b"})), ["R"])):
+        found = explained(System("s", events, (plant, requirement)))
+        unused = [item.message for item in found.remarks if item.kind == "unused-requirement"]
+        assert unused == [f"'requirement {name}' never restricts anything" for name in expected]
 
 
 def test_no_initial_state_is_told() -> None:

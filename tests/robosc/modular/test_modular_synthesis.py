@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from robosc.automata import Automaton, Edge, Event, Role, Semantics, System
+from robosc.automata import Automaton, DiscreteVariable, Edge, Event, InputVariable, Role, Semantics, System
 from robosc.automata.controlled import controlled_graph
-from robosc.expressions import Binary, StateTest, Unary
+from robosc.expressions import TRUE, Binary, Constant, IntegerType, Received, StateTest, Unary, VariableRead
 from robosc.modular.clusters import MAXIMUM_BITS, modules_of
 from robosc.modular.partition import partition
 from robosc.modular.synthesize import ModularResult, synthesize_modular
@@ -17,7 +17,7 @@ from support.effort import seeds
 from support.families import FAMILIES
 from support.random_parts import system_in_parts
 from support.random_systems import explicit_supervisor, wide_system
-from support.systems import automaton
+from support.systems import automaton, edge
 
 EXAMPLES = 120
 
@@ -103,7 +103,7 @@ def test_modules_that_are_too_large_to_tell_become_one() -> None:
 
 
 def test_modules_that_leave_no_common_beginning_are_found_out() -> None:
-    """Of two beginnings of a part one module allows this one, and another module the other one."""
+    """One module allows one of two beginnings of a part, and another module the other one."""
     trap = ("a -u_leave-> b", "b -u_leave-> a")
     shared = replace(automaton("S", ["x -stay-> x", "y -stay-> y"]), initial=("x", "y"))
     sides = [automaton(name, [edge.replace("leave", f"leave_{name}") for edge in trap]) for name in ("L", "R")]
@@ -116,6 +116,29 @@ def test_modules_that_leave_no_common_beginning_are_found_out() -> None:
     )
     system = System("beginnings", events, (shared, *sides), invariants=never)
     assert not check(system, synthesize_modular(system, module_bits=0.0))
+
+
+def test_requirements_that_read_the_same_data_stand_together() -> None:
+    """Both learn one value: that one of them has learned 1 and the other one 0 is never so."""
+    data = InputVariable("u_e", (), IntegerType(0, 1))
+    plants = [automaton(f"P_{name}", [f"x -{name}-> x"]) for name in ("u_e", "b", "c")]
+    watching = [
+        replace(
+            automaton(
+                f"R_{name}",
+                [edge("here -u_e-> here", n=Received(())), f"here -{name}-> here"],
+                variables=[DiscreteVariable("n", IntegerType(0, 1), (0,))],
+            ),
+            role=Role.REQUIREMENT,
+        )
+        for name in ("b", "c")
+    ]
+    events = tuple(Event(name, is_controllable=not name.startswith("u_")) for name in ("u_e", "b", "c"))
+    one, other = (Binary("=", VariableRead(f"R_{name}", "n"), Constant(value)) for name, value in (("b", 1), ("c", 0)))
+    marker = Binary("and", one, other)
+    system = System("data", events, (*plants, *watching), (data,), marker=marker)
+    assert not check(system, synthesize_modular(system, module_bits=0.0))
+    assert len(partition(replace(system, marker=TRUE)).demands) == 1
 
 
 def test_a_system_of_nothing_is_one_module() -> None:

@@ -6,7 +6,8 @@ from random import Random
 import pytest
 
 from robosc.errors import SynthesisCancelled
-from robosc.modular.clusters import clusters
+from robosc.modular import nonconflict
+from robosc.modular.clusters import _inflated, clusters
 from robosc.modular.nonconflict import SILENT, Graph, Label, TooLargeError, composed, is_nonconflicting, reduced
 from support.effort import seeds
 
@@ -46,9 +47,12 @@ def is_nonblocking(graphs: list[Graph]) -> bool:
 
 
 @pytest.mark.random
-def test_abstractions_tell_what_the_whole_composition_tells() -> None:
+@pytest.mark.parametrize("work", [nonconflict.MAXIMUM_WORK, 10])
+def test_abstractions_tell_what_the_whole_composition_tells(work: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With little work allowed, most are left as they are, and the answers are the same."""
+    monkeypatch.setattr(nonconflict, "MAXIMUM_WORK", work)
     met: Counter[bool] = Counter()
-    for seed in seeds(600):
+    for seed in seeds(300):
         random = Random(seed)
         labels = [f"e{number}" for number in range(random.randint(1, 6))]
         graphs = [drawn(random, labels) for _ in range(random.randint(1, 5))]
@@ -58,7 +62,7 @@ def test_abstractions_tell_what_the_whole_composition_tells() -> None:
         ]
         assert is_nonconflicting(copies, limit=LIMIT) == expected
         met[expected] += 1
-    assert min(met[True], met[False]) > 60, met
+    assert min(met[True], met[False]) > 30, met
 
 
 def chain(length: int, *, is_broken: bool) -> list[Graph]:
@@ -100,3 +104,5 @@ def test_weakly_bisimilar_states_become_one() -> None:
 def test_clusters_are_where_flow_stays() -> None:
     weights = {(a, b): 1.0 for group in ((0, 1, 2, 3), (4, 5, 6, 7)) for a in group for b in group if a < b}
     assert clusters(9, {**weights, (3, 4): 0.5}) == [[0, 1, 2, 3], [4, 5, 6, 7], [8]]
+    # Very many equal flows are no reason to lose all of them.
+    assert len(_inflated(dict.fromkeys(range(2000), 1.0 / 2000))) == 2_000

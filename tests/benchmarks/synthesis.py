@@ -59,7 +59,8 @@ def measured(family: str, size: int, engine: str) -> dict[str, object]:
         else:
             found = synthesize(system, engine=engine, should_stop=is_late)
             figures, added = [found.statistics], found.added
-    except SynthesisCancelled:
+    except (SynthesisCancelled, RecursionError):
+        # Without the kernel, a thousand automata are deeper than Python goes.
         return {}
     return {
         "seconds": time.perf_counter() - begin,

@@ -126,7 +126,7 @@ def _expanded(columns: list[_Column], column: _Column) -> _Column:
 
 def _inflated(column: _Column) -> _Column:
     whole = _normalized({node: flow**INFLATION for node, flow in column.items()})
-    # Of very many equal flows each is small: the largest stay.
+    # The largest stay: where very many are equal, each is small.
     smallest = min(SMALLEST_FLOW, max(whole.values()))
     kept = {node: flow for node, flow in whole.items() if flow >= smallest}
     return _normalized(kept)

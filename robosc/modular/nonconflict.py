@@ -85,7 +85,7 @@ def is_nonconflicting(graphs: Iterable[Graph], *, limit: int, should_stop: Calla
             owners[label].discard(other)
             owners[label].add(one)
         put(one, whole)
-    # What is left shares nothing, so each is nonblocking by itself or not.
+    # Those that are left share nothing, so each is nonblocking by itself or not.
     return all(map(_is_nonblocking, waiting.values())) and all(graph.initial for graph in waiting.values())
 
 

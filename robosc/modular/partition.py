@@ -219,7 +219,7 @@ def _joined(elements: list[_Element], parts: tuple[frozenset[str], ...]) -> Dema
     demands = [element.demand for element in elements]
     places = frozenset(place for element in elements for place in element.parts)
     return Demand(
-        # What is about no part, such as `marked false`, may be put to any.
+        # A demand about no part, such as `marked false`, may be put to any.
         parts=places if places or not parts else frozenset({0}),
         automata=frozenset().union(*(item.automata for item in demands)),
         conditions=frozenset().union(*(item.conditions for item in demands)),
@@ -244,7 +244,7 @@ class _Plants:
         invariants = [_read(item) for item in system.plant_invariants]
         self.names = {item.name for item in system.automata if item.role is Role.PLANT}
         plain = {event for name in self.names for event in self._automata[name].alphabet}
-        # Of an event that no plant has, requirement automata are all that a condition of plants could restrict.
+        # A condition of plants on an event that no plant has can restrict requirement automata alone.
         restricted = {event for event, _ in conditions if event not in plain}
         waiting = [item.name for item in system.automata if item.alphabet & restricted]
         waiting += [name for _, names in conditions for name in names]

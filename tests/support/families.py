@@ -6,7 +6,7 @@ of discrete event systems", Proc. IEEE 77(1), 1989, pp. 81-98, on several floors
 Lennartson and M. Fabian, "Symbolic computation and representation of supervisors", IEEE CASE 2010.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from random import Random
 
@@ -176,39 +176,23 @@ def random_robot(components: int, seed: int = 1) -> System:
 
 def machines_in_a_row(count: int) -> System:
     """Machines with a buffer of one place, a requirement, between each and the next: neighbours share them."""
-    automata = [
-        automaton(f"M{number}", [f"idle -start{number}-> busy", f"busy -u_done{number}-> idle"], marked=["idle"])
-        for number in range(count)
-    ]
-    automata += [
-        replace(
-            automaton(
-                f"B{number}", [f"empty -u_done{number}-> full", f"full -start{number + 1}-> empty"], marked=["empty"]
-            ),
-            role=Role.REQUIREMENT,
-        )
-        for number in range(count - 1)
-    ]
-    return _of(automata)
+    return _machines(count, {number: number + 1 for number in range(count - 1)})
 
 
 def assembly_tree(count: int) -> System:
     """Machines in a binary tree, each of which assembles what the two below it have made and put into its buffers."""
+    return _machines(count, {number: (number - 1) // 2 for number in range(1, count)})
+
+
+def _machines(count: int, following: Mapping[int, int]) -> System:
+    """Machines, and behind each that another one follows a buffer, a requirement, which that one empties."""
     automata = [
         automaton(f"M{number}", [f"idle -start{number}-> busy", f"busy -u_done{number}-> idle"], marked=["idle"])
         for number in range(count)
     ]
-    automata += [
-        replace(
-            automaton(
-                f"B{number}",
-                [f"empty -u_done{number}-> full", f"full -start{(number - 1) // 2}-> empty"],
-                marked=["empty"],
-            ),
-            role=Role.REQUIREMENT,
-        )
-        for number in range(1, count)
-    ]
+    for number, other in following.items():
+        edges = [f"empty -u_done{number}-> full", f"full -start{other}-> empty"]
+        automata.append(replace(automaton(f"B{number}", edges, marked=["empty"]), role=Role.REQUIREMENT))
     return _of(automata)
 
 

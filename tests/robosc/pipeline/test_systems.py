@@ -121,7 +121,7 @@ def test_a_synthesis_in_modules(tmp_path: Path) -> None:
         "nonblocking together, as found on abstractions: modules 1, 2, 3",
     ]
     assert "states of module 3" in supervisor._repr_html_()
-    # What they allow together is what the supervisor of the whole allows.
+    # Together they allow what the supervisor of the whole allows.
     graphs = [robosc.explore(item).graph for item in (supervisor, whole.supervisor)]
     assert graphs[0] == graphs[1]
     read = robosc.SystemSupervisor.read(supervisor.write(tmp_path / "row.rsup"))

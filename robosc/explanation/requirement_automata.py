@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from robosc.automata.structure import Automaton, EventCondition, Role, System
-from robosc.expressions import FALSE, TRUE, Binary, Expression, StateTest, Unary
+from robosc.expressions import FALSE, TRUE, Binary, Expression, StateTest
 
 
 def as_conditions(system: System) -> tuple[System, dict[str, tuple[int, ...]]]:
@@ -51,7 +51,7 @@ def _has_edge(automaton: Automaton, event: str) -> Expression:
         for expression in (
             [StateTest(automaton.name, location)]
             if TRUE in found
-            else [Binary("and", StateTest(automaton.name, location), Unary("holds", guard)) for guard in found]
+            else [Binary("and", StateTest(automaton.name, location), guard) for guard in found]
         )
     )
 

@@ -2,12 +2,32 @@
 
 from collections import Counter
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
-from robosc.automata import Automaton, DiscreteVariable, Edge, Event, InputVariable, Role, Semantics, System
+from robosc.automata import (
+    Automaton,
+    DiscreteVariable,
+    Edge,
+    Event,
+    InputVariable,
+    Role,
+    Semantics,
+    System,
+)
 from robosc.automata.controlled import controlled_graph
-from robosc.expressions import TRUE, Binary, Constant, IntegerType, Received, StateTest, Unary, VariableRead
+from robosc.expressions import (
+    TRUE,
+    Binary,
+    Constant,
+    IntegerType,
+    Received,
+    StateTest,
+    Unary,
+    VariableRead,
+    conjunction,
+)
 from robosc.modular.clusters import MAXIMUM_BITS, modules_of
 from robosc.modular.partition import partition
 from robosc.modular.synthesize import ModularResult, synthesize_modular
@@ -139,6 +159,48 @@ def test_requirements_that_read_the_same_data_stand_together() -> None:
     system = System("data", events, (*plants, *watching), (data,), marker=marker)
     assert not check(system, synthesize_modular(system, module_bits=0.0))
     assert len(partition(replace(system, marker=TRUE)).demands) == 1
+
+
+def of_automata(*automata: Automaton, **more: Any) -> System:
+    """The system of some automata; events are uncontrollable if they are called so."""
+    names = dict.fromkeys(edge.event for item in automata for edge in item.edges)
+    events = tuple(Event(name, is_controllable=not name.startswith("u_")) for name in names)
+    return System("by hand", events, automata, **more)
+
+
+def test_plants_that_share_an_event_or_an_invariant_are_one_part() -> None:
+    one, other = automaton("A", ["x -e-> y", "y -back-> x"]), automaton("B", ["x -e-> y", "y -home-> x"])
+    assert partition(of_automata(one, other)).parts == (frozenset({"A", "B"}),)
+    other = automaton("B", ["x -f-> y", "y -home-> x"])
+    assert len(partition(of_automata(one, other)).parts) == 2
+    never = Unary("not", Binary("and", StateTest("A", "y"), StateTest("B", "y")))
+    assert len(partition(of_automata(one, other, plant_invariants=(never,))).parts) == 1
+
+
+def test_an_event_that_two_modules_restrict_keeps_both_conditions() -> None:
+    """What P does is against what Q, or R, can do at any time: neither module knows of the other one's reason."""
+    plant = automaton("P", ["a -c-> b", "b -d-> a"])
+    others = [automaton(name, [f"x -u_{name}-> y", f"z -go_{name}-> x", f"x -rest_{name}-> z"]) for name in ("Q", "R")]
+    never = tuple(Unary("not", Binary("and", StateTest("P", "b"), StateTest(name, "y"))) for name in ("Q", "R"))
+    system = of_automata(plant, *others, invariants=never)
+    result = synthesize_modular(system, module_bits=0.0)
+    assert len(result.modules) == 2
+    assert check(system, result)
+
+
+def test_what_a_shared_part_leaves_open_is_the_same_in_all_modules() -> None:
+    """A shared part goes to b or to c: one module is marked in b alone, the other one in c alone, the whole never."""
+    shared = automaton("S", ["a -u_e-> b", "a -u_e-> c", "b -back-> a", "c -back-> a"])
+    sides = [automaton(name, [f"x -{name}-> y", f"y -un{name}-> x"]) for name in ("L", "R")]
+    marker = conjunction(
+        *(
+            Binary("or", StateTest("S", where), Binary("and", StateTest(name, "x"), StateTest(name, "y")))
+            for where, name in (("b", "L"), ("c", "R"))
+        )
+    )
+    system = of_automata(shared, *sides, marker=marker)
+    assert len(modules_of(partition(system), 0.0)) == 2
+    assert not check(system, synthesize_modular(system, module_bits=0.0))
 
 
 def test_a_system_of_nothing_is_one_module() -> None:

@@ -199,6 +199,10 @@ def test_code_is_generated(model: str, tmp_path: Path, capsys: pytest.CaptureFix
         ("tank = open", "unknown location of tank 'open'; there is *"),
     ):
         assert run(capsys, *arguments, text) == (2, "", f"robosc: --initial: {message}\n")
+    # The model's own initial predicate stays.
+    Path(model).write_text(f"{TANK}initial tank.level != 1;\n")
+    assert run(capsys, *arguments, "tank.level = 1")[0] == 1
+    assert run(capsys, *arguments, "tank.level = 2")[0] == 0
     status, _, err = run(capsys, "generate", model, "--target", "ros2", "-o", str(folder))
     assert (status, "the target ros2 needs a model of a robot" in err) == (1, True)
     Path(model).write_text(TANK.replace("level in any", "level = 1"))

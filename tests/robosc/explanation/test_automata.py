@@ -224,6 +224,15 @@ def test_a_requirement_that_restricts_by_what_it_marks_is_not_called_unused() ->
         assert unused == [f"'requirement {name}' never restricts anything" for name in expected]
 
 
+def test_runs_begin_where_the_supervisor_lets_them() -> None:
+    """From z nothing leads back to a marked state, so the system may not begin there."""
+    plant = replace(automaton("P", ["z -stop-> w", "a -go-> a"], marked=["a"]), initial=("z", "a"))
+    words = SystemWords(System("s", (GO, STOP), (plant,)))
+    with pytest.raises(RequestError, match="'stop' cannot happen in the initial state: P is a"):
+        explain_synthesis(words, after="stop")
+    assert explain_synthesis(words, after="go").state is not None
+
+
 def test_no_initial_state_is_told() -> None:
     system = System("s", (GO, STOP), (PLANT,), initial=StateTest("p.q", "b"))
     found = explain_synthesis(SystemWords(system))

@@ -16,12 +16,16 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from robosc.recursion import allow_depth
 from robosc.synthesis.compiled import Kernel, kernel_of
 from robosc.synthesis.engines import Manager
 from robosc.synthesis.image import Image
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.nodes import cofactors
 from robosc.synthesis.step import Step, is_enough
+
+_FRAMES_PER_LEVEL = 2
+"""Python frames for each level of a diagram, and for each group of steps, that saturation goes down."""
 
 
 def saturation(
@@ -65,6 +69,7 @@ class Saturation:
         self._monitor = monitor
         self._groups = _grouped(levels, steps)
         self._count = sum(len(group) for _, group in self._groups)
+        allow_depth(len(levels) + len(self._groups), _FRAMES_PER_LEVEL)
         self._known: dict[tuple[int, int, int], tuple[Any, Any, Any]] = {}
         self._phase = ""
         self._taken = self._told = 0
@@ -114,8 +119,9 @@ class Saturation:
         top, steps = self._groups[group]
         level = min(states.level, within.level)
         if level < top:
-            parts = zip(_split(states, level), _split(within, level), strict=True)
-            low, high = (self._saturated(part, inside, group) for part, inside in parts)
+            (low, high), (low_inside, high_inside) = _split(states, level), _split(within, level)
+            low = self._saturated(low, low_inside, group)
+            high = self._saturated(high, high_inside, group)
             return self._manager.ite(self._variables[level], high, low)
         states = self._saturated(states, within, group + 1)
         # The targets of states that a step has seen are there already: it is asked about new ones only.

@@ -1,5 +1,6 @@
 """Chaining and saturation find what going round and round over all steps finds, whatever the steps read and change."""
 
+import sys
 from collections.abc import Callable, Sequence
 from itertools import product
 from random import Random
@@ -187,6 +188,29 @@ def test_enough_is_enough_for_saturation(wanted: int) -> None:
     last = tuple(bool((wanted - 1) >> place & 1) for place in reversed(range(5)))
     found = saturation.of(begin, "test", sets.predicate({last}))
     assert len(sets.states(found)) == wanted
+
+
+def becoming_true(manager: Manager, name: str) -> Callable[[Any], Any]:
+    return lambda states: manager.exist([name], states) & manager.var(name)
+
+
+def test_diagrams_may_be_deeper_than_python_goes_by_itself() -> None:
+    """Each of 3,000 bits that are zero may become one, by an event of its own."""
+    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    manager = make_manager("cudd")
+    names = [f"bit{number}" for number in range(3_000)]
+    manager.declare(*names)
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(1_500)
+    try:
+        steps = [Step(becoming_true(manager, name), frozenset({name})) for name in names]
+        levels = {name: level for level, name in enumerate(names)}
+        states = manager.true
+        for name in reversed(names):
+            states = states & ~manager.var(name)
+        assert Saturation(manager, levels, steps, manager.true, silent()).of(states, "test") == manager.true
+    finally:
+        sys.setrecursionlimit(max(before, sys.getrecursionlimit()))
 
 
 def test_chaining_stops_when_told() -> None:

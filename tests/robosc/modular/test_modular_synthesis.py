@@ -178,7 +178,7 @@ def test_plants_that_share_an_event_or_an_invariant_are_one_part() -> None:
 
 
 def test_an_event_that_two_modules_restrict_keeps_both_conditions() -> None:
-    """What P does is against what Q, or R, can do at any time: neither module knows of the other one's reason."""
+    """Each of Q and R can at any time do what P must not see; neither module knows of the other one's reason."""
     plant = automaton("P", ["a -c-> b", "b -d-> a"])
     others = [automaton(name, [f"x -u_{name}-> y", f"z -go_{name}-> x", f"x -rest_{name}-> z"]) for name in ("Q", "R")]
     never = tuple(Unary("not", Binary("and", StateTest("P", "b"), StateTest(name, "y"))) for name in ("Q", "R"))

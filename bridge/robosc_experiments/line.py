@@ -38,7 +38,7 @@ LIMIT_S = 45.0
 """For each thing that happens."""
 
 
-def run_line(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: int = 0, model: Path = MODEL) -> Outcome:
+def run_line(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: int = 0) -> Outcome:
     """Let a robot follow a line behind a supervision layer, over serial lines.
 
     Args:
@@ -47,7 +47,6 @@ def run_line(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
         speed: Speed of the world, as a multiple of the clock's. The camera shows 20 pictures a second of the clock.
         say: Function that takes lines of progress.
         seed: Seed of what the scene leaves to chance.
-        model: Another one, with the communications of `line_follower_layer.rscd`.
 
     Raises:
         ScenarioError: It could not be run to its end. A robot that moves when it must not is no such error, but a
@@ -56,9 +55,7 @@ def run_line(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
     place = scene_of(scene, seed)
     if place.line is None or BOX not in {each.name for each in place.obstacles}:
         raise ScenarioError(f"the scene {place.name} needs a line, and an obstacle called {BOX}")
-    setting = Setting(
-        folder.resolve(), model.resolve(), Deployment.LAYER, place, scene, seed, speed, "lds02", CHANNELS, SKILLS
-    )
+    setting = Setting(folder.resolve(), MODEL, Deployment.LAYER, place, scene, seed, speed, "lds02", CHANNELS, SKILLS)
     say("starting the synthesis server, the simulated robot, the bridge and the follower")
     with running(setting) as rig:
         follower = Program("follower", ("-m", "robosc_experiments.follower", "--address", rig.address), folder)

@@ -269,7 +269,6 @@ def run_maze(
     speed: float,
     say: Say,
     seed: int = 0,
-    model: Path = MAZE_MODEL,
 ) -> Outcome:
     """Let a robot out of a maze, with a generated controller and the rotator of the example robots.
 
@@ -280,13 +279,12 @@ def run_maze(
         speed: Speed of the world, as a multiple of the clock's.
         say: Function that takes lines of progress.
         seed: Seed of what the scene leaves to chance.
-        model: Another one, with the communications of `maze_solver.rscd`.
 
     Raises:
         ScenarioError: It could not be run to its end. A robot that does not find the way out is no such error, but a
             fault of the outcome.
     """
-    setting = _setting(middleware, folder, model, Deployment.CONTROLLER, scene, seed, speed, MAZE_PATIENCE_S)
+    setting = _setting(middleware, folder, MAZE_MODEL, Deployment.CONTROLLER, scene, seed, speed, MAZE_PATIENCE_S)
     if setting.scene.goal is None:
         raise ScenarioError(f"the scene {setting.scene.name} has no goal: there is no way out of it")
     with prepared_stage(setting, say) as stage:
@@ -312,7 +310,6 @@ def run_line(
     speed: float,
     say: Say,
     seed: int = 0,
-    model: Path = LINE_MODEL,
 ) -> Outcome:
     """Let a robot follow a line behind a generated supervision layer around a follower that heeds nothing.
 
@@ -326,13 +323,12 @@ def run_line(
         speed: Speed of the world, as a multiple of the clock's.
         say: Function that takes lines of progress.
         seed: Seed of what the scene leaves to chance.
-        model: Another one, with the communications of `line_follower_layer.rscd`.
 
     Raises:
         ScenarioError: It could not be run to its end. A robot that moves when it must not is no such error, but a
             fault of the outcome.
     """
-    setting = _setting(middleware, folder, model, Deployment.LAYER, scene, seed, speed, LINE_PATIENCE_S)
+    setting = _setting(middleware, folder, LINE_MODEL, Deployment.LAYER, scene, seed, speed, LINE_PATIENCE_S)
     place = setting.scene
     if place.line is None or BOX not in {each.name for each in place.obstacles}:
         raise ScenarioError(f"the scene {place.name} needs a line, and an obstacle called {BOX}")

@@ -155,19 +155,14 @@ def _interval(
     return np.ceil(found[0]).astype(int), np.floor(found[1]).astype(int)
 
 
-def oval(straight_m: float = 1.0, radius_m: float = 0.5, width_m: float = WIDTH_M) -> Track:
-    """A closed track to the left of the origin, which is on it, with its straight pieces along x.
-
-    Args:
-        straight_m: Length of each straight piece.
-        radius_m: Of both curves.
-        width_m: Of the line.
-    """
+def oval() -> Track:
+    """Return a closed track to the left of the origin, which is on it, with straight pieces of 1 m along x."""
+    straight_m, radius_m = 1.0, 0.5
     angles = [math.radians(degree) for degree in range(-90, 91, 5)]
     half_m = straight_m / 2
     right = [(half_m + radius_m * math.cos(angle), radius_m * (1 + math.sin(angle))) for angle in angles]
     left = [(-x_m, 2 * radius_m - y_m) for x_m, y_m in right]
-    return Track([*right, *left, right[0]], width_m)
+    return Track([*right, *left, right[0]])
 
 
 def spline(points: Sequence[Point], width_m: float = WIDTH_M) -> tuple[Point, ...]:

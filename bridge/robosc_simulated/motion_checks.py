@@ -46,13 +46,12 @@ class Halt:
     why: str
 
 
-def check_maze(scene: Scene, motion: Motion, robot: str = "burger") -> tuple[str, ...]:
+def check_maze(scene: Scene, motion: Motion) -> tuple[str, ...]:
     """Return the faults of a way out of a maze.
 
     Args:
         scene: Scene with a goal.
-        motion: Motion of the robot.
-        robot: Key of `BODIES`.
+        motion: Motion of a Burger.
 
     Returns:
         Faults in sentences; none: it has come to the goal without touching anything.
@@ -62,7 +61,7 @@ def check_maze(scene: Scene, motion: Motion, robot: str = "burger") -> tuple[str
     """
     if scene.goal is None:
         raise ValueError(f"{scene.name} has no goal")
-    faults = [*_record_faults(motion), *_touch_faults(scene, motion, BODIES[robot].radius_m)]
+    faults = [*_record_faults(motion), *_touch_faults(scene, motion, BODIES["burger"].radius_m)]
     if motion.samples and not any(scene.goal.is_reached(sample.x_m, sample.y_m) for sample in motion.samples):
         last = motion.samples[-1]
         distance_m = math.hypot(last.x_m - scene.goal.x_m, last.y_m - scene.goal.y_m)
@@ -78,7 +77,6 @@ def check_line(
     lateral_m: float = LATERAL_M,
     settle_s: float = SETTLE_S,
     least_m: float = 0.0,
-    robot: str = "burger",
 ) -> tuple[str, ...]:
     """Return the faults in how a line was followed.
 
@@ -89,7 +87,6 @@ def check_line(
         lateral_m: Largest distance that its middle may have from the line.
         settle_s: World time that it has to come to rest in each halt.
         least_m: Shortest distance that it has to drive in all, so that standing still for ever is no success.
-        robot: Key of `BODIES`.
 
     Returns:
         Faults in sentences; none: it has kept to the line, and stood still when it had to.
@@ -99,7 +96,7 @@ def check_line(
     """
     if scene.line is None:
         raise ValueError(f"{scene.name} has no line")
-    faults = [*_record_faults(motion), *_touch_faults(scene, motion, BODIES[robot].radius_m)]
+    faults = [*_record_faults(motion), *_touch_faults(scene, motion, BODIES["burger"].radius_m)]
     if motion.samples:
         errors_m = lateral_errors_m(scene, motion)
         worst_m = max(errors_m)

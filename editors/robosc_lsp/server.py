@@ -205,13 +205,13 @@ class Server(LanguageServer):
         self._last_analysis_s = time.monotonic() - begun_s
 
     def _publish(self, uri: str, analysis: Analysis) -> None:
-        items = diagnostics(analysis, self.project, self._findings(uri, analysis))
+        items = diagnostics(analysis, self.project, self._findings(analysis))
         self.text_document_publish_diagnostics(
             lsp.PublishDiagnosticsParams(uri, items, version=self._versions.get(uri))
         )
 
-    def _findings(self, uri: str, analysis: Analysis) -> tuple[Diagnostic, ...]:
-        return (*analysis.inspected.checked.diagnostics, *self._from_synthesis(uri, analysis))
+    def _findings(self, analysis: Analysis) -> tuple[Diagnostic, ...]:
+        return (*analysis.inspected.checked.diagnostics, *self._from_synthesis(analysis))
 
     # Synthesis
 
@@ -222,7 +222,7 @@ class Server(LanguageServer):
             return None
         return known[1]
 
-    def _from_synthesis(self, uri: str, analysis: Analysis) -> tuple[Diagnostic, ...]:
+    def _from_synthesis(self, analysis: Analysis) -> tuple[Diagnostic, ...]:
         found = self.outcome(analysis)
         if found is None:
             return ()
@@ -450,7 +450,7 @@ class Server(LanguageServer):
         analysis = self.project.analysis(uri)
         if analysis is None or (kinds is not None and not {"", lsp.CodeActionKind.QuickFix.value} & set(kinds)):
             return []
-        findings = self._findings(uri, analysis)
+        findings = self._findings(analysis)
         actions: list[lsp.CodeAction] = []
         until_s = time.monotonic() + _FIX_TIME_S
         is_tried, untried = False, 0
@@ -486,7 +486,7 @@ class Server(LanguageServer):
         data = action.data if isinstance(action.data, dict) else {}
         uri = data.get("uri")
         analysis = self.project.analysis(uri) if isinstance(uri, str) else None
-        for item in self._findings(analysis.uri, analysis) if analysis is not None else ():
+        for item in self._findings(analysis) if analysis is not None else ():
             if analysis is None or item.location is None or _key(item) != data.get("finding"):
                 continue
             for fix in self._fixes(analysis, item):

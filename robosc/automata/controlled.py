@@ -33,11 +33,6 @@ class ControlledGraph:
     steps: tuple[tuple[tuple[str, tuple[int, ...]], ...], ...]
     parents: tuple[tuple[int, str] | None, ...]
 
-    @property
-    def transition_count(self) -> int:
-        """Number of triples of state, event and state."""
-        return sum(len(targets) for steps in self.steps for _, targets in steps)
-
     def trace(self, number: int) -> tuple[str, ...]:
         """Events of a shortest run from an initial state."""
         events: list[str] = []

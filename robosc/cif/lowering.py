@@ -444,7 +444,7 @@ class Lowering:
         for name in dict.fromkeys(name for part in (*(part for _, part in branches), otherwise) for name in part):
             entry = scope.entries[name]
             assert isinstance(entry, Entity)  # noqa: S101 - a variable of this automaton
-            old = (self.typing.entity(entry, item.at), item.at)
+            old = (self.typing.entity(entry), item.at)
             term, at = otherwise.get(name, old)
             for guard, part in reversed(branches):
                 new, at = part.get(name, (old[0], at))
@@ -496,7 +496,7 @@ class Lowering:
             message = f"'{name}' is a variable of '{entity.scope.path}', which alone may assign it"
             self.error("cif-assignment", message, name.at, "Let that automaton assign it on an edge of the same event.")
             return {}
-        own = self.typing.entity(entity, name.at)
+        own = self.typing.entity(entity)
         if "unknown" in (own.type.kind, term.type.kind) or isinstance(entity.declaration, syntax.Continuous):
             return {}
         if not overlaps(term.type, own.type):

@@ -340,7 +340,9 @@ class Parser(ExpressionParser):
         def one() -> syntax.Declaration:
             name = self.identifier()
             value = self.expression() if self.takes("=") else None
-            return syntax.Continuous(name, value, self.expression() if self.takes("der") else None)
+            if self.takes("der"):
+                self.expression()
+            return syntax.Continuous(name, value)
 
         return self._listed(one)
 

@@ -236,11 +236,10 @@ class Discrete:
 
 @dataclass(frozen=True, slots=True)
 class Continuous:
-    """`cont name;`."""
+    """`cont name;`; its derivative is not kept."""
 
     name: Identifier
     value: Expression | None
-    derivative: Expression | None
 
 
 @dataclass(frozen=True, slots=True)

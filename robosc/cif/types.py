@@ -68,7 +68,7 @@ class CifType:
                 return self.kind
 
 
-BOOL, REAL, STRING, VOID, AUTOMATON, UNKNOWN = map(CifType, ("bool", "real", "string", "void", "automaton", "unknown"))
+BOOL, REAL, STRING, AUTOMATON, UNKNOWN = map(CifType, ("bool", "real", "string", "automaton", "unknown"))
 
 
 def integer(low: int, high: int) -> CifType:

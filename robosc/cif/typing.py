@@ -156,7 +156,7 @@ class Typing:
             case syntax.Event() | syntax.Invariant() | syntax.LocationDeclaration():
                 pass
             case _:
-                self.entity(entity, entity.at)
+                self.entity(entity)
 
     # Checked kinds of terms
 
@@ -193,7 +193,7 @@ class Typing:
 
     # Entities
 
-    def entity(self, entity: Entity, at: Location) -> Term:
+    def entity(self, entity: Entity) -> Term:
         """The term of something declared."""
         if entity not in self._terms:
             self._terms[entity] = None
@@ -340,7 +340,7 @@ class Typing:
         if not is_value or not isinstance(found, Entity):
             self.scopes.wrong_kind(name, found, "a value")
             return ERROR
-        return self.entity(found, name.at)
+        return self.entity(found)
 
     def _unary(self, node: syntax.Unary, scope: Scope) -> Term:
         term = self.term(node.operand, scope)

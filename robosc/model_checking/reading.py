@@ -25,8 +25,6 @@ _BINARY = frozenset({"and", "or", "=>", "=", "!=", "<", "<=", ">", ">=", "+", "*
 
 UNARY_OPERATORS = ("AG", "AF", "AX", "EG", "EF", "EX")
 CLAIMS = {"invariant": "AG", "reachable": "EF"}
-ENABLED = "enabled()"
-"""Names of calls that stand for operators end in what no name has."""
 
 
 @dataclass(frozen=True, slots=True)

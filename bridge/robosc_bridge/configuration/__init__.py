@@ -5,7 +5,7 @@ from robosc_bridge.configuration.channels import CHANNELS, Channel, channel_name
 from robosc_bridge.configuration.load import Loaded, load, parse
 from robosc_bridge.configuration.problems import ConfigurationError, Problem
 from robosc_bridge.configuration.reference import reference
-from robosc_bridge.configuration.structure import Configuration, Safety, schema, schema_text
+from robosc_bridge.configuration.structure import Configuration, Safety, schema
 from robosc_bridge.configuration.template import init
 
 __all__ = [
@@ -24,6 +24,5 @@ __all__ = [
     "parse",
     "reference",
     "schema",
-    "schema_text",
     "unsuitable_because",
 ]

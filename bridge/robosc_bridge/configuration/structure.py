@@ -1,6 +1,5 @@
 """Content of a configuration: frozen structures that checks, JSON schema and documentation are made from."""
 
-import json
 from typing import Annotated, Any, Literal, get_args
 
 import msgspec
@@ -296,8 +295,3 @@ def schema() -> dict[str, Any]:
     """The JSON schema of a configuration, for editors and other programs; schema.json beside this file holds it."""
     made: dict[str, Any] = msgspec.to_builtins(msgspec.json.schema(Configuration))
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "RoboSC bridge", **made}
-
-
-def schema_text() -> str:
-    """The same as it is written into a file."""
-    return json.dumps(schema(), indent=2, sort_keys=True, ensure_ascii=False) + "\n"

@@ -40,17 +40,12 @@ MOTORS = {motor.model_number: motor for motor in (XL430_W250, XM430_W210)}
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """Voltages at which the battery is low.
+    """Voltages of the battery.
 
     Attributes:
-        warning_v: Voltage at which a person is told.
-        stop_v: Voltage at which the robot stops safely. Below 11.0 V for 5 s, OpenCR cuts the motors' power by
-            itself.
         empty_v: Voltage that counts as nothing left.
     """
 
-    warning_v: float = 11.5
-    stop_v: float = 11.1
     empty_v: float = 10.5
 
 

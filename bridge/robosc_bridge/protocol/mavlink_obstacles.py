@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from robosc_bridge.protocol.mavlink_messages import ObstacleRing, SectorDistance
 from robosc_bridge.protocol.revolutions import BINS, wrapped_deg
 
-RING = 72
 RING_STEP_DEG = 5
 _UNKNOWN_CM = 65535
 _EIGHTHS = 8
@@ -89,7 +88,7 @@ def nearest_in_sectors(sectors: Iterable[Sector]) -> tuple[float, ...]:
 
 
 def ring_distances_cm(ranges_m: Sequence[float], least_cm: int, most_cm: int) -> tuple[int, ...]:
-    """The `RING` distances of OBSTACLE_DISTANCE: `RING_STEP_DEG` apart, clockwise from the front.
+    """The 72 distances of OBSTACLE_DISTANCE: `RING_STEP_DEG` apart, clockwise from the front.
 
     Args:
         ranges_m: `BINS` bins, counter-clockwise from the front; NaN: nothing valid was measured.

@@ -8,11 +8,9 @@ methods that change something are only for callers on the same machine.
 from robosc_api.security.addresses import is_loopback_host, is_loopback_peer, joined
 from robosc_api.security.arguments import (
     add_client_arguments,
-    add_server_arguments,
     add_token_arguments,
     credentials_of,
     issue_token,
-    server_security_of,
 )
 from robosc_api.security.callers import CALLER, ENTRY, caller_of, is_admin, network_of, token_or_host_of
 from robosc_api.security.client import Credentials, check_credentials, close_channel, open_async_channel, open_channel
@@ -35,7 +33,6 @@ __all__ = [
     "TokenFile",
     "add_client_arguments",
     "add_port",
-    "add_server_arguments",
     "add_token_arguments",
     "caller_of",
     "check_credentials",
@@ -53,6 +50,5 @@ __all__ = [
     "network_of",
     "open_async_channel",
     "open_channel",
-    "server_security_of",
     "token_or_host_of",
 ]

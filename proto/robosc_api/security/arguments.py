@@ -6,41 +6,10 @@ from pathlib import Path
 
 from robosc_api.security.client import Credentials
 from robosc_api.security.errors import SecurityError
-from robosc_api.security.listening import ServerSecurity
 from robosc_api.security.tokens import Quota, Scope, make_token
 
 CA_VARIABLE = "ROBOSC_CA"
 TOKEN_VARIABLE = "ROBOSC_TOKEN_FILE"  # its name
-
-
-def add_server_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options for securing a service."""
-    group = parser.add_argument_group("security")
-    group.add_argument("--tls-certificate", type=Path, metavar="FILE", help="certificate chain (PEM); enables TLS")
-    group.add_argument("--tls-key", type=Path, metavar="FILE", help="private key of the certificate (PEM)")
-    group.add_argument(
-        "--client-ca",
-        type=Path,
-        metavar="FILE",
-        help="require client certificates signed by one of these authorities (PEM)",
-    )
-    group.add_argument("--tokens", type=Path, metavar="FILE", help="require a token of this file (see `token`)")
-    group.add_argument(
-        "--insecure-beyond-loopback",
-        action="store_true",
-        help="allow connections from other machines without TLS, on a trusted network",
-    )
-
-
-def server_security_of(arguments: argparse.Namespace) -> ServerSecurity:
-    """Return the security that those options describe."""
-    return ServerSecurity(
-        certificate=arguments.tls_certificate,
-        key=arguments.tls_key,
-        client_ca=arguments.client_ca,
-        tokens=arguments.tokens,
-        insecure_beyond_loopback=arguments.insecure_beyond_loopback,
-    )
 
 
 def add_client_arguments(parser: argparse.ArgumentParser) -> None:

@@ -32,9 +32,6 @@ from robosc.targets.python.step import read_method, receive_method, step_method
 from robosc.targets.python.when import matches_method
 from robosc.targets.python.writer import Writer, make_writer
 
-OLDEST_PYTHON = (3, 8)
-"""Generated code runs on this version of Python and later."""
-
 
 def header(supervisor: Supervisor) -> str:
     """The first lines of every generated Python file."""

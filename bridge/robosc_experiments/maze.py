@@ -28,7 +28,7 @@ WORLD_LIMIT_S = 1200.0
 LIMIT_S = 240.0
 
 
-def run_maze(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: int = 0) -> Outcome:
+def run_maze(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: int = 0, model: Path = MODEL) -> Outcome:
     """Let a robot out of a maze, over serial lines.
 
     Args:
@@ -37,6 +37,7 @@ def run_maze(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
         speed: Speed of the world, as a multiple of the clock's.
         say: Function that takes lines of progress.
         seed: Seed of what the scene leaves to chance.
+        model: Another one, with the communications of `narrow_maze.rscd`.
 
     Raises:
         ScenarioError: It could not be run to its end. A robot that does not find the way out is no such error, but a
@@ -45,7 +46,9 @@ def run_maze(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
     place = scene_of(scene, seed)
     if place.goal is None:
         raise ScenarioError(f"the scene {place.name} has no goal: there is no way out of it")
-    setting = Setting(folder.resolve(), MODEL, Deployment.CONTROLLER, place, scene, seed, speed, "lds01", CHANNELS, {})
+    setting = Setting(
+        folder.resolve(), model.resolve(), Deployment.CONTROLLER, place, scene, seed, speed, "lds01", CHANNELS, {}
+    )
     say("starting the synthesis server, the simulated robot and the bridge")
     with running(setting) as rig:
         _until_out(rig, say)

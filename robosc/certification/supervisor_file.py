@@ -118,7 +118,7 @@ class FileVerification:
 
 def verify_supervisor_file(
     supervisor: Supervisor,
-    bundle: Bundle,
+    bundle: Bundle | None,
     limits: Limits,
     *,
     deployment: Deployment | None = None,
@@ -130,7 +130,7 @@ def verify_supervisor_file(
 
     Args:
         supervisor: Supervisor as `decode` read it.
-        bundle: The texts.
+        bundle: The texts; None: the model that the supervisor holds, which has nothing to be compared with.
         limits: Limits of the check.
         deployment: Intended deployment, or None to take the supervisor's word for that.
         engine: Engine of a symbolic search.
@@ -141,21 +141,24 @@ def verify_supervisor_file(
         SynthesisCancelled: `should_stop` became true.
         UnsupportedModelError: The texts' model is nested too deeply, or outside what synthesis handles.
     """
-    checked = check(bundle)
-    if checked.model is None or checked.places is None:
-        return FileVerification(checked.diagnostics, (), (), None)
-    if (deployment or supervisor.deployment) is Deployment.LAYER:
-        ambiguous = layer_findings(checked.model, checked.places)
-        if ambiguous:
-            return FileVerification(sorted_diagnostics((*checked.diagnostics, *ambiguous)), (), (), None)
-    faults = [Fault("model", text) for text in model_differences(supervisor.model, checked.model)]
-    has_actions = any(item.kind is CommunicationKind.ACTION for item in checked.model.communications)
+    model = supervisor.model
+    if bundle is not None:
+        checked = check(bundle)
+        if checked.model is None or checked.places is None:
+            return FileVerification(checked.diagnostics, (), (), None)
+        model = checked.model
+        if (deployment or supervisor.deployment) is Deployment.LAYER:
+            ambiguous = layer_findings(model, checked.places)
+            if ambiguous:
+                return FileVerification(sorted_diagnostics((*checked.diagnostics, *ambiguous)), (), (), None)
+    faults = [Fault("model", text) for text in model_differences(supervisor.model, model)]
+    has_actions = any(item.kind is CommunicationKind.ACTION for item in model.communications)
     if deployment not in (None, supervisor.deployment) and has_actions:
         faults.append(Fault("deployment", f"it was made for the deployment {supervisor.deployment}, not {deployment}"))
     notes = tuple(_notes(supervisor.certificate, bundle))
     if faults:
         return FileVerification((), tuple(faults), notes, None)
-    executable = ExecutableSystem(checked.model, supervisor.deployment)
+    executable = ExecutableSystem(model, supervisor.deployment)
     system = executable.automata
     semantics = Semantics(system)
 
@@ -195,17 +198,17 @@ def verify_supervisor_file(
             item.reason,
             item.trace,
             item.is_shortest,
-            state_in_words(system, checked.model, item.state),
+            state_in_words(system, model, item.state),
         )
         for item in found.failures
     ]
     return FileVerification((), tuple(faults), (*notes, *_beliefs(supervisor.certificate, found)), report)
 
 
-def _notes(certificate: Certificate, bundle: Bundle) -> list[str]:
+def _notes(certificate: Certificate, bundle: Bundle | None) -> list[str]:
     """Return notes on differences that decide nothing."""
     notes = []
-    if certificate.bundle_sha256 != bundle.digest:
+    if bundle is not None and certificate.bundle_sha256 != bundle.digest:
         notes.append(
             "the certificate's digest is of other texts than these; only the models that the texts mean are compared"
         )

@@ -87,13 +87,13 @@ def convert_log(log: str | Path, path: str | Path, *, motion: Path | None = None
         # Half a file would open, too.
         target.unlink(missing_ok=True)
         raise
-    return Converted(
-        target, topics.entries, count, types, moved is not None, notes_of(reader.dropped, reader.torn_line)
-    )
+    empty = () if topics.entries else ("the log has no entries",)
+    notes = (*empty, *notes_of(reader.dropped, reader.torn_line))
+    return Converted(target, topics.entries, count, types, moved is not None, notes)
 
 
 def _write(writer: Any, types: Mapping[str, str], messages: Iterable[Message]) -> int:
-    """Write messages; returns their number."""
+    """Write messages; return their number."""
     schemas = {type_: writer.register_msgdef(type_, definition_text(type_)) for type_ in sorted(set(types.values()))}
     count = 0
     for message in messages:

@@ -79,8 +79,8 @@ def verify(
     """Verify properties of the robot under its supervisor, or check a supervisor against its model.
 
     With `supervisor`, that is checked first, and nothing that it says of itself is believed; the properties are
-    verified if it has passed. Without, the supervisor is made of the model, or is the one given as `model`. A
-    supervisor of automata is checked against these.
+    verified if it has passed. Without, the supervisor is made of the model, or is the one given as `model`; if there
+    are no properties either, it is checked against its model. A supervisor of automata is checked against these.
 
     Args:
         model: The model, as `load` returns it, the path of one, or a supervisor that was made.
@@ -94,7 +94,7 @@ def verify(
         should_stop: Function called again and again; once it returns true, the work ends.
 
     Raises:
-        TypeError: There is nothing to verify, or what is given does not fit together.
+        TypeError: Arguments do not fit together.
         ValueError: The files hold no property, or `maximum_states` is negative.
         FileAccessError: A file is not there or cannot be read.
         LanguageError: A file is too large or not UTF-8.
@@ -117,23 +117,26 @@ def verify(
         if supervisor is not None:
             if isinstance(model, CoreSupervisor):
                 raise TypeError("supervisor= is checked against a model: give the model as the first argument")
-            given = _Given(loaded(model), supervisor, options, limits, is_strict)
-            return _checked(given, claims, on_progress, should_stop)
-        if not claims:
-            raise TypeError("nothing to verify: name properties, or a supervisor to check with supervisor=...")
-        if isinstance(model, CoreSupervisor):
+            check = _SupervisorCheck(loaded(model), supervisor, options, limits, is_strict)
+            return _checked(check, claims, on_progress, should_stop)
+        if not isinstance(model, CoreSupervisor):
+            found = _made(loaded(model), claims, chosen, on_progress, should_stop)
+            if isinstance(found, Verification):
+                return found
+            model = found
+        if claims:
             return claims.verified(model, chosen.engine_options(), on_progress, should_stop)
-        return _made(loaded(model), claims, chosen, on_progress, should_stop)
+        return _checked(_SupervisorCheck(None, model, options, limits, is_strict), claims, on_progress, should_stop)
     except UnsupportedModelError as error:
         return Verification(VerificationStatus.UNSUPPORTED_MODEL, (), str(error), {})
 
 
-class _Given:
-    """A supervisor to check, and how."""
+class _SupervisorCheck:
+    """A supervisor to check, and how; without a model, it is checked against the one that it holds."""
 
     def __init__(
         self,
-        model: LoadedModel,
+        model: LoadedModel | None,
         supervisor: SupervisorLike,
         options: SynthesisOptions | None,
         limits: Limits,
@@ -224,7 +227,9 @@ def verdicts_of(
     return verdicts, system
 
 
-def _checked(given: _Given, claims: _Claims, on_progress: OnProgress, should_stop: ShouldStop) -> Verification:
+def _checked(
+    given: _SupervisorCheck, claims: _Claims, on_progress: OnProgress, should_stop: ShouldStop
+) -> Verification:
     """Check the given supervisor; verify properties of its robot if it is right."""
     engine = resolve_engine(given.options.engine)
     try:
@@ -249,24 +254,24 @@ def _checked(given: _Given, claims: _Claims, on_progress: OnProgress, should_sto
         Findings(found.diagnostics, given.model),
         "a library has no robot that a supervisor could be for" if is_library else "",
         report,
-        file_verification_text(report, supervisor.model.name, given.model.name),
+        file_verification_text(report, supervisor.model.name, *([] if given.model is None else [given.model.name])),
     )
 
 
 def _made(
     model: LoadedModel, claims: _Claims, options: SynthesisOptions, on_progress: OnProgress, should_stop: ShouldStop
-) -> Verification:
-    """Make the supervisor, and verify properties of its robot."""
+) -> Verification | CoreSupervisor:
+    """Return the supervisor that is made of a model, or the result if a property is wrong or there is none."""
     # Errors of properties are reported before the synthesis, which may take long.
     robot = check(model).model
-    errors = None if robot is None else claims.errors(robot)
+    errors = claims.errors(robot) if robot is not None and claims else None
     if errors is not None:
         return errors
     attempt = make(model, options, on_progress, should_stop, allow_livelock=True)
     if isinstance(attempt, Unsupported):
         raise UnsupportedModelError(attempt.reason)
     if attempt.supervisor is not None:
-        return claims.verified(attempt.supervisor, options.engine_options(), on_progress, should_stop)
+        return attempt.supervisor
     return _without(attempt, model)
 
 

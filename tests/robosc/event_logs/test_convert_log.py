@@ -212,6 +212,11 @@ def test_the_same_log_gives_the_same_file(tmp_path: Path) -> None:
     assert one == two
 
 
+def test_a_log_without_entries_is_noted(tmp_path: Path) -> None:
+    found = convert_log(written(tmp_path), tmp_path / "run.mcap")
+    assert (found.entries, found.notes) == (0, ("the log has no entries",))
+
+
 def test_what_no_message_can_hold_is_refused_before_a_file_is_there(tmp_path: Path) -> None:
     target = tmp_path / "run.mcap"
     with pytest.raises(LogError, match=r"run.jsonl, line 2: its 'time' is before 1970 or after 2038"):

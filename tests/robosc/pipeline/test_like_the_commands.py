@@ -174,6 +174,18 @@ def test_a_supervisor(
             assert str(found).endswith(told.rstrip())
 
 
+def test_a_supervisor_alone_is_checked_against_its_model() -> None:
+    path = EXAMPLES / "navigation" / "navigation.rscd"
+    supervisor = robosc.synthesize(path).supervisor
+    assert supervisor is not None
+    alone, of_the_model = robosc.verify(supervisor), robosc.verify(path)
+    assert alone.passed
+    assert (alone.status, alone.report) == (of_the_model.status, of_the_model.report)
+    assert alone.report == robosc.verify(path, supervisor=supervisor).report
+    broken = robosc.verify(supervisor.supervising(supervisor.executable, (), supervisor.certificate))
+    assert broken.status is robosc.VerificationStatus.FAILED
+
+
 def test_generate(
     capsys: pytest.CaptureFixture[str], given: tuple[Path, robosc.SynthesisOptions], tmp_path: Path
 ) -> None:

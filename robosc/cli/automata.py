@@ -251,14 +251,14 @@ def explain_synthesis(arguments: argparse.Namespace) -> ExitCode:
         UsageError: An argument means nothing for it, or it cannot be read.
     """
     from robosc.explanation import Explanation, SystemWords, document, explanation_text
-    from robosc.pipeline.explaining import Asked, explained_system
+    from robosc.pipeline.explaining import ExplanationSubject, explained_system
     from robosc.pipeline.results import SynthesisStatus
 
     bundle, found = _checked(arguments)
     if found.system is None:
         return report_none(arguments, Synthesized(bundle, SynthesisStatus.MODEL_ERRORS, found.diagnostics, "", None))
     words, engine = SystemWords(found.system, found.places), _options(arguments).engine_options()
-    asked = Asked(arguments.event, arguments.state, arguments.after)
+    asked = ExplanationSubject(arguments.event, arguments.state, arguments.after)
     made = _watched(lambda on_progress: explained_system(words, engine, asked, on_progress))
     if not isinstance(made.explanation, Explanation):
         return report_none(arguments, Synthesized(bundle, made.status, found.diagnostics, made.reason, None))

@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         return automata.explain_synthesis(arguments)
     from robosc.certification import SynthesisOutcome
     from robosc.explanation import document, explanation_text
-    from robosc.pipeline.explaining import Asked, explained
+    from robosc.pipeline.explaining import ExplanationSubject, explained
 
     bundle = read_bundle(arguments)
     progress = ProgressLine()
@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
             bundle,
             Deployment(arguments.deployment),
             engine_options(arguments),
-            Asked(arguments.event, arguments.state, arguments.after),
+            ExplanationSubject(arguments.event, arguments.state, arguments.after),
             lambda step: progress.show(step.message),
         )
     finally:

@@ -270,7 +270,7 @@ class _Parser(ExpressionParser):
         request, response, feedback = (given.types[key] for key in ("request", "response", "feedback"))
         return syntax.Action(name, given.identifier, request, response, feedback, given.link, given.options)
 
-    def _with(self, *keys: str) -> "_Given":
+    def _with(self, *keys: str) -> "_WithList":
         """A `with` list: an identifier, the types that `keys` names in their order, options anywhere among them."""
         self.take("with")
         identifier: syntax.Text | None = None
@@ -307,7 +307,7 @@ class _Parser(ExpressionParser):
             comma = "" if self.texts[self.place - 1] == "," else ", "
             raise self.fault(fix=f"Write '{comma}{missing}: none' before it, or the type that it carries.")
         link = self.name() if self.takes("links") else None
-        return _Given(identifier, types, tuple(options), link)
+        return _WithList(identifier, types, tuple(options), link)
 
     def _quality(self) -> syntax.Name:
         if self.texts[self.place] not in _QUALITIES:
@@ -559,7 +559,7 @@ class _Parser(ExpressionParser):
 
 
 @dataclass(frozen=True, slots=True)
-class _Given:
+class _WithList:
     """Content of a `with` list."""
 
     identifier: syntax.Text | None

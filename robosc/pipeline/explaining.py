@@ -105,7 +105,7 @@ def explain(
         return page(model.code)
     if model is None:
         return page(str(code))
-    asked = Asked(event, state, after)
+    asked = ExplanationSubject(event, state, after)
     if isinstance(model, System):
         check_system(model)
         return explained_system(SystemWords(model), options.engine_options(), asked, on_progress, should_stop)
@@ -132,7 +132,7 @@ def _status(explanation: Explanation) -> SynthesisStatus:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class ExplanationSubject:
     """Subject of an explanation; without any, all controllable events and warnings.
 
     Attributes:
@@ -150,7 +150,7 @@ def explained(
     bundle: Bundle,
     deployment: Deployment,
     engine: EngineOptions,
-    asked: Asked,
+    asked: ExplanationSubject,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> SynthesisOutcome | tuple[SynthesisProblem, Explanation]:
@@ -165,7 +165,7 @@ def explained(
 def explained_system(
     words: SystemWords,
     engine: EngineOptions,
-    asked: Asked,
+    asked: ExplanationSubject,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Explained:
@@ -181,7 +181,7 @@ def explained_system(
 def _explanation(
     words: ModelWords | SystemWords,
     engine: EngineOptions,
-    asked: Asked,
+    asked: ExplanationSubject,
     on_progress: OnProgress,
     should_stop: ShouldStop,
 ) -> Explanation:

@@ -149,9 +149,9 @@ class Names:
             self.enumerations[key] = Enumeration(type_, tuple(named))
         return self.enumerations[key]
 
-    def function(self, wish: str) -> str:
+    def function(self, preferred_name: str) -> str:
         """A new name for a static function."""
-        return self._globals.name(wish)
+        return self._globals.name(preferred_name)
 
 
 @dataclass(frozen=True)

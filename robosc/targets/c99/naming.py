@@ -40,9 +40,9 @@ def prefix_for(robot: str) -> str:
     return f"robot_{name}" if _KEPT_PREFIX.match(name) else name
 
 
-def member_name(wish: str) -> str:
+def member_name(preferred_name: str) -> str:
     """A legal name for a member of a struct: never a keyword, a macro or a name that C reserves."""
-    name = wish[:_MAXIMUM]
+    name = preferred_name[:_MAXIMUM]
     is_reserved = name in _TAKEN or name.startswith("_") or (len(name) > 1 and name.upper() == name)
     return f"{'x' if name.startswith('_') else ''}{name}_" if is_reserved else name
 
@@ -50,10 +50,10 @@ def member_name(wish: str) -> str:
 class CNamer(Namer):
     """Hands out distinct names of C."""
 
-    def legal(self, wish: str) -> str:
-        """A name of bounded length; it is legal if `wish` is, but for its length."""
-        return super().legal(wish)[:_MAXIMUM]
+    def legal(self, preferred_name: str) -> str:
+        """A name of bounded length; it is legal if `preferred_name` is, but for its length."""
+        return super().legal(preferred_name)[:_MAXIMUM]
 
-    def member(self, wish: str) -> str:
+    def member(self, preferred_name: str) -> str:
         """A new name for a member of a struct."""
-        return self.name(member_name(wish))
+        return self.name(member_name(preferred_name))

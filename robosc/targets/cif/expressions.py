@@ -5,6 +5,7 @@ compute is tabulated (`robosc.targets.cif.tables`); what is too large for that i
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import (
@@ -18,7 +19,6 @@ from robosc.expressions import (
     children,
 )
 from robosc.recursion import allow_depth
-from robosc.targets.cif.logic import LOGIC, Symbol
 from robosc.targets.cif.numbers import Number, Term, combined, comparison, fits, number_text, scaled
 from robosc.targets.cif.subjects import Place, Reader
 from robosc.targets.cif.tables import Table, TableTooLargeError, tabulate
@@ -31,10 +31,12 @@ from robosc.targets.cif.text import (
     any_of,
     chosen,
     compared,
+    equivalent,
+    implied,
     negated,
 )
 from robosc.targets.cif.words import expression_words
-from robosc.targets.code.predicates import Predicate, PredicateWriter
+from robosc.targets.code.predicates import Logic, Predicate, PredicateWriter
 
 MAXIMUM_REPEATED = 5_000
 """Longest text that is written several times in one expression."""
@@ -45,6 +47,21 @@ _FRAMES_PER_LEVEL = 6
 MAXIMUM_TEXT = 1_000_000
 """Longest text of one expression."""
 
+
+@dataclass(frozen=True, slots=True)
+class Symbol:
+    """A value of an enum, and where it is known."""
+
+    value: Text
+    known: Text = TRUE
+
+
+def _equal(operator: str, left: Text, right: Text) -> Text:
+    same = equivalent(left, right)
+    return same if operator == "=" else negated(same)
+
+
+LOGIC = Logic(TRUE, FALSE, all_of, any_of, negated, implied, _equal)
 
 Result = Predicate[Text] | Number | Symbol
 

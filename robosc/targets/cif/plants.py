@@ -7,8 +7,7 @@ from robosc.automata.structure import Assignment, Automaton, DiscreteVariable, E
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import MAXIMUM_INTEGER, BooleanType, EnumType, IntegerType, Type, Value
 from robosc.model.structure import Model
-from robosc.targets.cif.expressions import Translator
-from robosc.targets.cif.logic import Symbol
+from robosc.targets.cif.expressions import Symbol, Translator
 from robosc.targets.cif.names import data_plant, declared_events, shift
 from robosc.targets.cif.numbers import Number, comparison, fits, number_text
 from robosc.targets.cif.subjects import Place

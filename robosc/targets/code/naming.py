@@ -13,7 +13,7 @@ MAXIMUM_NAME = 100
 
 
 class Namer:
-    """Hands out distinct names; the same wishes in the same order give the same names.
+    """Hands out distinct names; the same preferred names in the same order give the same names.
 
     Args:
         taken: Names that must not be handed out.
@@ -27,13 +27,13 @@ class Namer:
         self.taken = set(taken)
         self.hidden = tuple(hidden)
 
-    def legal(self, wish: str) -> str:
+    def legal(self, preferred_name: str) -> str:
         """A legal name for any text."""
-        return re.sub(r"[^A-Za-z0-9_]", "_", wish)
+        return re.sub(r"[^A-Za-z0-9_]", "_", preferred_name)
 
-    def name(self, wish: str) -> str:
-        """A new name as close as possible to `wish`."""
-        base = self.legal(wish)
+    def name(self, preferred_name: str) -> str:
+        """A new name as close as possible to `preferred_name`."""
+        base = self.legal(preferred_name)
         name, number = base, 2
         while name in self.taken or any(name in other for other in self.hidden):
             name, number = f"{base}_{number}", number + 1

@@ -11,9 +11,9 @@ _BUILTINS = frozenset(dir(builtins))
 class PythonNamer(Namer):
     """Hands out distinct Python names."""
 
-    def legal(self, wish: str) -> str:
+    def legal(self, preferred_name: str) -> str:
         """A legal Python name for any text; no keyword, no built-in, and not mangled inside a class."""
-        name = super().legal(wish)
+        name = super().legal(preferred_name)
         if not name or name[0].isdigit() or name.startswith("_"):
             name = f"x{name}"
         # Soft keywords and built-ins are legal, but a reader would stumble over them.

@@ -82,6 +82,11 @@ def test_the_bridges_commands_are_understood(command: str) -> None:
     assert model is None or (ROOT / model).exists() or "/" not in str(model)
 
 
+@pytest.mark.parametrize("code", re.findall(r"^```python\n(.*?)^```$", BRIDGE, re.DOTALL | re.MULTILINE))
+def test_the_bridges_python_runs(code: str) -> None:
+    exec(compile(code, "bridge/README.md", "exec"), {})
+
+
 @pytest.mark.parametrize("command", [line for line in COMMANDS if line.startswith("make ")])
 def test_the_make_targets_exist(command: str) -> None:
     assert f"\n{command.split()[1]}: " in (ROOT / "Makefile").read_text(encoding="utf-8")

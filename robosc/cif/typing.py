@@ -164,7 +164,7 @@ class Typing:
         """The term of a boolean."""
         term = self.term(node, scope)
         if term.type.kind not in ("bool", "unknown"):
-            return self.mismatch(f"this must be a boolean, and is {_a(term.type)}", node.at)
+            return self.mismatch(f"this must be a boolean; it is {_a(term.type)}", node.at)
         return term
 
     def conjunction(self, nodes: tuple[syntax.Expression, ...], scope: Scope) -> Term:
@@ -348,13 +348,13 @@ class Typing:
             return ERROR
         if node.operator == "not":
             if term.type.kind != "bool":
-                return self.mismatch(f"'not' needs a boolean, and has {_a(term.type)}", node.at)
+                return self.mismatch(f"'not' needs a boolean; this is {_a(term.type)}", node.at)
             return negation(term)
         if node.operator == "sample":
             return broken(term.type.parts[0] if term.type.parts else UNKNOWN, term,
                           problem=Problem("a distribution is sampled", node.at))  # fmt: skip
         if not term.type.is_number:
-            return self.mismatch(f"'{node.operator}' needs a number, and has {_a(term.type)}", node.at)
+            return self.mismatch(f"'{node.operator}' needs a number; this is {_a(term.type)}", node.at)
         if node.operator == "+":
             return term
         if term.type.kind == "real":
@@ -639,7 +639,7 @@ class Typing:
         if function.type.kind == "unknown":
             return ERROR
         if function.type.kind != "func":
-            return self.mismatch(f"{_a(function.type)} cannot be called", node.at)
+            return self.mismatch(f"a value {_a(function.type)} cannot be called", node.at)
         result, *parameters = function.type.parts
         if len(parameters) != len(arguments) or not all(
             fits(item.type, type_) for item, type_ in zip(arguments, parameters, strict=False)

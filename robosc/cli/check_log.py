@@ -27,7 +27,7 @@ lead to; what a supervision layer held back must have been forbidden.
 _EPILOG = """\
 exit status:
   0  nothing is wrong
-  1  something in the log could not have happened, it tells of no event, or there is no supervisor
+  1  something in the log could not have happened, it contains no events, or there is no supervisor
   2  wrong use; a file that cannot be read or is no event log
 """
 

@@ -45,7 +45,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         action="append",
         choices=_PURPOSES,
         default=[],
-        help="examine what this purpose needs (may be repeated; default: everything, of which synth alone is needed)",
+        help="examine what this purpose needs (may be repeated; default: check everything; only synth is required)",
     )
     parser.add_argument("--server", metavar="HOST[:PORT]", help="examine whether this synthesis server can be used")
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")

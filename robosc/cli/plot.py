@@ -65,8 +65,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--clock",
         choices=("log", "robot"),
         default="log",
-        help="whose time: that of the log, which is the computer's, or that of the robot's world, which may pass "
-        "faster; --from and --to are of it, too (default: %(default)s)",
+        help="time axis, also of --from and --to: log (the computer's clock) or robot (the simulated clock, which may "
+        "be faster) (default: %(default)s)",
     )
     parser.add_argument(
         "--motion",

@@ -46,7 +46,7 @@ class Parser(argparse.ArgumentParser):
         if self._subparsers is not None and given[0].startswith("--") and len(given[0]) > 2:
             option = given[0].partition("=")[0]
             if not any(each.startswith(option) for each in self._option_string_actions):
-                message = f"options of a command stand behind it: {self.prog} COMMAND {option} ..."
+                message = f"put the options of a command after it: {self.prog} COMMAND {option} ..."
                 self.error(message)
         return super().parse_known_args(args, namespace)
 

@@ -19,8 +19,8 @@ password, and NAME.pub, the public key, one line of text for those who are to tr
 """
 
 _SIGN = """\
-Sign a supervisor file: FILE.rsup.sig is written beside it. Whoever trusts the key, such as a bridge that has the public
-key in its configuration, executes that supervisor without verifying it anew. Verify it before you sign it.
+Sign a supervisor file: FILE.rsup.sig is written beside it. A program that trusts the key, such as a bridge that has the
+public key in its configuration, executes that supervisor without verifying it again. Verify it before you sign it.
 """
 
 
@@ -28,12 +28,12 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     """Add both commands."""
     parser = commands.add_parser("key", help="make a key pair for signing supervisor files", description=_KEY)
     parser.add_argument("name", type=given_path, metavar="NAME", help="name of the files NAME.key and NAME.pub")
-    parser.add_argument("--comment", default="", metavar="TEXT", help="whose key it is; stands in NAME.pub")
+    parser.add_argument("--comment", default="", metavar="TEXT", help="owner of the key, written to NAME.pub")
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     parser.set_defaults(run=run_key)
 
     parser = commands.add_parser("sign", help="sign a supervisor file", description=_SIGN)
-    parser.add_argument("supervisor", type=given_path, metavar="FILE.rsup", help="the supervisor to vouch for")
+    parser.add_argument("supervisor", type=given_path, metavar="FILE.rsup", help="the supervisor file to sign")
     parser.add_argument(
         "--key", type=given_path, required=True, metavar="FILE.key", help="the private key to sign with"
     )

@@ -25,15 +25,15 @@ if TYPE_CHECKING:
 DEFAULT_STEPS = 1000
 
 _DESCRIPTION = """\
-Lead the robot under its supervisor by hand: you play the world, and choose among what the controller may do. Events
-come from a file (--events), by chance (--random, --until-trouble), or as commands that are typed: 'help' tells them.
+Step the robot under its supervisor by hand: you play the world, and choose among what the controller may do. Events
+come from a file (--events), by chance (--random, --until-trouble), or as commands that are typed: 'help' lists them.
 With none of these options commands are read from standard input; on a terminal with a prompt, a history and completion.
-Automata (FILE.cif, .gen, .wmod) are led likewise: there you are the plants.
+For automata (FILE.cif, .gen, .wmod), you play the plants.
 """
 
 _EPILOG = """\
 a file of events has one a line, with its data as JSON or as name=value; what is left out is unknown:
-  scan.response front=0.7              properties of an object; of an enum its value, or what it is made of
+  scan.response front=0.7              properties of an object; for an enum, its value or raw data
   scan.response {"front": 0.7}
   level.response 3
   move.request                         a request, where it is allowed
@@ -57,7 +57,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     """Add the command."""
     parser = commands.add_parser(
         "simulate",
-        help="lead the robot under its supervisor by hand, in the terminal or from a file",
+        help="step the robot under its supervisor by hand, in the terminal or from a file",
         description=_DESCRIPTION,
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

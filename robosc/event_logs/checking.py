@@ -147,12 +147,12 @@ class _Checking:
 
     def _notes(self) -> Iterator[str]:
         if not self._events:
-            yield "the log tells of no event: there was nothing to check"
+            yield "the log contains no events; nothing was checked"
         if self._others:
             kinds = sorted(self._unknown_kinds)
             shown = ", ".join(repr(kind[:_KIND_SHOWN]) for kind in kinds[:_KINDS_SHOWN])
             more = ", ..." if len(kinds) > _KINDS_SHOWN else ""
-            yield f"{self._others} lines are of a kind that no log has, and were not looked at: {shown}{more}"
+            yield f"{self._others} lines are of an unknown kind and were not checked: {shown}{more}"
 
     def take(self, entry: LogEntry) -> None:
         if entry.kind not in KINDS:

@@ -148,7 +148,7 @@ def sequence_of(
         raise PlotError(f"the time window from {begin_s:g} s to {end_s:g} s is empty")
     happened = run.events
     if not happened:
-        raise PlotError("the log tells of no event")
+        raise PlotError("the log contains no events")
     chosen = _chosen(_news(happened) if only_changes else happened, events)
     inside = [
         (entry.time_s - run.begin_s, entry)

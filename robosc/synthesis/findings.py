@@ -159,13 +159,13 @@ _EXPLANATIONS = {
     ),
     (Cause.SUPERVISOR, True): (
         "synthesis forbids it everywhere, because of what could follow it",
-        "Give a way back to marked states and into every variable's range from wherever it leads: what stops that "
-        "is told by 'robosc explain-synthesis'.",
+        "Give a way back to marked states and into every variable's range from wherever it leads; run "
+        "'robosc explain-synthesis' to see what prevents it.",
     ),
     (Cause.SUPERVISOR, False): (
         "synthesis keeps the behaviours from the states that allow it, because of what could follow there",
-        "Give a way back to marked states and into every variable's range from these states: what stops that is told "
-        "by 'robosc explain-synthesis'.",
+        "Give a way back to marked states and into every variable's range from these states; run "
+        "'robosc explain-synthesis' to see what prevents it.",
     ),
 }
 """Reason and remedy, by the cause and by whether the event would be allowed without it in a state that is reached."""
@@ -282,7 +282,7 @@ def _unprompted(model: Model, places: Places, found: Unprompted) -> Diagnostic:
         f"'{first}' can be requested again and again with no message of the robot in between, {_after(found.trace)}: "
         f"{_shown(found.loop)}, and so on",
         places.communications[first],
-        "Let a message ask for it and a requirement wait for that; or leave it, if the robot shall go on by itself.",
+        "Require an order message before it, or ignore this note if the robot should repeat it.",
         tuple(RelatedPlace("requested in the same loop", places.communications[name]) for name in others),
     )
 
@@ -296,7 +296,7 @@ def _unreached(model: Model, places: Places, component: str, state: str) -> Diag
         why, fix = "no transition leads there", "Give it a transition that leads there, or remove it."
     else:
         why = "what would lead there never happens under the supervisor"
-        fix = "Relax what is required, or remove the state: what stops the way is told by 'robosc explain-synthesis'."
+        fix = "Relax a requirement, or remove the state; run 'robosc explain-synthesis' to see what prevents it."
     place = places.states[component, state]
     return _warning("unreachable-state", f"{component} never gets to '{state}': {why}", place, fix)
 

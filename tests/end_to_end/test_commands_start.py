@@ -111,4 +111,4 @@ def test_a_bare_command_prints_its_help(program: str, words: str) -> None:
 def test_options_alone_are_wrong_use() -> None:
     done = started("robosc", "--json")
     assert done.returncode == 2
-    assert "options of a command stand behind it: robosc COMMAND --json ..." in done.stderr
+    assert "put the options of a command after it: robosc COMMAND --json ..." in done.stderr

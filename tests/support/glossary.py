@@ -12,6 +12,13 @@ WORDS = {
     "controllable": r"controllable",
     "release": r"releases?",
     "layer": r"layers?",
+    "livelock": r"livelocks?",
+    "guard": r"guards?",
+    "invariant": r"invariants?",
+    "decision diagram": r"decision diagrams?",
+    "batch": r"batch(?:es)?",
+    "policy": r"polic(?:y|ies)",
+    "event log": r"event logs?",
 }
 """Sections of the glossary, and the forms of their words."""
 
@@ -23,7 +30,7 @@ def unlinked(text: str, name: str) -> int | None:
 
     Headings, code and links to elsewhere do not count.
     """
-    link = re.search(rf"\]\([^)]*glossary\.md#{name}\)", text)
+    link = re.search(rf"\]\([^)]*glossary\.md#{name.replace(' ', '-')}\)", text)
     prose = _SILENT.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
     found = re.search(rf"\b{WORDS[name]}\b", prose, re.IGNORECASE)
     return None if found is None or (link is not None and link.start() < found.start()) else found.start()

@@ -109,7 +109,7 @@ def cache_folder(argument: Path | None, chosen: SupervisorSource) -> Path | None
     """
     folder = argument or _path(chosen.keep) or state_folder()
     if folder is None:
-        _log.warning("there is no home: what a synthesis server makes is not kept for a start without network")
+        _log.warning("$HOME is not set; supervisors of a synthesis server are not cached for a start without network")
     return folder
 
 
@@ -118,7 +118,7 @@ def _path(text: str | None) -> Path | None:
 
 
 def obtain(source: Source, tell: Callable[[str], None] = lambda text: None) -> Supervisor:
-    """Return the supervisor, verified or vouched for.
+    """Return the supervisor, verified or signed.
 
     Args:
         source: Source of the supervisor.

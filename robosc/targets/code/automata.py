@@ -61,8 +61,8 @@ class ControlledAutomata:
         choice = next(iter(edge_choices(system)), None)
         if choice is not None:
             raise UnsupportedModelError(
-                f"no code can tell where an event leads that can lead to several states: {choice}; let their guards "
-                "exclude each other"
+                f"the event {choice.event} leads to several states from {choice.automaton}.{choice.location}; its "
+                "guards must exclude each other"
             )
 
     @cached_property

@@ -419,7 +419,7 @@ def test_the_folder_is_that_of_the_command_line_the_configuration_or_the_user(
 
     monkeypatch.setattr(Path, "home", homeless)
     assert cache_folder(None, SupervisorSource()) is None
-    assert "there is no home" in caplog.text
+    assert "$HOME is not set" in caplog.text
 
 
 def test_a_folder_that_may_not_be_looked_into_holds_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

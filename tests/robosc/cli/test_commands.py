@@ -440,7 +440,7 @@ def test_options_before_a_command_are_told_their_place(words: list[str], capsys:
         main(words)
     assert left.value.code == 2
     option = words[0].partition("=")[0]
-    assert f"options of a command stand behind it: robosc COMMAND {option} ..." in capsys.readouterr().err
+    assert f"put the options of a command after it: robosc COMMAND {option} ..." in capsys.readouterr().err
 
 
 def test_options_of_the_program_itself_may_be_shortened(capsys: pytest.CaptureFixture[str]) -> None:

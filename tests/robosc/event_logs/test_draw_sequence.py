@@ -93,7 +93,7 @@ def test_nothing_to_show_is_told(chosen: dict[str, object], problem: str, tmp_pa
     with pytest.raises(PlotError) as caught:
         draw_sequence(SHORT, tmp_path / "plot.png", **chosen)  # type: ignore[arg-type]
     assert str(caught.value).startswith(problem)
-    with pytest.raises(PlotError, match="the log tells of no event"):
+    with pytest.raises(PlotError, match="the log contains no events"):
         sequence_of(run_of((0.0, "fault")))
     with pytest.raises(PlotError, match=r"plots are \.png, \.svg, \.html files"):
         draw_sequence(SHORT, tmp_path / "plot.gif")

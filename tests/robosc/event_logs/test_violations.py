@@ -237,8 +237,8 @@ def test_a_log_without_events_has_not_passed(tmp_path: Path) -> None:
     for entries in ([], [{"time": 1.0, "kind": "Event", "event": "go.request"}, {"time": 1.0, "kind": "x"}]):
         found = check_log(read(tmp_path, entries), supervisor())
         assert (found.violation_count, found.has_passed) == (0, False)
-        assert found.notes[0] == "the log tells of no event: there was nothing to check"
-    assert found.notes[1] == "2 lines are of a kind that no log has, and were not looked at: 'Event', 'x'"
+        assert found.notes[0] == "the log contains no events; nothing was checked"
+    assert found.notes[1] == "2 lines are of an unknown kind and were not checked: 'Event', 'x'"
 
 
 def test_a_restart_begins_in_the_initial_state(tmp_path: Path) -> None:

@@ -296,7 +296,7 @@ CHOICE = automaton("A", ["a -go-> b", "a -go-> c", "b -back-> a", "c -back-> a"]
 @pytest.mark.parametrize(
     ("made", "message"),
     [
-        (system(CHOICE), "A: go has several edges that can be taken in one state of a"),
+        (system(CHOICE), "the event go leads to several states from A.a; its guards must exclude each other"),
         (system(replace(CHOICE, edges=CHOICE.edges[1:], initial=("a", "c"))), "may begin in 2 states"),
         (system(replace(CHOICE, edges=CHOICE.edges[1:], name='A */ "; exit(1)')), "is no identifier"),
         (

@@ -30,7 +30,7 @@ from robosc.expressions import (
 from robosc.model.structure import CommunicationKind, ObjectValue
 from robosc.supervisor import Supervisor
 from robosc.targets import generate
-from robosc.targets.c99.layout import Layout, event_data, make_layout
+from robosc.targets.code.c.layout import Layout, event_data, make_layout
 from support.c99_main import batch_types, events_back, test_program
 
 GCC = shutil.which("gcc")

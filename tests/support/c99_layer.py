@@ -22,8 +22,8 @@ from robosc.execution.runtime.settings import Settings
 from robosc.expressions import DoubleType, Type
 from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
-from robosc.targets.c99.layer import request_parameters
-from robosc.targets.c99.layout import Layout, event_data
+from robosc.targets.code.c.layer import request_parameters
+from robosc.targets.code.c.layout import Layout, event_data
 from support.c99 import Reference, _hex, built, compare, data_words, microseconds
 from support.c99_layer_main import CALLBACKS, TOKENS, layer_program
 from support.c99_main import batch_types, events_back

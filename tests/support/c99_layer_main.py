@@ -5,9 +5,9 @@ import re
 from robosc.expressions import Type
 from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
-from robosc.targets.c99.header import receive_head, reply_head
-from robosc.targets.c99.layer import call_head, cancel_head, goal_head, request_head, request_parameters
-from robosc.targets.c99.layout import Layout, event_data
+from robosc.targets.code.c.header import receive_head, reply_head
+from robosc.targets.code.c.layer import call_head, cancel_head, goal_head, request_head, request_parameters
+from robosc.targets.code.c.layout import Layout, event_data
 from support.c99_main import _TOP, _Program, batch_types, events_back
 
 TOKENS = 4096

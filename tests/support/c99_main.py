@@ -17,11 +17,11 @@ from robosc.expressions import (
 )
 from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
-from robosc.targets.c99.header import batch, batch_parameters, receive_head, reply_head
-from robosc.targets.c99.layout import Layout, event_data
-from robosc.targets.c99.provide import Field, request_field
-from robosc.targets.c99.source import source_file
-from robosc.targets.c99.unit import make_unit
+from robosc.targets.code.c.header import batch, batch_parameters, receive_head, reply_head
+from robosc.targets.code.c.layout import Layout, event_data
+from robosc.targets.code.c.provide import Field, request_field
+from robosc.targets.code.c.source import source_file
+from robosc.targets.code.c.unit import make_unit
 
 _TOP = """
 #include "@p@.h"

@@ -17,8 +17,8 @@ from typing import Any
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets import GeneratedFiles, generate, write_files
-from robosc.targets.python.bundle import bundle
-from robosc.targets.python.generate import RUNTIME, model_part
+from robosc.targets.code.python.bundle import bundle
+from robosc.targets.code.python.generate import RUNTIME, model_part
 
 _numbers = itertools.count()
 

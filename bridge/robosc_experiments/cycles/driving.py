@@ -11,7 +11,7 @@ from pathlib import Path
 from robosc.model.structure import Communication, CommunicationKind, Model
 from robosc.supervisor import Supervisor
 from robosc.targets import GenerateOptions
-from robosc.targets.c99.layout import make_layout
+from robosc.targets.code.c.layout import make_layout
 from robosc.targets.code.naming import package_name
 from robosc.targets.cpp.model import fill_name
 from robosc_experiments.cycles.isolated import SCRIPTS, write_unit

@@ -1,7 +1,7 @@
 """The target `c99`."""
 
 from robosc.targets.c99 import automata
-from robosc.targets.c99.package import generate
+from robosc.targets.code.c.package import generate
 from robosc.targets.registry import Target, TargetInfo
 
 TARGET = Target(

@@ -17,13 +17,13 @@ from robosc.expressions import (
 )
 from robosc.model.received import Path
 from robosc.model.structure import Model
-from robosc.targets.c99.conditions import CDiagrams
-from robosc.targets.c99.expressions import CWriter, number_code
-from robosc.targets.c99.helpers import HELPERS, called
-from robosc.targets.c99.naming import CNamer, prefix_for
-from robosc.targets.c99.statements import statement_lines, unused
-from robosc.targets.c99.text import is_nested_too_deeply, safe, string_literal
 from robosc.targets.code.automata import AutomataWriter, ControlledAutomata, always, shallow
+from robosc.targets.code.c.conditions import CDiagrams
+from robosc.targets.code.c.expressions import CWriter, number_code
+from robosc.targets.code.c.helpers import HELPERS, called
+from robosc.targets.code.c.naming import CNamer, prefix_for
+from robosc.targets.code.c.statements import statement_lines, unused
+from robosc.targets.code.c.text import is_nested_too_deeply, safe, string_literal
 from robosc.targets.code.expression_writer import read_nothing
 from robosc.targets.code.expressions import (
     FALSE_CODE,

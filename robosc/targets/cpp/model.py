@@ -18,11 +18,11 @@ from robosc.expressions import (
     Type,
 )
 from robosc.model.structure import Communication, CommunicationKind, EventKind
-from robosc.targets.c99.header import batch, batch_parameters
-from robosc.targets.c99.layout import Layout, event_data
-from robosc.targets.c99.provide import Field, request_field
-from robosc.targets.c99.text import comment, string_literal
-from robosc.targets.c99.unit import Unit
+from robosc.targets.code.c.header import batch, batch_parameters
+from robosc.targets.code.c.layout import Layout, event_data
+from robosc.targets.code.c.provide import Field, request_field
+from robosc.targets.code.c.text import comment, string_literal
+from robosc.targets.code.c.unit import Unit
 from robosc.targets.code.text import indent
 from robosc.targets.cpp.naming import require_field_name
 from robosc.targets.ros.state_topic import state_topic

@@ -10,18 +10,18 @@ import jinja2
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind, Deployment, EventKind, Interface
 from robosc.supervisor import Supervisor
-from robosc.targets.c99.header import head, with_prefix
-from robosc.targets.c99.package import generate as generate_c
-from robosc.targets.c99.text import safe, string_literal
-from robosc.targets.c99.unit import Unit, make_unit
 from robosc.targets.code import templates
+from robosc.targets.code.c.header import head, with_prefix
+from robosc.targets.code.c.package import generate as generate_c
+from robosc.targets.code.c.text import safe, string_literal
+from robosc.targets.code.c.unit import Unit, make_unit
 from robosc.targets.code.naming import package_name
+from robosc.targets.code.python.folding import folded
 from robosc.targets.code.templates import shared_values
 from robosc.targets.cpp.model import Writer, fill_name, received_topics, take_name
 from robosc.targets.cpp.naming import require_namespace, require_package_name
 from robosc.targets.cpp.recording import PERIOD_S, record
 from robosc.targets.files import GeneratedFiles
-from robosc.targets.python.folding import folded
 from robosc.targets.registry import GenerateOptions, StateMessage
 from robosc.targets.ros.package import chosen, error_context, packages, release_identifiers, require_own_names
 from robosc.targets.ros.runtime.parameters import Parameter, declarations

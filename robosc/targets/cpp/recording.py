@@ -30,9 +30,9 @@ from robosc.expressions import (
 )
 from robosc.model.structure import CommunicationKind, Deployment, EventKind, Model
 from robosc.supervisor import Supervisor
-from robosc.targets.c99.header import batch
-from robosc.targets.c99.layout import Layout, event_data
-from robosc.targets.c99.text import string_literal
+from robosc.targets.code.c.header import batch
+from robosc.targets.code.c.layout import Layout, event_data
+from robosc.targets.code.c.text import string_literal
 from robosc.targets.code.text import indent
 from robosc.targets.cpp.model import received_topics, take_name
 

@@ -1,7 +1,7 @@
 """The target `python`."""
 
+from robosc.targets.code.python.package import generate
 from robosc.targets.python import automata
-from robosc.targets.python.package import generate
 from robosc.targets.registry import Target, TargetInfo
 
 TARGET = Target(

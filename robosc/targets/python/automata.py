@@ -12,14 +12,14 @@ from robosc.targets.code.automata import AutomataWriter, ControlledAutomata, alw
 from robosc.targets.code.expression_writer import read_nothing
 from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, Sort, call, place, variable
 from robosc.targets.code.naming import MAXIMUM_NAME, require_package_name, snake_case
+from robosc.targets.code.python.conditions import PythonDiagrams
+from robosc.targets.code.python.expressions import Scope, constant
+from robosc.targets.code.python.folding import folded
+from robosc.targets.code.python.naming import PythonNamer
+from robosc.targets.code.python.statements import function
 from robosc.targets.code.statements import Block
 from robosc.targets.code.templates import environment
 from robosc.targets.files import GeneratedFiles
-from robosc.targets.python.conditions import PythonDiagrams
-from robosc.targets.python.expressions import Scope, constant
-from robosc.targets.python.folding import folded
-from robosc.targets.python.naming import PythonNamer
-from robosc.targets.python.statements import function
 from robosc.targets.registry import GenerateOptions, SupervisedSystem
 
 _NO_MODEL = Model("", (), (), (), (), (), (), ())

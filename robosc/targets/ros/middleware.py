@@ -12,10 +12,10 @@ from robosc.model.structure import Communication, Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets.code import templates
 from robosc.targets.code.naming import package_name
+from robosc.targets.code.python.folding import folded
+from robosc.targets.code.python.generate import header
+from robosc.targets.code.python.package import beside_supervisor, python_text
 from robosc.targets.files import GeneratedFiles
-from robosc.targets.python.folding import folded
-from robosc.targets.python.generate import header
-from robosc.targets.python.package import beside_supervisor, python_text
 from robosc.targets.registry import GenerateOptions, StateMessage
 from robosc.targets.ros.layer import Renamed, remapped_names, require_names_of_a_layer, require_own_topics
 from robosc.targets.ros.package import chosen, context, error_context, packages, release_identifiers, require_own_names

@@ -8,9 +8,9 @@ from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind, Deployment, Interface, Model
 from robosc.supervisor import Supervisor
 from robosc.targets.code.naming import snake_case
+from robosc.targets.code.python.generate import header
+from robosc.targets.code.python.layout import make_layout
 from robosc.targets.code.templates import shared_values
-from robosc.targets.python.generate import header
-from robosc.targets.python.layout import make_layout
 from robosc.targets.registry import GenerateOptions
 from robosc.targets.ros.runtime.parameters import Parameter
 from robosc.targets.ros.state_topic import state_topic

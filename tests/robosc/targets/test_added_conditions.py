@@ -9,7 +9,7 @@ import pytest
 
 from robosc.certification import make_supervisor
 from robosc.targets import generate
-from robosc.targets.python.text import comment
+from robosc.targets.code.python.text import comment
 from support.models import bundle_of
 
 GOLDEN = Path(__file__).parents[1] / "supervisor" / "golden"

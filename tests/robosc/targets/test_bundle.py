@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from robosc.targets.python.bundle import bundle, statements
-from robosc.targets.python.generate import RUNTIME
+from robosc.targets.code.python.bundle import bundle, statements
+from robosc.targets.code.python.generate import RUNTIME
 
 
 @pytest.fixture

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc.targets.python.bundle import WIDTH
-from robosc.targets.python.folding import folded
+from robosc.targets.code.python.bundle import WIDTH
+from robosc.targets.code.python.folding import folded
 
 MARK = "  # noqa: E501"
 

@@ -36,7 +36,7 @@ from robosc.model.structure import (
 )
 from robosc.supervisor import Supervisor, decode, encode
 from robosc.targets import GenerateOptions, generate, write_files
-from robosc.targets.python import changes
+from robosc.targets.code.python import changes
 from support.effort import examples
 from support.generated import example_supervisor, imported, load_system, python_text, same
 from support.layers import BothSides

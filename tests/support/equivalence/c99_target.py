@@ -15,8 +15,8 @@ from robosc.execution.runtime.settings import Settings, settings_for
 from robosc.expressions import BooleanType, DoubleType, EnumType, StringType, Type
 from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
-from robosc.targets.c99.layer import request_parameters
-from robosc.targets.c99.layout import event_data, make_layout
+from robosc.targets.code.c.layer import request_parameters
+from robosc.targets.code.c.layout import event_data, make_layout
 from support.c99 import SANITIZERS, compiled, data_words, microseconds, settings_words
 from support.c99_layer import REFUSALS, caller_place, compiled_layer, layer_settings_words
 from support.c99_layer_main import TOKENS

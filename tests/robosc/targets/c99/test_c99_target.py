@@ -26,8 +26,8 @@ from robosc.model.structure import (
 )
 from robosc.supervisor import Supervisor
 from robosc.targets import GenerateOptions, generate
-from robosc.targets.c99.naming import member_name, prefix_for
-from robosc.targets.c99.text import safe, string_literal
+from robosc.targets.code.c.naming import member_name, prefix_for
+from robosc.targets.code.c.text import safe, string_literal
 from support.c99 import GCC, SANITIZERS, WARNINGS, Reference, compare, compiled, lonely_end, replay
 from support.c99_main import events_back
 from support.generated import example_supervisor

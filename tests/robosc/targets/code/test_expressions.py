@@ -5,9 +5,9 @@ from random import Random
 import pytest
 
 from robosc.expressions import BooleanType, IntegerType
-from robosc.targets.c99.expressions import C
+from robosc.targets.code.c.expressions import C
 from robosc.targets.code.expressions import Code, Kind, Sort, Unknown, call, integer, literal, operation, place
-from robosc.targets.python.expressions import PYTHON, code_text
+from robosc.targets.code.python.expressions import PYTHON, code_text
 
 A, B, D = (place(name, BooleanType()) for name in "abd")
 N = place("n", IntegerType(0, 9))

@@ -2,9 +2,9 @@
 
 import pytest
 
-from robosc.targets.c99.naming import CNamer
+from robosc.targets.code.c.naming import CNamer
 from robosc.targets.code.naming import Namer, snake_case
-from robosc.targets.python.naming import PythonNamer
+from robosc.targets.code.python.naming import PythonNamer
 
 
 def test_a_name_is_given_once() -> None:

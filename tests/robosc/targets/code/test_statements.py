@@ -3,11 +3,11 @@
 from random import Random
 
 from robosc.expressions import BooleanType, IntegerType
-from robosc.targets.c99 import statements as c99
+from robosc.targets.code.c import statements as c99
 from robosc.targets.code.expressions import TRUE_CODE, Code, Sort, call, integer, operation, place, variable, words_of
+from robosc.targets.code.python import statements as python
+from robosc.targets.code.python.expressions import code_text
 from robosc.targets.code.statements import Assign, Block, Comment, Do, If, Let, Return, Statement, codes, when
-from robosc.targets.python import statements as python
-from robosc.targets.python.expressions import code_text
 
 A, B = (place(name, BooleanType()) for name in "ab")
 N, M = (place(name, IntegerType(0, 9)) for name in "nm")

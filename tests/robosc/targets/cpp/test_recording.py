@@ -6,7 +6,7 @@ import pytest
 
 from robosc.supervisor import Supervisor
 from robosc.targets import generate
-from robosc.targets.c99.unit import make_unit
+from robosc.targets.code.c.unit import make_unit
 from robosc.targets.cpp.recording import STEPS, Recording, record
 from support.generated import example_supervisor
 from support.rclcpp_nodes import courier

@@ -1,0 +1,140 @@
+"""The generated `main.c` of a supervision layer: a caller that asks for everything, and a robot that says nothing."""
+
+from robosc.model.structure import CommunicationKind
+from robosc.targets.code.c.example import CANCEL, main_text
+from robosc.targets.code.c.layer import request_parameters
+from robosc.targets.code.c.layout import Layout
+from robosc.targets.code.c.received import unknown_name
+from robosc.targets.code.c.unit import Unit
+from robosc.targets.code.text import indent
+
+_BLOCKED = """\
+static bool print_blocked(void *context, const char *identifier, {prefix}_refusal_t why)
+{{
+    (void)context;
+    printf("blocked %s, reason %d\\n", identifier, (int)why);
+    return true;
+}}
+"""
+
+_PASS_ON = """\
+static bool print_pass_on(void *context, {prefix}_source_t source, const void *message)
+{{
+    (void)context;
+    (void)message;
+    printf("pass on %s\\n", {prefix}_source_name((int)source));
+    return true;
+}}
+"""
+
+_PUBLISH = """\
+static bool print_publish(void *context, {prefix}_topic_t topic, const void *message)
+{{
+    (void)context;
+    (void)message;
+    printf("publish on %s\\n", {prefix}_topic_name((int)topic));
+    return true;
+}}
+
+static bool print_default(void *context, {prefix}_topic_t topic)
+{{
+    (void)context;
+    printf("default message on %s\\n", {prefix}_topic_name((int)topic));
+    return true;
+}}
+"""
+
+_SEND = """\
+static bool print_{kind}(void *context, uint32_t id, {prefix}_communication_t what, const void *message)
+{{
+    (void)context;
+    (void)message;
+    printf("{kind} %s, id %" PRIu32 "\\n", {prefix}_communication_name((int)what), id);
+    return true;
+}}
+"""
+
+_TELL = """\
+static bool print_{kind}(void *context, {prefix}_communication_t what, uint32_t caller_id)
+{{
+    (void)context;
+    printf("to the caller: {kind} %s, its id %" PRIu32 "\\n", {prefix}_communication_name((int)what), caller_id);
+    return true;
+}}
+"""
+
+_HAND_ON = """\
+static bool print_{kind}(void *context, {prefix}_communication_t what, uint32_t caller_id, const void *message)
+{{
+    (void)context;
+    (void)message;
+    printf("to the caller: {kind} %s, its id %" PRIu32 "\\n", {prefix}_communication_name((int)what), caller_id);
+    return true;
+}}
+"""
+
+_END = """\
+static bool print_end(void *context, {prefix}_communication_t action, uint32_t caller_id, {prefix}_end_t end,
+                      const void *message)
+{{
+    (void)context;
+    (void)message;
+    printf("to the caller: end %d of %s, its id %" PRIu32 "\\n", (int)end,
+           {prefix}_communication_name((int)action), caller_id);
+    return true;
+}}
+"""
+
+
+def layer_example_file(unit: Unit) -> str:
+    """The text of `main.c`."""
+    layout = unit.layout
+    texts: list[str] = []
+    settings: list[str] = []
+    if layout.requests:
+        texts.append(_BLOCKED)
+        settings.append("blocked = print_blocked")
+    if layout.received_topics:
+        texts.append(_PASS_ON)
+        settings.append("pass_on = print_pass_on")
+    if layout.topics:
+        texts.append(_PUBLISH)
+        settings += ["publish = print_publish", "publish_default = print_default"]
+    if layout.of_kind(CommunicationKind.SERVICE):
+        texts += [_SEND.replace("{kind}", "call"), _HAND_ON.replace("{kind}", "answer")]
+        texts.append(_TELL.replace("{kind}", "answer_default"))
+        settings += ["call = print_call", "answer = print_answer", "answer_default = print_answer_default"]
+    if layout.of_kind(CommunicationKind.ACTION):
+        texts += [_SEND.replace("{kind}", "send_goal"), CANCEL, _TELL.replace("{kind}", "accept_goal")]
+        texts += [_TELL.replace("{kind}", "reject_goal"), _HAND_ON.replace("{kind}", "pass_feedback"), _END]
+        settings += ["send_goal = print_send_goal", "cancel_goal = print_cancel", "accept_goal = print_accept_goal"]
+        settings += ["reject_goal = print_reject_goal", "pass_feedback = print_pass_feedback", "end_goal = print_end"]
+    period = [*_requests(layout), f"{layout.prefix}_watch(&layer, now_us);"]
+    purpose = "a caller that asks for everything once a period, and a robot that says nothing"
+    return main_text(layout, "layer", purpose, texts, settings, "\n".join(indent(period, 2)))
+
+
+def _requests(layout: Layout) -> list[str]:
+    """Statements that ask for everything, with data of which nothing is known."""
+    if not layout.requests:
+        return []
+    lines = [
+        "/* This example has no messages; that they are finite must be found out where they come from. */",
+        f"const {layout.prefix}_sent_t what = {{NULL, true, false}};",
+    ]
+    for identifier in layout.topics:
+        data = [
+            f"&{unknown_name(raw)}" if layout.is_by_pointer(type_) else _UNKNOWN[raw].format(upper=layout.upper)
+            for raw, (_, type_) in request_parameters(layout, identifier).items()
+        ]
+        arguments = ", ".join(["&layer", "now_us", *data, "what"])
+        lines.append(f"{layout.function('request', identifier)}({arguments});")
+    for item in layout.of_kind(CommunicationKind.SERVICE):
+        lines.append(f"{layout.function('call', item.name)}(&layer, now_us, (uint32_t)period, what);")
+    for item in layout.of_kind(CommunicationKind.ACTION):
+        lines.append(f"{layout.function('goal', item.name)}(&layer, now_us, (uint32_t)period, what);")
+    return lines
+
+
+_UNKNOWN = {"int8_t": "{upper}_UNKNOWN", "int64_t": "{upper}_UNKNOWN_INTEGER", "double": "0.0", "const char *": "NULL"}
+"""Data of which nothing is known; a number stands for a double, since its NaN needs a header."""

@@ -1,0 +1,353 @@
+"""The generated C file: tables, the functions of the model, the engine, and the functions through which data comes."""
+
+from collections.abc import Iterable, Sequence
+from functools import partial
+
+from robosc.automata.executable import CALLED_KINDS
+from robosc.automata.plants import communication_plant_name
+from robosc.expressions import ArrayType, BooleanType, DoubleType, EnumType, IntegerType, NoneType, ObjectType, Type
+from robosc.model.received import converted_paths
+from robosc.model.structure import CommunicationKind, EventKind, is_tau
+from robosc.targets.code.c.conditions import CConditions
+from robosc.targets.code.c.expressions import number_code
+from robosc.targets.code.c.header import batch, batch_parameters, counts, head, receive_head, reply_head, runtime_text
+from robosc.targets.code.c.helpers import HELPERS, called
+from robosc.targets.code.c.layer_source import request_functions
+from robosc.targets.code.c.layout import Layout, data_that_comes, event_data
+from robosc.targets.code.c.provide import default_function, provide_function
+from robosc.targets.code.c.received import converter, converter_head, unknown_name
+from robosc.targets.code.c.statements import statement_lines, unused
+from robosc.targets.code.c.step import Stepper
+from robosc.targets.code.c.text import comment, string_literal
+from robosc.targets.code.c.unit import Reading, Unit
+from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, double, variable
+from robosc.targets.code.steps import initial_state
+from robosc.targets.code.text import indent
+
+_ENGINE = tuple(f"{part}.c" for part in "log releases goals steps policies decisions rest time replies life".split())
+_LAYER_ENGINE = tuple(f"{part}.c" for part in "log releases goals steps rest callers time replies layer life".split())
+"""The parts of the engines, each after those that it calls."""
+
+
+_NUMBERED = (CommunicationKind.SERVICE, CommunicationKind.ACTION, CommunicationKind.OUTGOING_MESSAGE)
+
+
+def source_file(unit: Unit) -> str:
+    """The text of `<robot>.c`."""
+    layout = unit.layout
+    conditions = CConditions(unit)
+    allows = [conditions.allow_function(event) for event in layout.executable.issued]
+    steppers = [Stepper(unit, event) for event in layout.events if not _never_taken(layout, event)]
+    steps = [item.step_function() for item in steppers]
+    happens = [item.happen_function() for item in steppers if _happens(layout, item.event)]
+    messages = layout.of_kind(CommunicationKind.INCOMING_MESSAGE)
+    provided = [] if layout.is_layer else [provide_function(unit, item) for item in layout.requests]
+    provided += [] if layout.is_layer else [default_function(unit, item) for item in messages]
+    held = [conditions.conjuncts_function(item.name) for item in messages]
+    held += [conditions.requirements_function(item.name) for item in layout.of_kind(CommunicationKind.ACTION)]
+    parts = _LAYER_ENGINE if layout.is_layer else _ENGINE
+    engine = [runtime_text(layout, part).rstrip().splitlines() for part in parts]
+    asked = request_functions(unit) if layout.is_layer else []
+    ends = [*engine, *happens, *asked, *_entries(layout), *_names(layout)]
+    rest = [*allows, *steps, *provided, *held, *_dispatchers(unit), *ends]
+    converters = {layout.converters[enum.name]: converter(unit, enum) for enum in layout.model.enums}
+    functions = {
+        **HELPERS,
+        **dict(unit.functions.values()),
+        **{name: "\n".join(lines) for name, lines in (*converters.items(), *conditions.nodes.items())},
+    }
+    needed = called(unit.used, unit.uses)
+    heads = [f"{converter_head(unit, enum)};" for enum in layout.model.enums if layout.converters[enum.name] in needed]
+    texts = [*heads, *(text for name, text in functions.items() if name in needed)]
+    return "\n\n".join([_prologue(layout), *texts, *("\n".join(block) for block in rest)]) + "\n"
+
+
+def _never_taken(layout: Layout, event: str) -> bool:
+    """Return True if an event is a tau that would change nothing in any state."""
+    return is_tau(event) and event not in layout.description.taus
+
+
+def _happens(layout: Layout, event: str) -> bool:
+    """Return True if the environment causes an event otherwise than by an error."""
+    found = layout.executable.events[event]
+    return not found.is_issued and found.kind is not EventKind.ERROR
+
+
+def _prologue(layout: Layout) -> str:
+    prefix = layout.prefix
+    numbers = counts(layout)
+    with_data = sum(_happens(layout, event) and bool(converted_paths(layout.model, event)) for event in layout.events)
+    lines = [
+        *head(layout.supervisor).splitlines(),
+        "",
+        f'#include "{prefix}.h"',
+        "",
+        "#include <math.h>",
+        "#include <string.h>",
+        "",
+        "#ifdef __FAST_MATH__",
+        '#error "NaN stands for what is unknown: do not compile with -ffast-math"',
+        "#endif",
+        "",
+        f"#define {layout.upper}_UNCONTROLLABLE_DATA {with_data}",
+        "#define FOREVER UINT64_MAX",
+        f"#define SILENT_BOUND INT64_C({layout.description.silent_bound})",
+        "#define PATIENCE 8",
+        "#define CANCEL_WAIT_US UINT64_C(500000)",
+        "#define REFUSED (-1)",
+        "#define KLEENE_UNKNOWN (-1)",
+        *(["#define LET_THROUGH (-1)"] if layout.is_layer else []),
+        "",
+        f"typedef {prefix}_state_t state_t;",
+    ]
+    if with_data or numbers.get("WHEN"):
+        lines += [
+            "",
+            "/* Notes on what was unknown in received data. */",
+            "typedef struct {",
+            "    bool is_unknown;",
+            "    bool is_enum_unknown;",
+            "} notes_t;",
+        ]
+    return "\n".join([*lines, *_unknown_constants(layout), *_tables(layout, numbers)])
+
+
+def _unknown_constants(layout: Layout) -> list[str]:
+    lines: list[str] = []
+    roots = [layout.source(data) for data in data_that_comes(layout)]
+    for root in dict.fromkeys(root for root in roots if isinstance(root, ObjectType | ArrayType)):
+        raw = layout.raw(root)
+        text = f"const {raw} {unknown_name(raw)} = {_unknown_value(layout, root)};"
+        if text not in lines:
+            lines += ["", text]
+    return lines
+
+
+def _unknown_value(layout: Layout, type_: Type) -> str:
+    match layout.source(type_):
+        case BooleanType():
+            return "-1"
+        case IntegerType():
+            return "INT64_MIN"
+        case DoubleType():
+            return "(double)NAN"
+        case ArrayType():
+            return "{NULL, 0}"
+        case ObjectType(name=name):
+            parts = [
+                _unknown_value(layout, part.type)
+                for part in layout.model.object(name).properties
+                if not isinstance(part.type, NoneType)
+            ]
+            return f"{{{', '.join(parts) or '0'}}}"
+        case _:
+            return "NULL"
+
+
+def _tables(layout: Layout, numbers: dict[str, int]) -> list[str]:
+    communication, event = (f"{layout.prefix}_{kind}_t" for kind in ("communication", "event"))
+    infos = {info.name: info for info in layout.description.communications}
+    services, actions, sensors = ([item.name for item in layout.of_kind(kind)] for kind in _NUMBERED)
+    topics = list(layout.topics)
+    requests = []
+    for item in layout.requests:
+        topic = topics.index(item.identifier) if item.kind is CommunicationKind.INCOMING_MESSAGE else -1
+        places = (names.index(item.name) if item.name in names else -1 for names in (services, actions))
+        numbers_of = (str(number) for number in (topic, *places, infos[item.name].conjunct_count))
+        identifier = [string_literal(item.identifier)] if layout.is_layer else []
+        name = layout.events[item.event(EventKind.REQUEST)]
+        requests.append([layout.communications[item.name], name, *numbers_of, *identifier])
+    members = [f"{communication} communication", f"{event} event", "int topic", "int service", "int action"]
+    members += ["int conjuncts", *(["const char *identifier"] if layout.is_layer else [])]
+    words = "Requests in source order; -1 where something does not apply."
+    lines = _table(members, "REQUESTS", requests, words)
+    in_layer = [f"{communication} communication"] if layout.is_layer else []
+    errors = [
+        [*([layout.communications[name]] if in_layer else []), layout.events[f"{name}.error"]] for name in services
+    ]
+    lines += _table([*in_layer, f"{event} error"], "SERVICES", errors)
+    members = [f"{communication} communication", f"{event} cancel", f"{event} error", "int requirements"]
+    ends = [
+        [layout.communications[name], layout.events[f"{name}.cancel"], layout.events[f"{name}.error"],
+         str(infos[name].requirement_count)] for name in actions
+    ]  # fmt: skip
+    lines += _table(members, "ACTIONS", ends)
+    silent = [layout.events[name] for name in (*layout.description.resets, *layout.description.taus)]
+    lines += _table(event, "SILENT", silent if numbers["SILENT"] else [], "Resets, then taus, in source order.")
+    return lines + _table(communication, "SENSORS", [layout.communications[name] for name in sensors])
+
+
+def _table(type_: str | list[str], name: str, rows: Sequence[str | list[str]], words: str = "") -> list[str]:
+    """A constant array of a type, or of structs with some members; none where it has no rows."""
+    if not rows:
+        return []
+    head_ = [f"static const {type_} {name}[] = {{"]
+    if not isinstance(type_, str):
+        head_ = ["static const struct {", *(f"    {member};" for member in type_), f"}} {name}[] = {{"]
+    entries = (row if isinstance(row, str) else f"{{{', '.join(row)}}}" for row in rows)
+    return ["", *(comment(words) if words else []), *head_, *(f"    {entry}," for entry in entries), "};"]
+
+
+def _switch(head_: str, parameters: str, subject: str, cases: Iterable[tuple[object, str]], default: str) -> list[str]:
+    """The function that chooses a statement by a subject: the default where there is none for it."""
+    lines = [line for label, statement in cases for line in (f"case {label}:", *indent(statement.splitlines()))]
+    if lines:
+        lines = [f"switch ({subject}) {{", *lines, "default:", "    break;", "}"]
+    ends = [default] if default else []
+    return [head_, "{", *indent([*statement_lines(unused(*parameters.split())), *lines, *ends]), "}"]
+
+
+def _dispatchers(unit: Unit) -> list[list[str]]:
+    """Return the functions through which the engine asks the model."""
+    layout = unit.layout
+    function, events = layout.function, layout.events
+    state, event, data = "const state_t *s", f"{layout.prefix}_event_t event", f"{layout.prefix}_request_t *data"
+    allowed = [(events[event], f"return {function('allows', event)}(s);") for event in layout.executable.issued]
+    head_ = f"static bool is_allowed({state}, {event})"
+    start = initial_state(layout.executable, Reading(unit), partial(_initial, layout))
+    initial = unit.definition("static void set_initial(state_t *s)", [*unused("s"), *start])
+    result = [initial, _same(layout), _model_settings(layout)]
+    result.append(_switch(head_, "s event", "event", allowed, "return false;"))
+    if layout.requests or layout.description.taus:
+        taken = [
+            (events[event.name], f"return {function('takes', event.name)}(s);")
+            for event in layout.executable.events.values()
+            if (event.is_issued and not _never_taken(layout, event.name)) or event.kind is EventKind.ERROR
+        ]
+        head_ = f"static int take_event(state_t *s, {event})"
+        result.append(_switch(head_, "s event", "event", taken, "return REFUSED;"))
+    requests = list(enumerate(layout.requests))
+    if requests and not layout.is_layer:
+        given = [(place, f"return {function('provides', item.name)}(s, data);") for place, item in requests]
+        head_ = f"static bool get_data({state}, int request, {data})"
+        result.append(_switch(head_, "s request data", "request", given, "return false;"))
+    messages = [(place, item) for place, item in requests if item.kind is CommunicationKind.INCOMING_MESSAGE]
+    if messages and not layout.is_layer:
+        defaults = [(place, f"return {function('is_default', item.name)}(data);") for place, item in messages]
+        head_ = f"static bool is_data_default(int request, const {data})"
+        result.append(_switch(head_, "request data", "request", defaults, "return true;"))
+    held = [(place, f"{function('conjuncts', item.name)}(s, holds);\nbreak;") for place, item in messages]
+    actions = list(enumerate(layout.of_kind(CommunicationKind.ACTION)))
+    required = [(place, f"{function('requirements', item.name)}(s, holds);\nbreak;") for place, item in actions]
+    for name, subject, cases in (("conjuncts", "request", held), ("requirements", "action", required)):
+        if cases:
+            head_ = f"static void get_{name}({state}, int {subject}, bool *holds)"
+            result.append(_switch(head_, f"s {subject} holds", subject, cases, ""))
+    return result
+
+
+def _initial(layout: Layout, type_: Type, value: bool | int | float | str) -> Code:
+    match type_:
+        case BooleanType():
+            return TRUE_CODE if value else FALSE_CODE
+        case IntegerType():
+            return number_code(int(value))
+        case DoubleType():
+            return double(float(value))
+        case EnumType(name=name):
+            return variable(layout.values[name, str(value)])
+        case _:
+            return variable(string_literal(str(value)))
+
+
+def _same(layout: Layout) -> list[str]:
+    tests = []
+    for component, behaviour in layout.executable.behaviours:
+        tests.append(f"a->{layout.locations[component]} == b->{layout.locations[component]}")
+        for item in behaviour.variables:
+            name, type_ = layout.variables[component, item.name]
+            is_plain = isinstance(type_, BooleanType | IntegerType | DoubleType | EnumType)
+            tests.append(f"a->{name} == b->{name}" if is_plain else f"strcmp(a->{name}, b->{name}) == 0")
+    plants = [communication_plant_name(item) for item in layout.model.communications if item.kind in CALLED_KINDS]
+    tests += [f"a->{layout.locations[plant]} == b->{layout.locations[plant]}" for plant in plants]
+    first, *others = tests or ["true"]
+    ends = [f"    && {test}" for test in others] or (["    "] if tests else [])
+    lines = [*statement_lines(unused("a", "b")), f"return {first}", *ends]
+    lines[-1] += ";"
+    return ["static bool is_same_state(const state_t *a, const state_t *b)", "{", *indent(lines), "}"]
+
+
+def _model_settings(layout: Layout) -> list[str]:
+    """Return the function that sets what the model itself says about the deployment."""
+    lines = [f"static void set_model_settings({layout.prefix}_settings_t *settings)", "{", "    (void)settings;"]
+    for item in layout.of_kind(CommunicationKind.OUTGOING_MESSAGE):
+        if item.max_age is not None:
+            span = max(1, round(item.max_age * 1e6))
+            lines.append(f"    settings->max_age_us[{layout.communications[item.name]}] = UINT64_C({span});")
+    lines += [f"    settings->releases[{layout.topics[identifier]}] = true;" for identifier in layout.releases]
+    return [*lines, "}"]
+
+
+_LOOK = "look_at_clock(r, now_us);"
+
+
+def _entries(layout: Layout) -> list[list[str]]:
+    """The functions through which data comes."""
+    result: list[list[str]] = []
+    sensors = [item.name for item in layout.of_kind(CommunicationKind.OUTGOING_MESSAGE)]
+    for identifier in layout.received_topics:
+        parameters = batch_parameters(layout, identifier)
+        ignored = statement_lines(unused(*parameters.values()))
+        body = ["if (!r->is_started) {", "    return;", "}", _LOOK]
+        for item in batch(layout, identifier):
+            event = item.event(EventKind.RESPONSE)
+            data = event_data(layout.model, event)
+            arguments = ["r", *([parameters[layout.raw(data)]] if data is not None else []), "true"]
+            call = f"{layout.function('happens', event)}({', '.join(arguments)})"
+            body += [f"if ({call}) {{", f"    see(r, {sensors.index(item.name)});", "}"]
+        body.append("guard(r, end_batch(r));")
+        if layout.is_layer:
+            source = layout.received_topics[identifier]
+            body += ["finish(r);", f"told(r, r->callbacks.pass_on(r->callbacks.context, {source}, message));"]
+        result.append([receive_head(layout, identifier), "{", *indent([*ignored, *body]), "}"])
+    return result + _replies(layout)
+
+
+def _replies(layout: Layout) -> list[list[str]]:
+    """The functions through which answers come; a layer hands them on to the caller."""
+    result = []
+
+    def add(event: str, start: list[str], body: list[str], end: list[str]) -> None:
+        before = ["bool is_well = true;", *start[:1], _LOOK, *start[1:]] if layout.is_layer else [_LOOK]
+        after = [*end, "guard(r, is_well);", "finish(r);"] if layout.is_layer else []
+        result.append([reply_head(layout, event), "{", *indent([*before, *body, *after]), "}"])
+
+    def taken(event: str) -> list[str]:
+        data = ["data"] if event_data(layout.model, event) is not None else []
+        happens = f"(void){layout.function('happens', event)}({', '.join(['r', *data, 'false'])});"
+        return [happens, "is_well = end_batch(r);" if layout.is_layer else "guard(r, end_batch(r));"]
+
+    for place, item in enumerate(layout.of_kind(CommunicationKind.SERVICE)):
+        event = item.event(EventKind.RESPONSE)
+        awaited = f"is_awaited = r->calls[{place}].is_awaited && r->calls[{place}].id == id;"
+        body = [f"if (close_call(r, {place}, id)) {{", *indent(taken(event)), "}"]
+        answer = [f"answer_caller(r, {place}, is_awaited, message);"]
+        add(event, ["bool is_awaited = false;", awaited], body, answer)
+    for place, item in enumerate(layout.of_kind(CommunicationKind.ACTION)):
+        for kind in (EventKind.FEEDBACK, EventKind.RESPONSE):
+            event, is_end = item.event(kind), kind is EventKind.RESPONSE
+            told = f"end_for_caller(r, {place}, {layout.upper}_END_SUCCEEDED, message);"
+            body = [
+                *([f"close_goal(r, {place});"] if is_end else []),
+                f"if (r->goals[{place}].is_running) {{",
+                *indent(taken(event)),
+                "} else {",
+                f"    unexpected(r, (int){layout.events[event]});",
+                "}",
+                *([told if is_end else f"pass_feedback(r, {place}, message);"] if layout.is_layer else []),
+            ]
+            add(event, [], [f"if (has_goal(r, {place}, id)) {{", *indent(body), "}"], [])
+    return result
+
+
+def _names(layout: Layout) -> list[list[str]]:
+    result = []
+    named = {"event": layout.events, "communication": layout.communications, "topic": layout.topics}
+    for kind, names in (named | ({"source": layout.received_topics} if layout.is_layer else {})).items():
+        body = [f"(void){kind};", "return NULL;"]
+        if names:
+            entries = (f"    {string_literal(name)}," for name in names)
+            value = f"({kind} >= 0 && {kind} < {len(names)}) ? names[{kind}] : NULL"
+            body = ["static const char *const names[] = {", *entries, "};", f"return {value};"]
+        result.append([f"const char *{layout.prefix}_{kind}_name(int {kind})", "{", *indent(body), "}"])
+    return result

@@ -1,4 +1,4 @@
-"""Check that docstrings name their subject first: none begins with a relative clause, or with 'of' or 'by'.
+"""Check that docstrings name their subject first: none begins with a relative clause, 'of', 'it', 'there' and the like.
 
     python deploy/check_docstrings.py robosc server/robosc_server
 
@@ -13,7 +13,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 CLAUSES = "How|So|That|What|Whatever|When|Where|Whether|Which|Who|Whoever|Whom|Whose|Why"
-DOCSTRING = re.compile(rf"\s*({CLAUSES}|By|Of)\b")
+OPENINGS = f"{CLAUSES}|As|By|Everything|If|In|It|Nobody|Nothing|Of|Something|There|To"
+DOCSTRING = re.compile(rf"\s*({OPENINGS})\b")
 ITEM = re.compile(rf"\s+(?:\*{{0,2}}\w+(?: \([^)]*\))?|Returns?|Yields?|:\w+(?: [*\w]+)?):\s+({CLAUSES})\b")
 GENERATED = re.compile(r"_pb2(_grpc)?\.py$")
 
@@ -30,7 +31,7 @@ def docstrings(tree: ast.Module) -> Iterator[ast.Constant]:
 
 
 def faults(text: str) -> Iterator[tuple[int, str]]:
-    """Yield the line and the opening word of each relative clause that a module's docstrings begin with."""
+    """Yield the line and the opening word of each docstring of a module that does not begin with its subject."""
     for docstring in docstrings(ast.parse(text)):
         lines = str(docstring.value).splitlines() or [""]
         for number, line in enumerate(lines):

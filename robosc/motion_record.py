@@ -53,7 +53,7 @@ class Sample(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Something that happened.
+    """An event in the record.
 
     Attributes:
         time: Seconds since 1970.

@@ -65,7 +65,7 @@ class PublicKey:
 
     @property
     def fingerprint(self) -> str:
-        """As `ssh-keygen -lf` tells it."""
+        """Fingerprint that `ssh-keygen -lf` prints."""
         digest = hashlib.sha256(base64.b64decode(self.line.partition(" ")[2])).digest()
         return "SHA256:" + base64.b64encode(digest).decode().rstrip("=")
 

@@ -185,7 +185,7 @@ def serve(pipe: Connection) -> None:
 
 
 def try_one(text: str) -> str:
-    """Everything that a text is put through, with what must be true of the findings.
+    """Put a text through all steps, with what must be true of the findings.
 
     Raises:
         AssertionError: Something is wrong with them.

@@ -29,7 +29,7 @@ def network() -> Iterator[Network]:
 
 @pytest.fixture
 def configuration(tmp_path: Path) -> Path:
-    """As `robosc-bridge init` writes it, with a face that other machines reach; its lines are not plugged in."""
+    """Write a configuration like `init`, with an endpoint that other machines reach; its lines are not plugged in."""
     file = tmp_path / "robot.yaml"
     assert robosc_bridge(["init", "--model", str(MODEL), "-o", str(file)]) == 0
     text = file.read_text()

@@ -86,7 +86,7 @@ def check(network: Network, secrets: Secrets) -> None:
 
 
 def assert_confined(container: Container, state: str, user: int) -> None:
-    """It is nobody, may nothing, and writes only where its state is."""
+    """Check that it is nobody, may nothing, and writes only where its state is."""
     assert container.run(["id", "-u"]).stdout == f"{user}\n"
     status = container.run(["cat", "/proc/1/status"]).stdout
     assert "CapEff:\t0000000000000000" in status and "NoNewPrivs:\t1" in status

@@ -121,7 +121,7 @@ class Stage:
         self.peer.publish(Empty(), "/halt")
 
     def halts(self) -> None:
-        """It halts, and so has heard the message: what is sent from here reaches it."""
+        """Check that it halts, and so has heard the message: what is sent from here reaches it."""
         self.until(lambda: self.speed == 0.0, "the robot to halt", self.halt)
         self.stands()
 

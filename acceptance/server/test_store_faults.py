@@ -45,7 +45,7 @@ def database_server() -> Iterator[Postgresql]:
 
 
 class Calls:
-    """Everything that a caller may ask a server for."""
+    """Calls that a caller may ask a server for."""
 
     def __init__(self, channel: grpc.aio.Channel, folder: Path) -> None:
         self.folder = folder

@@ -89,7 +89,7 @@ class DriverInfo:
 
 
 class UnknownDriverError(BridgeError, LookupError):
-    """There is no driver of that kind and name, or it cannot be used here."""
+    """A driver of that kind and name does not exist, or it cannot be used here."""
 
 
 # Description, place (`module:callable`) and features of the built-in drivers: listing them imports none.

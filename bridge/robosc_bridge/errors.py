@@ -35,7 +35,7 @@ class LineError(BridgeError):
 
 
 class LineMissingError(LineError):
-    """There is no such port: not plugged in, or called otherwise."""
+    """The port does not exist: not plugged in, or named differently."""
 
 
 class LineBusyError(LineError):
@@ -47,15 +47,15 @@ class LineDeniedError(LineError):
 
 
 class LineLostError(LineError):
-    """It was open and is gone."""
+    """The line was open and is gone."""
 
 
 class DeviceError(BridgeError):
-    """Something answers, and not as the device should."""
+    """The device answers differently from what was expected."""
 
 
 class DeviceSilentError(DeviceError, TimeoutError):
-    """It does not answer in time."""
+    """The device does not answer in time."""
 
 
 class WrongDeviceError(DeviceError):
@@ -63,4 +63,4 @@ class WrongDeviceError(DeviceError):
 
 
 class DeviceFaultError(DeviceError):
-    """It tells a fault of its own, which a person must see to."""
+    """The device reports a fault of its own, which a person must fix."""

@@ -68,7 +68,7 @@ class ReportedRun:
 
     @property
     def motion_verdict(self) -> str:
-        """Everything else in a word."""
+        """Verdict on the motion, in one word."""
         return "as required" if not self.faults else f"{len(self.faults)} faults"
 
 

@@ -33,7 +33,7 @@ class Ros2(ros.Middleware):
 
     @contextmanager
     def running(self, folder: Path) -> Iterator[Mapping[str, str]]:
-        """Nothing has to be started."""
+        """Yield the environment variables of a run: no other program has to be started."""
         if importlib.util.find_spec("rclpy") is None:
             raise ScenarioError("ROS 2 is not there: source its setup file, or install RoboSC with its extra `ros2`")
         profile = folder / "discovery.xml"

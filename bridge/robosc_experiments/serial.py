@@ -157,7 +157,7 @@ def configuration(setting: Setting, base: str, scanner: str, camera: str | None)
 
 @contextmanager
 def running(setting: Setting) -> Iterator[Rig]:
-    """Everything is started, and the bridge executes its supervisor; all has ended after the block.
+    """Start all programs until the bridge executes its supervisor; all have ended after the block.
 
     Raises:
         ScenarioError: A step fails; says which.

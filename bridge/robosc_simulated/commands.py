@@ -45,7 +45,7 @@ _MOST_GARBAGE = 4096
 
 
 class UnknownCommandError(ValueError):
-    """There is no such command, or not with such values."""
+    """The command does not exist, or not with such values."""
 
 
 def obey_input(obey: Callable[[str], str]) -> None:

@@ -28,7 +28,7 @@ class ErrorMonitor:
         return int(self._is_any)
 
     def tell(self, sentence: str) -> None:
-        """Something has gone wrong, and the simulator goes on."""
+        """Report an error after which the simulator goes on."""
         self._is_any = True
         # Also standard error may be a file on a full disk.
         with contextlib.suppress(OSError):

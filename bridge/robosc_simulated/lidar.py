@@ -85,7 +85,7 @@ class Lidar(ABC):
 
     @property
     def revolutions_per_s(self) -> float:
-        """As it rotates now, in world time."""
+        """Revolutions per second of world time, as it rotates now."""
         return self.nominal_hz * self._speed_share
 
     def set_speed(self, share: float) -> None:
@@ -136,7 +136,7 @@ class Lidar(ABC):
         return found
 
     def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
-        """It has no ears, unless a model says otherwise."""
+        """Receive bytes: a LiDAR has no ears, unless a model says otherwise."""
         return ()
 
     def _spin(self) -> None:
@@ -344,7 +344,7 @@ class Lds03(Lidar):
 
 
 def _angle(degrees: float) -> int:
-    """In degrees / 64, below a whole revolution."""
+    """Return the angle in degrees / 64, below a whole revolution."""
     return min(round(degrees * 64), 360 * 64 - 1)
 
 

@@ -150,7 +150,7 @@ class OpenCr:
     # As a device on a line.
 
     def plug_in(self) -> None:
-        """It has its battery, and notices nothing but that bytes are missing."""
+        """Plug it in: it has its battery, and notices only missing bytes."""
         self._parser.clear()
 
     def due_s(self) -> float:

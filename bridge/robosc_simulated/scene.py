@@ -102,7 +102,7 @@ IDEAL = Noise()
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything around a robot.
+    """Surroundings of a robot.
 
     Attributes:
         name: Name for a person.

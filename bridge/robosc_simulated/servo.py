@@ -239,7 +239,7 @@ class Servo:
         return Error.NONE
 
     def reset(self, keeps: frozenset[str]) -> None:
-        """Everything as from the factory but the items to keep; then it restarts."""
+        """Reset all items to the factory's values but the ones to keep; then it restarts."""
         self.table.restore(lambda item: item.is_eeprom and item.name not in keeps)
         self.reboot()
 

@@ -44,17 +44,17 @@ def whole_number(text: str, least: int, most: int) -> int:
 
 
 def coordinate(text: str) -> float:
-    """In metres."""
+    """Return a coordinate, in metres."""
     return number(text, -FARTHEST_M, FARTHEST_M)
 
 
 def angle(text: str) -> float:
-    """In radians."""
+    """Return an angle, in radians."""
     return number(text, -_MOST_RAD, _MOST_RAD)
 
 
 def voltage(text: str) -> float:
-    """In volts."""
+    """Return a voltage, in volts."""
     return number(text, 0.0, _HIGHEST_V)
 
 

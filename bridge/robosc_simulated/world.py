@@ -71,7 +71,7 @@ class Wheel:
 
 @dataclass(frozen=True)
 class WorldEvent:
-    """Something that is worth writing down.
+    """A happening that is worth recording.
 
     Attributes:
         kind: A collision, the goal reached for the first time, an obstacle moved, put away or put back.

@@ -93,7 +93,7 @@ class Viewer:
         self._news.set()
 
     def answer(self, text: str) -> None:
-        """Something that is told this one alone."""
+        """Send an answer to this page alone."""
         self._answers.append(text)
         self._news.set()
 
@@ -242,7 +242,7 @@ class Broadcaster:
             viewer.source_lost(text)
 
     async def define(self, robot: Robot) -> None:
-        """There is a robot."""
+        """Define the robot."""
         self._prepared = await self._robot_cache.prepared(robot)
         self._builder = MessageBuilder(self._prepared)
         self._status = self._update = self._position = self._gone = None

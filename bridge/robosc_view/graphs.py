@@ -252,7 +252,7 @@ class _Drawing:
             box.x += _MARGIN - left
 
     def _put(self, row: Sequence[int], wanted: Sequence[float]) -> None:
-        """As near to where they are wanted as their order and sizes allow, in the sense of least squares."""
+        """Place a row as near to the wanted positions as its order and sizes allow, in the sense of least squares."""
         offsets, offset = [], 0.0
         for before, place in zip([None, *row], row, strict=False):
             if before is not None:

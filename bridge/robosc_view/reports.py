@@ -53,7 +53,7 @@ class LogSpan:
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Something that a person is told."""
+    """A notice for a person."""
 
     code: str
     text: str

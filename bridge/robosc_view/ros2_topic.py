@@ -48,7 +48,7 @@ MAXIMUM_CHARACTERS = 8 * 2**20
 """Maximum length of one message, in characters."""
 
 MAXIMUM_TRANSITIONS = 100_000
-"""In one message."""
+"""Limit of transitions in one message."""
 
 MAXIMUM_WAITING = 1000
 """Entries that wait to be handed on."""

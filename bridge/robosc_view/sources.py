@@ -31,7 +31,7 @@ class Sink(Protocol):
     """Is told what a source has; used in the event loop of the server alone."""
 
     async def define(self, robot: Robot) -> None:
-        """There is a robot; told first, and again where it has become another."""
+        """Define the robot; called first, and again where it has become another."""
 
     def begin(self, components: Mapping[str, object]) -> None:
         """Receive the known state in which what happens next begins; an empty one is the initial state."""

@@ -23,7 +23,7 @@ LOOK_S = 0.3
 
 
 class NoSupervisorError(Exception):
-    """There is none of the model as it is; one sentence."""
+    """The model as it is has no supervisor; the message is one sentence."""
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,7 @@ class Measured:
         return self.times_s[max(int(rank), 1) - 1]
 
     def document(self) -> dict[str, Any]:
-        """As JSON values; times in milliseconds."""
+        """Return JSON values; times in milliseconds."""
 
         def milliseconds(percent: float) -> float | None:
             found = self.percentile_s(percent)

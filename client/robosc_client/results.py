@@ -94,7 +94,7 @@ class StateValues(msgspec.Struct, frozen=True, gc=False):
 
 
 class StateGraph(msgspec.Struct, frozen=True):
-    """Everything that the robot may do under its supervisor.
+    """States and events of the robot under its supervisor.
 
     Attributes:
         initial: Number of the initial state.

@@ -8,7 +8,7 @@ REACTION_LIMIT_S = 0.3
 
 @dataclass(frozen=True)
 class Happening:
-    """Something that changes in the robot's world.
+    """A change in the robot's world.
 
     Attributes:
         at_s: Seconds after the controller is connected.

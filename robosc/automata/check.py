@@ -58,7 +58,7 @@ class _Checker:
     system: System
 
     def problems(self) -> Iterator[str]:
-        """Everything that does not fit, in the system's order."""
+        """Yield a sentence for each fault, in the system's order."""
         system = self.system
         yield from _doubles("event", (event.name for event in system.events))
         yield from _doubles("automaton", (automaton.name for automaton in system.automata))

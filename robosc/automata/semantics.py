@@ -97,7 +97,7 @@ _Participant = tuple[int, dict[Value, tuple[_Arc, ...]]]
 
 @dataclass(frozen=True, slots=True)
 class _Rule:
-    """Everything about one event.
+    """Compiled meaning of one event.
 
     Attributes:
         event: The event.

@@ -1,4 +1,4 @@
-"""In what two checked models differ, in the words of models."""
+"""Differences between two checked models, in the words of models."""
 
 from collections.abc import Iterator
 from typing import Any, get_args
@@ -44,7 +44,7 @@ _TYPES = get_args(Type)
 
 
 def model_differences(told: Model, model: Model) -> tuple[str, ...]:
-    """In what a supervisor's model differs from a model; nothing if they are the same to the last bit.
+    """Return the differences of a supervisor's model from a model; none if they are the same to the last bit.
 
     Args:
         told: The supervisor's.

@@ -54,7 +54,7 @@ class StateInWords:
         return self.text()
 
     def text(self) -> str:
-        """In one line."""
+        """Return the state in one line."""
         return ", ".join(
             f"{name} = {str(value).lower() if isinstance(value, bool) else value}" for name, value in self.parts.items()
         )

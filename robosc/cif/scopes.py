@@ -32,7 +32,7 @@ type Declared = (
 
 @dataclass(eq=False, slots=True)
 class Entity:
-    """Something declared in a scope.
+    """A declaration in its scope.
 
     Attributes:
         declaration: Its declaration.
@@ -389,7 +389,7 @@ class Scopes:
         self.root.entries[f"definition {len(self.root.entries)}"] = scope
 
     def _stand_in(self, parameter: syntax.Parameter, scope: Scope) -> "Item | Alias | PendingInstance":
-        """Something of the kind of a parameter."""
+        """Return a stand-in of the parameter's kind."""
         match parameter.kind:
             case syntax.ParameterKind.ALGEBRAIC:
                 return self._algebraic(parameter, scope, None, scope)

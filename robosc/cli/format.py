@@ -53,9 +53,9 @@ class _Status(StrEnum):
     CHANGED = "changed"
     """Its layout is not canonical; it was written, unless nothing was to be written."""
     BROKEN = "broken"
-    """It has errors and was left alone."""
+    """The file has errors and was left alone."""
     INACCESSIBLE = "inaccessible"
-    """It cannot be read or written."""
+    """The file cannot be read or written."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,7 +37,7 @@ _COMMANDS = (
     new, check, format_, synth, simulate, verify, sign, explore, generate, explain_synthesis, explain, doc, plot,
     check_log, convert_log, doctor, completion,
 )  # fmt: skip
-"""In the order of `robosc --help`."""
+"""Modules of the commands, in the order of `robosc --help`."""
 
 _NAMES = (
     "new", "check", "format", "synth", "simulate", "verify", "key", "sign", "explore", "generate", "explain-synthesis",

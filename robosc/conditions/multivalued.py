@@ -35,7 +35,7 @@ Cube = tuple[int, ...]
 
 
 class EffortExceededError(Exception):
-    """There is no result within the bounds."""
+    """The bounds are too low for a result."""
 
 
 class Effort:

@@ -109,7 +109,7 @@ def search(
     queue: list[tuple[int, int]] = []
 
     def enter(parent: int | None, events: tuple[str, ...], is_sure: bool, node: Node) -> None:
-        """Something happened in a stable state, or the executor started."""
+        """Enter a run from a stable state after events, or from the executor's start."""
         run = controller.run(node)
         if run.end is None or run.events:
             if run.end is None:

@@ -9,9 +9,9 @@ class Grade(StrEnum):
 
     OK = "ok"
     NOTE = "note"
-    """Something is not there that is not needed, or is worth knowing."""
+    """A part that is not needed is missing, or a remark is worth knowing."""
     MISSING = "missing"
-    """Something that the purpose needs is not there, or does not work."""
+    """A part that the purpose needs is missing or does not work."""
 
 
 @dataclass(frozen=True, slots=True)

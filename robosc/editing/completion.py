@@ -40,7 +40,7 @@ type _Elements = Sequence[tuple[str, Sequence[str]]]
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """Something that can be written.
+    """A proposal for the text at the cursor.
 
     Attributes:
         text: Text to write.

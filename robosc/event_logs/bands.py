@@ -19,7 +19,7 @@ MAXIMUM_CURVES = 12
 
 
 class PlotError(RoboscError):
-    """Nothing can be drawn as asked."""
+    """The log has no part that can be drawn as asked."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,7 @@ class WrongDeploymentError(RoboscError):
 
 @dataclass(frozen=True, slots=True)
 class Violation:
-    """Something in a log that the supervisor does not account for.
+    """A deviation of a log from its supervisor.
 
     Attributes:
         line: The line of the log.
@@ -216,7 +216,7 @@ class _Checking:
             self._wrong(entry, "; ".join(problems))
 
     def _seen(self, event: str) -> None:
-        """Something has come, whether the state could accept it or not."""
+        """Note that an event has come, whether the state could accept it or not."""
         if self._awaited and event in self._identifiers:
             self._awaited.discard(self._identifiers[event])
 

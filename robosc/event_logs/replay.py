@@ -278,7 +278,7 @@ class Replay:
         return self.stored[component, variable] if place is None else self.state[place]
 
     def _differences(self, logged: Mapping[str, Mapping[str, Any]]) -> list[str]:
-        """In what the logged state is another one."""
+        """Return the differences of the logged state from the replayed one."""
         found: list[str] = []
         for component, behaviour in self._behaviours.items():
             told = logged.get(component)

@@ -36,12 +36,12 @@ class HindranceKind(StrEnum):
     REQUIREMENT = "requirement"
     """An event condition is not true."""
     SUPERVISOR = "supervisor"
-    """It can lead to a state that must be avoided."""
+    """The event can lead to a state that must be avoided."""
 
 
 @dataclass(frozen=True, slots=True)
 class Hindrance:
-    """Something that keeps an event from happening in some states.
+    """A cause that keeps an event from happening in some states.
 
     Attributes:
         kind: Kind of cause.

@@ -87,7 +87,7 @@ class RequestAvailability:
 
 
 class _NoData(dict[Any, Any]):
-    """Nothing was received: every part of it is unknown."""
+    """Data without values: every part of it is unknown."""
 
     def __missing__(self, key: Any) -> None:
         return None

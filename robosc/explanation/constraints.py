@@ -35,7 +35,7 @@ class ConstraintKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class RelaxableConstraint:
-    """Something that a problem could be without.
+    """A part that a problem could be without.
 
     Attributes:
         kind: Kind of constraint.

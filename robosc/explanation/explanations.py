@@ -213,7 +213,7 @@ class StateReport:
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """Something about the controlled system that its author should know.
+    """A remark on the controlled system for its author.
 
     Attributes:
         kind: `never-enabled`, `unused-requirement`, `unreachable-state`, `only-uncontrollable` or `deadlock`.

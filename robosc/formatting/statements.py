@@ -24,7 +24,7 @@ class Break(IntEnum):
     """Kind of break before a token, if its group is broken."""
 
     NONE = 0
-    """There is no break."""
+    """The line has no break."""
     LINE = 1
     """A line begins."""
     ENTRY = 2

@@ -43,7 +43,7 @@ class Fault(Exception):
 
 
 class TooManyFaults(Exception):
-    """There are so many syntax errors that the rest of the text is left unread."""
+    """The text has too many syntax errors: the rest of it is left unread."""
 
 
 class Extent(NamedTuple):

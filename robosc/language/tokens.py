@@ -103,7 +103,7 @@ def tokenize(text: str) -> Tokens:
 
 
 def tokenize_broken(text: str) -> Tokens:
-    """As `tokenize`; if a text in quotes is never closed, each ends with its line at last.
+    """Tokenize like `tokenize`; if a text in quotes is never closed, each ends with its line at last.
 
     One quote too many turns all behind it inside out: this way it spoils its own line alone.
     """

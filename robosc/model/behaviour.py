@@ -546,7 +546,7 @@ class BehaviourBuilder:
 
 
 def closure(start: list[str], steps: Mapping[str, set[str]]) -> set[str]:
-    """Everything that can be reached."""
+    """Return the states that can be reached."""
     found, frontier = set(start), list(start)
     while frontier:
         for target in steps[frontier.pop()]:

@@ -120,7 +120,7 @@ def check(bundle: Bundle) -> Checked:
 
 
 def inspect(bundle: Bundle) -> Inspected:
-    """As `check`; of a text with errors, what is sound of it has its names bound all the same."""
+    """Return the result of `check`; of a text with errors, its sound parts have their names bound all the same."""
     parsed = parse(bundle.main)
     if parsed.sound is None:
         return Inspected(Checked(None, parsed.diagnostics), parsed)

@@ -110,7 +110,7 @@ class ExpressionChecker:
         return None if typed is None else typed.expression
 
     def fitting(self, tree: syntax.Expression, wanted: Type, because: RelatedPlace | None = None) -> Typed | None:
-        """As `value`, with the type; `because` is where the wanted type is declared."""
+        """Return the expression of `value` with its type; `because` is where the wanted type is declared."""
         typed = self.infer(tree, wanted)
         if typed is not None and not fits(typed.type, wanted):
             if self._quoted(tree, wanted):

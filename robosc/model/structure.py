@@ -87,7 +87,7 @@ class ObjectDefinition(msgspec.Struct, frozen=True, gc=False):
 
 
 class EnumRule(msgspec.Struct, frozen=True, gc=False):
-    """If `condition` (over `Received` data of the source type) is true, the enum has `value`."""
+    """A rule: the enum has `value` if `condition` (over `Received` data of the source type) is true."""
 
     condition: Expression
     value: Name

@@ -48,7 +48,7 @@ class Joined:
 
 
 Quantifier = Literal["A", "E"]
-"""In all runs from here on, in some run."""
+"""Quantifier of runs: A for all runs from here on, E for some run."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -183,7 +183,7 @@ class _PropertyParser(ExpressionParser):
         return syntax.Call(syntax.Name(f"{operator}()", self.at(index)), operands)
 
     def is_negation(self, index: int) -> bool:
-        """As in a model; but here `service` and `action` begin operands, no condition follows one, and `U` may."""
+        """Return True for a negation: `service` and `action` begin operands, no condition follows one, and `U` may."""
         following = self.texts[index + 1]
         begins_operand = self.texts[index] == NOT and following in ("service", "action", "if")
         return begins_operand or (following != "U" and super().is_negation(index))

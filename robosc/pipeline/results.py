@@ -31,7 +31,7 @@ class VerificationStatus(StrEnum):
     PASSED = "passed"
     FAILED = "failed"
     NOT_CHECKED = "not checked"
-    """Nothing is wrong as far as was looked, and not everything could be."""
+    """No check failed, and not all were made."""
     PROPERTY_ERRORS = "property errors"
     """A property cannot be understood: the diagnostics tell."""
     NO_SUPERVISOR = "no supervisor"
@@ -40,7 +40,7 @@ class VerificationStatus(StrEnum):
 
 
 class NothingGeneratedError(RoboscError):
-    """There are no files to write; the message says why."""
+    """The target has no files to write; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,12 +22,12 @@ class TroubleKind(StrEnum):
     DEADLOCK = "deadlock"
     """No event at all can happen, in a state that is not marked."""
     WAITING = "waiting"
-    """Nothing is allowed and no service or action is under way, in a state that is not marked: only a message from
+    """No event is allowed and no service or action is under way, in a state that is not marked: only a message from
     outside can go on."""
     BLOCKED = "blocked"
     """The behaviours could do a request that requirements or the supervisor forbid."""
     UNKNOWN = "unknown"
-    """Something was unknown: an enum fell to its default past an unknown rule, a number was moved into its range, an
+    """Data was unknown: an enum fell to its default past an unknown rule, a number was moved into its range, an
     update was skipped, or what a request sends is unknown, so that it is not issued."""
 
 

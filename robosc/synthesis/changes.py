@@ -17,7 +17,7 @@ class Leads(Enum):
     TO_ONE_PLACE = auto()
     """All of them lead to one location, some of them from elsewhere."""
     AWAY = auto()
-    """To several locations."""
+    """Edges lead to several locations."""
 
 
 def leads_of(edges: Sequence[Edge]) -> Leads:

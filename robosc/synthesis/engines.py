@@ -60,7 +60,7 @@ class Manager(Protocol):
         """The predicate that a variable is true."""
 
     def ite(self, test: Any, then: Any, otherwise: Any) -> Any:
-        """If-then-else."""
+        """Return the predicate that is `then` where `test` is true, and `otherwise` elsewhere."""
 
     def let(self, definitions: Mapping[str, Any], node: Any) -> Any:
         """Substitute variables at once: all by truth values, all by names, or all by predicates."""

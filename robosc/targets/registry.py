@@ -185,7 +185,7 @@ class Target:
 
 
 class UnknownTargetError(RoboscError, LookupError):
-    """There is no target of that name."""
+    """A target of that name does not exist."""
 
 
 # Name, description and place of the built-in targets: listing them imports none.

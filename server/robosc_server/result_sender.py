@@ -97,4 +97,4 @@ class ResultSender:
 
 
 def _do_nothing() -> None:
-    """Nothing was counted."""
+    """Do nothing."""

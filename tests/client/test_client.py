@@ -115,7 +115,7 @@ def test_both_clients_have_the_same_methods() -> None:
 
 
 def test_methods_say_what_they_take_and_give() -> None:
-    """As a shell or an editor shows them, although they are described elsewhere."""
+    """Methods document themselves, although they are described elsewhere."""
     for kind in (Client, AsyncClient):
         for name in (name for name in vars(kind) if not name.startswith("_") and name != "close"):
             method = getattr(kind, name)

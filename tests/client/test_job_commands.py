@@ -89,7 +89,7 @@ class TestSubmit:
     )
     @pytest.mark.parametrize("more", [[], ["--json"]])
     def test_wrong_use(self, capfd: pytest.CaptureFixture[str], arguments: Any, words: str, more: Any) -> None:
-        """As the commands refuse it that wait for their result, before a server is asked."""
+        """Refusals are those of the commands that wait for their result, before a server is asked."""
         status, out, err = run(capfd, "submit", *arguments, "--server", "127.0.0.1:1", *more)
         assert status == 2
         assert words in (out if more else err)
@@ -333,7 +333,7 @@ class TestGet:
         ],
     )
     def test_without_a_result(self, capfd: pytest.CaptureFixture[str], tmp_path: Path, state: Any, words: str) -> None:
-        """As `watch` ends; where the job is can be told of any."""
+        """Exit statuses are those of `watch`; where the job is can be told of any."""
         with scripted(GetJob=[[jobs_pb2.GetJobResponse(job=job(4, state))]]) as (address, script):
             for more in (["--result"], ["-o", tmp_path / "out"]):
                 told = run(capfd, "get", "job-1", *more, "--server", address)

@@ -656,7 +656,7 @@ class TestPrograms:
 
     @pytest.mark.parametrize("json", [[], ["--json"]])
     def test_a_reader_who_leaves(self, json: Any) -> None:
-        """As `| head` does: that is no fault, and nobody is told of it."""
+        """A reader such as `| head` leaves: that is no fault, and nobody is told of it."""
         page = jobs_pb2.ListJobsResponse(
             jobs=[job(id=f"job-{number}") for number in range(100)], next_page_token="more"
         )

@@ -50,12 +50,17 @@ def test_what_names_its_thing_first_passes(tmp_path: Path) -> None:
         ("Number of jobs", "How many jobs", 4, "How"),
         ("Job of a caller", "Who waits", 8, "Who"),
         ("Number of jobs", "Of jobs", 4, "Of"),
+        ("Number of jobs", "There are jobs", 4, "There"),
+        ("Job of a caller", "It waits", 8, "It"),
+        ("Return True if", "Nothing if", 18, "Nothing"),
         ("name: Name of the job", "name: What it is called", 11, "What"),
         ("is_over: True if", "is_over: Whether", 12, "Whether"),
         ("Return True if", "Whether", 18, "Whether"),
     ],
 )
-def test_a_relative_clause_is_found_in_its_line(plain: str, riddle: str, line: int, word: str, tmp_path: Path) -> None:
+def test_an_opening_without_subject_is_found_in_its_line(
+    plain: str, riddle: str, line: int, word: str, tmp_path: Path
+) -> None:
     status, told = checked(tmp_path, GOOD.replace(plain, riddle))
     assert status == 1
     assert [entry.startswith(f"part/jobs.py:{line}: begins with '{word}':") for entry in told] == [True]

@@ -26,7 +26,7 @@ def editor(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Editor]:
 
 
 def state_of(editor: Editor, name: str) -> tuple[object, ...]:
-    """Everything that the server knows of a file; places and words, without the file's own name."""
+    """Return all that the server knows of a file; places and words, without the file's own name."""
     document, client = editor.document(name), editor.client
     findings = editor.findings(name)
     end = editor.position(editor.texts[name], len(editor.texts[name]))

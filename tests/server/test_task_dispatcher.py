@@ -32,7 +32,7 @@ def dispatcher_of(made: Parts) -> TaskDispatcher:
 
 
 async def drop(report: Report) -> None:
-    """Nobody watches."""
+    """Drop a report."""
 
 
 def test_equal_calls_that_wait_are_answered_by_the_first(tmp_path: Path) -> None:

@@ -84,10 +84,10 @@ class Splitmix:
         return candidates[((z >> 32) * len(candidates)) >> 32]
 
     def issued(self, request: int) -> None:
-        """Nothing."""
+        """Do nothing."""
 
     def close(self, enabled: tuple[int, ...]) -> None:
-        """Nothing."""
+        """Do nothing."""
 
 
 class Reference:
@@ -221,7 +221,7 @@ class Reference:
             self.lines.append(f"log {kind}")
 
     def close(self) -> None:
-        """Nothing."""
+        """Do nothing."""
 
     # Commands.
 

@@ -123,7 +123,7 @@ class CifSystem:
         return _Arc(self.scope.predicate(edge.guard, automaton.name), tuple(updates), target)
 
     def declared_names(self) -> set[str]:
-        """Everything that has a name, apart from the supervisor and its algebraic variables."""
+        """Return all names, apart from the supervisor and its algebraic variables."""
         found = {name for enum, literals in self.specification.enums for name in (enum, *literals)}
         for item in self.specification.automata:
             if item.kind == "plant":

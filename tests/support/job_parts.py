@@ -51,7 +51,7 @@ class Times:
 
 @dataclass
 class Parts:
-    """Everything that belongs together."""
+    """Parts that belong together."""
 
     store: Store
     workers: ScriptedWorkers
@@ -93,7 +93,7 @@ def sweep_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have a test say when it is swept: else it may be in the middle of it."""
 
     async def never(retention: Retention) -> None:
-        """Nothing is swept unless the test says so."""
+        """Sweep no job unless the test says so."""
         await asyncio.Event().wait()
 
     monkeypatch.setattr(Retention, "sweep_forever", never)

@@ -35,7 +35,7 @@ class Wall:
 
 @dataclass(slots=True)
 class Thing:
-    """Something round on the floor, of a colour (red, green, blue) and a radius."""
+    """A round object on the floor, of a colour (red, green, blue) and a radius."""
 
     x: float
     y: float

@@ -20,7 +20,7 @@ Holds = tuple[bool, ...]
 
 
 class Fault(Exception):
-    """Something that stops the robot until a restart."""
+    """A fault that stops the robot until a restart."""
 
 
 class Endless(Fault):

@@ -84,15 +84,15 @@ class LayerBench(Observed):
         return self.during(self.executor.on_request, identifier, message)
 
     def call(self, service: str, call_id: Any, message: Any = None) -> list[Sent]:
-        """It calls a service."""
+        """Call a service."""
         return self.during(self.executor.on_call, service, call_id, message)
 
     def goal(self, action: str, goal_id: Any, message: Any = None) -> list[Sent]:
-        """It sends a goal."""
+        """Send a goal."""
         return self.during(self.executor.on_goal, action, goal_id, message)
 
     def cancel(self, action: str, goal_id: Any) -> list[Sent]:
-        """It cancels a goal."""
+        """Cancel a goal."""
         return self.during(self.executor.on_cancel, action, goal_id)
 
     def receive(self, identifier: str, data: Any = None) -> list[Sent]:

@@ -111,7 +111,7 @@ def decode_lds01(data: bytes) -> tuple[list[lds01.Frame], int]:
 
 
 def decode_lds02(data: bytes) -> tuple[list[lds02.Frame], int]:
-    """As `decode_lds01`."""
+    """Decode like `decode_lds01`."""
     found: list[lds02.Frame] = []
     at = 0
     while at < len(data):
@@ -145,7 +145,7 @@ def decode_lds02(data: bytes) -> tuple[list[lds02.Frame], int]:
 
 
 def decode_lds03(data: bytes) -> tuple[list[lds03.Frame], int]:
-    """As `decode_lds01`."""
+    """Decode like `decode_lds01`."""
     found: list[lds03.Frame] = []
     at = 0
     while at < len(data):

@@ -152,7 +152,7 @@ class LiveRobot:
         self.feed.show(self.snapshot())
 
     def snapshot(self) -> Snapshot:
-        """As the loop of a bridge would make it."""
+        """Return a snapshot like that of a bridge's loop."""
         system, is_running = self.system, self.state is State.RUNNING
         now_s = time.monotonic()
         angle = 0.2 * (now_s - self._begin_s)

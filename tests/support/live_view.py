@@ -83,7 +83,7 @@ class StandIn:
         self._latest = _latest_of(greeting)
 
     def send(self, *messages: Message) -> None:
-        """To all pages, in this order."""
+        """Send to all pages, in this order."""
         self._do(self._send(messages))
 
     def send_text(self, text: str) -> None:

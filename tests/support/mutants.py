@@ -22,7 +22,7 @@ ALWAYS, NEVER = DecisionDiagram((), 1), DecisionDiagram((), 0)
 
 @dataclass(frozen=True, slots=True)
 class Mutant[T]:
-    """Something that was tampered with.
+    """A value that was tampered with.
 
     Attributes:
         name: Kind of change.

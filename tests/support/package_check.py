@@ -46,7 +46,7 @@ class Thing(metaclass=Accepting):
         return self
 
     def keys(self) -> list[str]:
-        """As keyword arguments it is none."""
+        """Return no names: it has no keyword arguments."""
         return []
 
     def __getitem__(self, key: str) -> Any:

@@ -112,7 +112,7 @@ class World:
         self.bench.executor.tick()
 
     def data(self, item: Communication) -> Any:
-        """Something that may come."""
+        """Return data that may come."""
         dice = self.dice
         if isinstance(item.response, BooleanType):
             return dice.choice((True, False, None))

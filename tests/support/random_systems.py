@@ -65,7 +65,7 @@ ATTEMPTS = 30
 
 
 def wide_system(seed: int) -> System:
-    """As `random_system`, with all that automata offer beyond RoboSC.
+    """Return a system like `random_system`, with all that automata offer beyond RoboSC.
 
     Several ways to begin, requirement automata, monitors, events of requirements alone, conditions on initial and
     marked states and on what plants can do and be, choices between edges of controllable events, an input variable,
@@ -107,7 +107,7 @@ def any_wide_systems() -> st.SearchStrategy[System]:
 
 
 def any_wide_system(seed: int) -> System:
-    """As `any_system`, with all that `wide_system` has."""
+    """Return a system like `any_system`, with all that `wide_system` has."""
     return _told("any_wide_system", seed, _Builder(Random(seed), is_wide=True).system())
 
 

@@ -20,7 +20,7 @@ SCAN_TIMEOUTS_S = {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
 
 @dataclass(frozen=True)
 class Fault:
-    """Something that goes wrong with a robot that moves.
+    """A fault of a robot that moves.
 
     Attributes:
         row: Row of the table on the page.

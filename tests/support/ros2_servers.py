@@ -40,7 +40,7 @@ class ServerHost:
             self._executor.spin_once(timeout_sec=0.1)
 
     def gate(self) -> "Gate":
-        """Something that a server waits for; opened at the latest at the end."""
+        """A gate that a server waits for; opened at the latest at the end."""
         self.gates.append(Gate())
         return self.gates[-1]
 

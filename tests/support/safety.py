@@ -88,7 +88,7 @@ class Bench:
         return self.last
 
     def cycles(self, time_s: float) -> Output:
-        """As many as fill this time."""
+        """Run as many cycles as fill this time."""
         for _ in range(round(time_s / STEP_S)):
             self.cycle()
         return self.last

@@ -38,7 +38,7 @@ class SafetyTwin:
         self.past: list[Past] = []
 
     def happens(self, name: str, value: Any = None, time_s: float = 0.0) -> None:
-        """Something was told to the layer."""
+        """Note an event for the layer."""
         self.past.append(Past(name, value, time_s))
 
     def _since_last(self, *names: str) -> list[Past]:

@@ -63,7 +63,7 @@ def process_of_view(*words: object) -> Iterator[subprocess.Popen[str]]:
 
 @contextlib.contextmanager
 def view_process(*words: object) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """As `process_of_view`, with the address that it prints."""
+    """Start a process like `process_of_view`, and yield it with the address that it prints."""
     with process_of_view(*words) as process:
         assert process.stdout is not None
         yield process, process.stdout.readline().strip()

@@ -25,7 +25,7 @@ ASIDE_M = 0.03
 
 
 def configuration(folder: Path, robot: SimulatedTurtleBot3) -> Path:
-    """As `init` writes it, with the places of the simulated devices."""
+    """Write a configuration like `init`, with the places of the simulated devices."""
     assert robot.camera is not None
     made = subprocess.run(
         [sys.executable, "-m", "robosc_bridge.main", "init", "--model", str(MODEL), "--scanner", "lds01"],

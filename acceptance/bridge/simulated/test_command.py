@@ -15,7 +15,7 @@ from support.wire import Host
 
 
 class Program:
-    """It, and its two ends."""
+    """A simulator process and its two ends."""
 
     def __init__(self, *arguments: str) -> None:
         self.process = subprocess.Popen(

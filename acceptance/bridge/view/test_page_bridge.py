@@ -71,7 +71,7 @@ class Bridge:
         return wait_until(look, limit_s=START_LIMIT_S)[1]
 
     def status(self) -> Any:
-        """As a terminal is told."""
+        """Return the status that a terminal gets."""
         line = [sys.executable, "-m", "robosc_bridge.command", "status", "--json", "--address", self.address]
         done = subprocess.run(line, capture_output=True, text=True, check=True, timeout=LIMIT_S)
         return json.loads(done.stdout)

@@ -199,7 +199,7 @@ The state in words, two boxes, two lines and their labels, the description, the 
 
 
 def test_sixty_components_at_fifty_events_a_second(browser: Browser) -> None:
-    """Nothing is left out, the last state stands there at the end, and no event costs more than what it has changed."""
+    """No entry is left out, the last state is shown at the end, and no event costs more than what it has changed."""
     told = many(PARTS)
     count = 4 * EVENTS_A_S
     busy = [False] * PARTS

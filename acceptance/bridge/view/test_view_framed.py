@@ -23,7 +23,7 @@ MODEL = EXAMPLES / "line_follower" / "line_follower.rscd"
 
 class _Quiet(http.server.SimpleHTTPRequestHandler):
     def log_request(self, *words: object) -> None:
-        """Nobody asked."""
+        """Drop a request's line."""
 
 
 @contextmanager

@@ -20,11 +20,11 @@ class Backoff:
         return self._failures == 0
 
     def failed(self) -> float:
-        """It has failed: how long to wait now."""
+        """Note a failure, and return the time to wait now."""
         wait_s = min(self._first_s * 2.0 ** min(self._failures, 32), self._limit_s)
         self._failures += 1
         return wait_s
 
     def succeeded(self) -> None:
-        """It has worked."""
+        """Note a success: the next pause is short again."""
         self._failures = 0

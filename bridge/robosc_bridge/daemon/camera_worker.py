@@ -114,7 +114,7 @@ class CameraWorker:
         return self._clock()
 
     def wake(self) -> None:
-        """Nothing: no step waits for long."""
+        """Do nothing: no step waits for long."""
 
     def close(self) -> None:
         """Give the camera back."""

@@ -13,7 +13,7 @@ _PRESENT_V = 7.0
 
 
 def scan_data(scan: Scan) -> dict[str, Any]:
-    """As sensor_msgs/LaserScan: 360 ranges, counter-clockwise from the front."""
+    """Return the data of a sensor_msgs/LaserScan: 360 ranges, counter-clockwise from the front."""
     known = [value for value in scan.raw.ranges_m if not math.isnan(value)]
     return {
         "ranges": list(scan.ranges_m),
@@ -27,7 +27,7 @@ def scan_data(scan: Scan) -> dict[str, Any]:
 
 
 def odometry_data(reading: DriveReading) -> dict[str, Any]:
-    """As nav_msgs/Odometry."""
+    """Return the data of a nav_msgs/Odometry."""
     pose, velocity = reading.pose, reading.velocity
     position = {"x": pose.x_m, "y": pose.y_m, "z": 0.0}
     return {
@@ -47,7 +47,7 @@ def _orientation(pose: Pose) -> dict[str, float]:
 
 
 def imu_data(reading: DriveReading) -> dict[str, Any]:
-    """As sensor_msgs/Imu; what the drive base does not measure is NaN."""
+    """Return the data of a sensor_msgs/Imu; what the drive base does not measure is NaN."""
     found = {
         name: {axis: reading.imu.get(f"{name}_{axis}", math.nan) for axis in "xyz"}
         for name in ("angular_velocity", "linear_acceleration")
@@ -57,7 +57,7 @@ def imu_data(reading: DriveReading) -> dict[str, Any]:
 
 
 def battery_data(reading: DriveReading, *, is_percent: bool) -> dict[str, Any]:
-    """As sensor_msgs/BatteryState; unknown parts are NaN."""
+    """Return the data of a sensor_msgs/BatteryState; unknown parts are NaN."""
     share = math.nan if reading.battery_share is None else reading.battery_share
     volts = math.nan if reading.battery_v is None else reading.battery_v
     return {"voltage": volts, "percentage": share * 100.0 if is_percent else share, "present": volts > _PRESENT_V}

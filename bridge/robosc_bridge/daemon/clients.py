@@ -17,11 +17,11 @@ class Clients:
         return program in self._programs
 
     def add(self, program: Program) -> None:
-        """It is there."""
+        """Add a program."""
         self._programs[program] = None
 
     def remove(self, program: Program) -> None:
-        """It is gone: nothing is told to it any more."""
+        """Remove a program: it gets no messages any more."""
         self._programs.pop(program, None)
 
     def tell(self, program: Program, item: ToProgram) -> None:

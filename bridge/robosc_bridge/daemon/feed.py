@@ -124,13 +124,13 @@ class Feed:
         return bool(self._subscriptions)
 
     def show(self, snapshot: Snapshot) -> None:
-        """There is a new snapshot."""
+        """Show a new snapshot."""
         self._snapshot = snapshot
         for subscription in self._subscriptions:
             subscription.put(None)
 
     def tell(self, entry: Entry) -> None:
-        """There is a new entry, whose values nobody changes any more."""
+        """Send a new entry, whose values nobody changes any more."""
         for subscription in self._subscriptions:
             subscription.put(entry)
 

@@ -180,7 +180,7 @@ class Daemon:
         return max(self._execution.due_s - self._clock.monotonic(), 0.0) if self._from_programs.is_empty else 0.0
 
     def _close(self) -> None:
-        """Nothing is done any more: whoever waits for something is told so."""
+        """Answer all that wait, and close."""
         for item in self._in_hand:
             _refuse(item)
         self._drain()
@@ -277,6 +277,6 @@ class Daemon:
 
 
 def _refuse(item: Item) -> None:
-    """Nobody takes it up any more."""
+    """Answer an order that is not taken up any more."""
     if isinstance(item, Order):
         answer(item, "" if item.command is OperatorCommand.QUIT else OVER)

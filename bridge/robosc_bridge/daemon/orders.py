@@ -68,7 +68,7 @@ class Orders:
             answer(order, why)
 
     def close(self, why: str) -> None:
-        """Nothing comes any more."""
+        """Answer every open order."""
         for until in Until:
             self.resolve(until, why)
 

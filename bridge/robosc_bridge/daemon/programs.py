@@ -234,7 +234,7 @@ class GoalEnded:
 
 @dataclass(frozen=True)
 class MessageRequested:
-    """As the caller of a layer: a message for the robot."""
+    """A message for the robot, of a layer's caller."""
 
     program: Program
     identifier: str
@@ -243,7 +243,7 @@ class MessageRequested:
 
 @dataclass(frozen=True)
 class CallRequested:
-    """As the caller of a layer: a call of a service, with an id of the program's own."""
+    """A call of a service, of a layer's caller, with an id of the program's own."""
 
     program: Program
     service: str
@@ -253,7 +253,7 @@ class CallRequested:
 
 @dataclass(frozen=True)
 class GoalRequested:
-    """As the caller of a layer: a goal of an action, with an id of the program's own."""
+    """A goal of an action, of a layer's caller, with an id of the program's own."""
 
     program: Program
     action: str
@@ -263,7 +263,7 @@ class GoalRequested:
 
 @dataclass(frozen=True)
 class CancelRequested:
-    """As the caller of a layer: a goal of its own is to end."""
+    """A cancel of a goal of its own, of a layer's caller."""
 
     program: Program
     action: str

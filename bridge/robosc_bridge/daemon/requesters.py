@@ -160,7 +160,7 @@ class Requesters:
                 layer.on_cancel(action, (program, goal_id))
 
     def _hold_back(self, item: ProgramRequest) -> None:
-        """Nothing is executed: everything is held back."""
+        """Hold a request back, since the bridge executes no supervisor now."""
         match item:
             case MessageRequested(program=program, identifier=identifier):
                 self._clients.tell(program, Blocked(identifier))

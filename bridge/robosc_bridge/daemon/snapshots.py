@@ -60,7 +60,7 @@ class Snapshots:
         self._due_s = -1.0
 
     def note(self, kind: str, what: str) -> None:
-        """Something of the bridge itself happened; it stands in no log file, whose readers know nothing of it."""
+        """Note an event of the bridge itself; it is in no log file, whose readers know nothing of it."""
         if self._feed.is_watched:
             self._feed.tell({"time": self._clock.wall(), "kind": kind, "what": what})
 

@@ -63,7 +63,7 @@ class StopSwitch:
             self._tell(StopEvent.STOP, executor)
 
     def reset(self) -> None:
-        """Everything is reset."""
+        """Reset all stops."""
         self._skill.is_stopped = False
 
     def _take(self, event: StopEvent | None, executor: Supervised | None) -> str:

@@ -45,7 +45,7 @@ _log = logging.getLogger(__name__)
 
 
 class NoSupervisorError(BridgeError):
-    """There is none that can be trusted; says why."""
+    """No trusted supervisor was found; the message says why."""
 
 
 @dataclass(frozen=True)

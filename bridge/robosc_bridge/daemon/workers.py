@@ -82,7 +82,7 @@ class SafetyGate(Protocol):
 
 
 class Worker(Protocol):
-    """Something that a thread does step by step."""
+    """Work that a thread does step by step."""
 
     name: str
 
@@ -230,7 +230,7 @@ class DriveWorker:
         return min(self._open_at_s, now_s + _CLOSED_S)
 
     def wake(self) -> None:
-        """Nothing: no step waits longer than its line's limit."""
+        """Do nothing: no step waits longer than its line's limit."""
 
     def close(self) -> None:
         """Stop the wheels, torque off, give the line back."""

@@ -81,14 +81,14 @@ class _StreamCamera(ABC):
         self._decoder = Decoder()
 
     def open(self) -> None:
-        """As `Camera` says."""
+        """Open the camera."""
         self.close()
         self._decoder = Decoder()
         self._descriptor = self._connected()
         os.set_blocking(self._descriptor, False)
 
     def receive(self, limit_s: float) -> GreyRows | None:
-        """As `Camera` says."""
+        """Return the next picture, or None if none came in time."""
         if self._descriptor < 0:
             raise LineLostError(self._path, "the camera is not open")
         poll = select.poll()
@@ -131,7 +131,7 @@ class _StreamCamera(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """As `Camera` says."""
+        """Close the camera."""
 
 
 class SocketCamera(_StreamCamera):
@@ -163,7 +163,7 @@ class SocketCamera(_StreamCamera):
         return "the camera is gone: whoever served its pictures has ended"
 
     def close(self) -> None:
-        """As `Camera` says."""
+        """Close the camera."""
         self._descriptor = -1
         if self._socket is not None:
             self._socket.close()
@@ -214,7 +214,7 @@ class ProcessCamera(_StreamCamera):
         return told[-1] if told else f"the camera's process has ended with status {process.poll()}"
 
     def close(self) -> None:
-        """As `Camera` says."""
+        """Close the camera."""
         self._descriptor = -1
         process, self._process = self._process, None
         if process is None:

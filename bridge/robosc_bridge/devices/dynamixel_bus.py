@@ -22,7 +22,7 @@ from robosc_bridge.protocol.dynamixel import DAMAGED_REQUEST, PING_DATA, PacketH
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 ANSWER_LIMIT_S = 0.034
-"""As the SDK has it: twice the 16 ms for which an adapter may keep bytes back, and 2 ms."""
+"""Time limit of an answer: twice the 16 ms for which an adapter may keep bytes back, and 2 ms, like the SDK."""
 
 
 def exchange_limit_s(answer_limit_s: float) -> float:
@@ -315,7 +315,7 @@ class DynamixelBus:
         raise self.silence_of(self._name_of(device), "does")
 
     def _is_foreign(self, status: StatusPacket, devices: Collection[int]) -> None:
-        """It is no answer to what these were asked."""
+        """Count an answer that comes from another device than these."""
         self.counters.foreign += 1
         if status.device not in devices:
             self.stranger = status.device

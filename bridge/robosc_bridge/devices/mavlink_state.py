@@ -26,7 +26,7 @@ _AUTOPILOT = 1  # Component.
 
 @dataclass(frozen=True, slots=True)
 class Timestamped[Content]:
-    """Something that was reported.
+    """A report with the time at which it came.
 
     Attributes:
         time_s: Time when it came, by `time.monotonic`, in seconds.

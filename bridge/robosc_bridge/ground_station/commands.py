@@ -74,7 +74,7 @@ class Checks:
 
 @dataclass(frozen=True)
 class Refusal:
-    """It cannot be.
+    """Refusal of a command.
 
     Attributes:
         result: As it is answered.

@@ -55,7 +55,7 @@ class Bucket:
         self._last_s: float | None = None
 
     def pass_time(self, now_s: float) -> None:
-        """It fills again."""
+        """Let time fill the budget again."""
         if self._last_s is not None:
             self._left = min(self._left + max(now_s - self._last_s, 0.0) * self._rate_per_s, self._most)
         self._last_s = now_s

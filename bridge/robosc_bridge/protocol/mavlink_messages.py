@@ -205,7 +205,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """To a command; targets of 0: to everybody."""
+    """Answer to a command; targets of 0: to everybody."""
 
     command: int
     result: int

@@ -23,7 +23,7 @@ _RESERVED = 10 * _UNITS_PER_S
 
 
 class SigningError(DeviceError):
-    """There is no key, or the time of the last packet cannot be kept."""
+    """The key is missing, or the time of the last packet cannot be kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +95,7 @@ class SigningTime:
         self._keep(timestamp + _RESERVED)
 
     def release(self, timestamp: int) -> None:
-        """Nothing is signed any more: a successor may begin with this one.
+        """Give back the reserved times: a successor may begin with this one.
 
         Raises:
             SigningError: It cannot be kept.

@@ -35,7 +35,7 @@ class Watcher:
         self._news = asyncio.Event()
 
     def put(self, event: Struct, size: int) -> None:
-        """There is an event."""
+        """Add an event."""
         if not self._with_events:
             return
         self._events.append((event, size))
@@ -50,7 +50,7 @@ class Watcher:
         self._lost += count if self._with_events else 0
 
     def wake(self) -> None:
-        """There is something new."""
+        """Wake the reader: news has come."""
         self._news.set()
 
     def take(self) -> tuple[list[Struct], int]:

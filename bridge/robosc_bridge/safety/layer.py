@@ -178,7 +178,7 @@ class SafetyLayer:
             self._latched.add(Reason.OPERATOR_STOP)
 
     def operator_seen(self, now_s: float) -> None:
-        """There was a sign of the operator then."""
+        """Note a sign of life of the operator at that time."""
         with self._lock:
             self._operator.update(now_s)
 

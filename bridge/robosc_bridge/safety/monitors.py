@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from robosc_bridge.safety.limits import SafetyLimits
 
 SECTOR_DEG = 30
-"""To both sides of where the robot goes, that the scanner must see: its own width, half a metre away."""
+"""Degrees to both sides of the robot's direction that the scanner must see: its own width, half a metre away."""
 
 
 class Freshness:
@@ -26,7 +26,7 @@ class Freshness:
         self._heard_s: float | None = None
 
     def update(self, time_s: float) -> None:
-        """It was heard of then."""
+        """Note the time of a report."""
         if math.isfinite(time_s):
             self._heard_s = time_s
 
@@ -120,7 +120,7 @@ class WheelMonitor:
         self._since_s: float | None = None
 
     def forget(self) -> None:
-        """Nothing is asked of the wheels."""
+        """Forget since when a wheel is off its goal."""
         self._since_s = None
 
     def is_astray(self, goals_m_s: tuple[float, float], wheels_m_s: tuple[float, float], time_s: float) -> bool:

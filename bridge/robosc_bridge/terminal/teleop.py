@@ -51,7 +51,7 @@ HELP = (
 
 _ARROWS = {"\x1b[A": "w", "\x1b[B": "s", "\x1b[C": "d", "\x1b[D": "a"}
 PRESENT = "present"
-"""In place of a key: the terminal has answered."""
+"""Answer of the terminal, in place of a key."""
 
 _ASK = "\x1b[5n"
 _CODES = {**_ARROWS, "\x1b[0n": PRESENT}
@@ -63,7 +63,7 @@ _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 
 class Running(Protocol):
-    """Something that was started, and goes on beside the keys."""
+    """A task that was started, and goes on beside the keys."""
 
     def is_alive(self) -> bool:
         """Return whether it has not ended."""

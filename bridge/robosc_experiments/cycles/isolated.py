@@ -28,18 +28,18 @@ class NullMiddleware:
         return message is None
 
     def publish(self, communication: str, message: Any) -> None:
-        """Nothing."""
+        """Do nothing."""
 
     def publish_default(self, identifier: str) -> None:
-        """Nothing."""
+        """Do nothing."""
 
     def call(self, communication: str, request_id: int, message: Any) -> None:
-        """Nothing."""
+        """Do nothing."""
 
     send_goal = call
 
     def cancel_goal(self, communication: str, goal_id: int) -> None:
-        """Nothing."""
+        """Do nothing."""
 
 
 def _load(file: Path) -> Any:

@@ -298,7 +298,7 @@ def run_verify(
     verify_supervisor: Callable[[argparse.Namespace], int],
     verify_properties: Callable[[argparse.Namespace], int],
 ) -> int:
-    """As `robosc.cli.verify.run_with`, for a command of this program.
+    """Run `robosc.cli.verify.run_with` for a command of this program.
 
     Raises:
         UsageError: As there; it names this command.

@@ -38,7 +38,7 @@ class Camera(HelperNode):
         raise NotImplementedError
 
     def stop(self) -> None:
-        """Nothing is in sight any more."""
+        """Publish that no line is in sight any more."""
         self.be_blind()
 
     def _read(self, message: Image) -> None:

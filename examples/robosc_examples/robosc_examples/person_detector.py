@@ -63,7 +63,7 @@ class PersonDetector(HelperNode):
             self._tell(Point(), 0.0)
 
     def stop(self) -> None:
-        """Nobody looks any more: somebody might stand there."""
+        """Publish a distance of 0, since somebody might stand there."""
         self._tell(Point(), 0.0)
 
 

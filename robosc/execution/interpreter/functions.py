@@ -47,7 +47,7 @@ Inner = Callable[[State, Data, Elements], Any]
 
 
 def no_data(path: Path) -> Any:
-    """Nothing was received."""
+    """Return None: no data was received."""
     return None
 
 

@@ -82,7 +82,7 @@ class Participant:
 
 @dataclass(frozen=True, slots=True)
 class EventRule:
-    """Everything about one event.
+    """Compiled rule of one event.
 
     Attributes:
         is_controllable: True if it is one that the executor takes by itself.

@@ -26,7 +26,7 @@ EARLY_MESSAGES = 1000
 """Messages that are kept until the controller runs."""
 
 Feedback = Callable[[Any], None]
-"""To be called with a goal's feedback."""
+"""Function to call with a goal's feedback."""
 
 
 class GoalRejected(Exception):

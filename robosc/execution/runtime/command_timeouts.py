@@ -24,7 +24,7 @@ class CommandTimeouts:
         self._arrived_s: Dict[str, float] = {}
 
     def arrived(self, identifier: str, now_s: float) -> None:
-        """Something came on an identifier, whether it is let through or not."""
+        """Note a message on an identifier, whether it is let through or not."""
         self._arrived_s[identifier] = now_s
 
     def silent(self, now_s: float) -> List[str]:

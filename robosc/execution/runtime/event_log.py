@@ -62,10 +62,10 @@ class NullLog:
     dropped = 0
 
     def write(self, entry: Entry) -> None:
-        """Nothing."""
+        """Do nothing."""
 
     def close(self) -> None:
-        """Nothing."""
+        """Do nothing."""
 
 
 class MemoryLog:
@@ -82,7 +82,7 @@ class MemoryLog:
         self.entries.append(entry)
 
     def close(self) -> None:
-        """Nothing."""
+        """Do nothing."""
 
 
 class JsonLinesLog:

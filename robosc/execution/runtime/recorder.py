@@ -85,12 +85,12 @@ class Recorder:
         )
 
     def unexpected(self, entry: Dict[str, Any]) -> None:
-        """Something came that the state, or nobody, waits for."""
+        """Record a message or reply that was not expected."""
         self.unexpected_count += 1
         self._write({'kind': 'unexpected', **entry})
 
     def unknown(self, event: str, what: Sequence[str]) -> None:
-        """Something was unknown at an event."""
+        """Record that data was unknown at an event."""
         self.unknown_count += len(what)
         self._write({'kind': 'unknown', 'event': event, 'unknown': list(what)})
 

@@ -380,7 +380,7 @@ class Runner:
             self._end_batch()
 
     def _finish(self) -> None:
-        """Something was handled, whether it went well or not. Never raises."""
+        """End the handling of a message or reply, whether it went well or not. Never raise."""
 
     def _update_may_request(self) -> None:
         self._may_request = (
@@ -403,7 +403,7 @@ class Runner:
 
     def _come_to_rest(self) -> None:
         """
-        Nothing is requested any more, wheels stop, goals are cancelled; what fails is a fault.
+        Stop all requests and wheels, and cancel goals; what fails is a fault.
 
         Never raises.
         """

@@ -57,7 +57,7 @@ class Sensors:
         return bool(self._sensors)
 
     def start(self, now_s: float) -> None:
-        """Nothing was seen so far."""
+        """Start anew: no message has been seen."""
         for sensor in self._sensors.values():
             sensor.seen_s = now_s
             sensor.was_seen = False

@@ -20,7 +20,7 @@ from robosc.execution.runtime.safe_stop import request_cancel
 
 
 class ExecutionError(Exception):
-    """Something that must not happen did; it becomes a fault."""
+    """A step that must not happen happened; it becomes a fault."""
 
 
 class Steps:

@@ -172,7 +172,7 @@ class _Reading(CWriter):
 
     @property
     def model(self) -> Model:
-        """There is none."""
+        """No model: reading it raises an error."""
         read_nothing("a model")
 
     def variable_place(self, component: str, variable: str) -> Code:

@@ -81,7 +81,7 @@ class Reader:
         return None if source.variable is None else self._types[source.automaton, source.variable]
 
     def values(self, source: Source) -> Sequence[Value | None]:
-        """Everything that can be read there, None for unknown at the end."""
+        """Return the values that can be read there, None for unknown at the end."""
         if isinstance(source, InputVariable) and source.may_be_unknown:
             return (*domain(source.type), None)
         type_ = self.type(source)

@@ -28,7 +28,7 @@ MAXIMUM_CASES = 1_000
 
 
 class TableTooLargeError(Exception):
-    """There are too many values to try, or cases to write down."""
+    """The table has too many values to try, or cases to write down."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class Table:
     result: _Result
 
     def results(self) -> set[Value | None]:
-        """Everything that it can be, None for unknown."""
+        """Return the values that it can be, None for unknown."""
         found, stack = set[Value | None](), [self.result]
         while stack:
             result = stack.pop()

@@ -84,10 +84,10 @@ class _World:
         return False
 
     def publish(self, communication: str, message: Any) -> None:
-        """Nothing is told: the events are."""
+        """Do nothing: the events are recorded."""
 
     def publish_default(self, identifier: str) -> None:
-        """Nothing is told."""
+        """Do nothing."""
 
     def call(self, communication: str, request_id: int, message: Any) -> None:
         self.open.setdefault(communication, []).append(request_id)

@@ -31,7 +31,7 @@ class Work:
         self._on_progress = on_progress
 
     def again(self) -> "Work":
-        """As much work anew."""
+        """Return fresh work of the same limit."""
         return Work(self.limit, self._should_stop, self._on_progress)
 
     def spend(self, amount: int) -> None:

@@ -67,7 +67,7 @@ class MethodMetrics:
 
 
 class Metrics:
-    """Everything that is counted.
+    """Metrics of the server.
 
     Args:
         version: Of RoboSC.

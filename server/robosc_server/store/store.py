@@ -26,7 +26,7 @@ _SWEEP_LOCK = 0x526F626F5343
 
 
 def _do_nothing() -> None:
-    """Nothing was locked."""
+    """Do nothing."""
 
 
 class Store:

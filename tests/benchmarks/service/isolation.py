@@ -33,7 +33,7 @@ HEADER = ("task", "in-process", "ready process", "of it isolation", "least", "ai
 
 
 async def _ignore(report: Report) -> None:
-    """Nobody watches."""
+    """Ignore a report."""
 
 
 async def _seconds(work: Callable[[], Awaitable[object]]) -> float:

@@ -30,7 +30,7 @@ WHILE_S = 0.3
 
 
 class Bug(Exception):
-    """In a part of the bridge."""
+    """A bug in a part of the bridge."""
 
 
 # What a line may do without any harm.

@@ -66,7 +66,7 @@ def test_it_turns_by_the_angle_that_is_asked_for_and_tells_when_it_has(scene: Sc
 
 
 def test_a_turn_is_steered_at_the_period_of_the_exchanges(scene: Scene) -> None:
-    """If each new speed hurried the next exchange, they would follow one another without a pause."""
+    """Exchanges keep their period: if each new speed hurried the next one, there would be no pause."""
     scene.up(0.3)
     speeds_rad_s, hurries = [scene.out.angular_rad_s], scene.hurries
     while scene.out != STANDSTILL:

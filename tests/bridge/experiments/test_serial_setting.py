@@ -17,7 +17,7 @@ from robosc_experiments.tail import LineCount, latest
 
 
 def quiet(text: str) -> None:
-    """Nobody listens."""
+    """Drop progress."""
 
 
 @pytest.mark.parametrize("speed", [SLOWEST, 1.0, 5.0, 20.0, FASTEST])

@@ -28,7 +28,7 @@ _ZEROS = (0.0,) * 6
 
 
 def _bytes(make: Make, sequence: int) -> str:
-    """As component 191 of system 1."""
+    """Return the bytes of component 191 of system 1."""
     codec = Codec(1, 191)
     for _ in range(sequence):
         codec.encode(lambda library: library.heartbeat_encode(10, 0, 0, 0, 0))

@@ -253,7 +253,7 @@ def test_the_gyroscope_feels_how_the_body_turns_and_not_the_wheels() -> None:
 
 
 def test_accelerations_are_those_of_the_body() -> None:
-    """It is felt when it comes to a wall; and no more while its wheels turn there."""
+    """Accelerations are felt when the robot comes to a wall; and no more while its wheels turn there."""
     with station_in(Noise(), Walls([(0.205, -1.0, 0.205, 1.0)])) as station:
         station.update(0.3)
         station.command(20)

@@ -94,7 +94,7 @@ def _failed_checks(found: FileVerification) -> set[str]:
 
 
 def _read_back(mutant: Mutant[Supervisor]) -> Supervisor | None:
-    """As it comes out of a file; None if the file is refused at once."""
+    """Return the supervisor that comes out of a file; None if the file is refused at once."""
     try:
         return decode(encode(mutant.value))
     except InvalidSupervisorError:

@@ -147,7 +147,7 @@ def test_a_cycle_that_is_never_reached_takes_a_search() -> None:
 
 
 def test_a_cycle_that_the_supervisor_cuts_is_none() -> None:
-    """Nothing may be dark and in b, so synthesis forbids the one or the other step."""
+    """Dark and b exclude each other, so synthesis forbids the one or the other step."""
     text = robot(
         EYE,
         component("B", "initial marked state a { transition if Eye.dark goto b } state b { transition goto a }"),
@@ -218,7 +218,7 @@ def test_what_only_part_of_a_message_could_bring_is_no_way_out() -> None:
 
 
 def test_an_own_cancel_and_a_tau_that_ask_for_each_other() -> None:
-    """In the dark the arm is cancelled, at once: the cancel is a silent step of its own, and the order matters."""
+    """Cancels are silent steps: in the dark the arm is cancelled, at once, and the order matters."""
     text = robot(
         INTERFACE,
         EYE,

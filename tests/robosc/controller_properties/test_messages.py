@@ -33,7 +33,7 @@ ROBOT = """robot R {
         marked state q { transition if Eye.a = first_yes and Eye.b = second_yes goto p }
     } }
 }"""
-"""It spins for ever once both enums are `yes`."""
+"""A robot that spins for ever once both enums are `yes`."""
 
 
 def spins(first: str, second: str, *types: str, topic: str = "sample") -> bool:

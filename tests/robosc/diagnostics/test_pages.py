@@ -145,7 +145,7 @@ def test_what_is_fixed_is_sound(item: Page) -> None:
 
 @pytest.mark.parametrize("item", TYPED, ids=lambda item: item.code)
 def test_a_session_goes_as_it_is_shown(item: Page, tmp_path: Path) -> None:
-    """Everything that is typed runs in one folder; each expected line is printed, in that order."""
+    """All commands run in one folder; each expected line is printed, in that order."""
     sessions = [*item.example, *(block for block in item.fixed if block.kind == "console")]
     for number, block in enumerate(sessions):
         lines = block.text.splitlines()

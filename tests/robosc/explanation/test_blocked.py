@@ -43,7 +43,7 @@ def wander(supervisor: Supervisor, dice: Random, steps: int) -> Any:
 
 
 def as_texts(components: Any) -> Any:
-    """As the topic `/state` has them."""
+    """Return components as the topic `/state` has them."""
 
     def text(value: Any) -> str:
         return str(value).lower() if isinstance(value, bool) else str(value)

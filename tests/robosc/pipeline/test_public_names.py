@@ -1,4 +1,4 @@
-"""Everything that `import robosc` offers: exactly these names, and each is loaded on use alone."""
+"""Names that `import robosc` offers: exactly these, and each is loaded on use alone."""
 
 import importlib
 import subprocess

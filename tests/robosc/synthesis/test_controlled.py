@@ -298,7 +298,7 @@ def test_a_trace_is_as_long_as_the_shortest_run(engine: str, length: int) -> Non
 
 
 def test_beyond_the_effort_a_trace_is_still_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It may be longer, and is the same for both engines."""
+    """Traces may be longer then, and are the same for both engines."""
     for seed in range(25):
         system = random_system(seed)
         questions = replace(random_questions(system, seed), restrictions=())

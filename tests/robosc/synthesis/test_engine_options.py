@@ -84,7 +84,7 @@ def test_an_expression_is_broken_off_in_the_middle(engine: str) -> None:
 
 
 def test_memory_that_cudd_is_refused_is_told_as_such() -> None:
-    """As dd tells it, far below what the limit of nodes leaves to it."""
+    """Messages are those of dd, far below what the limit of nodes leaves to it."""
     pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
     manager = make_manager("cudd")
     with pytest.raises(MemoryError, match="were refused memory"), limited(manager, 10**7):

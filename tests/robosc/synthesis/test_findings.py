@@ -169,7 +169,7 @@ def test_a_request_that_would_break_what_must_always_hold() -> None:
 
 
 def test_a_request_after_which_what_must_always_hold_could_not_be_kept() -> None:
-    """Nothing is broken at once: but then the wind can open the door."""
+    """No requirement is broken at once: but then the wind can open the door."""
     text = DOOR.replace("incoming message open", "incoming message §lift").replace(
         "on request to open", "on request to lift"
     )
@@ -309,7 +309,7 @@ def test_a_requirement_that_must_always_hold() -> None:
 
 
 def test_a_requirement_that_can_cancel_an_action_is_used() -> None:
-    """It holds whenever the motor may be started, and turns false while it drives."""
+    """The requirement holds whenever the motor may be started, and turns false while it drives."""
     starter = MOTOR.replace("marked state driving {", "marked state driving {\n on response from down goto driving")
     kept = "requirement drive needs Switch.off or Motor.still"
     assert found(robot(starter, SWITCH, kept)) == ()

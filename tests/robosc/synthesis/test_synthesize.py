@@ -218,7 +218,7 @@ def test_an_unknown_engine_is_refused() -> None:
 
 
 def test_an_event_condition_on_an_uncontrollable_event_makes_states_bad(engine: str) -> None:
-    """Nobody may set the counter back from 2, and nobody can forbid it: so 2 is never reached."""
+    """State 2 is never reached: nobody may set the counter back from it, and nobody can forbid it."""
     system = replace(
         counter(3),
         events=(Event("up", True), Event("zero", False)),

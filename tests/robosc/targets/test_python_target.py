@@ -60,7 +60,7 @@ class Twins:
         assert tuple(self.generated.description) == tuple(self.interpreted.description)
 
     def compare(self) -> None:
-        """Everything that can be asked without changing anything."""
+        """Compare all that can be asked without changing anything."""
         assert same(self.generated.state(), self.interpreted.state())
         for event in self.issued:
             allowed = self.interpreted.enabled(event)
@@ -172,7 +172,7 @@ def test_the_supervisor_of_a_random_text_behaves_as_interpreted(seed: int) -> No
 @settings(max_examples=examples(30))
 @given(st.integers(0, 2**32))
 def test_a_random_supervisor_that_asks_one_by_one_behaves_as_interpreted(seed: int) -> None:
-    """As a model with many requests does."""
+    """Models with many requests ask one by one."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(changes, "ASKED_TOGETHER", 0)
         twins = Twins(random_supervisor(seed))
@@ -283,7 +283,7 @@ def test_every_file_says_where_it_comes_from() -> None:
 
 
 def test_the_file_drives_an_executor_of_its_own(tmp_path: Path) -> None:
-    """Nothing of RoboSC is used but the file itself."""
+    """No module of RoboSC is used but the file itself."""
     files = generate(example_supervisor("line_follower/line_follower"), "python", GenerateOptions(package="follower"))
     sent: list[tuple[str, Any]] = []
 
@@ -367,7 +367,7 @@ def test_the_program_of_the_documentation_runs(tmp_path: Path) -> None:
 
 
 def test_the_file_of_a_layer_holds_back_what_is_not_allowed(tmp_path: Path) -> None:
-    """As its own text says it is used."""
+    """Use the file as its own text says."""
     supervisor = example_supervisor("line_follower/line_follower_layer", Deployment.LAYER)
     files = generate(supervisor, "python", GenerateOptions(package="follower_layer"))
     sides = BothSides()

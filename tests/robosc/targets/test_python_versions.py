@@ -63,7 +63,7 @@ class Seen:
         return next(self._observations)
 
     def close(self) -> Observation:
-        """Nothing to end."""
+        """Do nothing."""
         return Observation()
 
 

@@ -92,7 +92,7 @@ def test_whoever_waits_at_the_end_gets_the_default(calls: Calls) -> None:
 
 
 class Handle:
-    """As actionlib's `ServerGoalHandle`."""
+    """A twin of actionlib's `ServerGoalHandle`."""
 
     def __init__(self, name: str) -> None:
         self.id = name

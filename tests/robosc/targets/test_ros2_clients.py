@@ -15,7 +15,7 @@ NONE, REJECTED, UNKNOWN_GOAL, TERMINATED = 0, 1, 2, 3
 
 
 class Future:
-    """As of rclpy: its callbacks run when it is done."""
+    """A twin of rclpy's: its callbacks run when it is done."""
 
     def __init__(self) -> None:
         self._callbacks: list[Callable[[Any], None]] = []

@@ -121,7 +121,7 @@ def meaning(variables: Variables, expression: Expression, state: Mapping[str, in
 
 @pytest.fixture(autouse=True)
 def no_tables(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing is gone through value by value."""
+    """Fail where values are gone through one by one."""
     monkeypatch.setattr(expressions, "FEW_VALUATIONS", 0)
     monkeypatch.setattr(expressions, "MAXIMUM_VALUATIONS", 0)
 

@@ -212,7 +212,7 @@ class Kept:
         return 0
 
     def require_room(self, caller: Caller) -> None:
-        """There is."""
+        """Accept: the server has room."""
 
 
 @pytest.mark.parametrize("size", [1, 20, 21, 1000])

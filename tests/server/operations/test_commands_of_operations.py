@@ -166,7 +166,7 @@ def test_the_state_folder(capsys: pytest.CaptureFixture[str], tmp_path: Path) ->
 
 
 def folder_state(folder: Path) -> dict[str, bytes]:
-    """Everything in a folder; of what is shared by those who have a database open, the name alone."""
+    """Return the files in a folder; of what is shared by those who have a database open, the name alone."""
     return {path.name: b"" if path.name.endswith("-shm") else path.read_bytes() for path in folder.iterdir()}
 
 

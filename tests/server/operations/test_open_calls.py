@@ -156,7 +156,7 @@ def test_nobody_from_elsewhere_takes_the_places_of_this_machines_health_checks()
             return {}
 
         def add_done_callback(self, callback: object) -> None:
-            """It never ends."""
+            """Do nothing: the call never ends."""
 
     calls = OpenCalls(CallLimits(1, 1), health=CallLimits(3, 1))
     layered = calls.wrap(grpc.unary_unary_rpc_method_handler(lambda request, context: None), HEALTH)

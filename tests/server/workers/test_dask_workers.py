@@ -33,7 +33,7 @@ def test_a_missing_package_is_told_in_one_sentence(monkeypatch: pytest.MonkeyPat
 def test_a_package_that_cannot_be_loaded_is_told_in_one_sentence(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """As where /proc has processes alone."""
+    """The module cannot be loaded, like where /proc has processes alone."""
     (tmp_path / "distributed.py").write_text("open('/proc/none/meminfo')\n")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "distributed")
@@ -119,7 +119,7 @@ def test_a_fault_of_ours_on_the_cluster_is_an_answer(monkeypatch: pytest.MonkeyP
             return "name"
 
         def log_event(self, topic: str, event: object) -> None:
-            """Nobody listens."""
+            """Drop an event."""
 
     def broken(*arguments: object, **options: object) -> None:
         raise ValueError("on purpose")

@@ -172,7 +172,7 @@ def requests() -> list[tuple[TaskKind, Any]]:
 
 def test_every_task_is_done_as_without_confinement() -> None:
     async def note(report: object) -> None:
-        """Nobody watches."""
+        """Drop a report."""
 
     with BackgroundLoop() as loop:
         workers = LocalWorkers(2, must_be_confined=True)

@@ -37,7 +37,7 @@ class Ids:
         self._open: dict[str, list[int]] = {}
 
     def add(self, name: str, number: int) -> None:
-        """It was called."""
+        """Note a call."""
         self._open.setdefault(name, []).append(number)
 
     def last(self, name: str) -> int:
@@ -87,7 +87,7 @@ class World:
         self._issued: list[tuple[str, str, dict[str, Any]]] = []
 
     def take(self) -> tuple[tuple[str, str, dict[str, Any]], ...]:
-        """Everything since the last time, in order."""
+        """Return the calls since the last time, in order."""
         issued, self._issued = tuple(self._issued), []
         return issued
 

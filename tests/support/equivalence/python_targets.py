@@ -57,7 +57,7 @@ class PythonTarget:
         return observation(self._driver.seen(*self._shown))
 
     def close(self) -> Observation:
-        """Nothing to end."""
+        """Do nothing."""
         return Observation()
 
 

@@ -97,7 +97,7 @@ class StandInSurroundings:
                 raise ValueError(action.do)
 
     def ask(self, action: Action) -> None:
-        """Nobody does: these nodes are controllers."""
+        """Raise an error: these nodes are controllers."""
         raise ValueError(action.do)
 
     def take_issued(self) -> list[Issued]:
@@ -120,7 +120,7 @@ class StandInSurroundings:
         return kind, self._servers[name].name, set_parts(yaml.safe_load(text)) if text else {}
 
     def settle(self) -> None:
-        """Nothing: what comes next waits in line."""
+        """Do nothing: what comes next waits in line."""
 
     def spin(self) -> None:
         """For a moment."""

@@ -203,7 +203,7 @@ class Ros2Surroundings:
 
 
 class _ServerType:
-    """As much of a server as loading its type needs."""
+    """A stand-in for a server, with what loading its type needs."""
 
     def __init__(self, is_action: bool, package: str, type_: str) -> None:
         self.is_action, self.package, self.type_name = is_action, package, type_

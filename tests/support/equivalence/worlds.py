@@ -251,7 +251,7 @@ WORLDS: dict[str, Callable[[], Run]] = {
 
 
 _LAYERS = {"line_follower_layer": "line_follower"}
-"""In whose folder each robot is that only makes sense behind a supervision layer."""
+"""Folder of each robot that only makes sense behind a supervision layer."""
 
 
 def robot_supervisor(robot: str) -> Supervisor:

@@ -40,7 +40,7 @@ class Publishing:
         self._publisher.publish(message)
 
     def publish_default(self, identifier: str) -> None:
-        """Nothing: the robot goes on."""
+        """Do nothing: the robot goes on."""
 
 
 def connect(kind: str, topic: str) -> tuple[Any, Any]:

@@ -56,7 +56,7 @@ class Layout:
 
     @property
     def executable(self) -> ExecutableSystem:
-        """Everything that the model does."""
+        """Executable system of the model."""
         return self.supervisor.executable
 
 

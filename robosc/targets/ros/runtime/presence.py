@@ -39,5 +39,5 @@ class Presence:
         return now_s >= self._missed_since_s + LOST_S
 
     def forget(self) -> None:
-        """Nobody asks any more."""
+        """Forget the time since which the server is missed."""
         self._missed_since_s = None

@@ -52,7 +52,7 @@ Put = Callable[[Action, Optional[str]], None]
 
 
 def feedback_kind(name: str) -> str:
-    """As what the feedback of an action, by its name on ROS, waits in the inbox."""
+    """Return the key of an action's feedback in the inbox, by its name on ROS."""
     return f'feedback of {name}'
 
 

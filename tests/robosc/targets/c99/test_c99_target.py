@@ -427,7 +427,7 @@ def test_texts_are_escaped() -> None:
 @needs_gcc
 @pytest.mark.parametrize("robot", ["ball_pusher", "line_follower", "maze_solver", "object_finder", "person_follower"])
 def test_it_compiles_beside_what_a_c_library_adds_to_the_standard(robot: str, tmp_path: Path) -> None:
-    """As catkin and most builds compile it: with names that the headers declare beyond C99, such as `finite`."""
+    """Compile like catkin and most builds: with names that the headers declare beyond C99, such as `finite`."""
     files = generate(example_supervisor(f"{robot}/{robot}"), "c99")
     for path, text in files.items():
         (tmp_path / path).write_text(text, encoding="utf-8")

@@ -224,7 +224,7 @@ def test_a_requirement_without_a_value_never_holds() -> None:
 
 @pytest.mark.parametrize("size", [3, 3000])
 def test_long_chains(size: int) -> None:
-    """As deep as they are long, leaning left: written flat, without deep recursion."""
+    """Chains are as deep as they are long, leaning left: written flat, without deep recursion."""
     supervisor = unsupervised(SMALL)
     level, near, up = VariableRead("Lift", "level"), VariableRead("Lift", "near"), StateTest("Lift", "up")
     condition: Expression = up

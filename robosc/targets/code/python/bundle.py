@@ -1,14 +1,13 @@
 """Several modules as the text of one: generated Python is a single file, whatever it runs on."""
 
 import ast
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 
 _OWN = "robosc."
-_COPIED = re.compile(r"\n*A copy of this module stands in generated packages, which run on Python 3\.8 and later\.\n?")
+_COPIED = "\n\nA copy of this module stands in generated packages, which run on Python 3.8 and later."
 WIDTH = 99
 """Columns of generated Python: those of ament_flake8."""
 
@@ -152,7 +151,7 @@ def _take_apart(name: str) -> _Module:
         else:
             names += _defined(node)
     lines = [line for number, line in enumerate(text.splitlines(), 1) if number not in dropped]
-    title = _COPIED.sub("\n", ast.get_docstring(tree) or stem).strip().splitlines()
+    title = (ast.get_docstring(tree) or stem).replace(_COPIED, "").strip().splitlines()
     return _Module(name, tuple(title), frozenset(imports), tuple(needs), tuple(names), "\n".join(lines).strip() + "\n")
 
 

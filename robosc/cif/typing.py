@@ -440,7 +440,7 @@ class Typing:
         if not (left.is_usable and right.is_usable):
             return broken(type_, left, right)
         if operator in ("div", "mod") and not (right.is_static and right.value > 0):
-            problem = Problem(f"'{operator}' has a divisor that is no constant above zero", node.at)
+            problem = Problem(f"'{operator}' has a divisor that is not a constant above zero", node.at)
             return broken(type_, left, right, problem=problem)
         return made(type_, Binary(operator, left.core, right.core), left, right)  # type: ignore[arg-type]
 

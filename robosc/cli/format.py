@@ -145,7 +145,7 @@ def _files(path: Path) -> Sequence[Path]:
     if is_automata(path):
         raise UsageError(f"{_shown(path)} holds automata: only RoboSC's own models can be formatted")
     if not path.is_file():
-        raise UsageError(f"{_shown(path)} is no plain file")
+        raise UsageError(f"{_shown(path)} is not a plain file")
     return [path]
 
 

@@ -80,7 +80,7 @@ def _loaded(item: "EntryPoint") -> Plugin:
         # Somebody else's package must not take the built-in commands with it.
         return Plugin(item.name, None, f"'robosc {item.name}' cannot be loaded: {_one_line(error)}")
     if not (callable(getattr(module, "add_parser", None)) and callable(getattr(module, "run", None))):
-        return Plugin(item.name, None, f"'robosc {item.name}' cannot be loaded: {item.value} is no command")
+        return Plugin(item.name, None, f"'robosc {item.name}' cannot be loaded: {item.value} is not a command")
     return Plugin(item.name, module)
 
 

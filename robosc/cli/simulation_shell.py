@@ -275,7 +275,7 @@ def _numbers(name: str, words: Sequence[str], defaults: Sequence[int | None]) ->
         try:
             number = int(words[place]) if place < len(words) else default
         except ValueError:
-            raise _CommandFault(f"'{words[place]}' is no whole number: {shown}") from None
+            raise _CommandFault(f"'{words[place]}' is not a whole number: {shown}") from None
         if number is None or (place == 0 and not 1 <= number <= _MOST):
             raise _CommandFault(f"N is a number from 1 to {_MOST}: {shown}")
         found.append(number)

@@ -184,7 +184,7 @@ class _Checking:
         replay, event = self._replay, entry.event
         self._events += 1
         if not replay.has(event):
-            self._wrong(entry, f"{event} is no event of the model")
+            self._wrong(entry, f"{event} is not an event of the model")
             return
         problems: list[str] = []
         name, _, kind = event.rpartition(".")

@@ -70,7 +70,7 @@ class LogReader:
         self.torn_line: int | None = None
         if self._file.exists() and not (self._file.is_file() or self._file.is_dir()):
             # A pipe would not even open before somebody writes.
-            raise LogError(f"{path} is no plain file")
+            raise LogError(f"{path} is not a plain file")
 
     def __iter__(self) -> Iterator[LogEntry]:
         with self._file.open("rb") as stream:
@@ -155,15 +155,15 @@ class _Reading:
     def _entry(self, number: int, document: dict[str, Any]) -> LogEntry:
         time_s, kind = document.get("time"), document.get("kind")
         if not _is_time(time_s):
-            self._refuse(number, "its 'time' is no number of seconds")
+            self._refuse(number, "its 'time' is not a number of seconds")
         if not _is_name(kind) or not kind:
             self._refuse(number, "it has no 'kind'")
         event = document.get("event", "")
         if not _is_name(event) or (kind == "event" and not event):
-            self._refuse(number, "its 'event' is no event's name")
+            self._refuse(number, "its 'event' is not an event's name")
         what = document.get("what", "")
         if isinstance(what, str) and not _is_text(what):
-            self._refuse(number, "its 'what' is no text that can be shown")
+            self._refuse(number, "its 'what' is not a text that can be shown")
         is_controllable = document.get("controllable", False)
         if not isinstance(is_controllable, bool):
             self._refuse(number, "its 'controllable' is neither true nor false")
@@ -172,7 +172,7 @@ class _Reading:
         if kind == "dropped":
             count = document.get("count")
             if not isinstance(count, int) or isinstance(count, bool) or count < 0:
-                self._refuse(number, "its 'count' is no number of entries")
+                self._refuse(number, "its 'count' is not a number of entries")
             self.dropped += count
         return LogEntry(number, float(time_s), kind, event, is_controllable, document)
 
@@ -187,7 +187,7 @@ class _Reading:
                 if repr(part) == repr(before):
                     state[name] = before
             elif not _is_component(part):
-                self._refuse(number, f"the state of '{name[:_MAXIMUM_NAME]}' is no state with variables")
+                self._refuse(number, f"the state of '{name[:_MAXIMUM_NAME]}' is not a state with variables")
         self._state = state
         return state
 

@@ -14,19 +14,19 @@ from robosc.language.control_nodes import Declared, Family, Leaf, Node, is_free
 from robosc.language.words import spelled
 
 _WHY = {
-    Family.SEQUENCE: "an order is told by states, and what must hold before by a requirement",
+    Family.SEQUENCE: "write an order as states, and what must hold before as a requirement",
     Family.STATE_MACHINE: "a state machine is a component with a behaviour",
-    Family.REACTIVE_SEQUENCE: "what must hold all the time is told by a requirement",
-    Family.PIPELINE: "what may go on while the next begins is told by states",
-    Family.ROUND_ROBIN: "turns are told by states",
-    Family.FALLBACK: "another way after a failure is told by states behind 'error', and which of several requests "
-    "that are allowed goes first by the deployment's setting 'priority'",
-    Family.REACTIVE_FALLBACK: "what must not hold is told by a requirement",
-    Family.RECOVERY: "another way after a failure is told by states behind 'error'",
-    Family.PARALLEL: "components run side by side anyway, and requirements tell what must not go together",
-    Family.IF_THEN_ELSE: "a choice is told by requirements",
-    Family.SWITCH: "a choice is told by requirements",
-    Family.CONDITION: "a condition is told by a requirement",
+    Family.REACTIVE_SEQUENCE: "write what must hold all the time as a requirement",
+    Family.PIPELINE: "write what may go on while the next begins as states",
+    Family.ROUND_ROBIN: "write turns as states",
+    Family.FALLBACK: "write another way after a failure as states after 'error', and which of several requests "
+    "that are allowed goes first in the deployment's setting 'priority'",
+    Family.REACTIVE_FALLBACK: "write what must not hold as a requirement",
+    Family.RECOVERY: "write another way after a failure as states after 'error'",
+    Family.PARALLEL: "components run side by side anyway, and write what must not go together as requirements",
+    Family.IF_THEN_ELSE: "write a choice as requirements",
+    Family.SWITCH: "write a choice as requirements",
+    Family.CONDITION: "write a condition as a requirement",
     Family.INVERTER: "'!' negates a condition, and 'error' is the failure of a service or action",
     Family.FORCE_SUCCESS: "'response' and 'error' may lead to the same state",
     Family.FORCE_FAILURE: "'response' and 'error' may lead to the same state",

@@ -177,7 +177,7 @@ def _logged(stream: _Joined, name: str, model: Model) -> Iterator[ScriptedEvent]
             yield ScriptedEvent(entry.line, "", NO_DATA)
         elif entry.kind == "event":
             if entry.event not in known:
-                raise ScriptError(f"{name}:{entry.line}: {entry.event} is no event of {model.name}")
+                raise ScriptError(f"{name}:{entry.line}: {entry.event} is not an event of {model.name}")
             paths = () if entry.is_controllable else converted_paths(model, entry.event)
             told = {path: received.value(entry.event, entry.data, path) for path in paths}
             if MISFIT in told.values():

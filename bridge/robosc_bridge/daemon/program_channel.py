@@ -127,7 +127,9 @@ class ProgramChannel:
         """A program is there: what it serves that nobody serves yet is asked of it from now on."""
         for name in sorted(program.serves):
             if name not in self._services:
-                self._clients.refuse(program, f"'{name}' is no service or action of the model that is mapped to grpc")
+                self._clients.refuse(
+                    program, f"'{name}' is not a service or action of the model that is mapped to grpc"
+                )
             elif name in self._servers:
                 self._clients.refuse(program, f"'{name}' is served by {self._servers[name].name} already")
             else:

@@ -241,7 +241,7 @@ def program_of(hello: pb.Hello, name: str, tell: Callable[[programs.ToProgram], 
     for wanted in hello.serves:
         if wanted not in served:
             shown = wanted[:40] if wanted.isprintable() else "?"
-            raise RequestError(f"'{shown}' is no service or action of the model that is mapped to 'grpc'")
+            raise RequestError(f"'{shown}' is not a service or action of the model that is mapped to 'grpc'")
     may_request = hello.is_operator and operations.is_layer
     return programs.Program(name, tell, frozenset(hello.serves), may_request)
 

@@ -404,7 +404,7 @@ def _free(name: str, taken: Iterable[str]) -> str:
 
 def _checked(name: str) -> str:
     if _NAME.fullmatch(name) is None:
-        raise UnsupportedModelError(f"target cif: '{name}' is no name of CIF")
+        raise UnsupportedModelError(f"target cif: '{name}' is not a name of CIF")
     return name
 
 

@@ -139,7 +139,9 @@ def _require_names(system: System) -> None:
                 names += [variable.type.name, *variable.type.values]
     for name in names:
         if _NAME.fullmatch(name) is None:
-            raise UnsupportedModelError(f"{name!a:.100} is no identifier, and no identifiers with dots, as code needs")
+            raise UnsupportedModelError(
+                f"{name!a:.100} is neither an identifier nor identifiers with dots, as code needs"
+            )
 
 
 def _merged(automaton: Automaton) -> Automaton:

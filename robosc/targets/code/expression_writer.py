@@ -197,7 +197,7 @@ class ExpressionWriter(ABC):
             case Element(level=level, path=path):
                 code, type_ = self._element_code(level, path), path_type(self.model, self.elements[level][1], path)
         if not isinstance(type_, ArrayType):
-            raise InternalError(f"{code.word} is no array")
+            raise InternalError(f"{code.word} is not an array")
         return code, type_
 
     # The three readings

@@ -68,6 +68,6 @@ def require_package_name(name: str) -> None:
     """
     if snake_case(name) != name or keyword.iskeyword(name) or len(name) > 2 * MAXIMUM_NAME:
         raise UnsupportedModelError(
-            f"'{name}' is no name for a package: lower-case letters, digits and single underscores, "
+            f"'{name}' is not a name for a package: lower-case letters, digits and single underscores, "
             "starting with a letter, and no keyword of Python"
         )

@@ -141,7 +141,7 @@ def _require_valid(communication: Communication) -> None:
         )
     if interface and not (_PACKAGE.match(interface.package) and _MESSAGE.match(interface.type)):
         raise UnsupportedModelError(
-            f"{interface.type} from {interface.package}, linked by '{communication.name}', is no name of "
+            f"{interface.type} from {interface.package}, linked by '{communication.name}', is not a name of "
             "a ROS type such as Twist from geometry_msgs"
         )
 

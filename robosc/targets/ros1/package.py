@@ -13,7 +13,7 @@ def _require_names(found: tuple[Topic, ...], asked: tuple[Communication, ...]) -
     for identifier in [topic.identifier for topic in found] + [item.identifier for item in asked]:
         if identifier.startswith("_"):
             raise UnsupportedModelError(
-                f"the identifier {identifier!r} is no name in ROS 1: it begins with an underscore"
+                f"the identifier {identifier!r} is not a name in ROS 1: it begins with an underscore"
             )
 
 

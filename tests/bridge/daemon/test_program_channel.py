@@ -259,8 +259,8 @@ def test_what_is_served_already_is_not_served_by_another() -> None:
     second = Connected(scene, "second", ("ask", "fetch", "note", "nothing"))
     assert sorted(why(second.cycle())) == [
         "'ask' is served by first already",
-        "'note' is no service or action of the model that is mapped to grpc",
-        "'nothing' is no service or action of the model that is mapped to grpc",
+        "'note' is not a service or action of the model that is mapped to grpc",
+        "'nothing' is not a service or action of the model that is mapped to grpc",
     ]
     first.leave()
     third = Connected(scene, "third", ("ask",))

@@ -89,5 +89,5 @@ def test_what_was_wrong_is_told_and_is_no_markup(tmp_path: Path) -> None:
 def test_a_run_whose_log_cannot_be_read_is_one_that_failed(tmp_path: Path) -> None:
     outcome = recorded(tmp_path / "maze-serial-1")
     outcome.event_log.write_text("{}\n", encoding="utf-8")
-    with pytest.raises(ScenarioError, match="line 1: its 'time' is no number of seconds"):
+    with pytest.raises(ScenarioError, match="line 1: its 'time' is not a number of seconds"):
         reported(outcome, tmp_path)

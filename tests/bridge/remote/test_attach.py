@@ -91,10 +91,10 @@ class TestHello:
             ({"name": "x" * 101}, "a name of 1 to 100 printable characters"),
             ({"name": "a\nb"}, "a name of 1 to 100 printable characters"),
             ({"name": "\x1b[31m"}, "a name of 1 to 100 printable characters"),
-            ({"name": "arm", "serves": ["nothing"]}, "'nothing' is no service or action"),
-            ({"name": "arm", "serves": ["order"]}, "'order' is no service or action"),
-            ({"name": "arm", "serves": ["x" * 100_000]}, "is no service or action"),
-            ({"name": "arm", "serves": ["\n"]}, "'?' is no service or action"),
+            ({"name": "arm", "serves": ["nothing"]}, "'nothing' is not a service or action"),
+            ({"name": "arm", "serves": ["order"]}, "'order' is not a service or action"),
+            ({"name": "arm", "serves": ["x" * 100_000]}, "is not a service or action"),
+            ({"name": "arm", "serves": ["\n"]}, "'?' is not a service or action"),
         ],
     )
     def test_a_hello_that_makes_no_sense(self, hello: Any, words: str, daemon: FakeDaemon, stub: Any) -> None:

@@ -35,7 +35,7 @@ def test_a_limit_is_a_number_from_one_on(capsys: pytest.CaptureFixture[str], num
     with pytest.raises(SystemExit) as caught:
         main(["synth", NAVIGATION, f"--max-nodes={number}"])
     assert caught.value.code == 2
-    assert "is no number from 1 on" in capsys.readouterr().err
+    assert "is not a number from 1 on" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("option", [["--reorder"], ["--max-nodes", "5"]])

@@ -68,7 +68,7 @@ def test_for_machines(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         "violation_count": 1, "violations": ...,
     }  # fmt: skip
     assert [(item["line"], item["message"]) for item in found["violations"]] == [
-        (1, "scan_back.response is no event of the model")
+        (1, "scan_back.response is not an event of the model")
     ]
 
 

@@ -276,7 +276,7 @@ def test_files_that_cannot_be_accessed_do_not_keep_the_others_from_it(
         (["none.rscd"], "there is no file none.rscd"),
         (["a.rscd", "none.rscd"], "there is no file none.rscd"),
         (["empty"], "there is no .rscd file in the folder empty"),
-        (["/dev/null"], "/dev/null is no plain file"),
+        (["/dev/null"], "/dev/null is not a plain file"),
         (["x" * 300], f"cannot read {'x' * 300}: File name too long"),
         (["-", "a.rscd"], "- is standard input: it cannot be formatted together with files"),
         (["-", "-"], "- is standard input: it cannot be formatted together with files"),

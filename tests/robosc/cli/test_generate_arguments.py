@@ -98,7 +98,7 @@ def test_a_package_that_cannot_be_called_so(
     words = ["generate", LINE_FOLLOWER, "--target", target, "-o", str(folder), "--package", name]
     if run is client_main:
         words += ["--server", "127.0.0.1:1"]
-    assert f"'{name}' is no name for a package" in refused(capsys, run, *words)
+    assert f"'{name}' is not a name for a package" in refused(capsys, run, *words)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -63,7 +63,7 @@ def test_a_command_of_another_package_runs(capsys: pytest.CaptureFixture[str]) -
         (["absent", "-o", "x", "--speed", "3"], "'robosc absent' needs the package robosc_no_such_package, which is"),
         (["greet", "later"], "'robosc greet' needs the package robosc_no_such_package, which is not installed"),
         (["broken"], "'robosc broken' cannot be loaded: 100% broken by itself"),
-        (["hollow"], "'robosc hollow' cannot be loaded: robosc_test_hollow is no command"),
+        (["hollow"], "'robosc hollow' cannot be loaded: robosc_test_hollow is not a command"),
     ],
 )
 def test_what_cannot_run_says_why_in_one_sentence(

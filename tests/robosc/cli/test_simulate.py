@@ -228,7 +228,7 @@ def test_commands_from_a_file(capsys: pytest.CaptureFixture[str], monkeypatch: p
         ("why", "why which event? why EVENT"),
         ("undo 0", "N is a number from 1 to 1000000: undo [N]"),
         ("random", "N is a number from 1 to 1000000: random N [SEED]"),
-        ("random x", "'x' is no whole number: random N [SEED]"),
+        ("random x", "'x' is not a whole number: random N [SEED]"),
         ("until-trouble 1 2 3", "too many words: until-trouble [N] [SEED]"),
         ("save", "save to which file?"),
         ("save x.doc", "x.doc: the name of a saved run ends in .jsonl (an event log) or .py (a test)"),

@@ -77,27 +77,27 @@ def test_lines_that_were_torn_by_a_full_disk_are_those_that_the_log_counts(tmp_p
         ("hello", "no JSON"),
         ('{"time": NaN, "kind": "x"}', "no JSON"),
         ("[" * 100_000, "nested too deeply"),
-        ({"kind": "event"}, "its 'time' is no number of seconds"),
-        ({"time": 1e308, "kind": "x"}, "its 'time' is no number of seconds"),
-        ({"time": -2e12, "kind": "x"}, "its 'time' is no number of seconds"),
+        ({"kind": "event"}, "its 'time' is not a number of seconds"),
+        ({"time": 1e308, "kind": "x"}, "its 'time' is not a number of seconds"),
+        ({"time": -2e12, "kind": "x"}, "its 'time' is not a number of seconds"),
         ({"time": 1.0, "kind": "x\x01"}, "it has no 'kind'"),
-        (event(name="go\ud800"), "its 'event' is no event's name"),
-        (event(name="go\x1b[31m"), "its 'event' is no event's name"),
-        ({"time": 1.0, "kind": "fault", "what": "it \x00 broke"}, "its 'what' is no text that can be shown"),
-        ({"time": 1.0, "kind": "fault", "what": "\udfff"}, "its 'what' is no text that can be shown"),
-        (event(True), "its 'time' is no number of seconds"),
-        ('{"time": 1e999, "kind": "x"}', "its 'time' is no number of seconds"),
-        ('{"time": 1' + "0" * 400 + ', "kind": "x"}', "its 'time' is no number of seconds"),
+        (event(name="go\ud800"), "its 'event' is not an event's name"),
+        (event(name="go\x1b[31m"), "its 'event' is not an event's name"),
+        ({"time": 1.0, "kind": "fault", "what": "it \x00 broke"}, "its 'what' is not a text that can be shown"),
+        ({"time": 1.0, "kind": "fault", "what": "\udfff"}, "its 'what' is not a text that can be shown"),
+        (event(True), "its 'time' is not a number of seconds"),
+        ('{"time": 1e999, "kind": "x"}', "its 'time' is not a number of seconds"),
+        ('{"time": 1' + "0" * 400 + ', "kind": "x"}', "its 'time' is not a number of seconds"),
         ({"time": 1.0}, "it has no 'kind'"),
-        (event(name=""), "its 'event' is no event's name"),
-        (event(name="x" * 601), "its 'event' is no event's name"),
-        (event(name=3), "its 'event' is no event's name"),  # type: ignore[arg-type]
+        (event(name=""), "its 'event' is not an event's name"),
+        (event(name="x" * 601), "its 'event' is not an event's name"),
+        (event(name=3), "its 'event' is not an event's name"),  # type: ignore[arg-type]
         (event(controllable="yes"), "its 'controllable' is neither true nor false"),
         (event(state=None), "it has no 'state'"),
-        (event(state={"A": None}), "the state of 'A' is no state with variables"),
-        (event(state={"A": {"state": 1, "variables": {}}}), "the state of 'A' is no state with variables"),
-        (event(state={"A": {"state": "s"}}), "the state of 'A' is no state with variables"),
-        ({"time": 1.0, "kind": "dropped", "count": -1}, "its 'count' is no number of entries"),
+        (event(state={"A": None}), "the state of 'A' is not a state with variables"),
+        (event(state={"A": {"state": 1, "variables": {}}}), "the state of 'A' is not a state with variables"),
+        (event(state={"A": {"state": "s"}}), "the state of 'A' is not a state with variables"),
+        ({"time": 1.0, "kind": "dropped", "count": -1}, "its 'count' is not a number of entries"),
         ('{"time": 1.0, "kind": "x", "n": ' + "9" * 5000 + "}", "no JSON"),
     ],
 )  # fmt: skip
@@ -134,7 +134,7 @@ def test_what_never_ends_is_not_read(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     for place in (pipe, Path("/dev/zero")):
-        with pytest.raises(LogError, match="is no plain file"):
+        with pytest.raises(LogError, match="is not a plain file"):
             read_log(place)
     with pytest.raises(OSError, match="directory"):
         read_log(tmp_path)

@@ -96,7 +96,7 @@ _NOTHING_NEAR = {"value.level": 5}
     ("entries", "line", "sentence"),
     [
         (wrong(1, event="go.request"), 1, "go.request was not allowed: its requirements do not hold"),
-        (wrong(1, event="come.request"), 1, "come.request is no event of the model"),
+        (wrong(1, event="come.request"), 1, "come.request is not an event of the model"),
         (wrong(7, event="look.request"), 7, "look.request was not allowed: its requirements do not hold"),
         (wrong(6, event="look.request"), 6, "look.request happened although look.reset was still to"),
         (wrong(5, event="look.reset", controllable=True), 5, "look.reset was not allowed: the service is waiting"),

@@ -298,7 +298,7 @@ CHOICE = automaton("A", ["a -go-> b", "a -go-> c", "b -back-> a", "c -back-> a"]
     [
         (system(CHOICE), "the event go leads to several states from A.a; its guards must exclude each other"),
         (system(replace(CHOICE, edges=CHOICE.edges[1:], initial=("a", "c"))), "may begin in 2 states"),
-        (system(replace(CHOICE, edges=CHOICE.edges[1:], name='A */ "; exit(1)')), "is no identifier"),
+        (system(replace(CHOICE, edges=CHOICE.edges[1:], name='A */ "; exit(1)')), "is neither an identifier"),
         (
             replace(system(CHOICE), inputs=(InputVariable("go", (), BooleanType()),)),
             "the event 'go' carries data",

@@ -417,7 +417,7 @@ def test_a_package_may_be_called_as_one_likes() -> None:
     supervisor = example_supervisor("line_follower/line_follower")
     assert list(generate(supervisor, "python", GenerateOptions("my_robot"))) == ["my_robot.py"]
     for name in ("My", "1a", "a b", "../x", "a__b", "", "a" * 300, "class"):
-        with pytest.raises(UnsupportedModelError, match="is no name for a package"):
+        with pytest.raises(UnsupportedModelError, match="is not a name for a package"):
             generate(supervisor, "python", GenerateOptions(name))
 
 

@@ -120,7 +120,7 @@ def test_the_readme_names_both_sides(files: GeneratedFiles) -> None:
         ),
         (
             'component C { outgoing message m with identifier: "_x", type: none }',
-            "the identifier '_x' is no name in ROS 1",
+            "the identifier '_x' is not a name in ROS 1",
         ),
     ],
 )

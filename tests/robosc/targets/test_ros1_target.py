@@ -137,12 +137,12 @@ def test_a_package_may_be_called_as_one_likes() -> None:
         ),
         (
             'component C { outgoing message m with identifier: "_x", type: none }',
-            "the identifier '_x' is no name in ROS 1: it begins with an underscore",
+            "the identifier '_x' is not a name in ROS 1: it begins with an underscore",
         ),
         (
             "interface i use Trigger from std_srvs component C {"
             '  service s with identifier: "_s", request: none, response: none links i }',
-            "the identifier '_s' is no name in ROS 1",
+            "the identifier '_s' is not a name in ROS 1",
         ),
         (
             'component C { outgoing message m with identifier: "/diagnostics", type: string }',

@@ -271,11 +271,11 @@ def test_a_package_says_who_maintains_it_under_which_licence() -> None:
         ),
         (
             "interface i use twist from geometry_msgs component C { outgoing message m with type: none links i }",
-            "twist from geometry_msgs, linked by 'm', is no name of a ROS type",
+            "twist from geometry_msgs, linked by 'm', is not a name of a ROS type",
         ),
         (
             "interface i use Twist from Geometry_Msgs component C { outgoing message m with type: none links i }",
-            "Twist from Geometry_Msgs, linked by 'm', is no name",
+            "Twist from Geometry_Msgs, linked by 'm', is not a name",
         ),
         (
             "datatype enum E from double to { value > 1.0 -> a default -> b }"

@@ -135,7 +135,7 @@ class Unit:
             case ArrayType():
                 return place(lvalue.address, type_)
             case ObjectType():
-                raise InternalError(f"{lvalue} is no single value")
+                raise InternalError(f"{lvalue} is not a single value")
             case BooleanType():
                 code = call("boolean_of", read)
             case _:

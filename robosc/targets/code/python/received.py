@@ -135,7 +135,7 @@ class Reader(ReceivedReader):
             case ArrayType(element=element):
                 return self._read_array(path, type_, element)
             case _:
-                raise InternalError(f"{path_text(path)} is no single value")
+                raise InternalError(f"{path_text(path)} is not a single value")
         return self._assign(path, type_, value)
 
     def _read_array(self, path: Path, type_: Type, element: Type) -> Code:

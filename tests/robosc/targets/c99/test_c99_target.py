@@ -487,7 +487,7 @@ def test_the_prefix_may_be_chosen() -> None:
     files = generate(example_supervisor("line_follower/line_follower"), "c99", GenerateOptions("my_robot"))
     assert "my_robot_supervisor.c" in files
     assert "my_robot_supervisor_init" in files["my_robot_supervisor.h"]
-    with pytest.raises(UnsupportedModelError, match="is no name for a package"):
+    with pytest.raises(UnsupportedModelError, match="is not a name for a package"):
         generate(example_supervisor("line_follower/line_follower"), "c99", GenerateOptions("My-Robot"))
 
 

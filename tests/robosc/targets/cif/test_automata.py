@@ -175,8 +175,8 @@ def test_a_name_that_is_hidden_is_written_from_the_root() -> None:
 @pytest.mark.parametrize(
     ("name", "literal", "data", "message"),
     [
-        ("service calibrate", "a", "", "'service calibrate' is no name of CIF"),
-        ("p", "a-b", "", "'a-b' is no name of CIF"),
+        ("service calibrate", "a", "", "'service calibrate' is not a name of CIF"),
+        ("p", "a-b", "", "'a-b' is not a name of CIF"),
         ("p", "a", "e", "the event 'e' carries data"),
         ("e", "a", "e", "the event 'e' carries data"),
     ],

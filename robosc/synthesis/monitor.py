@@ -1,6 +1,7 @@
 """Cancellation and progress of a synthesis."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from robosc.errors import SynthesisCancelled
@@ -46,3 +47,60 @@ class ProgressMonitor:
         nodes = states.dag_size
         self.peak_nodes = max(self.peak_nodes, nodes)
         self._on_progress(SynthesisProgress(phase, rounds, nodes))
+
+
+class EffortSpentError(Exception):
+    """The work has taken more steps than it may.
+
+    Args:
+        monitor: Monitor whose limit ended it.
+    """
+
+    def __init__(self, monitor: "BoundedMonitor") -> None:
+        super().__init__(f"more than {monitor.limit} steps")
+        self.monitor = monitor
+
+
+class BoundedMonitor(ProgressMonitor):
+    """A monitor that counts steps, and ends the work at a limit once one is set.
+
+    Args:
+        monitor: Monitor of the waiting caller.
+        limit: Steps beyond which the work ends; None for no limit.
+
+    Attributes:
+        steps: Steps so far; the same for every engine.
+        limit: Steps beyond which the work ends.
+    """
+
+    def __init__(self, monitor: ProgressMonitor, limit: int | None = None) -> None:
+        super().__init__(lambda: False, lambda progress: None)
+        self._monitor = monitor
+        self.steps = 0
+        self.limit = limit
+
+    def check_stop(self) -> None:
+        """Before each step.
+
+        Raises:
+            SynthesisCancelled: The work is to end.
+            NodeLimitError: There are more nodes than there may be.
+            EffortSpentError: It has taken more steps than it may.
+        """
+        self._monitor.check_stop()
+        self.steps += 1
+        if self.limit is not None and self.steps > self.limit:
+            raise EffortSpentError(self)
+
+    def tell(self, phase: str, rounds: int, states: Any) -> None:
+        """Pass on progress."""
+        self._monitor.tell(phase, rounds, states)
+
+    @contextmanager
+    def ending_quietly(self) -> Iterator[None]:
+        """Within the block the limit ends the work without an error."""
+        try:
+            yield
+        except EffortSpentError as error:
+            if error.monitor is not self:
+                raise

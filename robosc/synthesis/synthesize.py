@@ -75,7 +75,7 @@ class _Synthesis:
         """The supervisor, or why there is none."""
         fixed_point = FixedPoint(self._encoding, self._monitor)
         with self._place.reordering():
-            good = fixed_point.good_states(self._problem, self._manager.false)
+            good = fixed_point.solution(self._problem, self._manager.false)
             reachable = None if good.reason else fixed_point.reachable_states(self._problem, good.states)
         if good.reason:
             statistics = self._statistics(good.rounds, 0)

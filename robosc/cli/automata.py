@@ -17,6 +17,7 @@ from robosc.cli.output import (
     require_other_file,
     write_bytes,
 )
+from robosc.cli.statistics import Figures, timed
 from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.json_documents import counts_text, diagnostics_json
 from robosc.model.structure import Deployment
@@ -50,6 +51,7 @@ class Synthesized:
         reason: Reason why there is no supervisor; empty if there is one, or the findings tell.
         supervisor: The supervisor, or None.
         explanation: Explanation of what is to blame if no supervisor exists.
+        figures: Figures of the synthesis; None if there was none.
     """
 
     bundle: Bundle
@@ -58,6 +60,7 @@ class Synthesized:
     reason: str
     supervisor: "SystemSupervisor | None"
     explanation: "EmptyExplanation | None" = None
+    figures: Figures | None = None
 
 
 def synthesized(arguments: argparse.Namespace, initial: str | None = None) -> Synthesized:
@@ -70,17 +73,17 @@ def synthesized(arguments: argparse.Namespace, initial: str | None = None) -> Sy
     Raises:
         UsageError: An argument means nothing for it, it cannot be read, or the initial states name what is not there.
     """
-    from robosc.explanation import EmptyExplanation
-    from robosc.pipeline.results import SynthesisStatus
+    from robosc.pipeline.results import NoSupervisor, SynthesisStatus
 
     bundle, found = _checked(arguments)
     if found.system is None:
         return Synthesized(bundle, SynthesisStatus.MODEL_ERRORS, found.diagnostics, "", None)
     if initial is not None:
         found = _beginning(found, initial)
-    made = _synthesis(arguments, found)
-    explanation = made.explanation if isinstance(made.explanation, EmptyExplanation) else None
-    return Synthesized(bundle, made.status, found.diagnostics, made.reason, made.supervisor, explanation)
+    made, seconds = timed(lambda: _synthesis(arguments, found))
+    explanation = None if isinstance(made.explanation, NoSupervisor) else made.explanation
+    figures = Figures(made.statistics, seconds)
+    return Synthesized(bundle, made.status, found.diagnostics, made.reason, made.supervisor, explanation, figures)
 
 
 def _beginning(found: "CheckedSystem", initial: str) -> "CheckedSystem":
@@ -178,6 +181,7 @@ def synth(arguments: argparse.Namespace) -> ExitCode:
                 ],
                 "conditions": {name: str(item) for name, item in made.supervisor.conditions.items()},
                 "initial": None if initial is None else str(initial),
+                **_statistics_json(arguments, made),
                 **diagnostics_json(made.diagnostics),
             }
         )
@@ -188,6 +192,7 @@ def synth(arguments: argparse.Namespace) -> ExitCode:
     sys.stdout.write("".join(f"{visible(line)}\n" for text in told for line in text.split("\n")))
     if output is not None:
         sys.stdout.write(f"written to {output}\n")
+    sys.stdout.write(_statistics_text(arguments, made))
     return ExitCode.OK
 
 
@@ -336,11 +341,21 @@ def report_none(arguments: argparse.Namespace, made: Synthesized) -> ExitCode:
     if arguments.json:
         explanation = document(made.explanation) if made.explanation else None
         told = {"status": str(made.status), "reason": made.reason, "explanation": explanation}
-        print_json({**told, **diagnostics_json(made.diagnostics)})
+        print_json({**told, **_statistics_json(arguments, made), **diagnostics_json(made.diagnostics)})
     else:
         print_diagnostics(made.diagnostics, made.bundle)
         if made.reason:
             sys.stderr.write(f"{arguments.model}: {visible(made.reason)}\n")
         if made.explanation is not None:
             sys.stderr.write(empty_text(made.explanation))
+        sys.stdout.write(_statistics_text(arguments, made))
     return ExitCode.FAILED
+
+
+def _statistics_json(arguments: argparse.Namespace, made: Synthesized) -> dict[str, object]:
+    is_asked = getattr(arguments, "statistics", False)
+    return {"statistics": made.figures.document() if made.figures else None} if is_asked else {}
+
+
+def _statistics_text(arguments: argparse.Namespace, made: Synthesized) -> str:
+    return str(made.figures or "") if getattr(arguments, "statistics", False) else ""

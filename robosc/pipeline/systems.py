@@ -296,6 +296,8 @@ def _synthesized_in_modules(
         iterations=max(item.iterations for item in figures),
         peak_nodes=max(item.peak_nodes for item in figures),
         states=found.states or 0,
+        search=max(item.search for item in figures),
+        closure=figures[0].closure,
     )
     group_of = {place: number for number, group in enumerate(found.groups, start=1) for place in group}
     modules = tuple(

@@ -6,7 +6,7 @@ guards. Predecessors are found by substitution, forward images with a relation f
 order.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
@@ -21,7 +21,7 @@ from robosc.synthesis.saturation import CompiledSaturation, Saturation
 from robosc.synthesis.step import Step
 from robosc.synthesis.transitions import Steps
 
-_FIRST_STEPS = 1000
+_FIRST_STEPS = 16_000
 """Steps that each of two ways is tried with at first; most systems need fewer."""
 
 
@@ -101,22 +101,23 @@ class FixedPoint:
             problem: The problem.
             known: States that are told beforehand to be good.
         """
-        limit = _FIRST_STEPS
+        limit, start = _FIRST_STEPS, self.initial & problem.safe
         while True:
-            backwards, onwards = BoundedMonitor(self._monitor, limit), BoundedMonitor(self._monitor, limit)
-            with backwards.ending_quietly():
-                return self._watched_by(backwards).good_states(problem, known)
-            with onwards.ending_quietly():
-                reached = self._watched_by(onwards).states_from(problem, self.initial & problem.safe, problem.safe)
+            found = self._bounded(limit, lambda solver: solver.good_states(problem, known))
+            if found is not None:
+                return found
+            reached = self._bounded(limit, lambda solver: solver.states_from(problem, start, problem.safe))
+            if reached is not None:
                 break
             limit *= 2
         found = self.good_states(Problem(problem.steps, reached), known & reached)
         return replace(found, is_of_reached=True)
 
-    def _watched_by(self, monitor: ProgressMonitor) -> "FixedPoint":
-        found = copy(self)
-        found._monitor = monitor
-        return found
+    def _bounded[T](self, limit: int, work: Callable[["FixedPoint"], T]) -> T | None:
+        """Return the result of some work, or None if it takes more steps than a limit."""
+        solver, monitor = copy(self), BoundedMonitor(self._monitor, limit)
+        solver._monitor = monitor
+        return monitor.result_of(lambda: work(solver))
 
     def good_states(self, problem: Problem, known: Any) -> GoodStates:
         """The states from which a supervisor can solve a problem; `known` ones are told beforehand to be such."""

@@ -1,7 +1,6 @@
 """Cancellation and progress of a synthesis."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 from robosc.errors import SynthesisCancelled
@@ -31,8 +30,11 @@ class ProgressMonitor:
         self._check_nodes = check_nodes
         self.peak_nodes = 0
 
-    def check_stop(self) -> None:
+    def check_stop(self, steps: int = 1) -> None:
         """Before each step.
+
+        Args:
+            steps: Number of steps since the last call, which may stand for several.
 
         Raises:
             SynthesisCancelled: The work is to end.
@@ -79,16 +81,22 @@ class BoundedMonitor(ProgressMonitor):
         self.steps = 0
         self.limit = limit
 
-    def check_stop(self) -> None:
+    def check_stop(self, steps: int = 1) -> None:
         """Before each step.
+
+        Args:
+            steps: Number of steps since the last call, which may stand for several.
 
         Raises:
             SynthesisCancelled: The work is to end.
             NodeLimitError: There are more nodes than there may be.
             EffortSpentError: It has taken more steps than it may.
         """
-        self._monitor.check_stop()
-        self.steps += 1
+        self.steps += steps
+        # What asks less often goes a little beyond the limit; that is nothing to count.
+        beyond = 0 if self.limit is None else max(0, self.steps - self.limit - 1)
+        self.steps -= beyond
+        self._monitor.check_stop(steps - beyond)
         if self.limit is not None and self.steps > self.limit:
             raise EffortSpentError(self)
 
@@ -96,11 +104,12 @@ class BoundedMonitor(ProgressMonitor):
         """Pass on progress."""
         self._monitor.tell(phase, rounds, states)
 
-    @contextmanager
-    def ending_quietly(self) -> Iterator[None]:
-        """Within the block the limit ends the work without an error."""
+    def result_of[T](self, work: Callable[[], T]) -> T | None:
+        """Return the result of some work that asks this monitor, or None if its limit has ended the work."""
+        # No context manager: those of contextlib keep the frames of an error, and their predicates, in a cycle.
         try:
-            yield
+            return work()
         except EffortSpentError as error:
             if error.monitor is not self:
                 raise
+            return None

@@ -18,7 +18,7 @@ from robosc.cli.output import (
     write_bytes,
 )
 from robosc.cli.statistics import Figures, timed
-from robosc.errors import Diagnostic, UnsupportedModelError
+from robosc.errors import Diagnostic, InvalidSupervisorError, UnsupportedModelError
 from robosc.json_documents import counts_text, diagnostics_json
 from robosc.model.structure import Deployment
 from robosc.pipeline.automata_files import SUFFIXES, is_automata
@@ -33,6 +33,10 @@ if TYPE_CHECKING:
     from robosc.pipeline.results import SynthesisStatus
     from robosc.pipeline.synthesis import OnProgress
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
+
+
+_SUPERVISOR = ".rsup"
+"""Ending of a supervisor's file."""
 
 
 def is_given(arguments: argparse.Namespace) -> bool:
@@ -155,8 +159,9 @@ def synth(arguments: argparse.Namespace) -> ExitCode:
     """
     output = arguments.output
     refuse(
-        output is not None and output.suffix not in SUFFIXES,
-        f"-o: the controlled system of automata is written to a file that ends in {', '.join(sorted(SUFFIXES))}",
+        output is not None and output.suffix not in {*SUFFIXES, _SUPERVISOR},
+        f"-o: the supervisor of automata is written to a file that ends in {_SUPERVISOR}, and the controlled system "
+        f"to one that ends in {', '.join(sorted(SUFFIXES))}",
     )
     refuse(arguments.allow_livelock, "--allow-livelock: automata have no silent steps of a controller")
     made = synthesized(arguments)
@@ -165,7 +170,11 @@ def synth(arguments: argparse.Namespace) -> ExitCode:
     if output is not None:
         for file in (made.bundle.main, *made.bundle.libraries):
             require_other_file(output, Path(file.name))
-        write_bytes(output, controlled_system(made.supervisor, output.suffix).encode())
+        is_supervisor = output.suffix == _SUPERVISOR
+        write_bytes(
+            output,
+            made.supervisor.encode() if is_supervisor else controlled_system(made.supervisor, output.suffix).encode(),
+        )
     initial = made.supervisor.initial_condition
     if arguments.json:
         print_json(
@@ -225,12 +234,17 @@ def verify(arguments: argparse.Namespace) -> ExitCode:
     """
     from robosc.pipeline.results import VerificationStatus
     from robosc.pipeline.systems import verify_system
+    from robosc.signatures import SignatureError
     from robosc.verification import Limits
 
-    refuse(arguments.supervisor is not None, "FILE.rsup: a supervisor file is of a robot, not of automata")
     refuse(bool(arguments.property or arguments.properties), "--property: properties are of robots, not of automata")
-    refuse(bool(arguments.signed_by), "--signed-by: a supervisor file is of a robot, not of automata")
-    made = synthesized(arguments)
+    refuse(arguments.supervisor is None and bool(arguments.signed_by), "--signed-by: it needs FILE.rsup")
+    try:
+        made = synthesized(arguments) if arguments.supervisor is None else _read(arguments)
+    except (InvalidSupervisorError, SignatureError) as error:
+        from robosc.cli.verify import report_malformed
+
+        return report_malformed(arguments, error)
     if made.supervisor is None:
         return report_none(arguments, made)
     supervisor, options, limits = made.supervisor, _options(arguments), Limits.of(arguments.limit)
@@ -247,6 +261,31 @@ def verify(arguments: argparse.Namespace) -> ExitCode:
         if not (has_passed and arguments.quiet):
             sys.stdout.write(str(result) if str(result).endswith("\n") else f"{result}\n")
     return ExitCode.OK if has_passed else ExitCode.FAILED
+
+
+def _read(arguments: argparse.Namespace) -> Synthesized:
+    """Read the supervisor's file of a command, which has to be of the automata of its model.
+
+    Raises:
+        InvalidSupervisorError: It is malformed, or one of other automata.
+        SignatureError: It is not signed as it must be.
+        UsageError: A file cannot be read.
+    """
+    from robosc.cli.sign import read_supervisor, signer_of
+    from robosc.cli.verify import tell_signer
+    from robosc.pipeline.results import SynthesisStatus
+    from robosc.pipeline.systems import decode_system
+
+    content = read_supervisor(arguments.supervisor)
+    bundle, found = _checked(arguments)
+    if found.system is None:
+        return Synthesized(bundle, SynthesisStatus.MODEL_ERRORS, found.diagnostics, "", None)
+    if arguments.signed_by:
+        tell_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
+    supervisor = decode_system(content)
+    if supervisor.system != found.system:
+        raise InvalidSupervisorError(f"the supervisor is one of other automata than those of {bundle.main.name}")
+    return Synthesized(bundle, SynthesisStatus.SUPERVISOR, found.diagnostics, "", supervisor)
 
 
 def explain_synthesis(arguments: argparse.Namespace) -> ExitCode:

@@ -352,9 +352,13 @@ def verify_system(
     found = verified.verification
     outcomes = {name: getattr(found, name) for name in _CHECKS}
     is_complete = verified.is_complete and not (is_strict and CheckOutcome.NOT_CHECKED in outcomes.values())
+    # What a file says of itself is not believed either; of a wrong supervisor the figure says nothing more.
+    told, counted = supervisor.states, found.states
+    is_miscounted = told > 0 and counted not in (None, told) and not found.failures
+    miscount = f"it tells of {told}, and there are {counted}" if is_miscounted else ""
     status = (
         VerificationStatus.FAILED
-        if found.failures
+        if found.failures or miscount
         else VerificationStatus.PASSED
         if is_complete
         else VerificationStatus.NOT_CHECKED
@@ -374,7 +378,8 @@ def verify_system(
                 },
             }
             for item in found.failures
-        ],
+        ]
+        + [{"check": "states", "message": miscount, "trace": [], "shortest": True, "state": {}}] * bool(miscount),
         "states": found.states,
         "transitions": found.transitions,
         "method": verified.method,
@@ -385,6 +390,7 @@ def verify_system(
     lines += [
         f"not {item.property}: {item.message}, after {', '.join(item.trace) or 'nothing'}" for item in found.failures
     ]
+    lines += [f"wrong states: {miscount}"] if miscount else []
     return Verification(status, (), "", report, "\n".join(lines) + "\n")
 
 

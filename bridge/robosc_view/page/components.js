@@ -4,7 +4,7 @@ import { byId, make, mark, quoted, say, show } from "./dom.js";
 import { count, value } from "./format.js";
 import { afterPainting } from "./frame.js";
 import { Graph } from "./graph.js";
-import { received, under } from "./received.js";
+import { isAutomata, received, under } from "./received.js";
 
 const SERVED = new Set(["service", "action"]);
 const WIDE_PX = 430;
@@ -41,6 +41,7 @@ class Card {
 
   headline(id, enlarge) {
     const parts = [make("h3", { id }, quoted(this.component.name)), this.state];
+    if (this.component.role) parts.splice(1, 0, make("span", { class: "quiet" }, this.component.role));
     if (this.graph) {
       const button = make("button", { type: "button", class: "plain icon", "aria-label": `Enlarge the graph of ${this.component.name}` }, "⤢");
       button.addEventListener("click", () => enlarge(this, button));
@@ -142,6 +143,7 @@ export function startComponents() {
       const { components = [], communications = [] } = received.definition;
       const byComponent = Map.groupBy(communications, (item) => item.component);
       cards = new Map(components.map((item, i) => [item.name, new Card(item, byComponent.get(item.name) ?? [], i, enlarge)]));
+      say(byId("components-title"), isAutomata() ? "Automata" : "Components");
       byId("cards").replaceChildren(...[...cards.values()].map((card) => card.element));
       narrow();
     },

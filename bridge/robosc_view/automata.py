@@ -30,8 +30,8 @@ MAXIMUM_EVENTS = 500
 MAXIMUM_AUTOMATA = 500
 """Sizes beyond which there is no page: nobody could find anything on it."""
 
-MAXIMUM_DRAWN = 10_000
-"""Edges that are drawn at all; automata after those are listed."""
+MAXIMUM_DRAWN = 3_000
+"""Edges of all automata that are laid out, which takes its time; automata after those are listed."""
 
 
 def too_large(system: System) -> str:

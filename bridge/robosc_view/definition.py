@@ -97,7 +97,7 @@ class DrawnAutomaton:
 
     Attributes:
         role: `plant`, `requirement` or `input variable`.
-        nodes: Its locations.
+        nodes: Its locations; none where it is not drawn because too much is.
         arrows: Its edges.
     """
 
@@ -242,6 +242,7 @@ def definition_text(robot: Robot) -> str:
             {
                 "name": item.name,
                 "role": "" if drawn is None else drawn.role,
+                "is_left_out": drawn is not None and not drawn.nodes,
                 "communications": [*item.messages, *item.services, *item.actions],
                 "graph": layout(drawn.nodes, drawn.arrows)
                 if drawn is not None

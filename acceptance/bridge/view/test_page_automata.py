@@ -153,10 +153,13 @@ def test_names_are_never_markup(browser: Browser, tmp_path: Path) -> None:
         assert seen.errors == []
 
 
-def test_a_system_of_many_events_is_filtered(browser: Browser, tmp_path: Path) -> None:
+def test_a_large_system_is_filtered_and_drawn_in_part(browser: Browser, tmp_path: Path) -> None:
     file = tmp_path / "many.cif"
+    ring = "".join(f"location l{place}: edge p0.c_a goto l{(place + 1) % 1500}; " for place in range(1, 1500))
     file.write_text(
-        "".join(
+        f"plant ring: location l0: initial; marked; edge p0.c_a goto l1; {ring} end\n"
+        f"plant twin: location l0: initial; marked; edge p0.c_a goto l1; {ring} end\n"
+        + "".join(
             f"plant p{number}: controllable c_a; uncontrollable u_b;\n"
             "location l: initial; marked; edge c_a goto m; location m: edge u_b goto l; end\n"
             for number in range(250)
@@ -166,6 +169,8 @@ def test_a_system_of_many_events_is_filtered(browser: Browser, tmp_path: Path) -
     with view_process(file) as (_, url), visit(browser, url) as seen:
         page = seen.page
         expect(page.locator(".play-event")).to_have_count(500)
+        expect(page.locator('[data-component="ring"]')).to_contain_text("too large to be drawn")
+        expect(page.locator('[data-component="p0"]')).to_contain_text("It is not drawn: the automata before it")
         page.locator("#play-filter").fill("p17.")
         expect(page.locator(".play-event:visible")).to_have_count(2)
         page.locator(form_of("p17.c_a")).locator("button").click()

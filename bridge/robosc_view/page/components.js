@@ -11,6 +11,7 @@ const WIDE_PX = 430;
 const LEAST_SCALE = 0.75;
 const NO_BEHAVIOUR = "No behaviour of its own.";
 const TOO_LARGE = "Its graph is too large to be drawn.";
+const LEFT_OUT = "It is not drawn: the automata before it are as much as can be drawn.";
 const KINDS = { __proto__: null, controllable: "controllable", uncontrollable: "uncontrollable", silent: "silent" };
 
 class Card {
@@ -67,7 +68,7 @@ class Card {
     const state = shown?.state ?? null;
     say(this.state, state ?? (this.graph ? "not known" : ""));
     if (this.graph && state !== this.graph.active) this.setActive(state);
-    if (this.note) say(this.note, state === null ? NO_BEHAVIOUR : TOO_LARGE);
+    if (this.note) say(this.note, state === null ? NO_BEHAVIOUR : this.component.is_left_out ? LEFT_OUT : TOO_LARGE);
     this.paintVariables(shown?.variables ?? {});
     for (const [name, place] of this.places) {
       const location = under(places, name) ?? "not known";

@@ -125,7 +125,9 @@ export function startPlay(send, token) {
     if (lines.length > 0) announce("play", [LEADS[kind], ...lines].join(" "));
   };
   const want = (message) => {
-    if (!send(message)) tell("wrong", ["there is no connection"]);
+    const isSent = send(message);
+    if (!isSent) tell("wrong", ["there is no connection"]);
+    return isSent;
   };
 
   for (const type of ["undo", "redo"]) byId(`play-${type}`).addEventListener("click", () => want({ type }));
@@ -143,7 +145,8 @@ export function startPlay(send, token) {
     const seed = walks;
     walks += 1;
     const steps = untilTrouble ? 1000 : Math.min(Math.max(Math.trunc(Number(byId("play-steps").value)) || 1, 1), 5000);
-    want({ type: "walk", steps, seed, until_trouble: untilTrouble });
+    // Of a large system it takes its time.
+    if (want({ type: "walk", steps, seed, until_trouble: untilTrouble })) tell("step", ["chance goes on…"]);
   };
   byId("play-walk").addEventListener("click", () => walk(false));
   byId("play-trouble").addEventListener("click", () => walk(true));

@@ -22,7 +22,7 @@ from robosc.errors import Diagnostic, InvalidSupervisorError, UnsupportedModelEr
 from robosc.json_documents import counts_text, diagnostics_json
 from robosc.model.structure import Deployment
 from robosc.pipeline.automata_files import SUFFIXES, is_automata
-from robosc.source import Bundle, visible
+from robosc.source import Bundle, SourceFile, visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -67,19 +67,20 @@ class Synthesized:
     figures: Figures | None = None
 
 
-def synthesized(arguments: argparse.Namespace, initial: str | None = None) -> Synthesized:
+def synthesized(arguments: argparse.Namespace, initial: str | None = None, text: str | None = None) -> Synthesized:
     """Check the model of a command, and synthesize if it has no errors.
 
     Args:
         arguments: Arguments of the command.
         initial: Description of the states in which automata begin, such as `tank.level = 1`; None: as the model says.
+        text: All of the model, whose file only gives it a name then; None: the file's.
 
     Raises:
         UsageError: An argument means nothing for it, it cannot be read, or the initial states name what is not there.
     """
     from robosc.pipeline.results import NoSupervisor, SynthesisStatus
 
-    bundle, found = _checked(arguments)
+    bundle, found = _checked(arguments, text)
     if found.system is None:
         return Synthesized(bundle, SynthesisStatus.MODEL_ERRORS, found.diagnostics, "", None)
     if initial is not None:
@@ -318,7 +319,7 @@ def explain_synthesis(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.FAILED if is_empty else ExitCode.OK
 
 
-def _checked(arguments: argparse.Namespace) -> "tuple[Bundle, CheckedSystem]":
+def _checked(arguments: argparse.Namespace, text: str | None = None) -> "tuple[Bundle, CheckedSystem]":
     from robosc.pipeline.automata_files import check_automata_file, load_automata_file
 
     refuse(bool(arguments.library_path), "-L: automata import no libraries, and CIF models files by their places")
@@ -327,7 +328,7 @@ def _checked(arguments: argparse.Namespace) -> "tuple[Bundle, CheckedSystem]":
     from robosc.pipeline.files import FileAccessError
 
     try:
-        bundle = load_automata_file(arguments.model)
+        bundle = load_automata_file(arguments.model) if text is None else Bundle(SourceFile(str(arguments.model), text))
     except FileAccessError as error:
         raise UsageError(str(error)) from error
     return bundle, check_automata_file(bundle)

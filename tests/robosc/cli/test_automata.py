@@ -168,7 +168,7 @@ def test_plain_automata_of_other_tools(tmp_path: Path, capsys: pytest.CaptureFix
         assert (document["states"], document["conditions"]) == (2, {"tank.c_fill": "true"})
         assert run(capsys, "verify", str(controlled))[0] == 0
         assert run(capsys, "generate", str(controlled), "--target", "c99", "-o", str(tmp_path / ending))[0] == 0
-        assert run(capsys, "view" if ending == ".gen" else "doc", str(controlled))[0] == 2
+        assert run(capsys, "format" if ending == ".gen" else "doc", str(controlled))[0] == 2
         controlled.write_text("x")
         status, out, err = run(capsys, "check", str(controlled))
         assert (status, "[automata-syntax]" in out + err) == (1, True)
@@ -387,7 +387,7 @@ def test_simulate_begins_as_it_is_told(model: str, tmp_path: Path, capsys: pytes
         ["doc"],
         ["explain-synthesis", "--deployment", "layer"],
         ["format"],
-        ["view"],
+        ["view", "--scene", "room"],
     ],
 )
 def test_what_means_nothing_for_automata_is_refused(

@@ -85,6 +85,9 @@ def formula_in(vocabulary: Vocabulary, diagram: DecisionDiagram, *, limit: int, 
     """The same as `to_expression`, for many diagrams in one vocabulary."""
     if diagram.root < 2:
         return TRUE if diagram.root else FALSE
+    if effort.available < 1:
+        # Every node takes a step: to read a large diagram for it would take long.
+        return None
     try:
         space = space_of([diagram], vocabulary.domains, effort.part(STEPS))
         found = _Formulas(space, vocabulary, limit).shortest(space.of(diagram))

@@ -27,7 +27,7 @@ from robosc.supervisor.diagram import Subject as Place
 from robosc.supervisor.diagram import diagram_domains
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.nodes import restrict
+from robosc.synthesis.nodes import implies, restrict
 
 MAXIMUM_NODES = 20_000
 """Nodes of what matters up to which more than restricting is tried."""
@@ -74,10 +74,9 @@ class Simplifier:
         Raises:
             UnsupportedModelError: Each tells apart too many ranges of one variable's values.
         """
-        positive, negative = care & wanted, care & ~wanted
-        if negative == self._manager.false:
+        if implies(self._manager, care, wanted):
             return None
-        if positive == self._manager.false:
+        if implies(self._manager, care, ~wanted):
             return extract(self._encoding, self._manager.false)
         plain = wanted & self._encoding.valid_states()
         simple = restrict(self._manager, wanted, care)
@@ -90,7 +89,7 @@ class Simplifier:
             return first
         found: dict[DecisionDiagram, _Length] = {}
         limit = OPERANDS
-        for diagram in self._others(places, positive, negative):
+        for diagram in self._others(places, care & wanted, care & ~wanted):
             if diagram in found:
                 continue
             found[diagram] = self._length(diagram, limit)

@@ -11,6 +11,8 @@ ICCAD 1990, pp. 126-129 (restrict).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from time import monotonic
 from typing import Any
 
 from robosc.automata.state import Subject
@@ -59,14 +61,17 @@ class Simplifier:
 
     Args:
         encoding: The variables.
+        seconds: Seconds, from now on, after which conditions are taken as they are; None for no limit but that of
+            steps.
     """
 
-    def __init__(self, encoding: Encoding) -> None:
+    def __init__(self, encoding: Encoding, seconds: float | None = None) -> None:
         self._encoding = encoding
         self._manager = encoding.manager
         self._domains = diagram_domains(encoding.system)
         self._home = {name: subject for subject, bits in encoding.subjects.items() for name in bits.names}
         self._formulas = Formulas(self._domains)
+        self._end = None if seconds is None else monotonic() + seconds
         self._more, self._left = Effort(TOTAL_STEPS), MAXIMUM_EFFORT
 
     def condition(self, wanted: Any, care: Any) -> DecisionDiagram | None:
@@ -84,6 +89,9 @@ class Simplifier:
         if implies(self._manager, care, ~wanted):
             return extract(self._encoding, self._manager.false)
         plain = wanted & self._encoding.valid_states()
+        if self._is_over():
+            with suppress(UnsupportedModelError):
+                return extract(self._encoding, plain)
         simple = restrict(self._manager, wanted, care)
         if simple.dag_size > plain.dag_size:
             simple = plain
@@ -95,6 +103,8 @@ class Simplifier:
         found: dict[DecisionDiagram, _Length] = {}
         limit = OPERANDS
         for diagram in self._others(places, care & wanted, care & ~wanted):
+            if self._is_over():
+                break
             if diagram in found:
                 continue
             found[diagram] = self._length(diagram, limit)
@@ -109,9 +119,14 @@ class Simplifier:
             return best
         with self._formulas.within(self._more):
             for diagram in self._wider(wanted, care & wanted, care & ~wanted):
+                if self._is_over():
+                    break
                 if diagram not in found:
                     found[diagram] = self._length(diagram, SHORT)
         return min(found, key=lambda diagram: found[diagram])
+
+    def _is_over(self) -> bool:
+        return self._end is not None and monotonic() >= self._end
 
     def _length(self, diagram: DecisionDiagram, limit: int = OPERANDS) -> _Length:
         """Return the length of a condition's formula; one without a formula is longer than any with."""

@@ -2,7 +2,7 @@
 
 import sys
 from dataclasses import replace
-from itertools import product
+from itertools import count, product
 from math import prod
 from random import Random
 from typing import Any
@@ -21,7 +21,7 @@ from robosc.expressions.evaluate import evaluate as evaluate_expression
 from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.supervisor.diagram import diagram_domains, validate
 from robosc.supervisor.predicates import state_predicates
-from robosc.synthesis import SynthesisStatus, simplify, synthesize
+from robosc.synthesis import EngineOptions, SynthesisStatus, simplify, synthesize
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.nodes import restrict
 from support.effort import examples
@@ -124,20 +124,20 @@ def test_what_is_given_up_is_right_all_the_same(
     assert length(system, found) > length(system, best)
 
 
-def rooms(count: int, seed: int) -> System:
+def rooms(number: int, seed: int) -> System:
     """Cats and mice that go through rooms, counted room by room, and never meet."""
     dice = Random(seed)
-    doors = {name: {(room, (room + 1) % count) for room in range(count)} for name in ("cat", "mouse")}
+    doors = {name: {(room, (room + 1) % number) for room in range(number)} for name in ("cat", "mouse")}
     for found in doors.values():
-        found |= {(here, other) for here, other in (dice.sample(range(count), 2) for _ in range(dice.randint(0, 3)))}
+        found |= {(here, other) for here, other in (dice.sample(range(number), 2) for _ in range(dice.randint(0, 3)))}
     automata = []
-    for name, begin in (("cat", 0), ("mouse", count - 1)):
-        for room in range(count):
+    for name, begin in (("cat", 0), ("mouse", number - 1)):
+        for room in range(number):
             edges = [f"some -{name}_{room}_{other}-> none" for here, other in sorted(doors[name]) if here == room]
             edges += [f"none -{name}_{here}_{room}-> some" for here, other in sorted(doors[name]) if other == room]
             initial = "some" if room == begin else "none"
             automata.append(automaton(f"{name}{room}", edges, initial=initial, marked=["some", "none"]))
-    apart = [Binary("or", StateTest(f"cat{room}", "none"), StateTest(f"mouse{room}", "none")) for room in range(count)]
+    apart = [Binary("or", StateTest(f"cat{room}", "none"), StateTest(f"mouse{room}", "none")) for room in range(number)]
     return replace(system(*automata), invariants=tuple(apart))
 
 
@@ -154,6 +154,23 @@ def test_of_places_that_tell_the_same_few_are_tested() -> None:
     for item in synthesize(system_).added:
         formula = formulas.formula(item.condition)
         assert formula is not None and operands(formula) <= 3, item.event
+
+
+def test_when_the_time_is_over_conditions_are_right_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With more time none is longer; the clock goes on by a second whenever it is asked."""
+    clock = count()
+    monkeypatch.setattr(simplify, "monotonic", lambda: float(next(clock)))
+    system_ = FAMILIES["cat and mouse, 1 pair"](2)
+    best = synthesize(system_, engine="autoref").added
+    assert next(clock) == 0, "without a limit no clock is asked"
+    lengths = []
+    for seconds in (0, 3, 8, 20, 60, 1_000):
+        added = synthesize(system_, engine=EngineOptions("autoref", condition_seconds=seconds)).added
+        assert [item.event for item in added] == [item.event for item in best]
+        check_conditions(system_, added)
+        lengths.append(length(system_, added))
+    assert lengths == sorted(lengths, reverse=True)
+    assert lengths[0] > lengths[3] > lengths[-1] == length(system_, best)
 
 
 def length(system: System, added: tuple[AddedCondition, ...]) -> int:

@@ -2,7 +2,7 @@
 
 A condition matters where the controlled system can be, the plant enables the event and the requirements allow it.
 Among those that agree there, candidates are found in five ways: by restricting, by leaving out places of the state (of
-those that restricting leaves, and, where that does not read well, of all), as relations between integers, and as sums
+those that restricting leaves, and, where that does not read well, of all), as relations between variables, and as sums
 of products for what is wanted and for what is not. The one with the shortest formula is kept, and without any the one
 with the smallest diagram. What is kept is what the supervisor holds, so its formula is right in all states.
 
@@ -20,10 +20,10 @@ from robosc.conditions.cover import Words, cover
 from robosc.conditions.formula import OPERANDS, STEPS, length
 from robosc.conditions.literals import operands
 from robosc.conditions.multivalued import MAXIMUM_SUBJECTS, Effort, EffortExceededError, space_of
-from robosc.conditions.relations import MAXIMUM_PLACES, Relations
+from robosc.conditions.relations import Relations, comparable
 from robosc.conditions.rendering import SHORT, TOTAL_STEPS, Formulas
 from robosc.errors import UnsupportedModelError
-from robosc.expressions import TRUE, IntegerType
+from robosc.expressions import TRUE
 from robosc.supervisor import DecisionDiagram
 from robosc.supervisor.diagram import Subject as Place
 from robosc.supervisor.diagram import diagram_domains
@@ -133,13 +133,9 @@ class Simplifier:
         nodes = len(diagram.nodes)
         formula = None
         # Unless places are tested again, or compared with each other, no formula has more nodes than operands.
-        if nodes <= limit or limit == OPERANDS or len(self._integers([diagram])) > 1:
+        if nodes <= limit or limit == OPERANDS or comparable(_subjects([diagram]), self._domains):
             formula = self._formulas.formula(diagram, limit=limit)
         return formula is None, length(TRUE if formula is None else formula), nodes
-
-    def _integers(self, diagrams: Iterable[DecisionDiagram]) -> list[Place]:
-        """The integers that diagrams test."""
-        return [subject for subject in _subjects(diagrams) if isinstance(self._domains[subject].type, IntegerType)]
 
     def _others(self, tested: set[Subject], positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
         """Other conditions over some places that are true in the positive states and false in the negative ones."""
@@ -221,15 +217,15 @@ class Simplifier:
         return positive, negative
 
     def _related(self, diagrams: Sequence[DecisionDiagram]) -> Iterator[DecisionDiagram]:
-        """The states that relations between integers and a short sum of products describe together."""
-        integers = self._integers(diagrams)
-        if not 2 <= len(integers) <= MAXIMUM_PLACES:
+        """The states that relations between variables and a short sum of products describe together."""
+        compared = comparable(_subjects(diagrams), self._domains)
+        if not compared:
             return
         try:
-            space = space_of(diagrams, self._domains, self._formulas.effort.part(STEPS), apart=integers)
+            space = space_of(diagrams, self._domains, self._formulas.effort.part(STEPS), apart=compared)
             relations = Relations(space, Words(space, self._formulas.vocabulary), self._domains)
             sets = [space.of(diagram) for diagram in diagrams]
-            places = relations.integers(range(len(space.subjects)))
+            places = relations.comparable(range(len(space.subjects)))
             pairs = [(sets[0], sets[1]), (sets[1], sets[0])]
             pairs = [pair for pair in pairs if relations.are_enough(*pair, places)] or pairs
         except EffortExceededError:

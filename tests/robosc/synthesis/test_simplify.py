@@ -16,7 +16,16 @@ from robosc.automata.semantics import Semantics
 from robosc.automata.state import subjects
 from robosc.conditions.literals import operands
 from robosc.conditions.rendering import Formulas, in_words
-from robosc.expressions import Binary, BinaryOperator, Expression, IntegerType, StateTest
+from robosc.expressions import (
+    Binary,
+    BinaryOperator,
+    EnumType,
+    EnumValue,
+    Expression,
+    IntegerType,
+    StateTest,
+    Unary,
+)
 from robosc.expressions.evaluate import evaluate as evaluate_expression
 from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.supervisor.diagram import diagram_domains, validate
@@ -31,6 +40,7 @@ from support.systems import automaton, edge, operation, read, system
 
 MOST_STATES = 2_000
 SIGNS: list[BinaryOperator] = ["+", "-"]
+SAMENESS: list[BinaryOperator] = ["=", "!="]
 COMPARISONS: list[BinaryOperator] = ["<=", "<", ">="]
 
 
@@ -106,6 +116,40 @@ def test_counters_that_depend_on_each_other() -> None:
             formulas = [Formulas(diagram_domains(system_)).formula(item.condition) for item in found.added]
             together += "; ".join(in_words(formula, ()) for formula in formulas if formula is not None)
     for part in ("a.n + b.n <= ", "a.n != b.n"):
+        assert part in together, together
+
+
+ROOM = EnumType("Room", ("hall", "attic", "cellar", "yard"))
+
+
+def house(seed: int) -> System:
+    """A cat and a mouse that go from room to room, and a bell that may ring where it does no harm."""
+    dice = Random(seed)
+    automata = []
+    for name in ("cat", "mouse"):
+        edges = []
+        for room in ROOM.values:
+            goes_to = dice.choice([other for other in ROOM.values if other != room])
+            here = operation(read(f"{name}.room"), "=", EnumValue("Room", room))
+            event = f"{dice.choice(['', 'u_'])}{name}_{room}"
+            edges.append(edge(f"still -{event}-> still", here, room=EnumValue("Room", goes_to)))
+        variables = [DiscreteVariable("room", ROOM, (dice.choice(ROOM.values),))]
+        automata.append(automaton(name, edges, variables=variables))
+    together = operation(read("cat.room"), dice.choice(SAMENESS), read("mouse.room"))
+    bell = automaton("bell", ["still -ring-> rung", "rung -rest-> still", edge("rung -u_fight-> lost", together)])
+    return replace(system(*automata, bell), invariants=(Unary("not", StateTest("bell", "lost")),))
+
+
+def test_enumerations_that_depend_on_each_other() -> None:
+    together = ""
+    for seed in range(12):
+        system_ = house(seed)
+        found = synthesize(system_, engine="autoref")
+        if found.status is SynthesisStatus.SUPERVISOR:
+            check_conditions(system_, found.added)
+            formulas = [Formulas(diagram_domains(system_)).formula(item.condition) for item in found.added]
+            together += "; ".join(in_words(formula, ()) for formula in formulas if formula is not None)
+    for part in ("cat.room = mouse.room", "cat.room != mouse.room"):
         assert part in together, together
 
 

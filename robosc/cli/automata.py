@@ -348,7 +348,10 @@ def _options(arguments: argparse.Namespace) -> "SynthesisOptions":
     from robosc.pipeline.options import SynthesisOptions
 
     return SynthesisOptions(
-        engine=arguments.engine or "auto", allow_reordering=arguments.reorder, maximum_nodes=arguments.max_nodes
+        engine=arguments.engine or "auto",
+        allow_reordering=arguments.reorder,
+        maximum_nodes=arguments.max_nodes,
+        condition_seconds=getattr(arguments, "condition_seconds", None),
     )
 
 

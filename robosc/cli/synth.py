@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 from robosc.cli import automata
 from robosc.cli.arguments import (
     SYNTHESIS_STATES,
+    add_condition_seconds_argument,
     add_deployment_argument,
     add_engine_options,
     add_livelock_argument,
@@ -74,6 +75,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_output_argument(parser)
     add_deployment_argument(parser)
     add_engine_options(parser)
+    add_condition_seconds_argument(parser)
     add_verify_limit_argument(parser, "--verify-limit", SYNTHESIS_STATES)
     add_livelock_argument(parser)
     parser.add_argument(

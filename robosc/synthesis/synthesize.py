@@ -91,12 +91,13 @@ class _Synthesis:
             return SynthesisResult(SynthesisStatus.EMPTY, (), statistics, good.reason)
         states = count_models(self._manager, reachable, self._encoding.state_names)
         added: list[AddedCondition] = []
-        simplifier = Simplifier(self._encoding)
+        simplifier = Simplifier(self._encoding, self._place.condition_seconds)
         for steps in self._problem.steps:
             self._monitor.check_stop()
             condition = self._added(simplifier, steps, good.states, reachable)
             if condition is not None:
                 added.append(AddedCondition(steps.event.name, condition))
+        initial = simplifier.condition(good.states, fixed_point.initial)
         # The figures are those of the synthesis: what the questions take on top is not in them.
         statistics = self._statistics(good, states, closure)
         controlled = ControlledSystem(self._encoding, self._monitor, self._problem, good.states, reachable)
@@ -105,7 +106,7 @@ class _Synthesis:
             tuple(added),
             statistics,
             answers=controlled.answers(questions),
-            initial=simplifier.condition(good.states, fixed_point.initial),
+            initial=initial,
         )
 
     def _statistics(self, good: GoodStates, states: int, closure: Closure) -> Statistics:

@@ -133,6 +133,18 @@ def test_it_restricts_as_python_does(seed: int) -> None:
     assert found.restrict(predicate, care) == nodes._Restrict(manager).walk(predicate, care)
 
 
+@settings(max_examples=examples(60))
+@given(seed=st.integers(0, 2**32))
+def test_it_tells_as_python_does_whether_one_implies_another(seed: int) -> None:
+    dice = Random(seed)
+    manager = manager_with(PLACES)
+    predicate, other = (random_predicate(manager, dice, PLACES, 2) for _ in range(2))
+    found = kernel_of(manager)
+    assert found is not None
+    for left, right in ((predicate, other), (predicate & other, other), (predicate, predicate | other)):
+        assert found.implies(left, right) == (left & ~right == manager.false)
+
+
 def counter(manager: Manager, bits: int) -> tuple[dict[str, int], Step]:
     """Counts with some bits upwards: as many rounds as there are numbers."""
     names = tuple(f"x{place}" for place in range(bits))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from robosc.cli.arguments import add_given_supervisor_options, suggest
 from robosc.cli.output import CommandError, ExitCode, UsageError
-from robosc.pipeline.automata_files import is_automata
+from robosc.pipeline.automata_files import SUFFIXES, is_automata
 
 if TYPE_CHECKING:
     from robosc.event_logs import LoggedRun
@@ -22,12 +22,11 @@ if TYPE_CHECKING:
     from robosc_view.definition import Robot
     from robosc_view.motion import SeenMotion
     from robosc_view.sources import Source
-    from robosc_view.watched_model import WatchedModel
+    from robosc_view.watched_model import MadeModel, WatchedModel
 
 _ADDRESS = "127.0.0.1:8066"
 _MOST_BYTES = (1 << 24) + 1
-_IN_LINK = "#model="
-_LINK = re.compile(r"https?://[^#]*" + _IN_LINK)
+_LINK = re.compile(rf"https?://[^#]*#model(?P<suffix>{'|'.join(map(re.escape, sorted(SUFFIXES)))})?=(?P<packed>.*)")
 
 _DESCRIPTION = """\
 Serve a web page that shows a robot under its supervisor: the automata with the states that they are in, variables,
@@ -60,8 +59,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "played",
         nargs="?",
         metavar="MODEL",
-        help="a model (.rscd) or its supervisor (.rsup) to play with; - for a model on standard input; or the link "
-        "that a page has made, which holds its model",
+        help="a model (.rscd; of automata .cif, .gen, .wmod) or a supervisor (.rsup) to play with; - for a model on "
+        "standard input; or the link that a page has made, which holds its model",
     )
     source = shown.add_mutually_exclusive_group()
     source.add_argument("--bridge", type=_bridge, metavar="HOST[:PORT]", help="a bridge, by its gRPC service")
@@ -216,16 +215,14 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc_view.sources import ViewError, require_view
 
     _take_played(arguments)
-    if arguments.model is not None and is_automata(arguments.model):
-        raise UsageError(
-            f"{arguments.model} holds automata: 'robosc explore --dot' draws them; a view needs RoboSC's own models"
-        )
     if not (arguments.bridge or arguments.ros2 or arguments.log or arguments.model):
         raise UsageError("what is shown? MODEL, --bridge HOST, --ros2, or --log FILE --model FILE")
     if arguments.log is not None and arguments.model is None:
         raise UsageError("--log needs --model: the model that the log is of")
     if arguments.model is not None and arguments.bridge is not None:
         raise UsageError("--model goes with --log or --ros2, or alone: a bridge tells its model itself")
+    if arguments.model is not None and is_automata(arguments.model):
+        _refuse_for_automata(arguments)
     if arguments.motion is not None and arguments.log is None:
         raise UsageError("--motion goes with --log")
     if arguments.namespace and not arguments.ros2:
@@ -239,6 +236,20 @@ def run(arguments: argparse.Namespace) -> int:
         raise CommandError(str(error), ExitCode.USAGE) from error
 
 
+def _refuse_for_automata(arguments: argparse.Namespace) -> None:
+    """Do nothing if all that is asked for means something for automata.
+
+    Raises:
+        UsageError: Something does not.
+    """
+    from robosc.cli.automata import refuse
+
+    alone = "automata are played with alone"
+    refuse(arguments.log is not None, f"--log: event logs are of robots, not of automata; {alone}")
+    refuse(arguments.ros2, f"--ros2: a node is generated from a model of a robot, not from automata; {alone}")
+    refuse(arguments.scene is not None, "--scene: automata are nowhere, and have no map")
+
+
 def _take_played(arguments: argparse.Namespace) -> None:
     """Take the MODEL that is played with: `text` is what it holds itself, `model` its file.
 
@@ -249,21 +260,23 @@ def _take_played(arguments: argparse.Namespace) -> None:
         return
     if arguments.bridge or arguments.ros2 or arguments.log or arguments.model:
         raise UsageError("MODEL is played with alone: without --bridge, --ros2, --log and --model")
+    suffix = ".rscd"
     if arguments.played == "-":
         from robosc.language import decode_source
 
         if arguments.end_with_input:
             raise UsageError("--end-with-input and a model on standard input do not go together")
         arguments.text = decode_source(sys.stdin.buffer.read(_MOST_BYTES), "standard input")
-    elif _LINK.match(arguments.played):
+    elif link := _LINK.match(arguments.played):
         from robosc_view.playground import unpacked
         from robosc_view.sources import RefusedError
 
         try:
-            arguments.text = unpacked(arguments.played.partition(_IN_LINK)[2])
+            arguments.text = unpacked(link["packed"])
         except RefusedError as error:
             raise UsageError(str(error)) from error
-    arguments.model = Path("model.rscd" if arguments.text is not None else arguments.played)
+        suffix = link["suffix"] or suffix
+    arguments.model = Path(f"model{suffix}" if arguments.text is not None else arguments.played)
 
 
 def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool, Robot | None]":
@@ -301,18 +314,26 @@ def _playground(arguments: argparse.Namespace, scene: Any) -> "tuple[Callable[[]
     """Return a function that makes the run of a page, that each page has its own, and the robot."""
     from robosc.cli.simulate import model_of_test
     from robosc_view.playground import KeptRuns, Playground, playable
-    from robosc_view.watched_model import synthesized
+    from robosc_view.requests import ROBOSC
+    from robosc_view.watched_model import synthesized, synthesized_automata
 
     words = ["--deployment", arguments.deployment or "controller", "--engine", arguments.engine, "--allow-livelock"]
     words += [word for folder in arguments.library_path for word in ("--library-path", str(folder))]
     words += [word for folder in arguments.interface_path for word in ("--interface-path", str(folder))]
     words += ["--reorder"] if arguments.reorder else []
     words += [] if arguments.max_nodes is None else ["--max-nodes", str(arguments.max_nodes)]
-    watched = _watched(arguments, words)
+    watched = _watched_automata(arguments) if is_automata(arguments.model) else _watched(arguments, words)
     file = None if arguments.text is not None else model_of_test(arguments)
     kept = KeptRuns()
+
+    async def make_of_link(text: str, language: str) -> "MadeModel":
+        if language == ROBOSC:
+            return await synthesized(words, text)
+        named = argparse.Namespace(**{**vars(arguments), "model": Path(f"model.{language}")})
+        return await synthesized_automata(named, text)
+
     return (
-        lambda: Playground(watched, kept, file, lambda text: synthesized(words, text), scene),
+        lambda: Playground(watched, kept, file, make_of_link, scene),
         False,
         playable(watched.made, scene),
     )
@@ -373,6 +394,38 @@ def _watched(arguments: argparse.Namespace, words: list[str]) -> "WatchedModel":
         lambda: seen if text is not None else read_again_().digest,
         make,
     )
+
+
+def _watched_automata(arguments: argparse.Namespace) -> "WatchedModel":
+    """The automata that are played with, whose files are looked at again and again."""
+    from robosc.cli import automata
+    from robosc.cli.output import print_diagnostics
+    from robosc.errors import RoboscError
+    from robosc.pipeline.automata_files import load_automata_file
+    from robosc_view.automata_synthesis import made_of
+    from robosc_view.watched_model import NoSupervisorError, WatchedModel, synthesized_automata
+
+    model: Path = arguments.model
+    text: str | None = arguments.text
+    found = automata.synthesized(arguments, text=text)
+    if found.supervisor is None:
+        automata.report_none(argparse.Namespace(model=model, json=False), found)
+        raise CommandError(f"there is no supervisor of {model}", ExitCode.FAILED)
+    print_diagnostics(found.diagnostics, found.bundle)
+    made = made_of(found)
+    if isinstance(made, str):
+        raise UsageError(made)
+    seen = found.bundle.digest
+
+    def digest() -> str:
+        if text is not None:
+            return seen
+        try:
+            return load_automata_file(model).digest
+        except RoboscError as error:
+            raise NoSupervisorError(str(error)) from error
+
+    return WatchedModel(made, seen, digest, lambda: synthesized_automata(arguments))
 
 
 def _whole_text(bundle: "Bundle") -> str | None:

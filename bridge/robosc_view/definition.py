@@ -5,7 +5,7 @@ The topic `/state` of generated nodes and the bridge's service tell it in the sa
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 import msgspec
@@ -91,6 +91,21 @@ def shape_of(value: Any) -> Shape:
         raise DefinitionError(f"the robot's definition is malformed: {str(error)[:300]}") from error
 
 
+@dataclass(frozen=True, slots=True)
+class DrawnAutomaton:
+    """An automaton without a model, as it is drawn.
+
+    Attributes:
+        role: `plant`, `requirement` or `input variable`.
+        nodes: Its locations; none where it is not drawn because too much is.
+        arrows: Its edges.
+    """
+
+    role: str
+    nodes: Sequence[Node]
+    arrows: Sequence[Arrow]
+
+
 @dataclass(frozen=True)
 class Robot:
     """A robot as a source defines it.
@@ -107,6 +122,7 @@ class Robot:
         log: The log that is replayed; None: it is live.
         scene: Walls and line on the floor, and the way of a recorded run, for the map; None: not known.
         play: Events that a page can have happen, with the data that they carry; None: it is not led by hand.
+        automata: Components by name that are automata without a model.
     """
 
     source: SourceKind
@@ -120,6 +136,7 @@ class Robot:
     log: LogSpan | None = None
     scene: Mapping[str, Any] | None = None
     play: Mapping[str, Any] | None = None
+    automata: Mapping[str, DrawnAutomaton] = field(default_factory=dict)
 
     @property
     def requests(self) -> tuple[str, ...]:
@@ -216,7 +233,7 @@ def definition_text(robot: Robot) -> str:
         "type": "definition",
         "robot": robot.shape.name,
         "version": robot.version,
-        "deployment": "layer" if robot.is_layer else "controller",
+        "deployment": "automata" if robot.automata else "layer" if robot.is_layer else "controller",
         "source": str(robot.source),
         "can_command": robot.can_command,
         # Whoever may be commanded wants the token of the server's start for it.
@@ -224,10 +241,17 @@ def definition_text(robot: Robot) -> str:
         "components": [
             {
                 "name": item.name,
+                "role": "" if drawn is None else drawn.role,
+                "is_left_out": drawn is not None and not drawn.nodes,
                 "communications": [*item.messages, *item.services, *item.actions],
-                "graph": None if item.behaviour is None else _graph(item.name, item.behaviour, model),
+                "graph": layout(drawn.nodes, drawn.arrows)
+                if drawn is not None
+                else None
+                if item.behaviour is None
+                else _graph(item.name, item.behaviour, model),
             }
             for item in robot.shape.components
+            for drawn in (robot.automata.get(item.name),)
         ],
         "communications": [
             {

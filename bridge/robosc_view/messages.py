@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from robosc.execution.runtime.event_log import Entry, plain
@@ -11,7 +12,7 @@ from robosc_view.definition import Robot, definition_text
 from robosc_view.reports import EventBatch, LaserScan, Notice, RunReport, Status
 
 if TYPE_CHECKING:
-    from robosc.pipeline.simulation import Run
+    from robosc.pipeline.led_run import LedRun
 
 MAXIMUM_TEXT = 300
 """Characters of an entry's text."""
@@ -261,6 +262,8 @@ def _word(value: Any, depth: int = 0) -> str:
         return "..."
     if isinstance(value, str):
         return value[: MAXIMUM_TEXT + 1]
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, float):
         return f"{value:g}"
     if isinstance(value, dict):
@@ -288,13 +291,14 @@ def position_text(time_s: float, speed: float, *, is_playing: bool) -> str:
     return _text({"type": "position", "time_s": time_s, "is_playing": is_playing, "speed": speed})
 
 
-def run_text(run: "Run", entries: int, report: RunReport) -> str:
+def run_text(run: "LedRun", entries: int, report: RunReport, beginning: int = 0) -> str:
     """The message `run`: what can happen in a run that is led by hand, and what was just done.
 
     Args:
         run: The run.
         entries: Number of its entries in the event log.
         report: Report of what was done.
+        beginning: Number of the state that it has begun in, of those that the definition tells.
     """
     hindered = run.hindrances()
     undone = run.undone
@@ -309,6 +313,8 @@ def run_text(run: "Run", entries: int, report: RunReport) -> str:
             "hindered": {event: list(why) for event, why in hindered.items()},
             "kind": report.kind,
             "lines": list(report.lines),
+            "choice": None if report.choice is None else asdict(report.choice),
+            "beginning": beginning,
         }
     )
 

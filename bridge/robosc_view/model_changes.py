@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from robosc.pipeline.supervisors import Supervisor
+from robosc.pipeline.systems import SystemSupervisor
 from robosc_view.watched_model import MadeModel
 
 MAXIMUM_CHANGES = 30
@@ -12,7 +13,7 @@ MAXIMUM_CHANGES = 30
 
 def model_changes(before: MadeModel, after: MadeModel) -> tuple[str, ...]:
     """Return what has become another: states, events, conditions of the supervisor, findings."""
-    old, new = Supervisor.of(before.supervisor), Supervisor.of(after.supervisor)
+    old, new = _made(before), _made(after)
     found = [*_sizes(old, new), *_events(old, new), *_conditions(old, new), *_findings(before.findings, after.findings)]
     if not found:
         return ("nothing that the supervisor does has changed",)
@@ -20,12 +21,20 @@ def model_changes(before: MadeModel, after: MadeModel) -> tuple[str, ...]:
     return (*found[:MAXIMUM_CHANGES], *((f"and {more} changes more",) if more > 0 else ()))
 
 
-def _sizes(old: Supervisor, new: Supervisor) -> Iterator[str]:
+type _Made = Supervisor | SystemSupervisor
+
+
+def _made(model: MadeModel) -> _Made:
+    made = model.supervisor
+    return made if isinstance(made, SystemSupervisor) else Supervisor.of(made)
+
+
+def _sizes(old: _Made, new: _Made) -> Iterator[str]:
     if old.states != new.states:
         yield f"{new.states} states, which were {old.states}"
 
 
-def _events(old: Supervisor, new: Supervisor) -> Iterator[str]:
+def _events(old: _Made, new: _Made) -> Iterator[str]:
     before, after = ([event.name for event in made.system.events] for made in (old, new))
     for word, there, elsewhere in (("new", after, before), ("gone", before, after)):
         names = [name for name in there if name not in elsewhere]
@@ -33,7 +42,7 @@ def _events(old: Supervisor, new: Supervisor) -> Iterator[str]:
             yield f"{word}: {', '.join(names)}"
 
 
-def _conditions(old: Supervisor, new: Supervisor) -> Iterator[str]:
+def _conditions(old: _Made, new: _Made) -> Iterator[str]:
     before, after = _needs(old), _needs(new)
     for event in dict.fromkeys((*before, *after)):
         was, now = before.get(event, ""), after.get(event, "")
@@ -42,7 +51,7 @@ def _conditions(old: Supervisor, new: Supervisor) -> Iterator[str]:
             yield f"{told}{f' (before: {was})' if was else ''}"
 
 
-def _needs(made: Supervisor) -> Mapping[str, str]:
+def _needs(made: _Made) -> Mapping[str, str]:
     """The conditions that a supervisor adds and that forbid anything, by event."""
     return {event: condition.text for event, condition in made.conditions.items() if condition.text != "true"}
 

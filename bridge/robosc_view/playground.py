@@ -1,7 +1,8 @@
 """The source for a model that nothing executes: whoever opens a page leads it by hand, each a run of its own.
 
 The run is that of `robosc simulate`: events with data, undo and redo, walks by chance and until there is trouble, kept
-as an event log or a test. When the model's file is saved, what was done so far is done again on the new model.
+as an event log or a test. Of automata it is also chosen where to begin, and which of several outcomes an event has.
+When the model's file is saved, what was done so far is done again on the new model.
 """
 
 import asyncio
@@ -10,23 +11,28 @@ import binascii
 import time
 import zlib
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+from robosc.certification.supervisor_file import StateInWords
 from robosc.errors import RoboscError
 from robosc.pipeline.event_scripts import parse_event
 from robosc.pipeline.led_run import Step, changes_text, event_text
 from robosc.pipeline.received_data import NO_DATA
 from robosc.pipeline.saved_runs import ModelOfTest, entries_of, event_log, pytest_module, state_by_component
 from robosc.pipeline.simulation import Run
+from robosc.pipeline.system_runs import ChoiceError, SystemRun
+from robosc.pipeline.systems import SystemSupervisor
 from robosc_bridge.daemon.states import OperatorCommand
+from robosc_view.automata import EdgesTaken, robot_of_automata, told_apart
 from robosc_view.definition import Robot, robot_of
 from robosc_view.messages import TransitionTracker, run_text, saved_text
 from robosc_view.model_changes import model_changes
 from robosc_view.replay import LastTaken
-from robosc_view.reports import EventBatch, Notice, RunReport, SourceKind, Status
-from robosc_view.requests import Back, Form, Happen, LoadModel, Resume, RunCommand, Save, Walk
+from robosc_view.reports import Choice, EventBatch, Notice, RunReport, SourceKind, Status
+from robosc_view.requests import Back, Form, Happen, LoadModel, Restart, Resume, RunCommand, Save, Walk
 from robosc_view.sources import RefusedError, ReplayCommand, Sink, not_replayed
 from robosc_view.watched_model import MadeModel, NoSupervisorError, WatchedModel
 
@@ -44,6 +50,9 @@ MAXIMUM_TEXT = 1 << 20
 
 MAXIMUM_LINK = 8000
 """Characters of a link beyond which none is offered: browsers and messages cut longer ones."""
+
+MAXIMUM_WAYS = 100
+"""States to begin in, or that an event can lead to, which a page offers."""
 
 _CODE = "model"
 
@@ -71,22 +80,37 @@ def unpacked(text: str) -> str:
         raise RefusedError("the link holds no model") from error
 
 
+@dataclass(frozen=True, slots=True)
+class KeptRun:
+    """A run of a page.
+
+    Attributes:
+        own: Model of the link that it plays with; None: the watched one.
+        history: Steps that were taken.
+        beginning: Parts of the state that it has begun in.
+    """
+
+    own: MadeModel | None = None
+    history: tuple[Step, ...] = ()
+    beginning: Mapping[str, object] = field(default_factory=dict)
+
+
 class KeptRuns:
     """Runs of pages, for pages that come back: after a lost connection, or loaded again. The oldest are forgotten."""
 
     def __init__(self) -> None:
-        self._runs: OrderedDict[str, tuple[MadeModel | None, tuple[Step, ...]]] = OrderedDict()
+        self._runs: OrderedDict[str, KeptRun] = OrderedDict()
 
-    def keep(self, page: str, own: MadeModel | None, history: tuple[Step, ...]) -> None:
-        """Keep what a page has done, and the model of the link that it plays with, if it is that."""
-        self._runs[page] = own, history
+    def keep(self, page: str, run: KeptRun) -> None:
+        """Keep what a page has done."""
+        self._runs[page] = run
         self._runs.move_to_end(page)
         while len(self._runs) > MAXIMUM_KEPT:
             self._runs.popitem(last=False)
 
-    def of(self, page: str) -> tuple[MadeModel | None, tuple[Step, ...]]:
-        """Return the link's model and the steps that were kept of a page; nothing where none were."""
-        return self._runs.get(page, (None, ()))
+    def of(self, page: str) -> KeptRun:
+        """Return the run that was kept of a page; an empty one where none was."""
+        return self._runs.get(page, KeptRun())
 
 
 class Playground:
@@ -96,7 +120,7 @@ class Playground:
         watched: The model.
         kept: Runs of pages that may come back.
         file: File of the model, for saved tests; None: it has none.
-        make: Function that makes a model of a text: of a link that is opened.
+        make: Function that makes a model of a text and its language: of a link that is opened.
         scene: Scene for the map.
         clock: Function that returns the time of what is told, in seconds since 1970-01-01 UTC.
     """
@@ -106,7 +130,7 @@ class Playground:
         watched: WatchedModel,
         kept: KeptRuns,
         file: ModelOfTest | None,
-        make: Callable[[str], Awaitable[MadeModel]],
+        make: Callable[[str, str], Awaitable[MadeModel]],
         scene: Any = None,
         clock: Callable[[], float] = time.time,
     ) -> None:
@@ -122,16 +146,16 @@ class Playground:
         self._is_changed = False
         # A model of a link takes the place of the watched one.
         self._own: MadeModel | None = None
-        self._begin(watched.made)
+        self._is_begun = False
+        self._made = watched.made
+        self._run: Run | SystemRun
+        self._edges: EdgesTaken | None
+        self._beginning = 0
 
-    @property
-    def robot(self) -> Robot:
-        """Robot that is shown."""
-        return playable(self._made, self._scene)
-
-    def _begin(self, made: MadeModel) -> None:
-        self._made = made
-        self._run = Run(made.supervisor)
+    async def _begin(self, made: MadeModel, beginning: int = 0) -> None:
+        # In another thread, since that of large automata takes its time.
+        self._run, self._edges = await asyncio.to_thread(_run_of, made, beginning)
+        self._made, self._beginning, self._is_begun = made, beginning, True
         # The steps that were told, and the entries of each.
         self._told: tuple[Step, ...] = ()
         self._entries: list[list[dict[str, Any]]] = []
@@ -139,10 +163,10 @@ class Playground:
     async def run(self, sink: Sink) -> None:
         """Do what is wanted, and tell what it leads to, until cancelled."""
         async with self._watched.listened(self._changed):
-            if self._own is None and self._made is not self._watched.made:
-                self._begin(self._watched.made)
+            if not self._is_begun or (self._own is None and self._made is not self._watched.made):
+                await self._begin(self._watched.made)
             await self._define(sink)
-            self._show(sink, RunReport())
+            await self._show(sink, self._begun())
             while True:
                 command = await self._commands.get()
                 try:
@@ -151,7 +175,7 @@ class Playground:
                     elif self._is_changed:
                         await self._renew(sink)
                 except (RefusedError, RoboscError) as error:
-                    self._show(sink, RunReport("wrong", (str(error),)))
+                    await self._show(sink, RunReport("wrong", (str(error),)))
 
     def lead(self, command: RunCommand) -> None:
         """Want something of the run; it is done after what was wanted before.
@@ -188,48 +212,81 @@ class Playground:
     async def _do(self, command: RunCommand, sink: Sink) -> None:
         run = self._run
         match command:
-            case Happen(line=line):
+            case Happen(line=line, way=way):
                 self._require_room(1)
-                event, data = parse_event(line)
                 before = run.state
-                step = run.step(run.event_called(event), *(() if data is NO_DATA else (data,)))
+                step = await asyncio.to_thread(self._happened, line, way)
+                if isinstance(step, RunReport):
+                    await self._show(sink, step)
+                    return
                 told = [*step.unknown, *(f"{name} keeps its value, since what it was to take is unknown"
                                          for name in step.skipped)]  # fmt: skip
                 changes = changes_text(before, step.state) or "nothing has changed"
-                self._show(sink, RunReport("unknown" if told else "step", (f"{event_text(step)}: {changes}", *told)))
+                await self._show(
+                    sink, RunReport("unknown" if told else "step", (f"{event_text(step)}: {changes}", *told))
+                )
             case Back.UNDO:
                 step_back = run.undo()
-                self._show(sink, RunReport("step", (f"taken back: {step_back.event}",) if step_back else ()))
+                await self._show(sink, RunReport("step", (f"taken back: {step_back.event}",) if step_back else ()))
             case Back.REDO:
                 step_again = run.redo()
-                self._show(sink, RunReport("step", (f"taken again: {step_again.event}",) if step_again else ()))
-            case Back.RESTART:
+                await self._show(sink, RunReport("step", (f"taken again: {step_again.event}",) if step_again else ()))
+            case Restart(beginning=int(beginning)) if isinstance(run, SystemRun):
+                if beginning >= len(self._made.beginnings):
+                    raise RefusedError("there is no such state to begin in")
+                await self._begin(self._made, beginning)
+                await self._show(sink, RunReport("step", ("back in the initial state",)))
+            case Restart():
                 run.restart()
-                self._show(sink, RunReport("step", ("back in the initial state",)))
+                await self._show(sink, RunReport("step", ("back in the initial state",)))
             case Walk(steps=steps, seed=seed, until_trouble=True):
                 self._require_room(steps)
                 before_count = len(run)
                 trouble = await asyncio.to_thread(run.walk_until_trouble, steps, seed)
                 none = f"no trouble in {len(run) - before_count} steps"
-                self._show(sink, RunReport("trouble", (str(trouble),)) if trouble else RunReport("step", (none,)))
+                await self._show(sink, RunReport("trouble", (str(trouble),)) if trouble else RunReport("step", (none,)))
             case Walk(steps=steps, seed=seed):
                 self._require_room(steps)
                 taken = await asyncio.to_thread(run.walk, steps, seed)
                 more = () if len(taken) == steps else ("nothing more can happen",)
-                self._show(sink, RunReport("step", (f"{len(taken)} events by chance, seed {seed}", *more)))
+                await self._show(sink, RunReport("step", (f"{len(taken)} events by chance, seed {seed}", *more)))
             case Save(form=form):
                 sink.answer(saved_text(*await asyncio.to_thread(self._saved, form)))
             case Resume(page=page):
                 await self._resume(page, sink)
-            case LoadModel(packed=text):
-                await self._load(unpacked(text), sink)
+            case LoadModel(packed=text, language=language):
+                await self._load(unpacked(text), language, sink)
 
     def _require_room(self, steps: int) -> None:
         if len(self._run) + steps > MAXIMUM_STEPS:
             raise RefusedError(f"a run here has at most {MAXIMUM_STEPS} events: save it, and begin again")
 
+    def _happened(self, line: str, way: int | None) -> Step | RunReport:
+        """The step of an event; or the report of the states that it can lead to."""
+        run = self._run
+        # Names of plain automata may hold blanks.
+        event, data = (line, NO_DATA) if line in run.events else parse_event(line)
+        event, given = run.event_called(event), () if data is NO_DATA else (data,)
+        if isinstance(run, Run):
+            return run.step(event, *given)
+        ways = run.choices(event, *given)
+        if way is not None and way < len(ways):
+            return run.step(event, *given, to=ways[way].parts)
+        if len(ways) <= 1:
+            return run.step(event, *given)
+        told = f"{event} can lead to {len(ways)} states: choose one beside its button"
+        told += f", which offers the first {MAXIMUM_WAYS}" if len(ways) > MAXIMUM_WAYS else ""
+        told += ", or enter its data" if run.data_fields(event) else ""
+        return RunReport("choose", (told,), Choice(event, line, told_apart(ways)[:MAXIMUM_WAYS]))
+
     def _saved(self, form: Form) -> tuple[str, str]:
-        """Name and text of a file."""
+        """Name and text of a file.
+
+        Raises:
+            RefusedError: It is a run of automata.
+        """
+        if isinstance(self._run, SystemRun):
+            raise RefusedError("a run of automata is not saved: event logs and tests are of robots")
         name = self._run.supervisor.model.name.lower()
         if form is Form.LOG:
             return f"{name}.jsonl", event_log(self._run)
@@ -239,34 +296,64 @@ class Playground:
         return f"test_{name}.py", pytest_module(self._run, model, model.path.parent / f"test_{name}.py")
 
     async def _resume(self, page: str, sink: Sink) -> None:
-        own, history = self._kept.of(page)
+        kept = self._kept.of(page)
         self._page = page
-        if len(self._run) or not (history or own):
+        is_same = not (kept.own or kept.history) and kept.beginning in ({}, self._begun_in)
+        if len(self._run) or is_same:
             return
-        if own is not None:
-            self._own = own
-            self._begin(own)
+        self._own = kept.own or self._own
+        told = await self._repeat(kept.own or self._made, kept.beginning, kept.history)
+        if kept.own is not None:
             await self._define(sink)
-        told = await asyncio.to_thread(self._again, history)
-        self._show(sink, RunReport("changed" if told else "step", told or ("what this page did before is here again",)))
+        report = ("changed", told) if told else ("step", ("what this page did before is here again",))
+        await self._show(sink, RunReport(*report))
+
+    @property
+    def _begun_in(self) -> Mapping[str, object]:
+        """Parts of the state that automata have begun in."""
+        return self._made.beginnings[self._beginning].parts if self._made.beginnings else {}
+
+    async def _repeat(
+        self, made: MadeModel, beginning: Mapping[str, object], history: tuple[Step, ...]
+    ) -> tuple[str, ...]:
+        """Begin a model as another run did, and do what it did, as far as possible; returns what is in the way."""
+        alike = [
+            number
+            for number, state in enumerate(made.beginnings)
+            if all(state.parts.get(name, value) == value for name, value in beginning.items())
+        ]
+        await self._begin(made, alike[0] if alike else 0)
+        lost = (
+            () if alike or not beginning else (f"it cannot begin where it did, and begins anew: {self._run.initial}",)
+        )
+        return (*lost, *await asyncio.to_thread(self._again, history))
 
     def _again(self, history: tuple[Step, ...]) -> tuple[str, ...]:
         """Take the events of a run again, as far as they can happen; returns what is in their way."""
         for number, step in enumerate(history):
             try:
-                self._run.step(step.event, *(() if step.given is NO_DATA else (step.given,)))
+                self._take_again(step)
             except RoboscError as error:
                 return (f"of {len(history)} events {number} happened again: {error}",)
         return ()
 
-    async def _load(self, text: str, sink: Sink) -> None:
+    def _take_again(self, step: Step) -> None:
+        run, given = self._run, () if step.given is NO_DATA else (step.given,)
         try:
-            self._own = await self._make(text)
+            run.step(step.event, *given)
+        except ChoiceError:
+            parts = run.state.parts
+            to = {name: value for name, value in step.state.parts.items() if name in parts}
+            cast(SystemRun, run).step(step.event, *given, to=to)
+
+    async def _load(self, text: str, language: str, sink: Sink) -> None:
+        try:
+            self._own = await self._make(text, language)
         except NoSupervisorError as error:
             raise RefusedError(f"there is no supervisor of the link's model: {error}") from error
-        self._begin(self._own)
+        await self._begin(self._own)
         await self._define(sink)
-        self._show(sink, RunReport("changed", ("this is the model of the link",)))
+        await self._show(sink, RunReport("changed", ("this is the model of the link",)))
 
     async def _renew(self, sink: Sink) -> None:
         """The model has changed: what was done is done again on it, as far as it can be."""
@@ -274,22 +361,31 @@ class Playground:
         before, after = self._made, self._watched.made
         if self._own is not None or after is before:
             # Its warning alone is news.
-            self._show(sink, RunReport())
+            await self._show(sink, RunReport())
             return
         told = list(await asyncio.to_thread(model_changes, before, after))
-        history = self._run.history
-        self._begin(after)
-        told += await asyncio.to_thread(self._again, history)
+        told += await self._repeat(after, self._begun_in, self._run.history)
         await self._define(sink)
-        self._show(sink, RunReport("changed", ("the model has changed", *told)))
+        await self._show(sink, RunReport("changed", ("the model has changed", *told)))
 
     # What is told
 
-    async def _define(self, sink: Sink) -> None:
-        await sink.define(self.robot)
-        self._tracker = TransitionTracker(self.robot)
+    def _begun(self) -> RunReport:
+        """Report of where a run has begun; an empty one where there is no choice."""
+        count = len(self._made.beginnings)
+        if count <= 1:
+            return RunReport()
+        offered = f", of which the first {MAXIMUM_WAYS} are offered" if count > MAXIMUM_WAYS else ""
+        where = told_apart(self._made.beginnings)[self._beginning]
+        told = f"there are {count} states to begin in{offered}, and this begins where {where}"
+        return RunReport("step", (f"{told}: choose another one, and restart",))
 
-    def _show(self, sink: Sink, report: RunReport) -> None:
+    async def _define(self, sink: Sink) -> None:
+        robot = await asyncio.to_thread(playable, self._made, self._scene)
+        await sink.define(robot)
+        self._tracker = TransitionTracker(robot)
+
+    async def _show(self, sink: Sink, report: RunReport) -> None:
         run = self._run
         history = run.history
         # A trouble that is as it was when it was told before is not told again.
@@ -300,7 +396,8 @@ class Playground:
         del self._entries[same:]
         first = sum(map(len, self._entries)) + 1
         for number, step in enumerate(history[same:], start=same + 1):
-            self._entries.append(list(entries_of(step, number)))
+            before = history[number - 2].state if number > 1 else run.initial
+            self._entries.append(self._entries_of(before, step, number))
         self._told = history
         sink.begin(state_by_component(history[same - 1].state if same else run.initial))
         new = [entry for entries in self._entries[same:] for entry in entries]
@@ -317,32 +414,46 @@ class Playground:
                 last=LastTaken(self._tracker, everything).after(len(everything)),
             )
         )
-        sink.show_run(run_text(run, len(everything), report))
+        sink.show_run(await asyncio.to_thread(run_text, run, len(everything), report, self._beginning))
         if self._page:
-            self._kept.keep(self._page, self._own, history)
+            self._kept.keep(self._page, KeptRun(self._own, history, self._begun_in))
+
+    def _entries_of(self, before: StateInWords, step: Step, number: int) -> list[dict[str, Any]]:
+        found = list(entries_of(step, number))
+        if self._edges is not None:
+            # Of automata the edges are told, and a state of hundreds of them not once more.
+            (entry,) = found
+            entry["transitions"] = self._edges.of(before, step)
+            del entry["state"]
+        return found
+
+
+def _run_of(made: MadeModel, beginning: int) -> tuple[Run | SystemRun, EdgesTaken | None]:
+    """Return a run of a model, and what tells the edges that its events take, of automata."""
+    if not isinstance(made.supervisor, SystemSupervisor):
+        return Run(made.supervisor), None
+    parts = made.beginnings[beginning].parts
+    return SystemRun(made.supervisor, parts), EdgesTaken(made.supervisor.system)
 
 
 def playable(made: MadeModel, scene: Any = None) -> Robot:
     """Return the robot of a model that is played with."""
-    run = Run(made.supervisor)
-    play = {
-        "events": [
-            {
-                "event": event,
-                "controllable": run.is_controllable(event),
-                "fields": [
-                    {
-                        "path": item.path,
-                        "type": item.type,
-                        "choices": item.choices,
-                        "is_boolean": item.type == "boolean",
-                    }
-                    for item in run.data_fields(event)
-                    if item.is_read
-                ],
-            }
-            for event in run.events
-        ],
+    play: dict[str, Any] = {
+        "language": made.language,
         "link": None if made.text is None else packed(made.text),
+        # A single state to begin in is nothing to choose.
+        "beginnings": told_apart(made.beginnings)[:MAXIMUM_WAYS] if len(made.beginnings) > 1 else (),
     }
+    if isinstance(made.supervisor, SystemSupervisor):
+        return robot_of_automata(made.supervisor, {**play, "forms": ()})
+    run = Run(made.supervisor)
+    events = [
+        {
+            "event": event,
+            "controllable": run.is_controllable(event),
+            "fields": [item.as_json() for item in run.data_fields(event) if item.is_read],
+        }
+        for event in run.events
+    ]
+    play |= {"events": events, "forms": tuple(Form)}
     return robot_of(made.supervisor, SourceKind.MODEL, version="", can_command=False, scene=scene, play=play)

@@ -120,12 +120,29 @@ class RunReport:
     """Report of what was just done with a run that is led by hand.
 
     Attributes:
-        kind: `step`, `unknown`, `trouble`, `changed` (the model) or `wrong`; empty: nothing was done.
+        kind: `step`, `unknown`, `trouble`, `changed` (the model), `wrong` or `choose`; empty: nothing was done.
         lines: Sentences about it.
+        choice: Choice that an event leaves open; None: none.
     """
 
     kind: str = ""
     lines: tuple[str, ...] = ()
+    choice: "Choice | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """Choice that an event of automata leaves open.
+
+    Attributes:
+        event: The event.
+        line: The event with its data, as it was wanted.
+        ways: States that it can lead to, by what tells them apart.
+    """
+
+    event: str
+    line: str
+    ways: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)

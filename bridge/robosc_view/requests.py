@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Protocol, runtime_checkable
 
+from robosc.pipeline.automata_files import SUFFIXES
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.sources import Pause, Play, RefusedError, ReplayCommand, Seek, Source
 
@@ -19,6 +20,10 @@ MAXIMUM_WALK = 5000
 
 MAXIMUM_PAGE = 64
 """Characters of the name that a page gives itself."""
+
+ROBOSC = "rscd"
+LANGUAGES = (ROBOSC, *sorted(suffix.removeprefix(".") for suffix in SUFFIXES))
+"""Languages of models, by the endings of their files."""
 
 _OF_WALKS = (("steps", 1, MAXIMUM_WALK), ("seed", 0, 2**31))
 
@@ -55,9 +60,11 @@ class Happen:
 
     Attributes:
         line: The event with its data, as in a file of events.
+        way: Number of the state that it leads to, of those that were told; None: there is one.
     """
 
     line: str
+    way: int | None = None
 
 
 class Back(StrEnum):
@@ -65,7 +72,17 @@ class Back(StrEnum):
 
     UNDO = "undo"
     REDO = "redo"
-    RESTART = "restart"
+
+
+@dataclass(frozen=True, slots=True)
+class Restart:
+    """Begin a run that is led by hand again.
+
+    Attributes:
+        beginning: Number of the state to begin in, of those that the definition tells; None: the same as before.
+    """
+
+    beginning: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,10 +124,12 @@ class LoadModel:
 
     Attributes:
         packed: Part of the link that holds it.
+        language: Language of the model.
         token: Token that is shown for it: a link that somebody else has made is not to set this machine to work.
     """
 
     packed: str
+    language: str
     token: object
 
 
@@ -125,7 +144,7 @@ class Resume:
     page: str
 
 
-RunCommand = Happen | Back | Walk | Save | LoadModel | Resume
+RunCommand = Happen | Back | Restart | Walk | Save | LoadModel | Resume
 
 
 @runtime_checkable
@@ -171,9 +190,11 @@ def parse_request(text: str) -> PageRequest:
         case "pause":
             return Pause()
         case "event":
-            return Happen(_text(document, "line"))
-        case "undo" | "redo" | "restart" as name:
+            return Happen(_text(document, "line"), _choice(document, "way"))
+        case "undo" | "redo" as name:
             return Back(name)
+        case "restart":
+            return Restart(_choice(document, "beginning"))
         case "walk":
             steps, seed = (int(_number(document, name, low, high)) for name, low, high in _OF_WALKS)
             return Walk(steps, seed, document.get("until_trouble") is True)
@@ -182,7 +203,10 @@ def parse_request(text: str) -> PageRequest:
         case "resume":
             return Resume(_text(document, "page")[:MAXIMUM_PAGE])
         case "model":
-            return LoadModel(_text(document, "packed"), document.get("token"))
+            language = document.get("language", ROBOSC)
+            if language not in LANGUAGES:
+                raise RefusedError(f"the language of a model is one of {', '.join(LANGUAGES)}")
+            return LoadModel(_text(document, "packed"), language, document.get("token"))
     raise RefusedError("there is nothing of that type")
 
 
@@ -191,6 +215,10 @@ def _text(document: dict[str, Any], name: str) -> str:
     if not isinstance(value, str) or not value.strip():
         raise RefusedError(f"'{name}' must be a text")
     return value
+
+
+def _choice(document: dict[str, Any], name: str) -> int | None:
+    return None if document.get(name) is None else int(_number(document, name, 0, 2**31))
 
 
 def _number(document: dict[str, Any], name: str, low: float, high: float) -> float:

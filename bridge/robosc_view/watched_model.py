@@ -4,9 +4,11 @@ A model that was changed is synthesized in a process of its own, which the next 
 supervisor the one before stays, with why it is not the file's.
 """
 
+import argparse
 import asyncio
 import contextlib
 import hashlib
+import pickle
 import sys
 import tempfile
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
@@ -15,8 +17,11 @@ from pathlib import Path
 
 import msgspec
 
+from robosc.certification.supervisor_file import StateInWords
 from robosc.errors import RoboscError
+from robosc.pipeline.systems import SystemSupervisor
 from robosc.supervisor import Supervisor, decode
+from robosc_view.requests import ROBOSC
 
 LOOK_S = 0.3
 """Between two looks at the files."""
@@ -34,11 +39,15 @@ class MadeModel:
         supervisor: The supervisor.
         findings: Findings about the model, a line each; of a supervisor's file nothing is known.
         text: Text of the model, if it is all of it: without libraries.
+        language: Language of the text: `rscd`, or of automata the ending of their files.
+        beginnings: States that automata may begin in.
     """
 
-    supervisor: Supervisor
+    supervisor: Supervisor | SystemSupervisor
     findings: tuple[str, ...] = ()
     text: str | None = None
+    language: str = ROBOSC
+    beginnings: tuple[StateInWords, ...] = ()
 
 
 class WatchedModel:
@@ -158,23 +167,51 @@ async def synthesized(words: Sequence[str], text: str | None = None) -> MadeMode
             given = Path(folder) / "model.rscd"
             given.write_bytes(text.encode("utf-8", "surrogatepass"))
             words = (*words, "--", str(given))
-        process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-P", "-m", "robosc.cli.main", "synth", "--json", "--output", str(made), *words),
-            stdin=asyncio.subprocess.DEVNULL,
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
-        )
-        try:
-            output, errors = await process.communicate()
-        finally:
-            if process.returncode is None:
-                with contextlib.suppress(ProcessLookupError):
-                    process.kill()
-                await asyncio.shield(process.wait())
-        if process.returncode != 0:
+        status, output, errors = await _output("robosc.cli.main", "synth", "--json", "--output", str(made), *words)
+        if status != 0:
             raise NoSupervisorError(_reason(output, errors))
         told = msgspec.json.decode(output, type=_Told)
         return MadeModel(read(made), tuple(map(str, told.diagnostics)), text)
+
+
+async def synthesized_automata(arguments: argparse.Namespace, text: str | None = None) -> MadeModel:
+    """The automata of which a process of their own makes the supervisor; cancelling this ends it.
+
+    Args:
+        arguments: Arguments of the command.
+        text: Text of the model, of which the arguments only give the name then; None: their file's.
+
+    Raises:
+        NoSupervisorError: There is none.
+    """
+    wanted = {name: getattr(arguments, name) for name in ("engine", "reorder", "max_nodes")}
+    given = msgspec.json.encode({"model": str(arguments.model), "text": text, **wanted})
+    status, output, errors = await _output("robosc_view.automata_synthesis", given=given)
+    if status != 0:
+        raise NoSupervisorError(_reason(b"", errors))
+    # From a process of our own. No supervisor's file could hold all of it: names of plain automata may be anything.
+    found = pickle.loads(output)  # noqa: S301
+    if isinstance(found, MadeModel):
+        return found
+    raise NoSupervisorError(found)
+
+
+async def _output(module: str, *words: str, given: bytes = b"") -> tuple[int | None, bytes, bytes]:
+    """Status, output and errors of a module that runs as a process; cancelling this ends it."""
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-P", "-m", module, *words),
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+    )
+    try:
+        output, errors = await process.communicate(given)
+    finally:
+        if process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await asyncio.shield(process.wait())
+    return process.returncode, output, errors
 
 
 def read(path: Path) -> Supervisor:

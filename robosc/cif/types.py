@@ -91,6 +91,8 @@ def fits(value: CifType, target: CifType) -> bool:
     """Return True if every value of a type is one of another: what constants and arguments need."""
     if target.kind == "real" and value.kind == "int":
         return True
+    if "unknown" in (value.kind, target.kind):
+        return True
     if not is_compatible(value, target):
         return False
     if value.kind in ("int", "list") and target.low is not None:
@@ -107,6 +109,8 @@ def overlaps(value: CifType, target: CifType) -> bool:
     """Return True if an expression of one type may be assigned to a variable of another."""
     if target.kind == "real" and value.kind == "int":
         return True
+    if "unknown" in (value.kind, target.kind):
+        return True
     if not is_compatible(value, target):
         return False
     if value.kind == "int":
@@ -116,12 +120,12 @@ def overlaps(value: CifType, target: CifType) -> bool:
 
 def joined(one: CifType, other: CifType) -> CifType | None:
     """The type of values of two types, such as those of the branches of an `if`; None if there is none."""
-    if one.kind == "unknown":
-        return other
+    if "unknown" in (one.kind, other.kind):
+        return other if one.kind == "unknown" else one
     if {one.kind, other.kind} == {"int", "real"}:
         return REAL
     if not is_compatible(one, other):
-        return other if other.kind == "unknown" else None
+        return None
     low = high = None
     if one.kind in ("int", "list") and one.low is not None and other.low is not None:
         low, high = min(one.low, other.low), max(one.range[1], other.range[1])

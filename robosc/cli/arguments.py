@@ -144,7 +144,29 @@ def engine_options(arguments: argparse.Namespace) -> "EngineOptions":
     """Return the engine options that `add_engine_options` has read."""
     from robosc.synthesis import EngineOptions
 
-    return EngineOptions(arguments.engine or "auto", arguments.reorder, arguments.max_nodes)
+    seconds = getattr(arguments, "condition_seconds", None)
+    return EngineOptions(arguments.engine or "auto", arguments.reorder, arguments.max_nodes, seconds)
+
+
+def add_condition_seconds_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the option for the time that conditions may take."""
+    parser.add_argument(
+        "--condition-seconds",
+        type=_seconds,
+        metavar="S",
+        help="after S seconds make no further condition of the supervisor shorter: it is right all the same, and "
+        "mostly told by the size of its diagram (default: only steps limit that, and the same comes out every time)",
+    )
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not value >= 0:
+        raise ValueError
+    return value
+
+
+_seconds.__name__ = "time"
 
 
 def add_verify_limit_argument(parser: argparse.ArgumentParser, name: str, default: int) -> None:

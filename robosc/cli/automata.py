@@ -17,11 +17,12 @@ from robosc.cli.output import (
     require_other_file,
     write_bytes,
 )
-from robosc.errors import Diagnostic, UnsupportedModelError
+from robosc.cli.statistics import Figures, timed
+from robosc.errors import Diagnostic, InvalidSupervisorError, UnsupportedModelError
 from robosc.json_documents import counts_text, diagnostics_json
 from robosc.model.structure import Deployment
 from robosc.pipeline.automata_files import SUFFIXES, is_automata
-from robosc.source import Bundle, visible
+from robosc.source import Bundle, SourceFile, visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,6 +33,10 @@ if TYPE_CHECKING:
     from robosc.pipeline.results import SynthesisStatus
     from robosc.pipeline.synthesis import OnProgress
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
+
+
+_SUPERVISOR = ".rsup"
+"""Ending of a supervisor's file."""
 
 
 def is_given(arguments: argparse.Namespace) -> bool:
@@ -50,6 +55,7 @@ class Synthesized:
         reason: Reason why there is no supervisor; empty if there is one, or the findings tell.
         supervisor: The supervisor, or None.
         explanation: Explanation of what is to blame if no supervisor exists.
+        figures: Figures of the synthesis; None if there was none.
     """
 
     bundle: Bundle
@@ -58,29 +64,31 @@ class Synthesized:
     reason: str
     supervisor: "SystemSupervisor | None"
     explanation: "EmptyExplanation | None" = None
+    figures: Figures | None = None
 
 
-def synthesized(arguments: argparse.Namespace, initial: str | None = None) -> Synthesized:
+def synthesized(arguments: argparse.Namespace, initial: str | None = None, text: str | None = None) -> Synthesized:
     """Check the model of a command, and synthesize if it has no errors.
 
     Args:
         arguments: Arguments of the command.
         initial: Description of the states in which automata begin, such as `tank.level = 1`; None: as the model says.
+        text: All of the model, whose file only gives it a name then; None: the file's.
 
     Raises:
         UsageError: An argument means nothing for it, it cannot be read, or the initial states name what is not there.
     """
-    from robosc.explanation import EmptyExplanation
-    from robosc.pipeline.results import SynthesisStatus
+    from robosc.pipeline.results import NoSupervisor, SynthesisStatus
 
-    bundle, found = _checked(arguments)
+    bundle, found = _checked(arguments, text)
     if found.system is None:
         return Synthesized(bundle, SynthesisStatus.MODEL_ERRORS, found.diagnostics, "", None)
     if initial is not None:
         found = _beginning(found, initial)
-    made = _synthesis(arguments, found)
-    explanation = made.explanation if isinstance(made.explanation, EmptyExplanation) else None
-    return Synthesized(bundle, made.status, found.diagnostics, made.reason, made.supervisor, explanation)
+    made, seconds = timed(lambda: _synthesis(arguments, found))
+    explanation = None if isinstance(made.explanation, NoSupervisor) else made.explanation
+    figures = Figures(made.statistics, seconds)
+    return Synthesized(bundle, made.status, found.diagnostics, made.reason, made.supervisor, explanation, figures)
 
 
 def _beginning(found: "CheckedSystem", initial: str) -> "CheckedSystem":
@@ -152,8 +160,9 @@ def synth(arguments: argparse.Namespace) -> ExitCode:
     """
     output = arguments.output
     refuse(
-        output is not None and output.suffix not in SUFFIXES,
-        f"-o: the controlled system of automata is written to a file that ends in {', '.join(sorted(SUFFIXES))}",
+        output is not None and output.suffix not in {*SUFFIXES, _SUPERVISOR},
+        f"-o: the supervisor of automata is written to a file that ends in {_SUPERVISOR}, and the controlled system "
+        f"to one that ends in {', '.join(sorted(SUFFIXES))}",
     )
     refuse(arguments.allow_livelock, "--allow-livelock: automata have no silent steps of a controller")
     made = synthesized(arguments)
@@ -162,7 +171,11 @@ def synth(arguments: argparse.Namespace) -> ExitCode:
     if output is not None:
         for file in (made.bundle.main, *made.bundle.libraries):
             require_other_file(output, Path(file.name))
-        write_bytes(output, controlled_system(made.supervisor, output.suffix).encode())
+        is_supervisor = output.suffix == _SUPERVISOR
+        write_bytes(
+            output,
+            made.supervisor.encode() if is_supervisor else controlled_system(made.supervisor, output.suffix).encode(),
+        )
     initial = made.supervisor.initial_condition
     if arguments.json:
         print_json(
@@ -178,6 +191,7 @@ def synth(arguments: argparse.Namespace) -> ExitCode:
                 ],
                 "conditions": {name: str(item) for name, item in made.supervisor.conditions.items()},
                 "initial": None if initial is None else str(initial),
+                **_statistics_json(arguments, made),
                 **diagnostics_json(made.diagnostics),
             }
         )
@@ -188,6 +202,7 @@ def synth(arguments: argparse.Namespace) -> ExitCode:
     sys.stdout.write("".join(f"{visible(line)}\n" for text in told for line in text.split("\n")))
     if output is not None:
         sys.stdout.write(f"written to {output}\n")
+    sys.stdout.write(_statistics_text(arguments, made))
     return ExitCode.OK
 
 
@@ -220,12 +235,17 @@ def verify(arguments: argparse.Namespace) -> ExitCode:
     """
     from robosc.pipeline.results import VerificationStatus
     from robosc.pipeline.systems import verify_system
+    from robosc.signatures import SignatureError
     from robosc.verification import Limits
 
-    refuse(arguments.supervisor is not None, "FILE.rsup: a supervisor file is of a robot, not of automata")
     refuse(bool(arguments.property or arguments.properties), "--property: properties are of robots, not of automata")
-    refuse(bool(arguments.signed_by), "--signed-by: a supervisor file is of a robot, not of automata")
-    made = synthesized(arguments)
+    refuse(arguments.supervisor is None and bool(arguments.signed_by), "--signed-by: it needs FILE.rsup")
+    try:
+        made = synthesized(arguments) if arguments.supervisor is None else _read(arguments)
+    except (InvalidSupervisorError, SignatureError) as error:
+        from robosc.cli.verify import report_malformed
+
+        return report_malformed(arguments, error)
     if made.supervisor is None:
         return report_none(arguments, made)
     supervisor, options, limits = made.supervisor, _options(arguments), Limits.of(arguments.limit)
@@ -242,6 +262,31 @@ def verify(arguments: argparse.Namespace) -> ExitCode:
         if not (has_passed and arguments.quiet):
             sys.stdout.write(str(result) if str(result).endswith("\n") else f"{result}\n")
     return ExitCode.OK if has_passed else ExitCode.FAILED
+
+
+def _read(arguments: argparse.Namespace) -> Synthesized:
+    """Read the supervisor's file of a command, which has to be of the automata of its model.
+
+    Raises:
+        InvalidSupervisorError: It is malformed, or one of other automata.
+        SignatureError: It is not signed as it must be.
+        UsageError: A file cannot be read.
+    """
+    from robosc.cli.sign import read_supervisor, signer_of
+    from robosc.cli.verify import tell_signer
+    from robosc.pipeline.results import SynthesisStatus
+    from robosc.pipeline.systems import decode_system
+
+    content = read_supervisor(arguments.supervisor)
+    bundle, found = _checked(arguments)
+    if found.system is None:
+        return Synthesized(bundle, SynthesisStatus.MODEL_ERRORS, found.diagnostics, "", None)
+    if arguments.signed_by:
+        tell_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
+    supervisor = decode_system(content)
+    if supervisor.system != found.system:
+        raise InvalidSupervisorError(f"the supervisor is one of other automata than those of {bundle.main.name}")
+    return Synthesized(bundle, SynthesisStatus.SUPERVISOR, found.diagnostics, "", supervisor)
 
 
 def explain_synthesis(arguments: argparse.Namespace) -> ExitCode:
@@ -274,7 +319,7 @@ def explain_synthesis(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.FAILED if is_empty else ExitCode.OK
 
 
-def _checked(arguments: argparse.Namespace) -> "tuple[Bundle, CheckedSystem]":
+def _checked(arguments: argparse.Namespace, text: str | None = None) -> "tuple[Bundle, CheckedSystem]":
     from robosc.pipeline.automata_files import check_automata_file, load_automata_file
 
     refuse(bool(arguments.library_path), "-L: automata import no libraries, and CIF models files by their places")
@@ -283,7 +328,7 @@ def _checked(arguments: argparse.Namespace) -> "tuple[Bundle, CheckedSystem]":
     from robosc.pipeline.files import FileAccessError
 
     try:
-        bundle = load_automata_file(arguments.model)
+        bundle = load_automata_file(arguments.model) if text is None else Bundle(SourceFile(str(arguments.model), text))
     except FileAccessError as error:
         raise UsageError(str(error)) from error
     return bundle, check_automata_file(bundle)
@@ -303,7 +348,10 @@ def _options(arguments: argparse.Namespace) -> "SynthesisOptions":
     from robosc.pipeline.options import SynthesisOptions
 
     return SynthesisOptions(
-        engine=arguments.engine or "auto", allow_reordering=arguments.reorder, maximum_nodes=arguments.max_nodes
+        engine=arguments.engine or "auto",
+        allow_reordering=arguments.reorder,
+        maximum_nodes=arguments.max_nodes,
+        condition_seconds=getattr(arguments, "condition_seconds", None),
     )
 
 
@@ -336,11 +384,21 @@ def report_none(arguments: argparse.Namespace, made: Synthesized) -> ExitCode:
     if arguments.json:
         explanation = document(made.explanation) if made.explanation else None
         told = {"status": str(made.status), "reason": made.reason, "explanation": explanation}
-        print_json({**told, **diagnostics_json(made.diagnostics)})
+        print_json({**told, **_statistics_json(arguments, made), **diagnostics_json(made.diagnostics)})
     else:
         print_diagnostics(made.diagnostics, made.bundle)
         if made.reason:
             sys.stderr.write(f"{arguments.model}: {visible(made.reason)}\n")
         if made.explanation is not None:
             sys.stderr.write(empty_text(made.explanation))
+        sys.stdout.write(_statistics_text(arguments, made))
     return ExitCode.FAILED
+
+
+def _statistics_json(arguments: argparse.Namespace, made: Synthesized) -> dict[str, object]:
+    is_asked = getattr(arguments, "statistics", False)
+    return {"statistics": made.figures.document() if made.figures else None} if is_asked else {}
+
+
+def _statistics_text(arguments: argparse.Namespace, made: Synthesized) -> str:
+    return str(made.figures or "") if getattr(arguments, "statistics", False) else ""

@@ -3,12 +3,15 @@
 import argparse
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robosc.cli.arguments import given_path
 from robosc.cli.output import ExitCode, UsageError, print_json, write_bytes
+from robosc.errors import InvalidSupervisorError
 from robosc.pipeline.files import FileAccessError, read_bounded
+from robosc.source import visible
 
 if TYPE_CHECKING:
     from robosc.signatures import PublicKey
@@ -74,10 +77,9 @@ def run_sign(arguments: argparse.Namespace) -> int:
         SigningUnavailableError: The package for it is not installed.
     """
     from robosc.signatures import read_private_key, sign, signature_file
-    from robosc.supervisor.codec import decode
 
     content = read_supervisor(arguments.supervisor)
-    supervisor = decode(content)
+    name, deployment = name_and_deployment(content)
     try:
         key = read_private_key(arguments.key)
     except OSError as error:
@@ -85,10 +87,25 @@ def run_sign(arguments: argparse.Namespace) -> int:
     file = signature_file(arguments.supervisor)
     write_bytes(file, sign(content, key))
     if arguments.json:
-        print_json({"file": str(file), "model": supervisor.model.name, "deployment": str(supervisor.deployment)})
+        print_json({"file": str(file), "model": name, "deployment": deployment})
     else:
-        sys.stdout.write(f"{file}: signature of a {supervisor.deployment} for {supervisor.model.name}\n")
+        sys.stdout.write(f"{file}: signature of a {deployment or 'supervisor'} for {visible(name)}\n")
     return ExitCode.OK
+
+
+def name_and_deployment(content: bytes) -> tuple[str, str | None]:
+    """Return the name of what a supervisor file is for, and its deployment; None if it is for automata.
+
+    Raises:
+        InvalidSupervisorError: The bytes are no supervisor, of a robot or of automata.
+    """
+    from robosc.pipeline.systems import decode_system
+    from robosc.supervisor.codec import decode
+
+    with suppress(InvalidSupervisorError):
+        return decode_system(content).system.name, None
+    supervisor = decode(content)
+    return supervisor.model.name, str(supervisor.deployment)
 
 
 def read_supervisor(file: Path) -> bytes:

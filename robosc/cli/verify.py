@@ -14,7 +14,7 @@ from robosc.cli.arguments import (
     read_bundle,
 )
 from robosc.cli.output import ExitCode, ProgressLine, UsageError, print_diagnostics, print_json
-from robosc.cli.sign import read_supervisor, signer_of
+from robosc.cli.sign import name_and_deployment, read_supervisor, signer_of
 from robosc.errors import Diagnostic, InvalidSupervisorError
 from robosc.model.structure import Deployment
 from robosc.pipeline.options import FOREIGN_STATES
@@ -190,20 +190,18 @@ def report_file_verification(
 
 def _verify_signature(arguments: argparse.Namespace) -> int:
     """Verify the signature of a file alone; its model is not looked at."""
-    from robosc.supervisor.codec import decode
-
     arguments.supervisor = arguments.model
     content = read_supervisor(arguments.supervisor)
     try:
         key = signer_of(arguments.supervisor, content, arguments.signed_by)
-        supervisor = decode(content)
-        if arguments.deployment not in (None, str(supervisor.deployment)):
-            raise SignatureError(f"made for the deployment {supervisor.deployment}, not {arguments.deployment}")
+        name, deployment = name_and_deployment(content)
+        if arguments.deployment not in (None, deployment):
+            made_for = f"the deployment {deployment}" if deployment else "automata"
+            raise SignatureError(f"made for {made_for}, not {arguments.deployment}")
     except (InvalidSupervisorError, SignatureError) as error:
         return report_malformed(arguments, error)
     if arguments.json:
-        print_json({"status": "signed", "model": supervisor.model.name, "deployment": str(supervisor.deployment),
-                    "signed_by": key.fingerprint})  # fmt: skip
+        print_json({"status": "signed", "model": name, "deployment": deployment, "signed_by": key.fingerprint})
     else:
         tell_signer(arguments, key)
     return ExitCode.OK

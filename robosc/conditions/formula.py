@@ -85,6 +85,9 @@ def formula_in(vocabulary: Vocabulary, diagram: DecisionDiagram, *, limit: int, 
     """The same as `to_expression`, for many diagrams in one vocabulary."""
     if diagram.root < 2:
         return TRUE if diagram.root else FALSE
+    if effort.available < 1:
+        # Every node takes a step: to read a large diagram for it would take long.
+        return None
     try:
         space = space_of([diagram], vocabulary.domains, effort.part(STEPS))
         found = _Formulas(space, vocabulary, limit).shortest(space.of(diagram))
@@ -122,15 +125,15 @@ class _Formulas:
             # Whatever a node tests matters, so it stands in every formula.
             return None
         opposite = self._space.without(1, node)
-        integers = self._relations.integers(tested)
+        compared = self._relations.comparable(tested)
         # A sum that is not the smallest may have some more.
         most = 2 + 2 * _most_cubes(self._limit)
         found: list[Expression] = []
-        if integers:
+        if compared:
             # A formula that tests each place once has few products, and is found soon.
             found += self._of_sums(node, opposite, max(2, len(tested)))
             if not found or self._least(found) > len(tested):
-                found += self._of_relations(node, opposite, integers, len(tested))
+                found += self._of_relations(node, opposite, compared, len(tested))
             if found:
                 most = _most_cubes(self._least(found))
         if not found or self._least(found) > len(tested):
@@ -140,7 +143,7 @@ class _Formulas:
                 return min(found, key=length, default=None)
             if not found or self._least(found) >= _LONG:
                 found += self._tried(partial(self._choice_at, node))
-            if integers and (not found or self._least(found) > len(tested)):
+            if compared and (not found or self._least(found) > len(tested)):
                 found += self._tried(partial(self._divided, node, tested))
         return min(found, key=length, default=None)
 
@@ -175,25 +178,25 @@ class _Formulas:
             pass
         return found
 
-    def _of_relations(self, node: Node, opposite: Node, integers: tuple[int, ...], least: int) -> list[Expression]:
+    def _of_relations(self, node: Node, opposite: Node, compared: tuple[int, ...], least: int) -> list[Expression]:
         """Formulas with relations, if there are any; no further ones after one with the least operands."""
         pairs = [(node, opposite, False), (opposite, node, True)]
-        exact = [pair for pair in pairs if self._tried(partial(self._enough, *pair[:2], integers))]
+        exact = [pair for pair in pairs if self._tried(partial(self._enough, *pair[:2], compared))]
         found: list[Expression] = []
         for pair in exact or pairs:
-            found += self._tried(partial(self._related, *pair, integers, least))
+            found += self._tried(partial(self._related, *pair, compared, least))
             if found and self._least(found) <= least:
                 break
         return found
 
-    def _enough(self, wanted: Node, forbidden: Node, integers: tuple[int, ...]) -> list[bool]:
-        return [True] if self._relations.are_enough(wanted, forbidden, integers) else []
+    def _enough(self, wanted: Node, forbidden: Node, compared: tuple[int, ...]) -> list[bool]:
+        return [True] if self._relations.are_enough(wanted, forbidden, compared) else []
 
     def _related(
-        self, wanted: Node, forbidden: Node, is_negated: bool, integers: tuple[int, ...], least: int
+        self, wanted: Node, forbidden: Node, is_negated: bool, compared: tuple[int, ...], least: int
     ) -> Iterator[Expression]:
         """Relations and whatever else they need, or, where they were found for the opposite, the negation of that."""
-        for description in self._relations.around(wanted, forbidden, integers):
+        for description in self._relations.around(wanted, forbidden, compared):
             parts = self._described(description, is_negated)
             if parts is not None:
                 found = self._join("or" if is_negated else "and", parts)

@@ -1,5 +1,7 @@
 """Relations between integers: the bounds of differences and sums that hold wherever a predicate is true.
 
+Enumerations of one type are integers of which only the equality counts.
+
 A predicate lies inside the conjunction of the relations that hold in it, so only the states inside it have to be told
 apart further; relations that these tests make unnecessary are dropped. Values that a store does not tell apart may lie
 on both sides of a relation: a relation is then possible for their class, and what is possible is enough to be exact.
@@ -16,11 +18,11 @@ from typing import Literal
 from robosc.conditions.cover import Words, cover
 from robosc.conditions.literals import Size, size
 from robosc.conditions.multivalued import EffortExceededError, Node, Space
-from robosc.expressions import MAXIMUM_INTEGER, Binary, Constant, Expression, IntegerType, VariableRead
-from robosc.supervisor.diagram import Domains
+from robosc.expressions import MAXIMUM_INTEGER, Binary, Constant, EnumType, Expression, IntegerType, VariableRead
+from robosc.supervisor.diagram import Domains, Subject
 
 MAXIMUM_PLACES = 6
-"""Integers up to which relations between them are looked for."""
+"""Integers, or enumerations of one type, up to which relations between them are looked for."""
 
 _MAXIMUM_MIXED = 4
 """Integers up to which sums of some, and differences of sums, are bounded as well."""
@@ -77,7 +79,7 @@ class Description:
 
 
 class Relations:
-    """Relations between the integers of one store.
+    """Relations between the integers, and the enumerations, of one store.
 
     Args:
         space: The store.
@@ -88,40 +90,42 @@ class Relations:
     def __init__(self, space: Space, words: Words, domains: Domains) -> None:
         self._space = space
         self._words = words
+        self._domains = domains
         self._values: dict[int, list[tuple[int, int]]] = {}
+        self._enums: dict[int, EnumType] = {}
         for variable, subject in enumerate(space.subjects):
             values = domains[subject]
-            if isinstance(values.type, IntegerType):
-                offset = int(values[0])
+            if isinstance(values.type, EnumType):
+                self._enums[variable] = values.type
+            if isinstance(values.type, IntegerType | EnumType):
+                offset = int(values[0]) if isinstance(values.type, IntegerType) else 0
                 self._values[variable] = [
                     (offset + runs[0].start, offset + runs[-1].stop - 1) for runs in space.classes[variable]
                 ]
         self._nodes: dict[Relation, Node] = {}
         self._known: dict[tuple[Node, tuple[int, ...]], tuple[Relation, ...]] = {}
 
-    def integers(self, variables: Iterable[int]) -> tuple[int, ...]:
-        """Those of some places that hold integers, in the order of the model's text; none if they are too many."""
-        found = sorted(
-            (variable for variable in variables if variable in self._values),
-            key=lambda variable: self._words.ranks[variable],
-        )
-        return tuple(found) if 2 <= len(found) <= MAXIMUM_PLACES else ()
+    def comparable(self, variables: Iterable[int]) -> tuple[int, ...]:
+        """Those of some places that can be compared with others of them, in the order of the model's text."""
+        numbers = {self._space.subjects[variable]: variable for variable in variables}
+        found = (numbers[subject] for subject in comparable(numbers, self._domains))
+        return tuple(sorted(found, key=lambda variable: self._words.ranks[variable]))
 
     def around(
-        self, wanted: Node, forbidden: Node, integers: tuple[int, ...], *, depth: int = _DEPTH
+        self, wanted: Node, forbidden: Node, compared: tuple[int, ...], *, depth: int = _DEPTH
     ) -> Iterator[Description]:
         """Yield descriptions with relations that are true where `wanted` is and false where `forbidden` is.
 
         Args:
             wanted: Node of the states where they must be true; not false.
             forbidden: Node of the states where they must be false; disjoint from `wanted`.
-            integers: The places that relations may name.
+            compared: The places that relations may name.
             depth: Number of times that relations may be looked for inside what relations leave open.
 
         Raises:
             EffortExceededError: It takes too many steps.
         """
-        relations = self._holding(wanted, integers)
+        relations = self._holding(wanted, compared)
         tried: set[tuple[Relation, ...]] = set()
         todo = [relations]
         while todo:
@@ -130,7 +134,7 @@ class Relations:
                 continue
             tried.add(chosen)
             inside = self._space.both(self._possible(chosen), forbidden)
-            for rest in self._rests(wanted, inside, integers, depth):
+            for rest in self._rests(wanted, inside, compared, depth):
                 found = self._needed(replace(rest, relations=chosen), forbidden)
                 if found.relations:
                     yield self._relaxed(found, forbidden)
@@ -138,11 +142,11 @@ class Relations:
                     # What was dropped may have spoilt the tests of single places.
                     todo += [found.relations, *((relation,) for relation in found.relations)]
 
-    def _rests(self, wanted: Node, inside: Node, integers: tuple[int, ...], depth: int) -> Iterator[Description]:
+    def _rests(self, wanted: Node, inside: Node, compared: tuple[int, ...], depth: int) -> Iterator[Description]:
         """Yield descriptions that are true where `wanted` is and exclude what is inside relations but forbidden."""
         near = self._space.both(inside, self._space.of_cube(self._space.around(wanted)))
         if depth and near != 0:
-            for inner in self.around(near, wanted, integers, depth=depth - 1):
+            for inner in self.around(near, wanted, compared, depth=depth - 1):
                 for single in self._sum(wanted, self._space.without(inside, near)):
                     yield Description((), single, inner)
         for single in self._sum(wanted, inside):
@@ -157,9 +161,9 @@ class Relations:
             return
         yield found
 
-    def are_enough(self, wanted: Node, forbidden: Node, integers: tuple[int, ...]) -> bool:
+    def are_enough(self, wanted: Node, forbidden: Node, compared: tuple[int, ...]) -> bool:
         """Return True if relations and the values that each place takes by itself exclude all that is forbidden."""
-        relations = self._holding(wanted, integers)
+        relations = self._holding(wanted, compared)
         inside = self._space.both(self._possible(relations), self._space.of_cube(self._space.around(wanted)))
         return bool(relations) and self._space.both(inside, forbidden) == 0
 
@@ -204,15 +208,17 @@ class Relations:
 
     # Which relations hold
 
-    def _holding(self, node: Node, integers: tuple[int, ...]) -> tuple[Relation, ...]:
+    def _holding(self, node: Node, compared: tuple[int, ...]) -> tuple[Relation, ...]:
         """Relations that hold wherever a predicate is true and that the ranges of its single places do not imply."""
-        if (node, integers) not in self._known:
-            self._known[node, integers] = tuple(self._bounding(node, integers))
-        return self._known[node, integers]
+        if (node, compared) not in self._known:
+            self._known[node, compared] = tuple(self._bounding(node, compared))
+        return self._known[node, compared]
 
-    def _bounding(self, node: Node, integers: tuple[int, ...]) -> Iterator[Relation]:
-        box = {variable: self._bounds(node, ((variable, 1),)) for variable in integers}
-        for form in _forms(integers):
+    def _bounding(self, node: Node, compared: tuple[int, ...]) -> Iterator[Relation]:
+        box = {variable: self._bounds(node, ((variable, 1),)) for variable in compared}
+        numbers = [variable for variable in compared if variable not in self._enums]
+        for form in (*_forms(numbers), *self._pairs(compared)):
+            is_enum = form[0][0] in self._enums
             if not self._is_computable(form):
                 continue
             low, high = self._bounds(node, form)
@@ -220,14 +226,21 @@ class Relations:
             if len(form) == 2 and form[1][1] < 0 and low == high == 0 and least < greatest:
                 yield Relation(form, "=", 0)
                 continue
-            if low > least:
+            if low > least and not is_enum:
                 yield Relation(form, ">=", low)
-            if high < greatest:
+            if high < greatest and not is_enum:
                 yield Relation(form, "<=", high)
             if len(form) == 2 and form[1][1] < 0 and low < 0 < high:
                 unequal = Relation(form, "!=", 0)
                 if self._space.both(node, self._built(unequal.opposite)) == 0:
                     yield unequal
+
+    def _pairs(self, compared: Iterable[int]) -> Iterator[Form]:
+        """The differences of enumerations of one type, of whose values nothing but equality matters."""
+        enums = [variable for variable in compared if variable in self._enums]
+        for first, second in combinations(enums, 2):
+            if self._enums[first] == self._enums[second]:
+                yield (first, 1), (second, -1)
 
     def _bounds(self, node: Node, form: Form) -> tuple[int, int]:
         """The least and the greatest value of a sum where a predicate, which is not false, is true."""
@@ -368,6 +381,21 @@ class Relations:
     def _read(self, variable: int) -> Expression:
         name, place = self._space.subjects[variable]
         return VariableRead(name, str(place))
+
+
+def comparable(subjects: Iterable[Subject], domains: Domains) -> list[Subject]:
+    """The places, among some, that hold integers, and those that hold enumerations of one type: none alone or too many.
+
+    Args:
+        subjects: The places.
+        domains: Values that they can hold.
+    """
+    kinds: dict[object, list[Subject]] = {}
+    for subject in subjects:
+        kind = domains[subject].type
+        if isinstance(kind, IntegerType | EnumType):
+            kinds.setdefault(IntegerType if isinstance(kind, IntegerType) else kind, []).append(subject)
+    return [item for found in kinds.values() if 2 <= len(found) <= MAXIMUM_PLACES for item in found]
 
 
 def _halves(relation: Relation) -> tuple[Relation, ...]:

@@ -6,7 +6,8 @@ diagram.
 """
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from robosc.conditions.formula import OPERANDS, formula_in
@@ -80,6 +81,15 @@ class Formulas:
         self.effort = Effort(TOTAL_STEPS)
         # With the operands that were allowed when they were looked for.
         self._known: dict[DecisionDiagram, tuple[int, Expression | None]] = {}
+
+    @contextmanager
+    def within(self, effort: Effort) -> Iterator[None]:
+        """Search with another effort."""
+        before, self.effort = self.effort, effort
+        try:
+            yield
+        finally:
+            self.effort = before
 
     def formula(self, diagram: DecisionDiagram, *, limit: int = OPERANDS) -> Expression | None:
         """A formula that reads better than its diagram, or None where none of at most `limit` operands was found."""

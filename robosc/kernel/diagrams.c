@@ -1,7 +1,7 @@
-/* Decision diagrams of CUDD: saturation and restriction, without Python in between.
+/* Decision diagrams of CUDD: saturation, restriction and extraction, without Python in between.
  *
  * Each function here is the twin of one in robosc/synthesis, operation by operation: `closure` of saturation.py,
- * `restrict` of nodes.py. CUDD is the one inside dd.cudd, found when this module is connected with it, so that a diagram of dd is one
+ * `restrict` of nodes.py, `extract` of diagrams.py. CUDD is the one inside dd.cudd, found when this module is connected with it, so that a diagram of dd is one
  * of this module. Python's lock is held all the time: whatever frees a predicate of the same manager waits.
  *
  * A node is passed as its address, 0 where there is none. Functions that return a node own one reference of it, unless
@@ -123,11 +123,11 @@ static DdNode *joined(DdManager *manager, int level, DdNode *low, DdNode *high) 
     return found;
 }
 
-/* Tables: what was found for two nodes and a number; all three nodes of an entry are owned. */
+/* Tables: what was found for two nodes and a number, a node or a value; all three nodes of an entry are owned. */
 
 typedef struct {
     DdNode *first, *second, *found;
-    int number;
+    int number, value;
 } Entry;
 
 typedef struct {
@@ -177,7 +177,7 @@ static int remember(Table *table, DdNode *first, DdNode *second, int number, DdN
         PyMem_Free(table->entries);
         *table = larger;
     }
-    *entry_of(table, first, second, number) = (Entry){owned(first), owned(second), owned(found), number};
+    *entry_of(table, first, second, number) = (Entry){owned(first), owned(second), owned(found), number, 0};
     table->count++;
     return 1;
 }
@@ -226,7 +226,7 @@ typedef struct {
     Py_ssize_t group_count, step_count;
     Table known;
     PyObject *pause, *tell;
-    long long taken, told;
+    long long taken, told, asked;
 } Closure;
 
 static DdNode *composed(Closure *closure, DdNode *f, const Substitutions *substitutions) {
@@ -289,10 +289,17 @@ static int told_of(Closure *closure, DdNode *states) {
     return answered(PyObject_CallFunction(closure->tell, "LK", closure->told, (unsigned long long)(uintptr_t)states));
 }
 
+/* Whether to go on, asked with the number of steps since it was asked last. */
+static int may_go_on(Closure *closure) {
+    long long steps = closure->taken - closure->asked;
+    closure->asked = closure->taken;
+    return answered(PyObject_CallFunction(closure->pause, "L", steps));
+}
+
 /* States and what a step adds to them of those within a predicate, led from new ones. */
 static DdNode *grown(Closure *closure, DdNode *states, DdNode *within, const Step *step, DdNode *new) {
     DdManager *manager = closure->manager;
-    if (closure->taken % PAUSE == 0 && !answered(PyObject_CallFunction(closure->pause, NULL))) {
+    if (closure->taken % PAUSE == 0 && !may_go_on(closure)) {
         return NULL;
     }
     closure->taken++;
@@ -567,6 +574,9 @@ PyObject *diagram_closure(PyObject *module, PyObject *arguments) {
     if (read_groups(&closure, groups) && read_identity(&closure) && make_table(&closure.known, 1024)) {
         found = of_whole(&closure, owned((DdNode *)(uintptr_t)states), (DdNode *)(uintptr_t)within);
     }
+    if (found != NULL && !may_go_on(&closure)) {
+        found = instead(closure.manager, found, NULL);
+    }
     free_closure(&closure);
     return passed(found);
 }
@@ -619,6 +629,346 @@ PyObject *diagram_restrict(PyObject *module, PyObject *arguments) {
     DdNode *found = restricted(manager, &known, (DdNode *)(uintptr_t)f, (DdNode *)(uintptr_t)care);
     free_table(manager, &known);
     return passed(found);
+}
+
+/* Extraction */
+
+/* A place of the state: the levels of its bits, most significant first, and how many values it can hold. */
+typedef struct {
+    int *levels;
+    int bits;
+    int end; /* The first place after those that its bits stand among. */
+    long long size;
+} Place;
+
+/* A first index and the predicate, owned, that holds from there on. */
+typedef struct {
+    long long start;
+    DdNode *function;
+} Run;
+
+typedef struct {
+    Run *items;
+    size_t count, room;
+} Runs;
+
+/* Reasons for which a predicate is not taken apart. */
+enum { NONE, BRANCHES, TOTAL };
+
+typedef struct {
+    DdManager *manager;
+    Place *places;
+    int place_count;
+    int *home; /* For each level the first place that bits stand among there. */
+    int level_count;
+    long long branches, left;
+    int refused, at;
+    Table known;
+    PyObject *numbers; /* A dictionary from nodes to their numbers, in ascending order. */
+} Extraction;
+
+static void forget(const Extraction *extraction, Runs *runs) {
+    for (size_t place = 0; place < runs->count; place++) {
+        drop(extraction->manager, runs->items[place].function);
+    }
+    PyMem_Free(runs->items);
+}
+
+static int append(Runs *runs, long long start, DdNode *function) {
+    if (runs->count == runs->room) {
+        size_t room = runs->room ? 2 * runs->room : 8;
+        Run *items = PyMem_Realloc(runs->items, room * sizeof *items);
+        if (items == NULL) {
+            PyErr_NoMemory();
+            return 0;
+        }
+        runs->items = items;
+        runs->room = room;
+    }
+    runs->items[runs->count++] = (Run){start, owned(function)};
+    return 1;
+}
+
+/* The cofactors of a predicate by the variable of a level, owned; other variables may stand above it. */
+static int split_at(DdManager *manager, DdNode *f, int level, DdNode **low, DdNode **high) {
+    if (level_of(manager, f) >= level) {
+        split(manager, f, level, low, high);
+        owned(*low);
+        owned(*high);
+        return 1;
+    }
+    DdNode *variable = cudd.variable(manager, cudd.index_at(manager, level));
+    *low = owned(cudd.cofactor(manager, f, negation(variable)));
+    *high = *low == NULL ? NULL : owned(cudd.cofactor(manager, f, variable));
+    return *high != NULL;
+}
+
+/* Add the cofactor of a predicate for each index of the bits from one on, equal neighbours merged. */
+static int collect(Extraction *extraction, int number, int bit, DdNode *f, long long start, Runs *runs) {
+    DdManager *manager = extraction->manager;
+    const Place *place = &extraction->places[number];
+    if (bit == place->bits || level_of(manager, f) > place->levels[place->bits - 1]) {
+        return append(runs, start, f);
+    }
+    size_t begin = runs->count;
+    long long half = (long long)1 << (place->bits - bit - 1);
+    DdNode *low, *high;
+    int is_done = split_at(manager, f, place->levels[bit], &low, &high) &&
+                  collect(extraction, number, bit + 1, low, start, runs);
+    size_t middle = runs->count;
+    if (is_done && low == high) {
+        /* The bit does not matter: both halves look alike. */
+        for (size_t item = begin; is_done && item < middle; item++) {
+            is_done = append(runs, runs->items[item].start + half, runs->items[item].function);
+        }
+    } else if (is_done) {
+        is_done = collect(extraction, number, bit + 1, high, start + half, runs);
+    }
+    drop(manager, low);
+    drop(manager, high);
+    if (!is_done) {
+        return 0;
+    }
+    Run *later = &runs->items[middle];
+    if (later->function == later[-1].function) {
+        drop(manager, later->function);
+        memmove(later, later + 1, (--runs->count - middle) * sizeof *later);
+    }
+    if ((long long)(runs->count - begin) > extraction->branches) {
+        extraction->refused = BRANCHES;
+        extraction->at = number;
+        return 0;
+    }
+    return 1;
+}
+
+static PyObject *tuple_of(const long long *values, size_t count) {
+    PyObject *tuple = PyTuple_New((Py_ssize_t)count);
+    for (size_t place = 0; tuple != NULL && place < count; place++) {
+        PyObject *value = PyLong_FromLongLong(values[place]);
+        if (value == NULL || PyTuple_SetItem(tuple, (Py_ssize_t)place, value) < 0) {
+            Py_CLEAR(tuple);
+        }
+    }
+    return tuple;
+}
+
+/* The number of a node with branches, from 2 on. */
+static int node_number(Extraction *extraction, int place, const long long *starts, const long long *children,
+                       size_t count) {
+    PyObject *of_starts = tuple_of(starts, count), *of_children = tuple_of(children, count);
+    PyObject *node = NULL, *number = NULL;
+    int found = -1;
+    if (of_starts != NULL && of_children != NULL) {
+        node = Py_BuildValue("iOO", place, of_starts, of_children);
+    }
+    PyObject *known = node == NULL ? NULL : PyDict_GetItemWithError(extraction->numbers, node);
+    if (known != NULL) {
+        found = (int)PyLong_AsLong(known);
+    } else if (node != NULL && !PyErr_Occurred()) {
+        Py_ssize_t next = PyDict_Size(extraction->numbers) + 2;
+        number = PyLong_FromSsize_t(next);
+        if (number != NULL && PyDict_SetItem(extraction->numbers, node, number) == 0) {
+            found = (int)next;
+        }
+    }
+    Py_XDECREF(of_starts);
+    Py_XDECREF(of_children);
+    Py_XDECREF(node);
+    Py_XDECREF(number);
+    return found;
+}
+
+static int number_of(Extraction *extraction, DdNode *f, int first);
+
+static int home_of(const Extraction *extraction, DdNode *f) {
+    int level = level_of(extraction->manager, f);
+    return level < extraction->level_count ? extraction->home[level] : -1;
+}
+
+/* The number of the node that tests a place, whose cofactors are more than one. */
+static int branched(Extraction *extraction, int number, const Runs *runs) {
+    const Place *place = &extraction->places[number];
+    long long *starts = PyMem_Malloc(2 * runs->count * sizeof *starts), *children;
+    size_t count = 0;
+    int found = -1;
+    if (starts == NULL) {
+        PyErr_NoMemory();
+        return found;
+    }
+    children = starts + runs->count;
+    /* Codes from the size on stand for no value: what a predicate says of them is nobody's business. */
+    for (size_t item = 0; item < runs->count && runs->items[item].start < place->size; item++) {
+        DdNode *below = runs->items[item].function;
+        int home = home_of(extraction, below);
+        int is_same = home >= 0 && extraction->places[home].end == place->end;
+        found = number_of(extraction, below, is_same ? number + 1 : home);
+        if (found < 0) {
+            PyMem_Free(starts);
+            return found;
+        }
+        if (count == 0 || children[count - 1] != found) {
+            starts[count] = runs->items[item].start;
+            children[count++] = found;
+        }
+    }
+    found = count == 1 ? (int)children[0] : node_number(extraction, number, starts, children, count);
+    PyMem_Free(starts);
+    return found;
+}
+
+static int new_number(Extraction *extraction, DdNode *f, int first) {
+    for (int number = first; number >= 0 && number < extraction->places[first].end; number++) {
+        Runs runs = {0};
+        int found = -1, is_done = collect(extraction, number, 0, f, 0, &runs);
+        int is_tested = is_done && runs.count > 1;
+        if (is_tested) {
+            extraction->left -= (long long)runs.count;
+            if (extraction->left < 0) {
+                extraction->refused = TOTAL;
+                extraction->at = number;
+            } else {
+                found = branched(extraction, number, &runs);
+            }
+        }
+        forget(extraction, &runs);
+        if (is_tested || !is_done) {
+            return found;
+        }
+    }
+    PyErr_SetString(PyExc_ValueError, "a predicate depends on none of the places that its topmost variable stands for");
+    return -1;
+}
+
+/* The number of a predicate: 0 false, 1 true, from 2 on nodes; it does not depend on the places of its topmost
+ * variable that stand before one. -1 is a failure.
+ */
+static int number_of(Extraction *extraction, DdNode *f, int first) {
+    if (regular(f) == cudd.one(extraction->manager)) {
+        return f == cudd.one(extraction->manager);
+    }
+    Entry *entry = entry_of(&extraction->known, f, NULL, first);
+    if (entry->found != NULL) {
+        return entry->value;
+    }
+    int found = new_number(extraction, f, first);
+    if (found >= 0) {
+        if (!remember(&extraction->known, f, NULL, first, f)) {
+            return -1;
+        }
+        entry_of(&extraction->known, f, NULL, first)->value = found;
+    }
+    return found;
+}
+
+static int read_place(PyObject *pair, Place *place) {
+    PyObject *levels;
+    if (pair == NULL || !PyArg_ParseTuple(pair, "LO!", &place->size, &PyTuple_Type, &levels)) {
+        return 0;
+    }
+    place->bits = (int)PyTuple_Size(levels);
+    place->levels = PyMem_Calloc((size_t)place->bits + 1, sizeof *place->levels);
+    if (place->levels == NULL) {
+        PyErr_NoMemory();
+        return 0;
+    }
+    for (int bit = 0; bit < place->bits; bit++) {
+        place->levels[bit] = (int)PyLong_AsLong(PyTuple_GetItem(levels, bit));
+    }
+    return !PyErr_Occurred();
+}
+
+static int read_home(Extraction *extraction, int first, int end) {
+    for (int number = first; number < end; number++) {
+        Place *place = &extraction->places[number];
+        place->end = end;
+        for (int bit = 0; bit < place->bits; bit++) {
+            if (place->levels[bit] < 0 || place->levels[bit] >= extraction->level_count) {
+                PyErr_SetString(PyExc_ValueError, "there is no such level");
+                return 0;
+            }
+            extraction->home[place->levels[bit]] = first;
+        }
+    }
+    return 1;
+}
+
+static int read_places(Extraction *extraction, PyObject *blocks) {
+    int count = 0;
+    for (Py_ssize_t block = 0; block < PyTuple_Size(blocks); block++) {
+        count += (int)PyTuple_Size(PyTuple_GetItem(blocks, block));
+    }
+    if (PyErr_Occurred()) {
+        return 0;
+    }
+    extraction->places = PyMem_Calloc((size_t)count + 1, sizeof(Place));
+    extraction->level_count = cudd.size(extraction->manager);
+    extraction->home = PyMem_Calloc((size_t)extraction->level_count + 1, sizeof(int));
+    extraction->numbers = PyDict_New();
+    if (extraction->places == NULL || extraction->home == NULL || extraction->numbers == NULL) {
+        PyErr_NoMemory();
+        return 0;
+    }
+    for (int level = 0; level < extraction->level_count; level++) {
+        extraction->home[level] = -1;
+    }
+    extraction->place_count = count;
+    int number = 0;
+    for (Py_ssize_t block = 0; block < PyTuple_Size(blocks); block++) {
+        PyObject *places = PyTuple_GetItem(blocks, block);
+        int first = number;
+        for (Py_ssize_t item = 0; item < PyTuple_Size(places); item++) {
+            if (!read_place(PyTuple_GetItem(places, item), &extraction->places[number++])) {
+                return 0;
+            }
+        }
+        if (!read_home(extraction, first, number)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+PyObject *diagram_extract(PyObject *module, PyObject *arguments) {
+    (void)module;
+    Extraction extraction = {0};
+    PyObject *bdd, *blocks, *result = NULL;
+    unsigned long long f;
+    if (!PyArg_ParseTuple(arguments, "OKO!LL", &bdd, &f, &PyTuple_Type, &blocks, &extraction.branches,
+                          &extraction.left)) {
+        return NULL;
+    }
+    extraction.manager = manager_of(bdd);
+    DdNode *predicate = (DdNode *)(uintptr_t)f;
+    int found = -1;
+    if (read_places(&extraction, blocks) && make_table(&extraction.known, 256)) {
+        found = number_of(&extraction, predicate, home_of(&extraction, predicate));
+    }
+    if (extraction.refused && !PyErr_Occurred()) {
+        result = Py_BuildValue("iOi", extraction.refused, Py_None, extraction.at);
+    } else if (found < 0) {
+        result = passed(NULL);
+    } else {
+        result = Py_BuildValue("iNi", NONE, PyDict_Keys(extraction.numbers), found);
+    }
+    free_table(extraction.manager, &extraction.known);
+    for (int number = 0; extraction.places != NULL && number < extraction.place_count; number++) {
+        PyMem_Free(extraction.places[number].levels);
+    }
+    PyMem_Free(extraction.places);
+    PyMem_Free(extraction.home);
+    Py_XDECREF(extraction.numbers);
+    return result;
+}
+
+PyObject *diagram_implies(PyObject *module, PyObject *arguments) {
+    (void)module;
+    PyObject *bdd;
+    unsigned long long f, g;
+    if (!PyArg_ParseTuple(arguments, "OKK", &bdd, &f, &g)) {
+        return NULL;
+    }
+    return PyBool_FromLong(cudd.leq(manager_of(bdd), (DdNode *)(uintptr_t)f, (DdNode *)(uintptr_t)g));
 }
 
 PyObject *diagram_release(PyObject *module, PyObject *arguments) {

@@ -9,6 +9,8 @@ static PyMethodDef FUNCTIONS[] = {
     {"connect", diagram_connect, METH_VARARGS, "Find the functions of CUDD in a library, given by its path."},
     {"closure", diagram_closure, METH_VARARGS, "Return a set of states closed under steps: see synthesis/saturation.py."},
     {"restrict", diagram_restrict, METH_VARARGS, "Return a predicate that equals another where a third is true."},
+    {"implies", diagram_implies, METH_VARARGS, "Return whether a predicate is true only where another one is."},
+    {"extract", diagram_extract, METH_VARARGS, "Return a predicate as nodes over places: see synthesis/diagrams.py."},
     {"release", diagram_release, METH_VARARGS, "Give back the reference of a node that was returned."},
     {"space", space_make_store, METH_VARARGS, "Return an empty store, for places with so many classes."},
     {"space_make", space_make, METH_VARARGS, "Return the node with some children, and the steps it took."},

@@ -27,7 +27,7 @@ def load_automata_file(path: Path) -> Bundle:
         LanguageError: A file is too large or not UTF-8.
     """
     from robosc.cif import load_cif
-    from robosc.language.bundle import read_source
+    from robosc.language.reading import read_source
     from robosc.pipeline.files import FileAccessError
     from robosc.source import SourceFile
 

@@ -74,6 +74,11 @@ class LedRun(ABC):
     # Parts that differ
 
     @property
+    def locations(self) -> dict[str, str]:
+        """Location of each service and action, by its name; automata have none."""
+        return {}
+
+    @property
     @abstractmethod
     def state(self) -> StateInWords:
         """The current state."""

@@ -20,6 +20,8 @@ class SynthesisOptions:
         allow_reordering: True if the engine may change the order of its variables while it works.
         maximum_nodes: Nodes of decision diagrams beyond which the work is given up; None: no limit of the caller's.
         verified_states: States up to which the supervisor is verified one by one; None: 200,000.
+        condition_seconds: Seconds after which synthesis on this machine makes no further condition shorter (for each
+            module of its own); None: only steps limit it, and the same comes out every time.
 
     Raises:
         ValueError: There is no such deployment.
@@ -31,6 +33,7 @@ class SynthesisOptions:
     allow_reordering: bool = False
     maximum_nodes: int | None = None
     verified_states: int | None = None
+    condition_seconds: float | None = None
 
     def __post_init__(self) -> None:
         # A text equals its deployment without being it, and would silently be taken for the other one.
@@ -40,13 +43,15 @@ class SynthesisOptions:
         """The same for the engine of this machine.
 
         Raises:
-            ValueError: No diagram fits into so few nodes.
+            ValueError: No diagram fits into so few nodes, or the seconds are less than none.
         """
         from robosc.synthesis import EngineOptions
 
         if self.maximum_nodes is not None and self.maximum_nodes < 1:
             raise ValueError(f"maximum_nodes is {self.maximum_nodes}, and must be at least 1")
-        return EngineOptions(self.engine, self.allow_reordering, self.maximum_nodes)
+        if self.condition_seconds is not None and not self.condition_seconds >= 0:
+            raise ValueError(f"condition_seconds is {self.condition_seconds}, and must be at least 0")
+        return EngineOptions(self.engine, self.allow_reordering, self.maximum_nodes, self.condition_seconds)
 
 
 DEFAULT_OPTIONS = SynthesisOptions()

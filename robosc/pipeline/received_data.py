@@ -82,6 +82,15 @@ class DataField:
         """Its name in the data: `value.front`."""
         return ".".join(("value", *self.path))
 
+    def as_json(self) -> dict[str, object]:
+        """Description for a form as JSON values."""
+        return {
+            "path": list(self.path),
+            "type": self.type,
+            "choices": list(self.choices),
+            "is_boolean": self.type == "boolean",
+        }
+
 
 def data_fields(model: Model, event: str) -> tuple[DataField, ...]:
     """The parts of the data that comes with an event, in the model's order; none where it carries nothing."""

@@ -71,6 +71,23 @@ def asked_parts(system: System, text: str) -> dict[str, Value]:
     return found
 
 
+def beginnings(supervisor: SystemSupervisor) -> tuple[StateInWords, ...]:
+    """The states that automata under their supervisor may begin in, in the order of their values.
+
+    Raises:
+        UnsupportedModelError: They are too many to go through them.
+    """
+    semantics = Semantics(supervisor.system)
+    return tuple(state_in_words(supervisor.system, None, state) for state in _beginnings(semantics, supervisor))
+
+
+def _beginnings(semantics: Semantics, supervisor: SystemSupervisor) -> list[State]:
+    try:
+        return [item for item in semantics.initial_states if supervisor.may_begin(item)]
+    except TooManyChoicesError as error:
+        raise UnsupportedModelError(f"{supervisor.system.name} cannot be simulated: {error}") from None
+
+
 class SystemRun(LedRun):
     """A run of automata under their supervisor.
 
@@ -91,10 +108,7 @@ class SystemRun(LedRun):
         self._inputs: dict[str, list[InputVariable]] = {}
         for item in system.inputs:
             self._inputs.setdefault(item.event, []).append(item)
-        try:
-            ways = [item for item in self._semantics.initial_states if supervisor.may_begin(item)]
-        except TooManyChoicesError as error:
-            raise UnsupportedModelError(f"{system.name} cannot be simulated: {error}") from None
+        ways = _beginnings(self._semantics, supervisor)
         self._first = self._now = self._only(ways, initial or {}, system.name, "begin in", "initial")
         super().__init__(system.name, {event.name: event.is_controllable for event in system.events})
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 from robosc.dd_modules import load_dd
 from robosc.kernel import kernel_module
@@ -14,6 +14,24 @@ _LAYOUT = (56, 64)
 
 _NODE_OFFSET = 2
 """The number of a predicate in dd is the address of its node and this; 0 and 1 are its constants."""
+
+
+TOTAL = 2
+"""Reason for which a predicate is not taken apart: more ranges in all than there may be."""
+
+
+class Extracted(NamedTuple):
+    """A predicate as nodes over places, or the place at which it has too many ranges.
+
+    Attributes:
+        refused: 0, or the reason why there are no nodes.
+        nodes: For each node the number of its place, its starts and its children.
+        number: Number of the root, or of the place.
+    """
+
+    refused: int
+    nodes: list[tuple[int, tuple[int, ...], tuple[int, ...]]]
+    number: int
 
 
 def kernel_of(manager: Manager) -> "Kernel | None":
@@ -61,13 +79,31 @@ class Kernel:
         """Return what `nodes.restrict` does."""
         return self._returned(self._module.restrict(self._manager, self.address(predicate), self.address(care)))
 
+    def implies(self, predicate: Any, other: Any) -> bool:
+        """Return what `nodes.implies` does."""
+        return bool(self._module.implies(self._manager, self.address(predicate), self.address(other)))
+
+    def extract(
+        self, predicate: Any, blocks: tuple[tuple[tuple[int, tuple[int, ...]], ...], ...], branches: int, maximum: int
+    ) -> Extracted:
+        """Return what `diagrams.extract` does, as far as a number of branches and of ranges go.
+
+        Args:
+            predicate: The predicate.
+            blocks: Blocks of places: for each place how many values it can hold, and the levels of its bits.
+            branches: Ranges of one place's values that a node may tell apart.
+            maximum: Ranges that all nodes together may tell apart.
+        """
+        found = self._module.extract(self._manager, self.address(predicate), blocks, branches, maximum)
+        return Extracted(*found)
+
     def closure(
         self,
         states: Any,
         within: Any,
         groups: tuple[Any, ...],
         until: Any,
-        pause: Callable[[], None],
+        pause: Callable[[int], None],
         tell: Callable[[int, int], None],
     ) -> Any:
         """Return a set of states closed under some steps.
@@ -77,7 +113,7 @@ class Kernel:
             within: Predicate that added states satisfy.
             groups: Steps as `saturation` has them for the kernel.
             until: States once all of which are found the rest is not; or None.
-            pause: Called again and again; what it raises ends the work.
+            pause: Called again and again with the number of steps since the last call; what it raises ends the work.
             tell: Called with the number of the round and the address of the states that are found then.
         """
         begin, inside, enough = self.address(states), self.address(within), self.address(until)

@@ -5,6 +5,7 @@ from typing import Any
 from robosc.automata.state import Subject
 from robosc.errors import InternalError, UnsupportedModelError
 from robosc.supervisor import DecisionDiagram, DecisionNode
+from robosc.synthesis.compiled import TOTAL, kernel_of
 from robosc.synthesis.encoding import Bits, Encoding
 from robosc.synthesis.nodes import cofactors, is_constant
 
@@ -72,10 +73,7 @@ class _Extractor:
                 continue
             self._left -= len(runs)
             if self._left < 0:
-                raise UnsupportedModelError(
-                    f"a condition of the supervisor relates the values of '{subject}' to those of other variables in "
-                    f"more than {self._maximum} ways; use smaller ranges"
-                )
+                raise _too_many_in_all(subject, self._maximum)
             for start, below in runs:
                 if start >= len(bits.domain):
                     # Codes that stand for no value: what a predicate says of them is nobody's business.
@@ -116,10 +114,7 @@ class _Extractor:
             if start or runs[-1][1] != below:
                 runs.append((half + start, below))
         if len(runs) > MAXIMUM_BRANCHES:
-            raise UnsupportedModelError(
-                f"a condition of the supervisor tells apart more than {MAXIMUM_BRANCHES} ranges of the values of "
-                f"'{subject}'; use a smaller range"
-            )
+            raise _too_many_branches(subject)
         return runs
 
     def _is_below(self, predicate: Any, name: str) -> bool:
@@ -135,6 +130,20 @@ class _Extractor:
         return self._manager.let({name: False}, predicate), self._manager.let({name: True}, predicate)
 
 
+def _too_many_branches(subject: Subject) -> UnsupportedModelError:
+    return UnsupportedModelError(
+        f"a condition of the supervisor tells apart more than {MAXIMUM_BRANCHES} ranges of the values of "
+        f"'{subject}'; use a smaller range"
+    )
+
+
+def _too_many_in_all(subject: Subject, maximum: int) -> UnsupportedModelError:
+    return UnsupportedModelError(
+        f"a condition of the supervisor relates the values of '{subject}' to those of other variables in "
+        f"more than {maximum} ways; use smaller ranges"
+    )
+
+
 def extract(encoding: Encoding, predicate: Any, maximum: int = MAXIMUM_TOTAL) -> DecisionDiagram:
     """The decision diagram of a state predicate, with numbers that depend on its function and the order alone.
 
@@ -147,4 +156,15 @@ def extract(encoding: Encoding, predicate: Any, maximum: int = MAXIMUM_TOTAL) ->
         UnsupportedModelError: It tells apart more than `MAXIMUM_BRANCHES` ranges of one variable's values, or more than
             `maximum` in all.
     """
-    return _Extractor(encoding, maximum).diagram(predicate)
+    kernel = kernel_of(encoding.manager)
+    if kernel is None:
+        return _Extractor(encoding, maximum).diagram(predicate)
+    found = kernel.extract(predicate, encoding.levels, MAXIMUM_BRANCHES, maximum)
+    subjects = [subject for block in encoding.blocks for subject in block]
+    if found.refused:
+        subject = subjects[found.number]
+        is_total = found.refused == TOTAL
+        raise _too_many_in_all(subject, maximum) if is_total else _too_many_branches(subject)
+    places = [(subject.automaton, subject.variable) for subject in subjects]
+    nodes = [DecisionNode(*places[place], starts, children) for place, starts, children in found.nodes]
+    return DecisionDiagram(tuple(nodes), found.number)

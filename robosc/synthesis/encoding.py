@@ -11,6 +11,7 @@ compared or computed with together stand among each other, those of equal weight
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from robosc.automata.state import Subject, initial_values, subject_domain, subject_type, subjects
@@ -182,6 +183,16 @@ class Encoding:
             if limit_has_bit:
                 result = self.manager.ite(variable, result, self.manager.true)
         return result
+
+    @cached_property
+    def levels(self) -> tuple[tuple[tuple[int, tuple[int, ...]], ...], ...]:
+        """Blocks of places: for each place how many values it can hold, and the levels of its bits."""
+        level = {name: level for level, name in enumerate(self.order)}
+        places = {
+            subject: (len(bits.domain), tuple(level[name] for name in bits.names))
+            for subject, bits in self.subjects.items()
+        }
+        return tuple(tuple(places[subject] for subject in block) for block in self.blocks)
 
     def valid_states(self) -> Any:
         """Return the predicate that is true where every place of the state encodes a value."""

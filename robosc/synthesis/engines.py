@@ -85,11 +85,14 @@ class EngineOptions:
             R. Rudell, "Dynamic variable ordering for ordered binary decision diagrams", ICCAD 1993, pp. 42-47). The
             static order is mostly better and takes no time; what comes out is the same.
         maximum_nodes: Nodes of all predicates together beyond which work is given up; None for no limit.
+        condition_seconds: Seconds after which conditions that are left are not made shorter; None for no limit but that
+            of steps, with which the same comes out every time.
     """
 
     name: str = "auto"
     is_reordering: bool = False
     maximum_nodes: int | None = None
+    condition_seconds: float | None = None
 
 
 def engine_options(engine: str | EngineOptions) -> EngineOptions:

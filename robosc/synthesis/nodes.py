@@ -22,6 +22,12 @@ def is_constant(manager: Manager, node: Any) -> bool:
     return bool(node == manager.true or node == manager.false)
 
 
+def implies(manager: Manager, node: Any, other: Any) -> bool:
+    """Return True if a predicate is true only where another one is; CUDD makes no node for that."""
+    kernel = kernel_of(manager)
+    return bool(node & ~other == manager.false) if kernel is None else kernel.implies(node, other)
+
+
 def renamed(manager: Manager, names: Mapping[str, str], node: Any) -> Any:
     """A predicate with variables called otherwise, no two alike.
 

@@ -1,33 +1,35 @@
 """Short condition that the supervisor adds to an event, of those that do the same in every state that matters.
 
 A condition matters where the controlled system can be, the plant enables the event and the requirements allow it.
-Among those that agree there, candidates are found in five ways: by restricting, by leaving out places of the state,
-as relations between integers, and as sums of products for what is wanted and for what is not. The one with the
-shortest formula is kept, and without any the one with the smallest diagram. What is kept is what the supervisor
-holds, so its formula is right in all states.
+Among those that agree there, candidates are found in five ways: by restricting, by leaving out places of the state (of
+those that restricting leaves, and, where that does not read well, of all), as relations between variables, and as sums
+of products for what is wanted and for what is not. The one with the shortest formula is kept, and without any the one
+with the smallest diagram. What is kept is what the supervisor holds, so its formula is right in all states.
 
 Source: O. Coudert and J. C. Madre, "A unified framework for the formal verification of sequential circuits", IEEE
 ICCAD 1990, pp. 126-129 (restrict).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from time import monotonic
 from typing import Any
 
 from robosc.automata.state import Subject
 from robosc.conditions.cover import Words, cover
 from robosc.conditions.formula import OPERANDS, STEPS, length
 from robosc.conditions.literals import operands
-from robosc.conditions.multivalued import EffortExceededError, space_of
-from robosc.conditions.relations import MAXIMUM_PLACES, Relations
-from robosc.conditions.rendering import Formulas
+from robosc.conditions.multivalued import MAXIMUM_SUBJECTS, Effort, EffortExceededError, space_of
+from robosc.conditions.relations import Relations, comparable
+from robosc.conditions.rendering import SHORT, TOTAL_STEPS, Formulas
 from robosc.errors import UnsupportedModelError
-from robosc.expressions import TRUE, IntegerType
+from robosc.expressions import TRUE
 from robosc.supervisor import DecisionDiagram
 from robosc.supervisor.diagram import Subject as Place
 from robosc.supervisor.diagram import diagram_domains
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.nodes import restrict
+from robosc.synthesis.nodes import implies, restrict
 
 MAXIMUM_NODES = 20_000
 """Nodes of what matters up to which more than restricting is tried."""
@@ -35,12 +37,13 @@ MAXIMUM_NODES = 20_000
 MAXIMUM_KEPT_NODES = 1_000
 """Nodes of it that may be left over the places that a restricted condition tests."""
 
+MAXIMUM_EFFORT = 3_000_000
+"""Nodes of it over all places that conditions test, counted once for each of these, from which places are left out one
+by one: a third of a second with the faster engine."""
+
 MAXIMUM_RANGES = 10_000
 """Ranges of values that the diagram of such a set of states may tell apart: bits of several places may take far fewer
 nodes than their values do."""
-
-MAXIMUM_SUBJECTS = 40
-"""Places that a restricted condition may test: with more, no formula would be short."""
 
 
 _Length = tuple[bool, tuple[int, bool, int], int]
@@ -49,20 +52,27 @@ _Length = tuple[bool, tuple[int, bool, int], int]
 _SHORT: _Length = (False, (2, False, 0), 0)
 """Longer than a condition than which none is shorter."""
 
+_READABLE: _Length = (False, (SHORT + 1, False, 0), 0)
+"""Longer than a condition that reads well."""
+
 
 class Simplifier:
     """Simplifies the conditions of one supervisor.
 
     Args:
         encoding: The variables.
+        seconds: Seconds, from now on, after which conditions are taken as they are; None for no limit but that of
+            steps.
     """
 
-    def __init__(self, encoding: Encoding) -> None:
+    def __init__(self, encoding: Encoding, seconds: float | None = None) -> None:
         self._encoding = encoding
         self._manager = encoding.manager
         self._domains = diagram_domains(encoding.system)
         self._home = {name: subject for subject, bits in encoding.subjects.items() for name in bits.names}
         self._formulas = Formulas(self._domains)
+        self._end = None if seconds is None else monotonic() + seconds
+        self._more, self._left = Effort(TOTAL_STEPS), MAXIMUM_EFFORT
 
     def condition(self, wanted: Any, care: Any) -> DecisionDiagram | None:
         """A short condition that is `wanted` wherever `care` is true; None where it could be true everywhere.
@@ -74,23 +84,27 @@ class Simplifier:
         Raises:
             UnsupportedModelError: Each tells apart too many ranges of one variable's values.
         """
-        positive, negative = care & wanted, care & ~wanted
-        if negative == self._manager.false:
+        if implies(self._manager, care, wanted):
             return None
-        if positive == self._manager.false:
+        if implies(self._manager, care, ~wanted):
             return extract(self._encoding, self._manager.false)
         plain = wanted & self._encoding.valid_states()
+        if self._is_over():
+            with suppress(UnsupportedModelError):
+                return extract(self._encoding, plain)
         simple = restrict(self._manager, wanted, care)
         if simple.dag_size > plain.dag_size:
             simple = plain
-        places = {self._home[name] for name in self._manager.support(simple)}
+        places = self._places(simple)
         is_large = care.dag_size > MAXIMUM_NODES
         first = extract(self._encoding, simple) if is_large or len(places) == 1 else None
         if first is not None and (is_large or self._length(first) < _SHORT):
             return first
         found: dict[DecisionDiagram, _Length] = {}
         limit = OPERANDS
-        for diagram in self._others(places, positive, negative):
+        for diagram in self._others(places, care & wanted, care & ~wanted):
+            if self._is_over():
+                break
             if diagram in found:
                 continue
             found[diagram] = self._length(diagram, limit)
@@ -99,32 +113,67 @@ class Simplifier:
         if all(length[0] for length in found.values()) or len(places) <= limit:
             # What restricting gives needs a test of each of its places, and is mostly the longest: soon given up.
             first = extract(self._encoding, simple)
-            found[first] = self._length(first, limit)
-            return min((first, *found), key=lambda diagram: found[diagram])
+            found = {first: self._length(first, limit), **found}
+        best = min(found, key=lambda diagram: found[diagram])
+        if found[best] <= _READABLE:
+            return best
+        with self._formulas.within(self._more):
+            for diagram in self._wider(wanted, care & wanted, care & ~wanted):
+                if self._is_over():
+                    break
+                if diagram not in found:
+                    found[diagram] = self._length(diagram, SHORT)
         return min(found, key=lambda diagram: found[diagram])
+
+    def _is_over(self) -> bool:
+        return self._end is not None and monotonic() >= self._end
 
     def _length(self, diagram: DecisionDiagram, limit: int = OPERANDS) -> _Length:
         """Return the length of a condition's formula; one without a formula is longer than any with."""
         nodes = len(diagram.nodes)
         formula = None
         # Unless places are tested again, or compared with each other, no formula has more nodes than operands.
-        if nodes <= limit or limit == OPERANDS or len(self._integers([diagram])) > 1:
+        if nodes <= limit or limit == OPERANDS or comparable(_subjects([diagram]), self._domains):
             formula = self._formulas.formula(diagram, limit=limit)
         return formula is None, length(TRUE if formula is None else formula), nodes
-
-    def _integers(self, diagrams: Iterable[DecisionDiagram]) -> list[Place]:
-        """The integers that diagrams test."""
-        return [subject for subject in _subjects(diagrams) if isinstance(self._domains[subject].type, IntegerType)]
 
     def _others(self, tested: set[Subject], positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
         """Other conditions over some places that are true in the positive states and false in the negative ones."""
         if len(tested) > MAXIMUM_SUBJECTS:
             return
         # Both stay apart: a condition over the places that are left tells them from each other.
-        away = [name for name in self._encoding.state_names if self._home[name] not in tested]
-        positive, negative = self._needed(tested, self._away(away, positive), self._away(away, negative))
-        if self._is_large(positive) or self._is_large(negative):
+        positive, negative = self._over(tested, positive, negative)
+        if max(positive.dag_size, negative.dag_size) <= MAXIMUM_KEPT_NODES:
+            yield from self._telling_apart(*self._needed(tested, positive, negative))
+
+    def _wider(self, wanted: Any, positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
+        """The same over few places of all that a condition tests.
+
+        Where places go together, as those of a token that is in one of them, restricting may leave one out that says
+        in one test what many others say together.
+        """
+        places = self._places(wanted)
+        positive, negative = self._over(places, positive, negative)
+        effort = 2 * len(places) * (positive.dag_size + negative.dag_size)
+        if len(places) > MAXIMUM_SUBJECTS or effort > self._left:
             return
+        self._left -= effort
+        for is_reversed in (False, True):
+            states = self._needed(places, positive, negative, is_reversed=is_reversed)
+            if len(self._places(*states)) <= SHORT:
+                yield from self._telling_apart(*states)
+
+    def _places(self, *predicates: Any) -> set[Subject]:
+        """The places that predicates depend on."""
+        return {self._home[name] for item in predicates for name in self._manager.support(item)}
+
+    def _over(self, places: set[Subject], positive: Any, negative: Any) -> tuple[Any, Any]:
+        """The values that some places have in the states."""
+        away = [name for name in self._encoding.state_names if self._home[name] not in places]
+        return self._away(away, positive), self._away(away, negative)
+
+    def _telling_apart(self, positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
+        """Conditions that are true in the positive states and false in the negative ones."""
         try:
             diagrams = [extract(self._encoding, states, MAXIMUM_RANGES) for states in (positive, negative)]
         except UnsupportedModelError:
@@ -141,14 +190,24 @@ class Simplifier:
         """The values that the other places have in states, whatever some have."""
         return self._manager.exist(names, states) if names else states
 
-    def _needed(self, tested: Iterable[Subject], positive: Any, negative: Any) -> tuple[Any, Any]:
-        """The states without every place that is not needed to tell them from each other, larger ones first."""
-        if self._is_large(positive) or self._is_large(negative):
-            return positive, negative
+    def _needed(
+        self, tested: Iterable[Subject], positive: Any, negative: Any, *, is_reversed: bool = False
+    ) -> tuple[Any, Any]:
+        """The states without every place that is not needed to tell them from each other, larger ones first.
+
+        Args:
+            tested: Places that may go.
+            positive: Some states.
+            negative: Other states.
+            is_reversed: True if of places of one size the first ones in the model's text go first: of several that
+                tell the same, others are left then.
+        """
         ranks = {subject: rank for rank, subject in enumerate(self._domains)}
+        direction = 1 if is_reversed else -1
 
         def cost(subject: Subject) -> tuple[int, int]:
-            return -len(self._encoding.subjects[subject].domain), -ranks[subject.automaton, subject.variable]
+            rank = ranks[subject.automaton, subject.variable]
+            return -len(self._encoding.subjects[subject].domain), direction * rank
 
         for subject in sorted(tested, key=cost):
             names = self._encoding.subjects[subject].names
@@ -157,19 +216,16 @@ class Simplifier:
                 positive, negative = fewer
         return positive, negative
 
-    def _is_large(self, states: Any) -> bool:
-        return bool(states.dag_size > MAXIMUM_KEPT_NODES)
-
     def _related(self, diagrams: Sequence[DecisionDiagram]) -> Iterator[DecisionDiagram]:
-        """The states that relations between integers and a short sum of products describe together."""
-        integers = self._integers(diagrams)
-        if not 2 <= len(integers) <= MAXIMUM_PLACES:
+        """The states that relations between variables and a short sum of products describe together."""
+        compared = comparable(_subjects(diagrams), self._domains)
+        if not compared:
             return
         try:
-            space = space_of(diagrams, self._domains, self._formulas.effort.part(STEPS), apart=integers)
+            space = space_of(diagrams, self._domains, self._formulas.effort.part(STEPS), apart=compared)
             relations = Relations(space, Words(space, self._formulas.vocabulary), self._domains)
             sets = [space.of(diagram) for diagram in diagrams]
-            places = relations.integers(range(len(space.subjects)))
+            places = relations.comparable(range(len(space.subjects)))
             pairs = [(sets[0], sets[1]), (sets[1], sets[0])]
             pairs = [pair for pair in pairs if relations.are_enough(*pair, places)] or pairs
         except EffortExceededError:

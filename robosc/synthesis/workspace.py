@@ -28,12 +28,14 @@ class Workspace:
         encoding: The variables.
         monitor: Monitor of the waiting caller; it also counts nodes where they are limited.
         is_reordering: True if the engine may change its order.
+        condition_seconds: Seconds that conditions may be made shorter for; None for no limit.
     """
 
     engine: str
     encoding: Encoding
     monitor: ProgressMonitor
     is_reordering: bool
+    condition_seconds: float | None
 
     def reordering(self) -> AbstractContextManager[None]:
         """Let the engine change its order meanwhile, if it may."""
@@ -65,4 +67,5 @@ def workspace(
     manager = make_manager(name)
     monitor = ProgressMonitor(should_stop, on_progress, node_check(manager, options.maximum_nodes))
     with limited(manager, options.maximum_nodes):
-        yield Workspace(name, Encoding(system, manager, monitor.check_stop), monitor, options.is_reordering)
+        encoding = Encoding(system, manager, monitor.check_stop)
+        yield Workspace(name, encoding, monitor, options.is_reordering, options.condition_seconds)

@@ -347,6 +347,8 @@ class TestErrors:
                     client.synthesize(BUNDLE, SynthesisOptions(maximum_nodes=states))
             with pytest.raises(RequestRefusedError):
                 client.synthesize(BUNDLE, SynthesisOptions(verified_states=-1))
+            with pytest.raises(RequestRefusedError, match="condition_seconds is for synthesis on this machine"):
+                client.synthesize(BUNDLE, SynthesisOptions(condition_seconds=5.0))
             with pytest.raises(RequestRefusedError):
                 client.submit(Check(BUNDLE), retention_s=1e300)
 

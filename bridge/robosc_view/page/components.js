@@ -4,13 +4,14 @@ import { byId, make, mark, quoted, say, show } from "./dom.js";
 import { count, value } from "./format.js";
 import { afterPainting } from "./frame.js";
 import { Graph } from "./graph.js";
-import { received, under } from "./received.js";
+import { isAutomata, received, under } from "./received.js";
 
 const SERVED = new Set(["service", "action"]);
 const WIDE_PX = 430;
 const LEAST_SCALE = 0.75;
 const NO_BEHAVIOUR = "No behaviour of its own.";
 const TOO_LARGE = "Its graph is too large to be drawn.";
+const LEFT_OUT = "It is not drawn: the automata before it are as much as can be drawn.";
 const KINDS = { __proto__: null, controllable: "controllable", uncontrollable: "uncontrollable", silent: "silent" };
 
 class Card {
@@ -41,6 +42,7 @@ class Card {
 
   headline(id, enlarge) {
     const parts = [make("h3", { id }, quoted(this.component.name)), this.state];
+    if (this.component.role) parts.splice(1, 0, make("span", { class: "quiet" }, this.component.role));
     if (this.graph) {
       const button = make("button", { type: "button", class: "plain icon", "aria-label": `Enlarge the graph of ${this.component.name}` }, "⤢");
       button.addEventListener("click", () => enlarge(this, button));
@@ -66,7 +68,7 @@ class Card {
     const state = shown?.state ?? null;
     say(this.state, state ?? (this.graph ? "not known" : ""));
     if (this.graph && state !== this.graph.active) this.setActive(state);
-    if (this.note) say(this.note, state === null ? NO_BEHAVIOUR : TOO_LARGE);
+    if (this.note) say(this.note, state === null ? NO_BEHAVIOUR : this.component.is_left_out ? LEFT_OUT : TOO_LARGE);
     this.paintVariables(shown?.variables ?? {});
     for (const [name, place] of this.places) {
       const location = under(places, name) ?? "not known";
@@ -142,6 +144,7 @@ export function startComponents() {
       const { components = [], communications = [] } = received.definition;
       const byComponent = Map.groupBy(communications, (item) => item.component);
       cards = new Map(components.map((item, i) => [item.name, new Card(item, byComponent.get(item.name) ?? [], i, enlarge)]));
+      say(byId("components-title"), isAutomata() ? "Automata" : "Components");
       byId("cards").replaceChildren(...[...cards.values()].map((card) => card.element));
       narrow();
     },

@@ -1,12 +1,14 @@
-// A model that is played with: its events as buttons, their data, undo and redo, chance, kept runs, and a link.
+// A model that is played with: its events as buttons, their data and outcomes, undo and redo, chance, kept runs, a link.
 
 import { announce } from "./announce.js";
 import { byId, make, mark, quoted, say, show } from "./dom.js";
 import { count } from "./format.js";
-import { isModel, received } from "./received.js";
+import { isAutomata, isModel, received, under } from "./received.js";
 
-const IN_LINK = "#model=";
-const LEADS = { __proto__: null, step: "", unknown: "Unknown:", trouble: "Trouble:", changed: "Saved:", wrong: "Not done:" };
+/** The part of an address that holds a model: its language, where that is not RoboSC's, and the model. */
+const IN_LINK = /^#model(?:\.(\w+))?=(.*)$/;
+const FILTERED_FROM = 12;
+const LEADS = { __proto__: null, step: "", choose: "Which?", unknown: "Unknown:", trouble: "Trouble:", changed: "Saved:", wrong: "Not done:" };
 
 /** One event: a button, a field for each part of its data, and why it cannot happen. */
 class PlayEvent {
@@ -17,8 +19,10 @@ class PlayEvent {
     this.button = make("button", { type: "submit", class: `happen is-${kind}` },
       make("span", { class: `mark is-${kind}`, "aria-hidden": "true" }, controllable ? "◆" : "○"), " ", quoted(event));
     this.why = make("p", { class: "play-why" });
+    this.ways = make("div", { class: "play-ways buttons", role: "group", "aria-label": `What ${event} leads to`, hidden: true });
     this.form = make("form", { class: "play-event", "data-event": event },
-      this.button, ...this.fields.map((field) => field.element), this.why);
+      this.button, ...this.fields.map((field) => field.element), this.why, this.ways);
+    this.send = send;
     this.form.addEventListener("submit", (submitted) => {
       submitted.preventDefault();
       // The keyboard, too, can only have happen what can.
@@ -32,15 +36,27 @@ class PlayEvent {
     return known.length > 0 ? `${this.event} ${nested(known)}` : this.event;
   }
 
-  paint(why) {
+  /** @param {string[] | undefined} why Reasons why it cannot happen. @param {object | null} choice Choice that is open. */
+  paint(why, choice) {
     // Not "disabled": then it could not be reached, and its reason not be read.
     mark(this.button, "aria-disabled", why !== undefined);
     say(this.why, (why ?? []).join("; "));
     show(this.why, why !== undefined);
+    const ways = choice?.event === this.event ? choice.ways : [];
+    this.ways.replaceChildren(...ways.map((told, way) => {
+      const button = make("button", { type: "button", class: "plain" }, quoted(told));
+      button.addEventListener("click", () => {
+        // This one goes, and the focus with it.
+        this.button.focus();
+        this.send({ type: "event", line: choice.line, way });
+      });
+      return button;
+    }));
+    show(this.ways, ways.length > 0);
   }
 }
 
-/** A part of the data of an event; nothing in it is unknown. */
+/** A part of the data of an event; nothing in it is unknown, or of automata any value. */
 class Field {
   constructor(event, { path, type, choices, is_boolean: isBoolean }) {
     this.path = path;
@@ -48,9 +64,10 @@ class Field {
     this.isChoice = choices.length > 0;
     const name = path.join(".") || "value";
     const label = `${name} of ${event}`;
+    const nothing = isAutomata() ? "any" : "unknown";
     this.input = this.isChoice
-      ? make("select", { "aria-label": label }, make("option", { value: "" }, "unknown"), ...choices.map((choice) => make("option", { value: choice }, choice)))
-      : make("input", { type: "text", placeholder: "unknown", "aria-label": label, autocomplete: "off", size: 9 });
+      ? make("select", { "aria-label": label }, make("option", { value: "" }, nothing), ...choices.map((choice) => make("option", { value: choice }, choice)))
+      : make("input", { type: "text", placeholder: nothing, "aria-label": label, autocomplete: "off", size: 9 });
     this.element = make("label", { class: "play-field", title: `${name}: ${type}` }, quoted(name), this.input);
   }
 
@@ -108,21 +125,34 @@ export function startPlay(send, token) {
     if (lines.length > 0) announce("play", [LEADS[kind], ...lines].join(" "));
   };
   const want = (message) => {
-    if (!send(message)) tell("wrong", ["there is no connection"]);
+    const isSent = send(message);
+    if (!isSent) tell("wrong", ["there is no connection"]);
+    return isSent;
   };
 
-  for (const type of ["undo", "redo", "restart"]) byId(`play-${type}`).addEventListener("click", () => want({ type }));
+  for (const type of ["undo", "redo"]) byId(`play-${type}`).addEventListener("click", () => want({ type }));
+  const beginning = byId("play-beginning");
+  byId("play-restart").addEventListener("click", () =>
+    want(beginning.hidden ? { type: "restart" } : { type: "restart", beginning: beginning.selectedIndex }));
+  const filter = byId("play-filter");
+  const narrow = () => {
+    const wanted = filter.hidden ? "" : filter.value.trim().toLowerCase();
+    for (const item of events) show(item.form, item.event.toLowerCase().includes(wanted));
+  };
+  filter.addEventListener("input", narrow);
   for (const form of ["log", "test"]) byId(`play-${form}`).addEventListener("click", () => want({ type: "save", form }));
   const walk = (untilTrouble) => {
     const seed = walks;
     walks += 1;
     const steps = untilTrouble ? 1000 : Math.min(Math.max(Math.trunc(Number(byId("play-steps").value)) || 1, 1), 5000);
-    want({ type: "walk", steps, seed, until_trouble: untilTrouble });
+    // Of a large system it takes its time.
+    if (want({ type: "walk", steps, seed, until_trouble: untilTrouble })) tell("step", ["chance goes on…"]);
   };
   byId("play-walk").addEventListener("click", () => walk(false));
   byId("play-trouble").addEventListener("click", () => walk(true));
   byId("play-link").addEventListener("click", async () => {
-    const address = `${location.origin}/${IN_LINK}${received.definition.play.link}`;
+    const { language, link } = received.definition.play;
+    const address = `${location.origin}/#model${isAutomata() ? `.${language}` : ""}=${link}`;
     history.replaceState(null, "", address);
     try {
       await navigator.clipboard.writeText(address);
@@ -141,6 +171,8 @@ export function startPlay(send, token) {
   });
 
   let isLinkOpened = false;
+  /** Number of the state that the run has begun in, as it was told; what a person chooses meanwhile stays chosen. */
+  let begun = null;
   let isResumed = false;
   return {
     build() {
@@ -163,18 +195,29 @@ export function startPlay(send, token) {
         const forms = events.filter((item) => own.has(item.event) === isOwn).map((item) => item.form);
         byId(place).replaceChildren(...(forms.length > 0 ? forms : [make("p", { class: "quiet" }, "Nothing.")]));
       }
+      say(byId("play-own-title"), isAutomata() ? "Controllable events" : "The controller may");
+      say(byId("play-world-title"), isAutomata() ? "Uncontrollable events" : "The world may");
+      show(filter, events.length > FILTERED_FROM);
+      narrow();
+      beginning.replaceChildren(...play.beginnings.map((told) => make("option", {}, told)));
+      show(beginning, play.beginnings.length > 0);
+      begun = null;
+      for (const form of ["log", "test"]) show(byId(`play-${form}`), play.forms.includes(form));
       show(byId("play-link"), play.link !== null);
-      const packed = isLinkOpened ? "" : location.hash.startsWith(IN_LINK) ? location.hash.slice(IN_LINK.length) : "";
+      show(byId("play-keep"), play.forms.length > 0 || play.link !== null);
+      const [, language, packed] = (isLinkOpened ? null : IN_LINK.exec(location.hash)) ?? [];
       isLinkOpened = true;
       if (!packed) return;
       // A page that is loaded again goes on with what it did, and does not open the link again.
       history.replaceState(null, "", location.pathname);
-      if (packed !== play.link) want({ type: "model", packed, token });
+      if (packed !== play.link) want({ type: "model", packed, language, token });
     },
     paint() {
       const { run } = received;
       if (run === null) return;
-      for (const item of events) item.paint(run.hindered[item.event]);
+      for (const item of events) item.paint(under(run.hindered, item.event), run.choice);
+      if (run.beginning !== begun) beginning.selectedIndex = run.beginning;
+      begun = run.beginning;
       for (const type of ["undo", "redo"]) {
         const button = byId(`play-${type}`);
         button.disabled = run[type] === "";

@@ -32,6 +32,9 @@ export const isReplay = () => received.definition?.source === "log";
 /** Returns true if nothing is executed: a model that is played with. */
 export const isModel = () => received.definition?.source === "model";
 
+/** Returns true if what is played with are automata without a model of RoboSC. */
+export const isAutomata = () => received.definition?.deployment === "automata";
+
 /** Age of the state that is shown, in seconds. */
 export function ageS() {
   if (received.update === null) return 0;

@@ -6,12 +6,14 @@ import { isModel, isReplay, received } from "./received.js";
 
 const SOURCES = { __proto__: null, bridge: "bridge", ros2: "ROS 2", log: "recorded run", model: "model alone" };
 
+const DEPLOYMENTS = { __proto__: null, layer: "supervision layer", automata: "automata" };
+
 /** The definition is new. */
 export function paintRobot() {
   const { definition } = received;
   if (definition === null) return;
   say(byId("robot"), definition.robot);
-  const deployment = definition.deployment === "layer" ? "supervision layer" : "controller";
+  const deployment = DEPLOYMENTS[definition.deployment] ?? "controller";
   const source = SOURCES[definition.source] ?? definition.source;
   say(byId("about"), [deployment, source, definition.version].filter(Boolean).join(" · "));
   document.title = `${definition.robot} – RoboSC live view`;

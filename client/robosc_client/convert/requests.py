@@ -145,6 +145,8 @@ def _verify_request(task: Verify) -> pb.VerifyRequest:
 
 
 def _options(options: SynthesisOptions) -> pb.SynthesisOptions:
+    if options.condition_seconds is not None:
+        raise ValueError("condition_seconds is for synthesis on this machine: a server limits all of its time")
     return pb.SynthesisOptions(
         deployment=_DEPLOYMENTS[options.deployment],
         engine=_engine(options.engine),

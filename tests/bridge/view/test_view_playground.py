@@ -25,10 +25,10 @@ from robosc.supervisor import Supervisor, encode
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view import command, watched_model
 from robosc_view.model_changes import model_changes
-from robosc_view.playground import MAXIMUM_KEPT, KeptRuns, Playground, packed, playable, unpacked
+from robosc_view.playground import MAXIMUM_KEPT, KeptRun, KeptRuns, Playground, packed, playable, unpacked
 from robosc_view.replay import Recording, Replay
 from robosc_view.reports import SourceKind
-from robosc_view.requests import parse_request
+from robosc_view.requests import ROBOSC, parse_request
 from robosc_view.sources import Pause, RefusedError
 from robosc_view.watched_model import MadeModel, NoSupervisorError, WatchedModel, file_digest, read, synthesized
 from support.live import large_model, supervisor_without_synthesis
@@ -59,7 +59,8 @@ class Files:
         """The run of one more page."""
         return Playground(self.watched, self.kept, None, self._of_link)
 
-    async def _of_link(self, text: str) -> MadeModel:
+    async def _of_link(self, text: str, language: str) -> MadeModel:
+        assert language == ROBOSC
         self.begun.append(text)
         return MadeModel(SECOND, (), text)
 
@@ -95,6 +96,11 @@ class Files:
 async def looking(files: Files) -> AsyncIterator[Any]:
     async with served(files.source, is_shared=False, robot=files.robot) as server, opened(server.url) as page:
         yield page
+
+
+def supervisor_in(made: MadeModel) -> Supervisor:
+    assert isinstance(made.supervisor, Supervisor)
+    return made.supervisor
 
 
 def components(update: dict[str, Any]) -> set[str]:
@@ -177,7 +183,7 @@ def test_nothing_is_commanded_or_replayed() -> None:
 def test_what_synth_tells(tmp_path: Path) -> None:
     async def run() -> None:
         made = await synthesized(["--", str(MODEL)])
-        assert made.supervisor.model.name == "LineFollower"
+        assert supervisor_in(made).model.name == "LineFollower"
         again = await synthesized([], MODEL.read_text(encoding="utf-8"))
         assert again.supervisor.added == made.supervisor.added
         wrong = tmp_path / "wrong.rscd"
@@ -203,7 +209,7 @@ def test_what_synth_tells(tmp_path: Path) -> None:
 def test_nothing_of_the_folder_that_one_works_in_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "argparse.py").write_text("import pathlib; pathlib.Path('was_run').touch(); raise SystemExit")
     monkeypatch.chdir(tmp_path)
-    assert asyncio.run(synthesized(["--", str(MODEL)])).supervisor.model.name == "LineFollower"
+    assert supervisor_in(asyncio.run(synthesized(["--", str(MODEL)]))).model.name == "LineFollower"
     assert not (tmp_path / "was_run").exists()
 
 
@@ -378,7 +384,7 @@ def test_chance_and_trouble() -> None:
             told = await page.told("run")
             told = await done(page, "walk", steps=12, seed=3)
             assert (told["steps"], told["lines"]) == (12, ["12 events by chance, seed 3"])
-            twin = Run(made_of(GATE).supervisor)
+            twin = Run(supervisor_in(made_of(GATE)))
             assert [entry["event"] for entry in page.entries() if entry["kind"] == "event"] == [
                 step.event for step in twin.walk(12, 3)
             ]
@@ -401,7 +407,7 @@ def test_a_run_is_kept_as_a_log_and_as_a_test() -> None:
             await page.told("run")
             await done(page, "event", line="light day")
             await done(page, "event", line="open")
-            twin = Run(made_of(GATE).supervisor)
+            twin = Run(supervisor_in(made_of(GATE)))
             twin.step("light.response", "day")
             twin.step("open.request")
             await page.send(type="save", form="log")
@@ -526,9 +532,9 @@ def test_a_page_that_comes_back_goes_on_with_its_run() -> None:
     asyncio.run(run())
     kept = KeptRuns()
     for number in range(MAXIMUM_KEPT + 1):
-        kept.keep(str(number), MadeModel(FIRST), ())
-    assert kept.of("0") == (None, ())
-    assert kept.of("1") == (MadeModel(FIRST), ())
+        kept.keep(str(number), KeptRun(MadeModel(FIRST)))
+    assert kept.of("0") == KeptRun()
+    assert kept.of("1") == KeptRun(MadeModel(FIRST))
 
 
 @pytest.mark.parametrize(
@@ -544,6 +550,10 @@ def test_a_page_that_comes_back_goes_on_with_its_run() -> None:
         {"type": "save", "form": "word"},
         {"type": "save", "form": ["log"]},
         {"type": "model", "packed": None},
+        {"type": "model", "packed": "x", "language": "word"},
+        {"type": "model", "packed": "x", "language": ["cif"]},
+        {"type": "event", "line": "e", "way": -1},
+        {"type": "restart", "beginning": "first"},
     ],
 )
 def test_requests_that_make_no_sense_are_refused(request_: dict[str, Any]) -> None:
@@ -555,7 +565,7 @@ def test_what_is_shown_live_is_not_led_by_hand() -> None:
     async def run() -> None:
         made = made_of(GATE)
         log = LoggedRun((LogEntry(1, 0.0, "restart", "", False, {}),))
-        recording = Recording(log, made.supervisor)
+        recording = Recording(log, supervisor_in(made))
         async with served(lambda: Replay(recording), is_shared=False) as server, opened(server.url) as page:
             await page.send(type="undo")
             assert "only a model alone is" in (await page.told("refused"))["why"]

@@ -110,6 +110,24 @@ def test_synth(model: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert (document["states"], list(document["conditions"])) == (3, ["tank.c_fill"])
 
 
+def test_figures_of_the_synthesis(model: str, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = run(capsys, "synth", model, "--statistics")
+    assert status == 0
+    lines = [line.split(maxsplit=1) for line in out.splitlines()[-7:]]
+    assert ["search", "backwards"] in lines
+    assert ["rounds", "1"] in lines
+    status, out, _ = run(capsys, "synth", model, "--json", "--statistics")
+    found = json.loads(out)["statistics"]
+    assert (found["search"], found["state_bits"], found["iterations"]) == ("backwards", 2, 1)
+    assert found["seconds"] >= 0
+    Path(model).write_text(f"{TANK}marked false;\n")
+    status, out, _ = run(capsys, "synth", model, "--statistics")
+    assert status == 1
+    assert "search" in out
+    Path(model).write_text(f"{TANK}marked nothing;\n")
+    assert json.loads(run(capsys, "synth", model, "--json", "--statistics")[1])["statistics"] is None
+
+
 def test_synth_in_modules(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model = tmp_path / "two.cif"
     model.write_text(TANK.replace("level in any", "level = 1") + TANK.replace("tank", "tub").replace(" in any", " = 1"))
@@ -150,7 +168,7 @@ def test_plain_automata_of_other_tools(tmp_path: Path, capsys: pytest.CaptureFix
         assert (document["states"], document["conditions"]) == (2, {"tank.c_fill": "true"})
         assert run(capsys, "verify", str(controlled))[0] == 0
         assert run(capsys, "generate", str(controlled), "--target", "c99", "-o", str(tmp_path / ending))[0] == 0
-        assert run(capsys, "view" if ending == ".gen" else "doc", str(controlled))[0] == 2
+        assert run(capsys, "format" if ending == ".gen" else "doc", str(controlled))[0] == 2
         controlled.write_text("x")
         status, out, err = run(capsys, "check", str(controlled))
         assert (status, "[automata-syntax]" in out + err) == (1, True)
@@ -239,6 +257,40 @@ def test_verify(model: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(capsys, "verify", model, "--quiet") == (0, "", "")
 
 
+def test_a_supervisor_file(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "tank.rsup"
+    assert run(capsys, "synth", model, "-o", str(file))[1].splitlines()[-1] == f"written to {file}"
+    assert run(capsys, "verify", str(file), model)[1].splitlines()[0] == "tank: passed"
+    changed = file.read_bytes().replace(b'"states":3', b'"states":2')
+    assert changed != file.read_bytes()
+    file.write_bytes(changed)
+    status, out, _ = run(capsys, "verify", str(file), model)
+    assert (status, out.splitlines()[0]) == (1, "tank: failed")
+    assert out.splitlines()[-1] == "wrong states: it tells of 2, and there are 3"
+    fault = json.loads(run(capsys, "verify", str(file), model, "--json")[1])["faults"][0]
+    assert (fault["check"], fault["message"]) == ("states", "it tells of 2, and there are 3")
+    Path(model).write_text(TANK.replace("level > 1", "level > 2"))
+    status, _, err = run(capsys, "verify", str(file), model)
+    assert (status, "one of other automata" in err) == (1, True)
+    file.write_text("{}")
+    assert json.loads(run(capsys, "verify", str(file), model, "--json")[1])["status"] == "failed"
+    Path(model).write_text(f"{TANK}marked x;")
+    assert json.loads(run(capsys, "verify", str(file), model, "--json")[1])["status"] == "model errors"
+
+
+def test_a_signed_supervisor_file(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, key, other = tmp_path / "tank.rsup", tmp_path / "lab", tmp_path / "other"
+    run(capsys, "synth", model, "-o", str(file))
+    for name in (key, other):
+        assert run(capsys, "key", str(name))[0] == 0
+    status, out, _ = run(capsys, "sign", str(file), "--key", f"{key}.key", "--json")
+    assert (status, json.loads(out)["model"], json.loads(out)["deployment"]) == (0, "tank", None)
+    assert run(capsys, "verify", str(file), "--signed-by", f"{key}.pub")[0] == 0
+    assert run(capsys, "verify", str(file), model, "--signed-by", f"{key}.pub")[0] == 0
+    assert run(capsys, "verify", str(file), model, "--signed-by", f"{other}.pub")[0] == 1
+    assert run(capsys, "verify", model, "--signed-by", f"{key}.pub")[0] == 2
+
+
 CHOICE = """input bool sensor;
 plant p:
   uncontrollable u;
@@ -321,7 +373,7 @@ def test_simulate_begins_as_it_is_told(model: str, tmp_path: Path, capsys: pytes
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["synth", "-o", "x.rsup"],
+        ["synth", "-o", "x.txt"],
         ["synth", "--allow-livelock"],
         ["synth", "--deployment", "layer"],
         ["check", "-L", "."],
@@ -335,7 +387,7 @@ def test_simulate_begins_as_it_is_told(model: str, tmp_path: Path, capsys: pytes
         ["doc"],
         ["explain-synthesis", "--deployment", "layer"],
         ["format"],
-        ["view"],
+        ["view", "--scene", "room"],
     ],
 )
 def test_what_means_nothing_for_automata_is_refused(

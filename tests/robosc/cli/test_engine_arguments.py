@@ -1,7 +1,8 @@
-"""`--engine`, `--reorder` and `--max-nodes` of the commands that synthesize."""
+"""`--engine`, `--reorder`, `--max-nodes` and `--condition-seconds` of the commands that synthesize."""
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,7 +12,7 @@ from support.models import EXAMPLES
 NAVIGATION = str(EXAMPLES / "navigation" / "navigation.rscd")
 
 
-def outcome(capsys: pytest.CaptureFixture[str], *arguments: str) -> object:
+def outcome(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
     assert main(["synth", NAVIGATION, "--json", *arguments]) == 0
     return json.loads(capsys.readouterr().out)["summary"]
 
@@ -20,6 +21,22 @@ def test_reordering_and_enough_nodes_change_nothing(capsys: pytest.CaptureFixtur
     plain = outcome(capsys)
     assert outcome(capsys, "--reorder") == plain
     assert outcome(capsys, "--max-nodes", "100000") == plain
+
+
+def test_the_time_of_conditions_is_limited(capsys: pytest.CaptureFixture[str]) -> None:
+    plain, hasty = outcome(capsys), outcome(capsys, "--condition-seconds", "0")
+    assert outcome(capsys, "--condition-seconds", "1e9") == plain
+    assert hasty["added"].keys() == plain["added"].keys()
+    assert len(str(hasty["added"])) > len(str(plain["added"]))
+    assert hasty["certificate"]["maximally_permissive"] == plain["certificate"]["maximally_permissive"] == "passed"
+
+
+@pytest.mark.parametrize("seconds", ["-1", "nan", "soon"])
+def test_a_time_is_a_number_from_zero_on(capsys: pytest.CaptureFixture[str], seconds: str) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["synth", NAVIGATION, f"--condition-seconds={seconds}"])
+    assert caught.value.code == 2
+    assert f"invalid time value: '{seconds}'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", [["synth"], ["explore"], ["check", "--synthesize"]])

@@ -1,4 +1,4 @@
-"""Formulas with relations between integers: the same meaning in every state, and short where the predicate is."""
+"""Formulas with relations between integers, or enumerations: the same meaning everywhere, and short where it is."""
 
 from collections.abc import Callable
 from itertools import product
@@ -14,7 +14,7 @@ from robosc.conditions.literals import Vocabulary, has_relation, operands
 from robosc.conditions.multivalued import Effort, Space
 from robosc.conditions.relations import MAXIMUM_PLACES, Description, Relation, Relations
 from robosc.conditions.rendering import in_words
-from robosc.expressions import Binary, Constant, Expression, IntegerType, VariableRead
+from robosc.expressions import Binary, Constant, EnumType, Expression, IntegerType, VariableRead
 from robosc.expressions.evaluate import evaluate as evaluate_expression
 from robosc.supervisor import DecisionDiagram, DecisionNode
 from robosc.supervisor.diagram import Domains, Subject, SubjectDomain, evaluate, validate
@@ -29,6 +29,12 @@ def integers(**ranges: tuple[int, int]) -> dict[Subject, SubjectDomain]:
         (name[0], name[1:]): SubjectDomain(range(low, high + 1), IntegerType(low, high))
         for name, (low, high) in ranges.items()
     }
+
+
+def rooms(*names: str, kind: str = "Room") -> dict[Subject, SubjectDomain]:
+    """Variables of an enumeration, `A.r` by name `Ar`."""
+    values = ("hall", "attic", "cellar", "yard")
+    return {(name[0], name[1:]): SubjectDomain(values, EnumType(kind, values)) for name in names}
 
 
 def diagram_of(domains: Domains, holds: Predicate) -> DecisionDiagram:
@@ -112,6 +118,17 @@ MODE: dict[Subject, SubjectDomain] = {("X", None): SubjectDomain(("on", "off", "
         (TWO, lambda a, b: a <= 3 and b <= 4, "A.n <= 3 and B.m <= 4"),
         (TWO, lambda a, b: a != b and a + b <= 12, "A.n != B.m and A.n + B.m <= 12"),
         (TWO, lambda a, b: a != b and (a, b) not in {(5, 4), (7, 2)}, None),
+        (rooms("Ar", "Br"), lambda a, b: a == b, "A.r = B.r"),
+        (rooms("Ar", "Br"), lambda a, b: a != b, "A.r != B.r"),
+        (rooms("Ar", "Br"), lambda a, b: a != b != "yard", "B.r != yard and A.r != B.r"),
+        (rooms("Ar", "Br"), lambda a, b: a == b or a == "hall", "A.r = hall or A.r = B.r"),
+        (rooms("Ar", "Br", "Cr"), lambda *v: len(set(v)) == 3, "A.r != B.r and A.r != C.r and B.r != C.r"),
+        (rooms("Ar", "Br", "Cr", "Dr"), lambda a, b, c, d: a != b or c != d, "A.r != B.r or C.r != D.r"),
+        ({**rooms("Ar", "Br"), **TWO}, lambda a, b, n, m: a != b and n <= m, "A.r != B.r and A.n <= B.m"),
+        ({**MODE, **rooms("Ar", "Br")}, lambda x, n, m, a, b: x == "on" or a != b, "X.on or A.r != B.r"),
+        # One is of another type, however much their values look alike; nor is one more than the other.
+        ({**rooms("Ar"), **rooms("Br", kind="Place")}, lambda a, b: a == b, None),
+        (rooms("Ar", "Br"), lambda a, b: a < b, None),
         # No difference and no sum.
         (integers(An=(0, 4), Bm=(0, 4)), lambda a, b: a * b <= 2, None),
     ],
@@ -168,6 +185,39 @@ def test_predicates_with_relations_in_them(data: st.DataObject, count: int) -> N
         same_everywhere(formula, domains, holds)
 
 
+@st.composite
+def enum_shapes(draw: st.DrawFn, depth: int = 2) -> Predicate:
+    """A predicate over enumerations and an integer: relations, tests of single places, and what joins them."""
+    ways: list[Predicate]
+    if depth and draw(st.booleans()):
+        first, second = draw(enum_shapes(depth - 1)), draw(enum_shapes(depth - 1))
+        ways = [
+            lambda *values: first(*values) and second(*values),
+            lambda *values: first(*values) or second(*values),
+            lambda *values: not first(*values),
+        ]
+        return draw(st.sampled_from(ways))
+    place, other = draw(st.permutations(range(3)))[:2]
+    value = draw(st.sampled_from(["hall", "yard"]))
+    ways = [
+        lambda *values: values[place] == values[other],
+        lambda *values: values[place] != value,
+        lambda *values: values[3] <= 2,
+    ]
+    return draw(st.sampled_from(ways))
+
+
+@settings(max_examples=examples(60))
+@given(st.data())
+def test_predicates_with_relations_between_enumerations(data: st.DataObject) -> None:
+    domains = {**rooms("Ar", "Br", "Cr"), **integers(Dn=(0, 4))}
+    holds, matters = data.draw(enum_shapes()), data.draw(enum_shapes())
+    formula = to_expression(diagram_of(domains, holds), domains, limit=1000, effort=Effort(20 * STEPS))
+    if formula is not None:
+        same_everywhere(formula, domains, holds)
+    check_descriptions(domains, tuple(domains)[:3], holds, matters)
+
+
 @settings(max_examples=examples(20))
 @given(st.integers(0, 2**32 - 1))
 def test_any_predicate(seed: int) -> None:
@@ -209,16 +259,21 @@ def test_descriptions_between_what_must_be_and_what_must_not(data: st.DataObject
         **integers(An=data.draw(RANGES), Bn=data.draw(RANGES)),
     }
     holds, matters = data.draw(st.one_of(modes(), shapes(2))), data.draw(st.one_of(modes(), shapes(2)))
+    check_descriptions(domains, tuple(domains)[1:], holds, matters)
+
+
+def check_descriptions(domains: Domains, compared: tuple[Subject, ...], holds: Predicate, matters: Predicate) -> None:
+    """Each description is right where it matters, whether the values of the places are all told apart or not."""
     sets = [
         diagram_of(domains, lambda *values: matters(*values) and holds(*values)),
         diagram_of(domains, lambda *values: matters(*values) and not holds(*values)),
     ]
     if min(diagram.root for diagram in sets) < 2:
         return
-    for apart in ((), tuple(domains)[1:]):
+    for apart in ((), compared):
         space = Space(sets, domains, Effort(200_000), apart=apart)
         relations = Relations(space, Words(space, Vocabulary(domains)), domains)
-        places = relations.integers(range(len(space.subjects)))
+        places = relations.comparable(range(len(space.subjects)))
         if not places:
             return
         wanted, forbidden = (space.of(diagram) for diagram in sets)
@@ -254,6 +309,12 @@ def test_no_number_in_a_relation_leaves_32_bits(low: int, holds: Predicate) -> N
     formula = to_expression(diagram_of(domains, holds), domains)
     assert formula is not None
     same_everywhere(formula, domains, holds)
+
+
+def test_enumerations_of_two_types_are_not_compared() -> None:
+    domains = {**rooms("Ar"), **rooms("Br", kind="Place")}
+    formula = to_expression(diagram_of(domains, lambda a, b: a == b), domains)
+    assert formula is not None and not has_relation(formula)
 
 
 def test_so_many_integers_are_left_alone() -> None:

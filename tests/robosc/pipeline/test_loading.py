@@ -122,3 +122,5 @@ def test_wrong_use_is_a_type_error() -> None:
     assert robosc.SynthesisOptions(deployment="layer").deployment is robosc.Deployment.LAYER  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="maximum_nodes is 0, and must be at least 1"):
         robosc.synthesize(NAVIGATION, robosc.SynthesisOptions(maximum_nodes=0))
+    with pytest.raises(ValueError, match=r"condition_seconds is -1\.0, and must be at least 0"):
+        robosc.synthesize(NAVIGATION, robosc.SynthesisOptions(condition_seconds=-1.0))

@@ -14,6 +14,7 @@ import robosc
 from robosc.automata import DiscreteVariable, EventCondition, InputVariable, Role, System, disables
 from robosc.automata.compile import State
 from robosc.expressions import Binary, Constant, EnumType, IntegerType, StateTest, Unary
+from robosc.pipeline.system_runs import beginnings
 from robosc.pipeline.walking import TroubleKind
 from support.effort import examples
 from support.naive_system import NaiveSystem
@@ -77,9 +78,10 @@ def test_a_product_by_hand_enumerates_the_same_states_and_runs(seed: int) -> Non
         with pytest.raises(robosc.NothingGeneratedError, match="too many to list"):
             robosc.explore(supervisor, maximum_states=MAXIMUM_STATES).write("never.json")
         return
-    beginnings = naive.beginnings(supervisor.initial)
+    first = naive.beginnings(supervisor.initial)
+    assert by_name(state.parts for state in beginnings(supervisor)) == by_name(parts(drawn, state) for state in first)
     reached: dict[State, dict[str, frozenset[State]]] = {}
-    left = sorted(beginnings)
+    left = sorted(first)
     while left:
         state = left.pop()
         if state not in reached:
@@ -94,7 +96,7 @@ def test_a_product_by_hand_enumerates_the_same_states_and_runs(seed: int) -> Non
     place = {repr(item): number for number, item in enumerate(numbers)}
     number_of = {state: place[repr(parts(drawn, state))] for state in reached}
     assert sorted(number_of.values()) == list(range(len(graph.states)))
-    assert {number_of[state] for state in beginnings} == set(graph.initial_states)
+    assert {number_of[state] for state in first} == set(graph.initial_states)
     assert set(graph.transitions) == {
         (number_of[state], event, number_of[target])
         for state, steps in reached.items()
@@ -103,19 +105,19 @@ def test_a_product_by_hand_enumerates_the_same_states_and_runs(seed: int) -> Non
     }
     for state, number in number_of.items():
         assert graph.states[number].is_marked is naive.is_marked(state)
-    _lead(supervisor, naive, reached, sorted(beginnings), Random(seed))
+    _lead(supervisor, naive, reached, sorted(first), Random(seed))
 
 
 def _lead(
     supervisor: robosc.SystemSupervisor,
     naive: NaiveSystem,
     reached: dict[State, dict[str, frozenset[State]]],
-    beginnings: list[State],
+    first: list[State],
     dice: Random,
 ) -> None:
     """Lead a run along the product."""
     drawn = supervisor.system
-    now = dice.choice(beginnings)
+    now = dice.choice(first)
     run = robosc.simulate(supervisor, initial=parts(drawn, now))
     past = [now]
     for _ in range(STEPS):
@@ -320,6 +322,7 @@ def test_ways_to_begin() -> None:
     with pytest.raises(robosc.ChoiceError, match="by hand cannot begin in a state with A = c; it can begin in: A = a"):
         robosc.simulate(supervisor, initial={"A": "c"})
     assert robosc.simulate(supervisor, initial={"A": "b"}).step("go").state.components == {"A": "a"}
+    assert [state.parts for state in beginnings(supervisor)] == [{"A": "a"}, {"A": "b"}]
     found = robosc.explore(supervisor)
     assert found.graph is not None
     assert (found.graph.initial_states, found.graph.initial) == ((0, 1), 0)

@@ -4,6 +4,7 @@ from itertools import pairwise, product
 
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from robosc.automata import DiscreteVariable
 from robosc.automata.compile import compile_expression
@@ -12,6 +13,7 @@ from robosc.errors import UnsupportedModelError
 from robosc.expressions import Expression, IntegerType, Received, leaves
 from robosc.supervisor import DecisionDiagram
 from robosc.supervisor.diagram import diagram_domains, evaluate, validate
+from robosc.synthesis import compiled
 from robosc.synthesis.blocks import Blocks
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
@@ -70,11 +72,35 @@ def test_bits_among_each_other_give_the_same_values(condition: Expression) -> No
         assert evaluate(diagram, lambda *place, at=indices: at[place]) == (function(state, {}) is True)
 
 
-def test_a_diagram_has_a_limit_in_all() -> None:
+@settings(max_examples=examples(60))
+@given(condition=_without_data, together=st.integers(1, 4), maximum=st.integers(1, 60))
+def test_the_kernel_takes_diagrams_apart_as_python_does(condition: Expression, together: int, maximum: int) -> None:
+    """The same nodes with the same numbers, or the same reason; in blocks of bits that stand among each other, too."""
+    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    places = subjects(SYSTEM)
+    blocks = tuple(places[first : first + together] for first in range(0, len(places), together))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("robosc.synthesis.encoding.blocks_of", lambda made: Blocks(blocks, {}))
+        encoding = Encoding(SYSTEM, make_manager("cudd"))
+    predicate = ExpressionEncoder(encoding).holds(condition)
+    nodes = len(encoding.manager)
+    answers: list[DecisionDiagram | str] = []
+    for kernel in (compiled.kernel_of, lambda manager: None):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("robosc.synthesis.diagrams.kernel_of", kernel)
+            patch.setattr("robosc.synthesis.diagrams.MAXIMUM_BRANCHES", 12)
+            try:
+                answers.append(extract(encoding, predicate, maximum))
+            except UnsupportedModelError as error:
+                answers.append(str(error))
+        # What is made on the way is given back.
+        assert len(encoding.manager) == nodes
+    assert answers[0] == answers[1]
+
+
+def test_a_diagram_has_a_limit_in_all(engine: str) -> None:
     made = [automaton(n, ["l -e-> l"], variables=[DiscreteVariable("x", IntegerType(0, 99), (0,))]) for n in "AB"]
-    encoding = Encoding(
-        system(*made, conditions={"e": operation(read("A.x"), "<", read("B.x"))}), make_manager("autoref")
-    )
+    encoding = Encoding(system(*made, conditions={"e": operation(read("A.x"), "<", read("B.x"))}), make_manager(engine))
     less = ExpressionEncoder(encoding).holds(operation(read("A.x"), "<", read("B.x")))
     # One hundred ranges of the one, and for all but its last value two of the other.
     assert len(extract(encoding, less, 400).nodes) == 100
@@ -82,9 +108,9 @@ def test_a_diagram_has_a_limit_in_all() -> None:
         extract(encoding, less, 250)
 
 
-def counter(bits: int) -> Encoding:
+def counter(bits: int, engine: str) -> Encoding:
     variable = DiscreteVariable("x", IntegerType(0, 2**bits - 1), (0,))
-    return Encoding(system(automaton("A", ["l -e-> l"], variables=[variable])), make_manager("autoref"))
+    return Encoding(system(automaton("A", ["l -e-> l"], variables=[variable])), make_manager(engine))
 
 
 def test_every_other_value(engine: str) -> None:
@@ -105,9 +131,9 @@ def test_codes_beyond_the_last_value_leave_no_branch(engine: str) -> None:
     assert extract(encoding, ~encoding.code(bits, 7)) == DecisionDiagram((), 1)
 
 
-def test_too_many_ranges_are_refused_at_once() -> None:
+def test_too_many_ranges_are_refused_at_once(engine: str) -> None:
     """A condition on the last of 31 bits has 2^31 ranges: no list of these is ever begun."""
-    encoding = counter(31)
+    encoding = counter(31, engine)
     odd = encoding.manager.var(encoding.subjects[Subject("A", "x")].names[-1])
     with pytest.raises(UnsupportedModelError, match=r"more than 100000 ranges of the values of 'A\.x'"):
         extract(encoding, odd)

@@ -2,7 +2,7 @@
 
 import sys
 from dataclasses import replace
-from itertools import product
+from itertools import count, product
 from math import prod
 from random import Random
 from typing import Any
@@ -14,13 +14,23 @@ from hypothesis import strategies as st
 from robosc.automata import DiscreteVariable, System
 from robosc.automata.semantics import Semantics
 from robosc.automata.state import subjects
+from robosc.conditions.literals import operands
 from robosc.conditions.rendering import Formulas, in_words
-from robosc.expressions import Binary, BinaryOperator, Expression, IntegerType, StateTest
+from robosc.expressions import (
+    Binary,
+    BinaryOperator,
+    EnumType,
+    EnumValue,
+    Expression,
+    IntegerType,
+    StateTest,
+    Unary,
+)
 from robosc.expressions.evaluate import evaluate as evaluate_expression
 from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.supervisor.diagram import diagram_domains, validate
 from robosc.supervisor.predicates import state_predicates
-from robosc.synthesis import SynthesisStatus, simplify, synthesize
+from robosc.synthesis import EngineOptions, SynthesisStatus, simplify, synthesize
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.nodes import restrict
 from support.effort import examples
@@ -30,6 +40,7 @@ from support.systems import automaton, edge, operation, read, system
 
 MOST_STATES = 2_000
 SIGNS: list[BinaryOperator] = ["+", "-"]
+SAMENESS: list[BinaryOperator] = ["=", "!="]
 COMPARISONS: list[BinaryOperator] = ["<=", "<", ">="]
 
 
@@ -108,6 +119,40 @@ def test_counters_that_depend_on_each_other() -> None:
         assert part in together, together
 
 
+ROOM = EnumType("Room", ("hall", "attic", "cellar", "yard"))
+
+
+def house(seed: int) -> System:
+    """A cat and a mouse that go from room to room, and a bell that may ring where it does no harm."""
+    dice = Random(seed)
+    automata = []
+    for name in ("cat", "mouse"):
+        edges = []
+        for room in ROOM.values:
+            goes_to = dice.choice([other for other in ROOM.values if other != room])
+            here = operation(read(f"{name}.room"), "=", EnumValue("Room", room))
+            event = f"{dice.choice(['', 'u_'])}{name}_{room}"
+            edges.append(edge(f"still -{event}-> still", here, room=EnumValue("Room", goes_to)))
+        variables = [DiscreteVariable("room", ROOM, (dice.choice(ROOM.values),))]
+        automata.append(automaton(name, edges, variables=variables))
+    together = operation(read("cat.room"), dice.choice(SAMENESS), read("mouse.room"))
+    bell = automaton("bell", ["still -ring-> rung", "rung -rest-> still", edge("rung -u_fight-> lost", together)])
+    return replace(system(*automata, bell), invariants=(Unary("not", StateTest("bell", "lost")),))
+
+
+def test_enumerations_that_depend_on_each_other() -> None:
+    together = ""
+    for seed in range(12):
+        system_ = house(seed)
+        found = synthesize(system_, engine="autoref")
+        if found.status is SynthesisStatus.SUPERVISOR:
+            check_conditions(system_, found.added)
+            formulas = [Formulas(diagram_domains(system_)).formula(item.condition) for item in found.added]
+            together += "; ".join(in_words(formula, ()) for formula in formulas if formula is not None)
+    for part in ("cat.room = mouse.room", "cat.room != mouse.room"):
+        assert part in together, together
+
+
 @pytest.mark.parametrize(("family", "size"), [("dining philosophers", 3), ("cat and mouse, 1 pair", 2)])
 @pytest.mark.parametrize("bound", ["MAXIMUM_NODES", "MAXIMUM_KEPT_NODES", "MAXIMUM_SUBJECTS", "STEPS"])
 def test_what_is_given_up_is_right_all_the_same(
@@ -116,10 +161,60 @@ def test_what_is_given_up_is_right_all_the_same(
     system = FAMILIES[family](size)
     best = synthesize(system, engine="autoref").added
     monkeypatch.setattr(simplify, bound, 0)
+    monkeypatch.setattr(simplify, "MAXIMUM_EFFORT", 0)
     found = synthesize(system, engine="autoref").added
     assert [item.event for item in found] == [item.event for item in best]
     check_conditions(system, found)
     assert length(system, found) > length(system, best)
+
+
+def rooms(number: int, seed: int) -> System:
+    """Cats and mice that go through rooms, counted room by room, and never meet."""
+    dice = Random(seed)
+    doors = {name: {(room, (room + 1) % number) for room in range(number)} for name in ("cat", "mouse")}
+    for found in doors.values():
+        found |= {(here, other) for here, other in (dice.sample(range(number), 2) for _ in range(dice.randint(0, 3)))}
+    automata = []
+    for name, begin in (("cat", 0), ("mouse", number - 1)):
+        for room in range(number):
+            edges = [f"some -{name}_{room}_{other}-> none" for here, other in sorted(doors[name]) if here == room]
+            edges += [f"none -{name}_{here}_{room}-> some" for here, other in sorted(doors[name]) if other == room]
+            initial = "some" if room == begin else "none"
+            automata.append(automaton(f"{name}{room}", edges, initial=initial, marked=["some", "none"]))
+    apart = [Binary("or", StateTest(f"cat{room}", "none"), StateTest(f"mouse{room}", "none")) for room in range(number)]
+    return replace(system(*automata), invariants=tuple(apart))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_tokens_counted_place_by_place(seed: int) -> None:
+    system_ = rooms(7, seed)
+    check_conditions(system_, synthesize(system_).added)
+
+
+def test_of_places_that_tell_the_same_few_are_tested() -> None:
+    """Tests of all other rooms would tell, too, where the mouse is, but in many words."""
+    system_ = rooms(50, 2)
+    formulas = Formulas(diagram_domains(system_))
+    for item in synthesize(system_).added:
+        formula = formulas.formula(item.condition)
+        assert formula is not None and operands(formula) <= 3, item.event
+
+
+def test_when_the_time_is_over_conditions_are_right_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With more time none is longer; the clock goes on by a second whenever it is asked."""
+    clock = count()
+    monkeypatch.setattr(simplify, "monotonic", lambda: float(next(clock)))
+    system_ = FAMILIES["cat and mouse, 1 pair"](2)
+    best = synthesize(system_, engine="autoref").added
+    assert next(clock) == 0, "without a limit no clock is asked"
+    lengths = []
+    for seconds in (0, 3, 8, 20, 60, 1_000):
+        added = synthesize(system_, engine=EngineOptions("autoref", condition_seconds=seconds)).added
+        assert [item.event for item in added] == [item.event for item in best]
+        check_conditions(system_, added)
+        lengths.append(length(system_, added))
+    assert lengths == sorted(lengths, reverse=True)
+    assert lengths[0] > lengths[3] > lengths[-1] == length(system_, best)
 
 
 def length(system: System, added: tuple[AddedCondition, ...]) -> int:

@@ -229,6 +229,13 @@ def test_random_models(tmp_path: Path) -> None:
         # It may begin in two states, in one of which the supervisor lets it.
         "input bool s; uncontrollable u; controllable c; plant p: disc int[0..1] x in any; location a: initial; marked;"
         " edge u when x = 1 goto b; edge c; location b: marked; end requirement invariant p.a;",
+        # The supervisor compares two variables of an enumeration.
+        "enum Room = hall, attic, yard; input bool s; controllable c, d; uncontrollable u, v, w;"
+        " plant cat: disc Room room = hall; location: initial; marked; edge u when room = hall do room := attic;"
+        " edge u when room = attic do room := yard; edge v when room = yard do room := hall; end"
+        " plant mouse: disc Room room = yard; location: initial; marked; edge w do room := cat.room; end"
+        " plant bell: location still: initial; marked; edge c when s goto rung; edge u, v, w;"
+        " location rung: edge w when cat.room = mouse.room goto lost; edge d goto still; location lost; end",
     ],
 )
 def test_small_models(text: str, tmp_path: Path) -> None:

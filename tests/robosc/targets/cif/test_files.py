@@ -65,9 +65,10 @@ GOLDEN = Path(__file__).parents[2] / "supervisor" / "golden"
         ("capacity", "component_Bolts.v_n + component_Nuts.v_m <= 19"),
         # What is -2 in the model is 0 in the file.
         ("follower", "component_First.v_at >= component_Second.v_at"),
+        ("house", "component_Cat.v_room != component_Mouse.v_room"),
     ],
 )
-def test_relations_between_integers(name: str, test: str) -> None:
+def test_relations_between_variables(name: str, test: str) -> None:
     supervisor = made((GOLDEN / f"{name}.rscd").read_text(encoding="utf-8"))
     assert test in generate(supervisor, "cif")["supervisor.cif"]
     assert assert_same_control(supervisor, reachable=100, others=50) >= 100

@@ -1,0 +1,72 @@
+"""The process that synthesizes automata for a page: what is wanted comes on standard input, what was made goes out.
+
+It answers with a pickled `MadeModel`, or with the reason why there is none, which only its parent reads.
+"""
+
+import argparse
+import pickle
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+
+from robosc.cli import automata
+from robosc.cli.output import CommandError
+from robosc.errors import RoboscError, Severity
+from robosc.explanation import empty_text
+from robosc.pipeline.system_runs import beginnings
+from robosc_view.automata import distinct_beginnings, too_large
+from robosc_view.watched_model import MadeModel, finding_text
+
+MAXIMUM_FINDINGS = 10
+"""Errors that are told; of more the rest is counted."""
+
+
+def made_of(found: automata.Synthesized) -> MadeModel | str:
+    """Return what a page plays with; or the reason why there is nothing, a line for each part of it.
+
+    Raises:
+        UnsupportedModelError: There are too many states to begin in.
+    """
+    if found.supervisor is None:
+        return _reason(found)
+    whole = None if found.bundle.libraries else found.bundle.main.text
+    told = tuple(finding_text(item.severity, item.message, item.code) for item in found.diagnostics)
+    language = Path(found.bundle.main.name).suffix.removeprefix(".")
+    system = found.supervisor.system
+    why_not = too_large(system)
+    if why_not:
+        return why_not
+    # Of a copy: what a supervisor works out for itself cannot be pickled.
+    begin = distinct_beginnings(system, beginnings(replace(found.supervisor)))
+    return MadeModel(found.supervisor, told, whole, language, begin)
+
+
+def _reason(found: automata.Synthesized) -> str:
+    wrong = [str(item) for item in found.diagnostics if item.severity is Severity.ERROR]
+    more = len(wrong) - MAXIMUM_FINDINGS
+    lines = [*wrong[:MAXIMUM_FINDINGS], *([f"and {more} errors more"] if more > 0 else [])]
+    if found.reason:
+        lines.append(found.reason)
+    if found.explanation is not None:
+        lines += empty_text(found.explanation).splitlines()
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Answer what is wanted."""
+    wanted = msgspec.json.decode(sys.stdin.buffer.read())
+    text = wanted.pop("text")
+    arguments = argparse.Namespace(
+        **{**wanted, "model": Path(wanted["model"]), "library_path": (), "interface_path": (), "deployment": None}
+    )
+    try:
+        made = made_of(automata.synthesized(arguments, text=text))
+    except (CommandError, RoboscError) as error:
+        made = str(error)
+    sys.stdout.buffer.write(pickle.dumps(made))
+
+
+if __name__ == "__main__":
+    main()

@@ -19,6 +19,7 @@ from robosc.errors import InvalidSupervisorError, InvalidSystemError, NodeLimitE
 from robosc.explanation import EmptyExplanation, SystemWords, explain_empty
 from robosc.pipeline.conditions import Condition, Conditions, condition_of, conditions_of
 from robosc.pipeline.files import given_path, read_bounded, write_whole
+from robosc.pipeline.findings import Findings
 from robosc.pipeline.loading import FileName
 from robosc.pipeline.options import SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, Outcome, SynthesisStatus, Verification, VerificationStatus
@@ -206,7 +207,7 @@ class SystemSynthesis(Outcome):
         reason: Reason why there is no supervisor; empty where there is one.
         supervisor: The supervisor, or None.
         statistics: Figures of the work; None where the automata cannot be handled.
-        diagnostics: Always empty: automata have no text that findings could be about.
+        diagnostics: Every finding about the file of the automata, sorted by place; empty where there is no file.
         explanation: Explanation of why there is no supervisor, or None where there is one.
     """
 
@@ -214,7 +215,7 @@ class SystemSynthesis(Outcome):
     reason: str
     supervisor: SystemSupervisor | None
     statistics: Statistics | None
-    diagnostics: tuple[()] = ()
+    diagnostics: Findings = field(default_factory=Findings)
     explanation: EmptyExplanation | NoSupervisor | None = None
 
     def _made(self) -> object:
@@ -367,13 +368,19 @@ def verify_system(
         "transitions": found.transitions,
         "method": verified.method,
     }
-    lines = [f"{supervisor.system.name}: {status}"]
-    lines += [f"  {name.replace('_', ' '):<21} {outcome}" for name, outcome in outcomes.items()]
-    lines.append(f"  {'method':<21} {verified.method}")
+    return Verification(status, (), "", report, system_verification_text(report))
+
+
+def system_verification_text(report: Mapping[str, Any]) -> str:
+    """Return the report about a verified supervisor of automata, for people."""
+    lines = [f"{report['system']}: {report['status']}"]
+    lines += [f"  {name.replace('_', ' '):<21} {outcome}" for name, outcome in report["checks"].items()]
+    lines.append(f"  {'method':<21} {report['method']}")
     lines += [
-        f"not {item.property}: {item.message}, after {', '.join(item.trace) or 'nothing'}" for item in found.failures
+        f"not {item['check'].replace('_', ' ')}: {item['message']}, after {', '.join(item['trace']) or 'nothing'}"
+        for item in report["faults"]
     ]
-    return Verification(status, (), "", report, "\n".join(lines) + "\n")
+    return "\n".join(lines) + "\n"
 
 
 def _verified(

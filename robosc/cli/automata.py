@@ -194,6 +194,8 @@ def synth(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Exi
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
     """
+    from robosc.pipeline.systems import system_summary_text
+
     output = arguments.output
     refuse(
         output is not None and output.suffix not in SUFFIXES,
@@ -232,9 +234,7 @@ def synth(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Exi
         )
         return ExitCode.OK
     print_diagnostics(made.diagnostics, model)
-    told = [str(made.supervisor)] if initial is None else [str(made.supervisor), f"it begins only where {initial}"]
-    # Names of plain automata may be anything.
-    sys.stdout.write("".join(f"{visible(line)}\n" for text in told for line in text.split("\n")))
+    sys.stdout.write(system_summary_text(made.supervisor))
     if output is not None:
         sys.stdout.write(f"written to {output}\n")
     return ExitCode.OK

@@ -124,8 +124,7 @@ class SystemSupervisor:
 
         Raises:
             FileAccessError: The place cannot be written.
-            UnsupportedModelError: The file would become too large, an expression is nested too deeply, or an automaton
-                or a variable has a name that is no identifier.
+            UnsupportedModelError: The file would become too large, or an expression is nested too deeply.
         """
         path = given_path(file)
         write_whole(path, self.encode())
@@ -369,6 +368,14 @@ def verify_system(
         "method": verified.method,
     }
     return Verification(status, (), "", report, system_verification_text(report))
+
+
+def system_summary_text(supervisor: SystemSupervisor) -> str:
+    """Return the supervisor of automata for people, as `robosc synth` prints it."""
+    initial = supervisor.initial_condition
+    told = str(supervisor) if initial is None else f"{supervisor}\nit begins only where {initial}"
+    # Names of plain automata may be anything.
+    return "".join(f"{visible(line)}\n" for line in told.split("\n"))
 
 
 def system_verification_text(report: Mapping[str, Any]) -> str:

@@ -26,6 +26,7 @@ from robosc.source import visible
 if TYPE_CHECKING:
     from collections.abc import Callable
     from enum import StrEnum
+    from pathlib import Path
 
     from robosc.explanation import EmptyExplanation
     from robosc.pipeline.exploring import Exploration
@@ -197,16 +198,8 @@ def synth(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Exi
     from robosc.pipeline.systems import system_summary_text
 
     output = arguments.output
-    refuse(
-        output is not None and output.suffix not in SUFFIXES,
-        f"-o: the controlled system of automata is written to a file that ends in {', '.join(sorted(SUFFIXES))}",
-    )
-    refuse(arguments.allow_livelock, "--allow-livelock: automata have no silent steps of a controller")
-    refuse(
-        arguments.verify_limit != SYNTHESIS_STATES,
-        "--verify-limit: the supervisor of automata is verified by the command verify",
-    )
-    model = loaded(arguments)
+    refuse_output(output)
+    model = loaded_for_synthesis(arguments)
     made = machine.synthesize(model, synthesis_options(arguments), is_modular=arguments.modular)
     if made.supervisor is None:
         return report_none(arguments, made, model)
@@ -273,10 +266,7 @@ def verify(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Ex
     from robosc.pipeline.results import SynthesisStatus, VerificationStatus
     from robosc.pipeline.systems import system_verification_text
 
-    refuse(arguments.supervisor is not None, "FILE.rsup: a supervisor file is of a robot, not of automata")
-    refuse(bool(arguments.property or arguments.properties), "--property: properties are of robots, not of automata")
-    refuse(bool(arguments.signed_by), "--signed-by: a supervisor file is of a robot, not of automata")
-    model = loaded(arguments)
+    model = loaded_for_verification(arguments)
     found = machine.verify(
         model, synthesis_options(arguments), maximum_states=arguments.limit, is_strict=arguments.strict
     )
@@ -296,27 +286,23 @@ def verify(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Ex
 
 
 def generate(
-    arguments: argparse.Namespace, generation: "GenerateOptions", machine: Machine = THIS_MACHINE
+    arguments: argparse.Namespace, package: str | None, machine: Machine = THIS_MACHINE
 ) -> "tuple[LoadedAutomata, Generation]":
-    """Generate the files of a target from automata.
+    """Generate the files of a target from automata, which may be called as a package is.
 
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
         UnsupportedModelError: The target cannot do the automata.
     """
-    from robosc.targets import ALL
+    from robosc.targets import GenerateOptions
 
-    refuse(arguments.target == ALL, "--target all: of automata name one target: c99, cif or python")
-    refuse(
-        arguments.target == "cif" and arguments.package is not None,
-        "--package: of automata, --target cif makes one file and no package",
-    )
-    refuse(arguments.allow_livelock, "--allow-livelock: automata have no silent steps of a controller")
-    model = loaded(arguments)
-    if arguments.initial is not None:
-        _require_beginning(model, arguments.initial)
+    model = loaded_for_generation(arguments)
     made = machine.generate(
-        model, arguments.target, generation, synthesis_options(arguments), initial=arguments.initial
+        model,
+        arguments.target,
+        GenerateOptions(package=package),
+        synthesis_options(arguments),
+        initial=arguments.initial,
     )
     require_supported(made)
     return model, made
@@ -368,6 +354,40 @@ def explain_synthesis(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.FAILED if is_empty else ExitCode.OK
 
 
+def loaded_for_synthesis(arguments: argparse.Namespace) -> "LoadedAutomata":
+    """Read the model of a command that synthesizes; raises as `loaded`."""
+    refuse(arguments.allow_livelock, "--allow-livelock: automata have no silent steps of a controller")
+    refuse(
+        arguments.verify_limit != SYNTHESIS_STATES,
+        "--verify-limit: the supervisor of automata is verified by the command verify",
+    )
+    return loaded(arguments)
+
+
+def loaded_for_verification(arguments: argparse.Namespace) -> "LoadedAutomata":
+    """Read the model of a command that verifies; raises as `loaded`."""
+    refuse(arguments.supervisor is not None, "FILE.rsup: a supervisor file is of a robot, not of automata")
+    refuse(bool(arguments.property or arguments.properties), "--property: properties are of robots, not of automata")
+    refuse(bool(arguments.signed_by), "--signed-by: a supervisor file is of a robot, not of automata")
+    return loaded(arguments)
+
+
+def loaded_for_generation(arguments: argparse.Namespace) -> "LoadedAutomata":
+    """Read the model of a command that generates; raises as `loaded`."""
+    from robosc.targets import ALL
+
+    refuse(arguments.target == ALL, "--target all: of automata name one target: c99, cif or python")
+    refuse(
+        arguments.target == "cif" and arguments.package is not None,
+        "--package: of automata, --target cif makes one file and no package",
+    )
+    refuse(arguments.allow_livelock, "--allow-livelock: automata have no silent steps of a controller")
+    model = loaded(arguments)
+    if arguments.initial is not None:
+        _require_beginning(model, arguments.initial)
+    return model
+
+
 def loaded(arguments: argparse.Namespace) -> "LoadedAutomata":
     """Read the model of a command.
 
@@ -379,13 +399,26 @@ def loaded(arguments: argparse.Namespace) -> "LoadedAutomata":
 
     refuse(bool(arguments.library_path), "-L: automata import no libraries, and CIF models files by their places")
     refuse(bool(arguments.interface_path), "-I: automata have no types of ROS")
-    refuse(arguments.deployment == str(Deployment.LAYER), "--deployment: automata are no node of a robot")
+    deployment = getattr(arguments, "deployment", None)
+    refuse(deployment == str(Deployment.LAYER), "--deployment: automata are no node of a robot")
     try:
         model = load(arguments.model)
     except FileAccessError as error:
         raise UsageError(str(error)) from error
     assert isinstance(model, LoadedAutomata)  # noqa: S101 - asked only of models whose name says so
     return model
+
+
+def refuse_output(output: "Path | None") -> None:
+    """Do nothing if a controlled system can be written to a file of this name.
+
+    Raises:
+        UsageError: It cannot.
+    """
+    refuse(
+        output is not None and output.suffix not in SUFFIXES,
+        f"-o: the controlled system of automata is written to a file that ends in {', '.join(sorted(SUFFIXES))}",
+    )
 
 
 def refuse(is_given: bool, message: str) -> None:

@@ -139,12 +139,17 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
         "message of the package robosc_msgs (--target ros2-msgs) on ~/state; both (default: stateMessage of "
         "controller-config.json; json). Nodes for ROS 1 have the text only",
     )
+    add_initial_argument(parser)
+    parser.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")
+
+
+def add_initial_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the option for where automata begin."""
     parser.add_argument(
         "--initial",
         metavar="STATE",
         help="state in which automata begin that may begin in several: 'p.x = 1, q = on'",
     )
-    parser.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -155,7 +160,7 @@ def run(arguments: argparse.Namespace) -> int:
     require_generatable(arguments.target)
     options = generate_options(arguments)
     if automata.is_given(arguments):
-        model, made = automata.generate(arguments, options)
+        model, made = automata.generate(arguments, options.package)
         return report_generated(arguments, made, made.files, model)
     refuse_initial(arguments)
     bundle = read_bundle(arguments)

@@ -75,12 +75,17 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_engine_options(parser)
     add_verify_limit_argument(parser, "--verify-limit", SYNTHESIS_STATES)
     add_livelock_argument(parser)
+    add_modular_argument(parser)
+    parser.set_defaults(run=run)
+
+
+def add_modular_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the option for a synthesis in modules."""
     parser.add_argument(
         "--modular",
         action="store_true",
         help="synthesize automata in modules: for systems of many parts, of which one diagram cannot hold the states",
     )
-    parser.set_defaults(run=run)
 
 
 def add_output_argument(parser: argparse.ArgumentParser) -> None:
@@ -94,13 +99,22 @@ def run(arguments: argparse.Namespace) -> int:
     """Synthesize; 0 with a supervisor, 1 without."""
     if automata.is_given(arguments):
         return automata.synth(arguments)
-    if arguments.modular:
-        raise UsageError("--modular is for automata (FILE.cif, .gen, .wmod): a robot's model is synthesized as a whole")
+    refuse_modular(arguments)
     require_other_file(arguments.output, arguments.model)
     bundle = read_bundle(arguments)
     allow_livelock, verify_limit = arguments.allow_livelock, arguments.verify_limit
     outcome = make(arguments, bundle, allow_livelock=allow_livelock, verify_limit=verify_limit)
     return report_synthesis(arguments, outcome, bundle)
+
+
+def refuse_modular(arguments: argparse.Namespace) -> None:
+    """Do nothing unless a robot's model is to be synthesized in modules.
+
+    Raises:
+        UsageError: It is.
+    """
+    if arguments.modular:
+        raise UsageError("--modular is for automata (FILE.cif, .gen, .wmod): a robot's model is synthesized as a whole")
 
 
 def make(

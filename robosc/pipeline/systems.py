@@ -387,7 +387,7 @@ def system_verification_text(report: Mapping[str, Any]) -> str:
         f"not {item['check'].replace('_', ' ')}: {item['message']}, after {', '.join(item['trace']) or 'nothing'}"
         for item in report["faults"]
     ]
-    return "\n".join(lines) + "\n"
+    return "".join(f"{visible(line)}\n" for line in lines)
 
 
 def _verified(

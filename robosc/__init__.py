@@ -14,10 +14,10 @@ As a Python API, it is these functions, one for each command (`robosc.pipeline`,
 The names are imported on use: who only reads a supervisor's file does not load the synthesizer.
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robosc._version import __version__
+from robosc.named_on_use import named_on_use
 
 if TYPE_CHECKING:
     from robosc.certification import Progress
@@ -192,11 +192,7 @@ __all__ = [
 
 if not TYPE_CHECKING:
     # A type checker knows the names from above, and is to find every other one wrong.
-    def __getattr__(name: str) -> Any:
-        """Import a public name from its module on first use."""
-        if name not in _HOMES:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+    __getattr__ = named_on_use(__name__, _HOMES)
 
 
 def __dir__() -> list[str]:

@@ -8,7 +8,7 @@ import pytest
 
 import robosc
 from robosc.certification import OutcomeStatus, make_supervisor
-from robosc.cli.main import _NAMES, make_parser
+from robosc.cli import main as command_line
 from robosc.cli.plugins import wanted_plugins
 from robosc_bridge import main as bridge
 from robosc_client.main import make_parser as client_parser
@@ -62,7 +62,11 @@ def test_every_target_is_in_the_matrix() -> None:
 @pytest.mark.parametrize("command", [line for line in COMMANDS if re.match(r"robosc(-client)? ", line)])
 def test_the_commands_are_understood(command: str) -> None:
     program, *arguments = shlex.split(command)
-    parser = make_parser(wanted_plugins(arguments, _NAMES)) if program == "robosc" else client_parser()
+    parser = (
+        command_line.make_parser(wanted_plugins(arguments, command_line.COMMANDS))
+        if program == "robosc"
+        else client_parser()
+    )
     parsed = parser.parse_args(arguments)
     for place in (getattr(parsed, "model", None), *getattr(parsed, "paths", ())):
         # A reader has made a robot called Patrol, or writes MODEL in place of it.

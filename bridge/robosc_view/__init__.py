@@ -6,8 +6,9 @@ come with the extra `view`; they are imported only where a page is served. The n
 the command line can tell of the command without loading any of it.
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from robosc.named_on_use import named_on_use
 
 if TYPE_CHECKING:
     from robosc_view.endpoint import ViewEndpoint
@@ -18,8 +19,4 @@ _HOMES = {"ViewEndpoint": "endpoint", "ViewError": "sources"}
 __all__ = ["ViewEndpoint", "ViewError"]
 
 
-def __getattr__(name: str) -> Any:
-    """Import a public name from its module on first use."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+__getattr__ = named_on_use(__name__, _HOMES)

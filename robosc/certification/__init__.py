@@ -1,13 +1,30 @@
-"""The way from a problem to a certified supervisor, and the verification of a supervisor's file."""
+"""The way from a problem to a certified supervisor, and the verification of a supervisor's file.
 
-from robosc.certification.pipeline import (
-    OutcomeStatus,
-    Progress,
-    SynthesisOutcome,
-    SynthesisProblem,
-    make_supervisor,
-    prepare,
-)
+The names are imported on use: who only reports progress does not load the check of models.
+"""
+
+from typing import TYPE_CHECKING
+
+from robosc.named_on_use import named_on_use
+
+if TYPE_CHECKING:
+    from robosc.certification.pipeline import (
+        OutcomeStatus,
+        SynthesisOutcome,
+        SynthesisProblem,
+        make_supervisor,
+        prepare,
+    )
+    from robosc.certification.progress import Progress
+
+_HOMES = {
+    "OutcomeStatus": "pipeline",
+    "Progress": "progress",
+    "SynthesisOutcome": "pipeline",
+    "SynthesisProblem": "pipeline",
+    "make_supervisor": "pipeline",
+    "prepare": "pipeline",
+}
 
 __all__ = [
     "OutcomeStatus",
@@ -17,3 +34,5 @@ __all__ = [
     "make_supervisor",
     "prepare",
 ]
+
+__getattr__ = named_on_use(__name__, _HOMES)

@@ -15,6 +15,7 @@ import msgspec
 from robosc import explanation as explanations
 from robosc.automata import ExecutableSystem, Semantics
 from robosc.certification.certify import certify
+from robosc.certification.progress import Progress
 from robosc.controller_properties import check_controller, controller_findings
 from robosc.errors import Diagnostic, NodeLimitError, sorted_diagnostics
 from robosc.model.check import check
@@ -47,19 +48,6 @@ class OutcomeStatus(StrEnum):
     EMPTY = "empty"
     """No supervisor exists: a result about the model, not a fault."""
     MODEL_ERRORS = "model errors"
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """Progress of long work.
-
-    Attributes:
-        stage: `check`, `synthesis`, `verification` or `controller`.
-        message: One short line.
-    """
-
-    stage: str
-    message: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from robosc.cif.parser import parse
 from robosc.cif.scopes import Scopes
 from robosc.cif.typing import Typing
 from robosc.errors import Diagnostic, LanguageError, Severity, sorted_diagnostics
-from robosc.language.bundle import read_source
+from robosc.language.reading import read_source
 from robosc.model.findings import Findings
 from robosc.recursion import allow_depth
 from robosc.source import Bundle, Location, SourceFile

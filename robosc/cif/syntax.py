@@ -1,7 +1,11 @@
-"""Syntax tree of a CIF text: what was written, with places, before any name is looked up."""
+"""Syntax tree of a CIF text: what was written, with places, before any name is looked up.
 
-from dataclasses import dataclass
+Values of msgspec, as in `robosc.language.syntax`.
+"""
+
 from enum import StrEnum
+
+import msgspec
 
 from robosc.source import Location
 
@@ -16,8 +20,7 @@ class Root(StrEnum):
     SPECIFICATION = "^"
 
 
-@dataclass(frozen=True, slots=True)
-class Name:
+class Name(msgspec.Struct, frozen=True, gc=False):
     """A reference, such as `x`, `a.x`, `.a.x` or `^a.x`; without `$`.
 
     Attributes:
@@ -34,8 +37,7 @@ class Name:
         return f"{self.root}{'.'.join(self.parts)}"
 
 
-@dataclass(frozen=True, slots=True)
-class Identifier:
+class Identifier(msgspec.Struct, frozen=True, gc=False):
     """Name of something that is declared."""
 
     text: str
@@ -45,16 +47,14 @@ class Identifier:
 # Expressions
 
 
-@dataclass(frozen=True, slots=True)
-class Literal:
+class Literal(msgspec.Struct, frozen=True, gc=False):
     """A number, string or truth value."""
 
     value: bool | int | float | str
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Unary:
+class Unary(msgspec.Struct, frozen=True, gc=False):
     """`-`, `+`, `not` or `sample` before an operand."""
 
     operator: str
@@ -62,8 +62,7 @@ class Unary:
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Binary:
+class Binary(msgspec.Struct, frozen=True, gc=False):
     """An operator between two operands; `at` is the place of the operator."""
 
     operator: str
@@ -72,8 +71,7 @@ class Binary:
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class If:
+class If(msgspec.Struct, frozen=True, gc=False):
     """`if g: a elif h: b else c end`: conditions that all must hold, with the value for each."""
 
     branches: tuple[tuple[tuple["Expression", ...], "Expression"], ...]
@@ -81,8 +79,7 @@ class If:
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Switch:
+class Switch(msgspec.Struct, frozen=True, gc=False):
     """`switch v: case a: b else c end`."""
 
     subject: "Expression"
@@ -91,8 +88,7 @@ class Switch:
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
+class Group(msgspec.Struct, frozen=True, gc=False):
     """Several values in brackets: a tuple `(a, b)`, list `[a]`, set `{a}`, or dictionary of keys and values in turn."""
 
     kind: str
@@ -100,8 +96,7 @@ class Group:
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Index:
+class Index(msgspec.Struct, frozen=True, gc=False):
     """`base[index]`."""
 
     base: "Expression"
@@ -109,8 +104,7 @@ class Index:
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Slice:
+class Slice(msgspec.Struct, frozen=True, gc=False):
     """`base[low:high]`."""
 
     base: "Expression"
@@ -119,8 +113,7 @@ class Slice:
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Call:
+class Call(msgspec.Struct, frozen=True, gc=False):
     """Call of a function: a word of the language, or an expression."""
 
     function: "str | Expression"
@@ -128,8 +121,7 @@ class Call:
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Cast:
+class Cast(msgspec.Struct, frozen=True, gc=False):
     """`<type>operand`."""
 
     type: "Type"
@@ -137,8 +129,7 @@ class Cast:
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Special:
+class Special(msgspec.Struct, frozen=True, gc=False):
     """`time`, `?` (a received value), `self`, or the derivative `x'`."""
 
     word: str
@@ -149,8 +140,7 @@ class Special:
 type Expression = Literal | Name | Unary | Binary | If | Switch | Group | Index | Slice | Call | Cast | Special
 
 
-@dataclass(frozen=True, slots=True)
-class Type:
+class Type(msgspec.Struct, frozen=True, gc=False):
     """A written type.
 
     Attributes:
@@ -173,24 +163,21 @@ class Type:
 # Declarations
 
 
-@dataclass(frozen=True, slots=True)
-class TypeDeclaration:
+class TypeDeclaration(msgspec.Struct, frozen=True, gc=False):
     """`type name = type;`."""
 
     name: Identifier
     type: Type
 
 
-@dataclass(frozen=True, slots=True)
-class Enum:
+class Enum(msgspec.Struct, frozen=True, gc=False):
     """`enum name = a, b;`."""
 
     name: Identifier
     literals: tuple[Identifier, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
+class Event(msgspec.Struct, frozen=True, gc=False):
     """`controllable name;`; `is_controllable` is None where that is not said, `data` the type of a channel."""
 
     name: Identifier
@@ -198,8 +185,7 @@ class Event:
     data: Type | None
 
 
-@dataclass(frozen=True, slots=True)
-class Constant:
+class Constant(msgspec.Struct, frozen=True, gc=False):
     """`const type name = value;`."""
 
     name: Identifier
@@ -207,8 +193,7 @@ class Constant:
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
-class Algebraic:
+class Algebraic(msgspec.Struct, frozen=True, gc=False):
     """`alg type name = value;`, whose value may stand elsewhere."""
 
     name: Identifier
@@ -216,16 +201,14 @@ class Algebraic:
     value: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
-class Input:
+class Input(msgspec.Struct, frozen=True, gc=False):
     """`input type name;`."""
 
     name: Identifier
     type: Type
 
 
-@dataclass(frozen=True, slots=True)
-class Discrete:
+class Discrete(msgspec.Struct, frozen=True, gc=False):
     """`disc type name = value;`; no values: the default; `is_any`: every value of the type."""
 
     name: Identifier
@@ -234,8 +217,7 @@ class Discrete:
     is_any: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Continuous:
+class Continuous(msgspec.Struct, frozen=True, gc=False):
     """`cont name;`."""
 
     name: Identifier
@@ -243,8 +225,7 @@ class Continuous:
     derivative: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
-class Equation:
+class Equation(msgspec.Struct, frozen=True, gc=False):
     """`equation name = value;`, or of the derivative `name'`."""
 
     name: Identifier
@@ -252,8 +233,7 @@ class Equation:
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
-class Predicates:
+class Predicates(msgspec.Struct, frozen=True, gc=False):
     """`initial p, q;` or `marked p, q;`; without predicates it always holds."""
 
     word: str
@@ -269,8 +249,7 @@ class InvariantForm(StrEnum):
     DISABLES = "disables"
 
 
-@dataclass(frozen=True, slots=True)
-class Invariant:
+class Invariant(msgspec.Struct, frozen=True, gc=False):
     """One invariant.
 
     Attributes:
@@ -290,8 +269,7 @@ class Invariant:
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Function:
+class Function(msgspec.Struct, frozen=True, gc=False):
     """A function that a user has defined; its body is read and left aside."""
 
     name: Identifier
@@ -299,31 +277,27 @@ class Function:
     parameters: tuple[tuple[Identifier, Type], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class InputOutput:
+class InputOutput(msgspec.Struct, frozen=True, gc=False):
     """A declaration about pictures or printing; it means nothing here."""
 
     word: str
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Import:
+class Import(msgspec.Struct, frozen=True, gc=False):
     """`import "file";`."""
 
     file: str
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Namespace:
+class Namespace(msgspec.Struct, frozen=True, gc=False):
     """`namespace a.b;`."""
 
     name: Name
 
 
-@dataclass(frozen=True, slots=True)
-class Alphabet:
+class Alphabet(msgspec.Struct, frozen=True, gc=False):
     """`alphabet a, b;` or `monitor a, b;`."""
 
     word: str
@@ -340,8 +314,7 @@ class ParameterKind(StrEnum):
     COMPONENT = "component"
 
 
-@dataclass(frozen=True, slots=True)
-class Parameter:
+class Parameter(msgspec.Struct, frozen=True, gc=False):
     """One parameter of a definition.
 
     Attributes:
@@ -361,8 +334,7 @@ class Parameter:
     definition: Name | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class EdgeEvent:
+class EdgeEvent(msgspec.Struct, frozen=True, gc=False):
     """An event on an edge; `name` is None for `tau`, `use` is `!` or `?` for a channel."""
 
     name: Name | None
@@ -371,8 +343,7 @@ class EdgeEvent:
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Assignment:
+class Assignment(msgspec.Struct, frozen=True, gc=False):
     """`address := value`; an address is a name, an index of one, or a tuple of addresses."""
 
     address: Expression
@@ -380,8 +351,7 @@ class Assignment:
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class IfUpdate:
+class IfUpdate(msgspec.Struct, frozen=True, gc=False):
     """`if g: updates elif h: updates else updates end`."""
 
     branches: tuple[tuple[tuple[Expression, ...], tuple["Update", ...]], ...]
@@ -392,8 +362,7 @@ class IfUpdate:
 type Update = Assignment | IfUpdate
 
 
-@dataclass(frozen=True, slots=True)
-class Edge:
+class Edge(msgspec.Struct, frozen=True, gc=False):
     """An edge; no events: `tau`, no target: a self-loop."""
 
     events: tuple[EdgeEvent, ...]
@@ -403,8 +372,7 @@ class Edge:
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class LocationDeclaration:
+class LocationDeclaration(msgspec.Struct, frozen=True, gc=False):
     """A location of an automaton."""
 
     name: Identifier | None
@@ -415,8 +383,7 @@ class LocationDeclaration:
     at: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Component:
+class Component(msgspec.Struct, frozen=True, gc=False):
     """A group or automaton, or the definition of one.
 
     Attributes:
@@ -434,8 +401,7 @@ class Component:
     body: tuple["Declaration", ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Instance:
+class Instance(msgspec.Struct, frozen=True, gc=False):
     """`name: Definition(arguments);`."""
 
     name: Identifier
@@ -466,8 +432,7 @@ type Declaration = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Specification:
+class Specification(msgspec.Struct, frozen=True, gc=False):
     """Text of one file."""
 
     file: str

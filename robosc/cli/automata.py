@@ -17,6 +17,7 @@ from robosc.cli.output import (
     require_other_file,
     write_bytes,
 )
+from robosc.cli.statistics import Figures, timed
 from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.json_documents import counts_text, diagnostics_json, json_text
 from robosc.model.structure import Deployment
@@ -83,9 +84,10 @@ class ThisMachine:
         self, model: "LoadedAutomata", options: "SynthesisOptions", *, is_modular: bool
     ) -> "SystemSynthesis":
         """Synthesize the supervisor."""
-        from robosc.pipeline.synthesis import synthesize
+        # Not `robosc.synthesize`: it loads what models of RoboSC need.
+        from robosc.pipeline.automata_models import automata_synthesis
 
-        return _watched(lambda told: synthesize(model, options, is_modular=is_modular, on_progress=told))
+        return _watched(lambda told: automata_synthesis(model, options, told, lambda: False, is_modular=is_modular))
 
     def explore(self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int) -> "Exploration":
         """Return the graph of the controlled system."""
@@ -200,9 +202,12 @@ def synth(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Exi
     output = arguments.output
     refuse_output(output)
     model = loaded_for_synthesis(arguments)
-    made = machine.synthesize(model, synthesis_options(arguments), is_modular=arguments.modular)
+    options = synthesis_options(arguments)
+    made, seconds = timed(lambda: machine.synthesize(model, options, is_modular=arguments.modular))
+    # A server has no option for figures.
+    figures = Figures(made.statistics, seconds) if getattr(arguments, "statistics", False) else None
     if made.supervisor is None:
-        return report_none(arguments, made, model)
+        return report_none(arguments, made, model, figures)
     if output is not None:
         for file in model.files:
             require_other_file(output, arguments.model.parent / file.name)
@@ -222,6 +227,7 @@ def synth(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Exi
                 ],
                 "conditions": {name: str(item) for name, item in made.supervisor.conditions.items()},
                 "initial": None if initial is None else str(initial),
+                **({} if figures is None else {"statistics": figures.document()}),
                 **diagnostics_json(made.diagnostics),
             }
         )
@@ -230,6 +236,7 @@ def synth(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Exi
     sys.stdout.write(system_summary_text(made.supervisor))
     if output is not None:
         sys.stdout.write(f"written to {output}\n")
+    sys.stdout.write("" if figures is None else str(figures))
     return ExitCode.OK
 
 
@@ -489,8 +496,10 @@ def require_supported(outcome: "Exploration | Generation | Verification") -> Non
         raise UnsupportedModelError(outcome.reason)
 
 
-def report_none(arguments: argparse.Namespace, made: _Outcome, model: "LoadedAutomata") -> ExitCode:
-    """Report that there is no supervisor, and what is to blame."""
+def report_none(
+    arguments: argparse.Namespace, made: _Outcome, model: "LoadedAutomata", figures: Figures | None = None
+) -> ExitCode:
+    """Report that there is no supervisor, what is to blame, and the figures of the synthesis if they are asked for."""
     from robosc.explanation import EmptyExplanation, document, empty_text
 
     explanation = made.explanation if isinstance(made.explanation, EmptyExplanation) else None
@@ -499,6 +508,7 @@ def report_none(arguments: argparse.Namespace, made: _Outcome, model: "LoadedAut
             "status": str(made.status),
             "reason": made.reason,
             "explanation": document(explanation) if explanation else None,
+            **({} if figures is None else {"statistics": figures.document()}),
         }
         print_json({**told, **diagnostics_json(made.diagnostics)})
     else:
@@ -507,4 +517,5 @@ def report_none(arguments: argparse.Namespace, made: _Outcome, model: "LoadedAut
             sys.stderr.write(f"{arguments.model}: {visible(made.reason)}\n")
         if explanation is not None:
             sys.stderr.write(empty_text(explanation))
+        sys.stdout.write("" if figures is None else str(figures))
     return ExitCode.FAILED

@@ -150,7 +150,7 @@ def _files(path: Path) -> Sequence[Path]:
 
 
 def _format_file(path: Path, format_text: FormatText, *, writes: bool) -> _Outcome:
-    from robosc.language.bundle import MAXIMUM_BYTES
+    from robosc.language.reading import MAXIMUM_BYTES
 
     name = _shown(path)
     try:
@@ -168,7 +168,7 @@ def _format_file(path: Path, format_text: FormatText, *, writes: bool) -> _Outco
 
 
 def _format_standard_input(format_text: FormatText, *, writes: bool) -> _Outcome:
-    from robosc.language.bundle import MAXIMUM_BYTES
+    from robosc.language.reading import MAXIMUM_BYTES
 
     if sys.stdin is None:
         raise UsageError("standard input is closed")
@@ -181,7 +181,7 @@ def _format_standard_input(format_text: FormatText, *, writes: bool) -> _Outcome
 def _formatted(content: bytes, name: str, format_text: FormatText) -> _Outcome:
     """The canonical content of a file; a byte order mark stays."""
     from robosc.language import decode_source
-    from robosc.language.bundle import MAXIMUM_BYTES
+    from robosc.language.reading import MAXIMUM_BYTES
 
     source = None
     try:

@@ -1,49 +1,41 @@
 """`robosc`: check, synthesize, verify, explore and generate on this machine.
 
-Every command is a module with `add_parser` and `run`; what a command needs is imported when it runs, so
-that `robosc check` does not pay for decision diagrams. Other packages add commands (`robosc.cli.plugins`).
+Every command is a module with `add_parser` and `run`, imported when it is called, and imports what it needs when it
+runs, so that `robosc check` does not pay for decision diagrams. Other packages add commands (`robosc.cli.plugins`).
 """
 
 import argparse
+import importlib
 import sys
 from collections.abc import Sequence
 
 from robosc._version import __version__
-from robosc.cli import (
-    check,
-    check_log,
-    completion,
-    convert_log,
-    doc,
-    doctor,
-    explain,
-    explain_synthesis,
-    explore,
-    generate,
-    new,
-    plot,
-    sign,
-    simulate,
-    synth,
-    verify,
-)
-from robosc.cli import format as format_
 from robosc.cli.plugins import Plugin, wanted_plugins
 from robosc.cli.running import Parser, guarded, parse
 
-__all__ = ["guarded", "main", "make_parser", "parse"]
+__all__ = ["COMMANDS", "guarded", "main", "make_parser", "parse"]
 
-_COMMANDS = (
-    new, check, format_, synth, simulate, verify, sign, explore, generate, explain_synthesis, explain, doc, plot,
-    check_log, convert_log, doctor, completion,
-)  # fmt: skip
-"""In the order of `robosc --help`."""
-
-_NAMES = (
-    "new", "check", "format", "synth", "simulate", "verify", "key", "sign", "explore", "generate", "explain-synthesis",
-    "explain", "doc", "plot", "check-log", "convert-log", "doctor", "completion",
-)  # fmt: skip
-"""Names of the commands: a call of one of them needs no search for commands of other packages."""
+COMMANDS = {
+    "new": "new",
+    "check": "check",
+    "format": "format",
+    "synth": "synth",
+    "simulate": "simulate",
+    "verify": "verify",
+    "key": "sign",
+    "sign": "sign",
+    "explore": "explore",
+    "generate": "generate",
+    "explain-synthesis": "explain_synthesis",
+    "explain": "explain",
+    "doc": "doc",
+    "plot": "plot",
+    "check-log": "check_log",
+    "convert-log": "convert_log",
+    "doctor": "doctor",
+    "completion": "completion",
+}
+"""Modules of the commands, in the order of `robosc --help`; who calls one of them needs none of other packages."""
 
 _EPILOG = """\
 exit status:
@@ -54,11 +46,12 @@ exit status:
 """
 
 
-def make_parser(plugins: Sequence[Plugin] = ()) -> Parser:
-    """The parser of the whole command line.
+def make_parser(plugins: Sequence[Plugin] = (), called: str | None = None) -> Parser:
+    """The parser of the command line.
 
     Args:
         plugins: Commands of other packages.
+        called: The one command that is called, whose module alone is loaded; None: all of them.
     """
     parser = Parser(
         prog="robosc",
@@ -68,26 +61,8 @@ def make_parser(plugins: Sequence[Plugin] = ()) -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"robosc {__version__}")
     commands = parser.add_subparsers(title="commands", dest="command", required=True, metavar="COMMAND")
-    for command in (
-        new,
-        check,
-        format_,
-        synth,
-        simulate,
-        verify,
-        sign,
-        explore,
-        generate,
-        explain_synthesis,
-        explain,
-        doc,
-        plot,
-        check_log,
-        convert_log,
-        doctor,
-        completion,
-    ):
-        command.add_parser(commands)
+    for module in dict.fromkeys(COMMANDS.values() if called is None else (COMMANDS[called],)):
+        importlib.import_module(f"robosc.cli.{module}").add_parser(commands)
     for plugin in plugins:
         plugin.add_parser(commands)
     return parser
@@ -95,7 +70,7 @@ def make_parser(plugins: Sequence[Plugin] = ()) -> Parser:
 
 def make_whole_parser() -> Parser:
     """The parser with the commands of all other packages that can be loaded."""
-    return make_parser([plugin for plugin in wanted_plugins((), _NAMES) if plugin.module is not None])
+    return make_parser([plugin for plugin in wanted_plugins((), COMMANDS) if plugin.module is not None])
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -104,7 +79,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises:
         SystemExit: The arguments are no command's, or ask for help.
     """
-    parser = make_parser(wanted_plugins(sys.argv[1:] if argv is None else argv, _NAMES))
+    given = sys.argv[1:] if argv is None else argv
+    parser = make_parser(wanted_plugins(given, COMMANDS), given[0] if given and given[0] in COMMANDS else None)
     arguments = parse(parser, argv)
     return guarded("robosc", lambda: int(arguments.run(arguments)), as_json=getattr(arguments, "json", False))
 

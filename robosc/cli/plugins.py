@@ -6,7 +6,7 @@ is called or all of them are listed.
 """
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -53,7 +53,7 @@ class Plugin:
         raise UsageError(self.problem)
 
 
-def wanted_plugins(argv: Sequence[str], built_in: Sequence[str]) -> tuple[Plugin, ...]:
+def wanted_plugins(argv: Sequence[str], built_in: Collection[str]) -> tuple[Plugin, ...]:
     """The commands of other packages that matter for some arguments: all for help, and where no such command exists.
 
     Args:

@@ -26,6 +26,7 @@ from robosc.cli.output import (
     require_other_file,
     write_bytes,
 )
+from robosc.cli.statistics import Figures, timed
 from robosc.errors import Diagnostic
 from robosc.json_documents import diagnostics_json
 from robosc.model.structure import Deployment
@@ -76,6 +77,11 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_verify_limit_argument(parser, "--verify-limit", SYNTHESIS_STATES)
     add_livelock_argument(parser)
     add_modular_argument(parser)
+    parser.add_argument(
+        "--statistics",
+        action="store_true",
+        help="also print the figures of the synthesis: how it went about the search, its size and its time",
+    )
     parser.set_defaults(run=run)
 
 
@@ -97,14 +103,19 @@ def add_output_argument(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize; 0 with a supervisor, 1 without."""
+    from robosc.supervisor import encode
+
     if automata.is_given(arguments):
         return automata.synth(arguments)
     refuse_modular(arguments)
     require_other_file(arguments.output, arguments.model)
     bundle = read_bundle(arguments)
     allow_livelock, verify_limit = arguments.allow_livelock, arguments.verify_limit
-    outcome = make(arguments, bundle, allow_livelock=allow_livelock, verify_limit=verify_limit)
-    return report_synthesis(arguments, outcome, bundle)
+    outcome, seconds = timed(lambda: make(arguments, bundle, allow_livelock=allow_livelock, verify_limit=verify_limit))
+    if outcome.supervisor is not None and arguments.output is not None:
+        write_bytes(arguments.output, encode(outcome.supervisor))
+    figures = Figures(outcome.statistics, seconds) if arguments.statistics else None
+    return report_written(arguments, outcome, bundle, figures)
 
 
 def refuse_modular(arguments: argparse.Namespace) -> None:
@@ -137,17 +148,17 @@ def make(
         progress.clear()
 
 
-def report_synthesis(arguments: argparse.Namespace, outcome: "SynthesisOutcome", bundle: Bundle) -> ExitCode:
-    """Write the supervisor's file, print the outcome as asked and return the exit status."""
-    from robosc.supervisor import encode
+def report_written(
+    arguments: argparse.Namespace, outcome: "SynthesisOutcome", bundle: Bundle, figures: Figures | None = None
+) -> ExitCode:
+    """Print the outcome as asked and return the exit status.
 
-    if outcome.supervisor is not None and arguments.output is not None:
-        write_bytes(arguments.output, encode(outcome.supervisor))
-    return report_written(arguments, outcome, bundle)
-
-
-def report_written(arguments: argparse.Namespace, outcome: "SynthesisOutcome", bundle: Bundle) -> ExitCode:
-    """Print the outcome as asked and return the exit status: of a supervisor whose file is there, if it has one."""
+    Args:
+        arguments: Arguments of the command.
+        outcome: The outcome; the file of a supervisor is written already, if it is to have one.
+        bundle: The model.
+        figures: Figures that are printed, too.
+    """
     from robosc.conditions.summary import summary_json, summary_text
 
     if arguments.json:
@@ -157,6 +168,7 @@ def report_written(arguments: argparse.Namespace, outcome: "SynthesisOutcome", b
                 **reasons_json(outcome),
                 "summary": summary_json(outcome.supervisor) if outcome.supervisor else None,
                 "file": str(arguments.output) if outcome.supervisor and arguments.output else None,
+                **({} if figures is None else {"statistics": figures.document()}),
                 **diagnostics_json(outcome.diagnostics),
             }
         )
@@ -166,6 +178,7 @@ def report_written(arguments: argparse.Namespace, outcome: "SynthesisOutcome", b
             sys.stdout.write(summary_text(outcome.supervisor))
             if arguments.output is not None:
                 sys.stdout.write(f"written to {arguments.output}\n")
+        sys.stdout.write("" if figures is None else str(figures))
     return ExitCode.OK if outcome.supervisor is not None else ExitCode.FAILED
 
 

@@ -3,8 +3,9 @@
 The names are imported on use, so that who only reads an explanation does not load the synthesizer.
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from robosc.named_on_use import named_on_use
 
 if TYPE_CHECKING:
     from robosc.explanation.blame import explain_empty
@@ -45,8 +46,4 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    """Import a public name from its module on first use."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+__getattr__ = named_on_use(__name__, _HOMES)

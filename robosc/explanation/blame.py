@@ -8,10 +8,11 @@ from robosc.explanation.analysis import Analysis
 from robosc.explanation.conflict import minimal_conflict, minimal_removal
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
 from robosc.explanation.explanations import Blamed, CounterexampleReport, EmptyExplanation, Path, StateValues
-from robosc.explanation.problems import BoundedMonitor, EffortSpentError, Problems
+from robosc.explanation.problems import Problems
 from robosc.explanation.reports import Reporter
 from robosc.explanation.words import Words
 from robosc.synthesis.engines import EngineOptions
+from robosc.synthesis.monitor import BoundedMonitor, EffortSpentError
 from robosc.synthesis.result import SynthesisProgress
 from robosc.synthesis.workspace import Workspace, workspace
 
@@ -120,7 +121,7 @@ class _Search:
     def _solve(self, kept: frozenset[int]) -> bool:
         dropped = (item for place, item in enumerate(self._constraints) if place not in kept)
         fixed_point, problem = self._problems.without(dropped)
-        return bool(fixed_point.good_states(problem, self._false).reason)
+        return bool(fixed_point.solution(problem, self._false).reason)
 
 
 def explain_empty(
@@ -153,7 +154,7 @@ def explain_lost(place: Workspace, monitor: BoundedMonitor, problems: Problems, 
     fixed_point, problem = problems.without(())
     if fixed_point.initial == false:
         return EmptyExplanation(_NOWHERE, (), is_minimal=True, removal=(), is_of_automata=words.is_of_automata)
-    fixed_point.good_states(problem, false)
+    fixed_point.solution(problem, false)
     # What one synthesis takes, encoding and all, tells how large the problem is.
     monitor.limit = max(LEAST_EFFORT, EFFORT * monitor.steps)
     with place.reordering():

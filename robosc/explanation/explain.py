@@ -13,7 +13,7 @@ from robosc.explanation.blame import explain_lost
 from robosc.explanation.conflict import minimal_conflict
 from robosc.explanation.explanations import EventHere, EventReport, Explanation, Reason, Remark, StateReport
 from robosc.explanation.notation import events_text
-from robosc.explanation.problems import BoundedMonitor, Problems
+from robosc.explanation.problems import Problems
 from robosc.explanation.reports import Reporter
 from robosc.explanation.requests import MAXIMUM_SHOWN, RequestError
 from robosc.explanation.words import Words
@@ -22,7 +22,7 @@ from robosc.synthesis.controlled import ControlledSystem
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.expression_encoder import ExpressionEncoder
-from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
 from robosc.synthesis.nodes import count_models
 from robosc.synthesis.result import SynthesisProgress
 from robosc.synthesis.runs import SystemRun, decoded

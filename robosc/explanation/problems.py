@@ -18,42 +18,6 @@ from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.transitions import Steps, transition_of
 
 
-class EffortSpentError(Exception):
-    """The work has taken more steps than it may."""
-
-
-class BoundedMonitor(ProgressMonitor):
-    """A monitor that counts steps, and ends the work at a limit once one is set.
-
-    Args:
-        monitor: Monitor of the waiting caller.
-    """
-
-    def __init__(self, monitor: ProgressMonitor) -> None:
-        super().__init__(lambda: False, lambda progress: None)
-        self._monitor = monitor
-        self.steps = 0
-        """Steps so far; the same for every engine."""
-        self.limit: int | None = None
-        """Steps beyond which the work ends."""
-
-    def check_stop(self) -> None:
-        """Before each step.
-
-        Raises:
-            SynthesisCancelled: The work is to end.
-            EffortSpentError: It has taken more steps than it may.
-        """
-        self._monitor.check_stop()
-        self.steps += 1
-        if self.limit is not None and self.steps > self.limit:
-            raise EffortSpentError
-
-    def tell(self, phase: str, rounds: int, states: Any) -> None:
-        """Pass on progress."""
-        self._monitor.tell(phase, rounds, states)
-
-
 class Problems:
     """Variants of a problem without some of its constraints.
 

@@ -226,7 +226,7 @@ typedef struct {
     Py_ssize_t group_count, step_count;
     Table known;
     PyObject *pause, *tell;
-    long long taken, told;
+    long long taken, told, asked;
 } Closure;
 
 static DdNode *composed(Closure *closure, DdNode *f, const Substitutions *substitutions) {
@@ -289,10 +289,17 @@ static int told_of(Closure *closure, DdNode *states) {
     return answered(PyObject_CallFunction(closure->tell, "LK", closure->told, (unsigned long long)(uintptr_t)states));
 }
 
+/* Whether to go on, asked with the number of steps since it was asked last. */
+static int may_go_on(Closure *closure) {
+    long long steps = closure->taken - closure->asked;
+    closure->asked = closure->taken;
+    return answered(PyObject_CallFunction(closure->pause, "L", steps));
+}
+
 /* States and what a step adds to them of those within a predicate, led from new ones. */
 static DdNode *grown(Closure *closure, DdNode *states, DdNode *within, const Step *step, DdNode *new) {
     DdManager *manager = closure->manager;
-    if (closure->taken % PAUSE == 0 && !answered(PyObject_CallFunction(closure->pause, NULL))) {
+    if (closure->taken % PAUSE == 0 && !may_go_on(closure)) {
         return NULL;
     }
     closure->taken++;
@@ -566,6 +573,9 @@ PyObject *diagram_closure(PyObject *module, PyObject *arguments) {
     DdNode *found = NULL;
     if (read_groups(&closure, groups) && read_identity(&closure) && make_table(&closure.known, 1024)) {
         found = of_whole(&closure, owned((DdNode *)(uintptr_t)states), (DdNode *)(uintptr_t)within);
+    }
+    if (found != NULL && !may_go_on(&closure)) {
+        found = instead(closure.manager, found, NULL);
     }
     free_closure(&closure);
     return passed(found);

@@ -31,7 +31,7 @@ def load_automata_file(path: Path, text: str | None = None) -> Bundle:
         LanguageError: A file is too large or not UTF-8.
     """
     from robosc.cif import load_cif
-    from robosc.language.bundle import decode_source, read_source
+    from robosc.language.reading import decode_source, read_source
     from robosc.pipeline.files import FileAccessError
     from robosc.source import SourceFile
 

@@ -4,8 +4,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from robosc.automata import CheckedSystem, System
-from robosc.explanation import EmptyExplanation, document
-from robosc.explanation.requests import SystemRequests
 from robosc.expressions import conjunction
 from robosc.json_documents import diagnostics_json
 from robosc.pipeline.automata_files import check_automata_file
@@ -14,10 +12,10 @@ from robosc.pipeline.loading import LoadedAutomata
 from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, SynthesisStatus, Verification, VerificationStatus
 from robosc.pipeline.systems import SystemSynthesis, synthesize_system, verify_system
-from robosc.verification import Limits
 
 if TYPE_CHECKING:
     from robosc.pipeline.synthesis import OnProgress, ShouldStop
+    from robosc.verification import Limits
 
 _OF_ROBOTS = ("deployment", "allow_livelock", "verified_states")
 
@@ -40,6 +38,8 @@ def begun(system: System, initial: str) -> System:
     Raises:
         RequestError: It names what is not there.
     """
+    from robosc.explanation.requests import SystemRequests
+
     return replace(system, initial=conjunction(system.initial, SystemRequests(system).state(initial)))
 
 
@@ -73,13 +73,15 @@ def automata_synthesis(
 def automata_verification(
     model: LoadedAutomata,
     options: SynthesisOptions,
-    limits: Limits,
+    limits: "Limits",
     on_progress: "OnProgress",
     should_stop: "ShouldStop",
     *,
     is_strict: bool,
 ) -> Verification:
     """Synthesize the supervisor of automata, and verify it by other means than it was made."""
+    from robosc.explanation import EmptyExplanation, document
+
     made = automata_synthesis(model, options, on_progress, should_stop)
     if made.status is SynthesisStatus.UNSUPPORTED_MODEL:
         return Verification(VerificationStatus.UNSUPPORTED_MODEL, made.diagnostics, made.reason, {})

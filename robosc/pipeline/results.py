@@ -3,16 +3,18 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robosc.errors import Diagnostic, RoboscError
-from robosc.explanation import EmptyExplanation
 from robosc.pipeline.files import given_path
 from robosc.pipeline.findings import Findings
 from robosc.pipeline.loading import FileName
 from robosc.source import visible
 from robosc.tables import html_table, html_text
-from robosc.targets import GeneratedFiles, Written, write_generated
+
+if TYPE_CHECKING:
+    from robosc.explanation import EmptyExplanation
+    from robosc.targets import GeneratedFiles, Written
 
 
 class SynthesisStatus(StrEnum):
@@ -103,10 +105,10 @@ class Outcome:
         """The value that was made, or None."""
         return None
 
-    def _why(self) -> EmptyExplanation | None:
+    def _why(self) -> "EmptyExplanation | None":
         """An explanation of why nothing was made, beyond the reason; None where there is none."""
-        explanation = getattr(self, "explanation", None)
-        return explanation if isinstance(explanation, EmptyExplanation) else None
+        explanation: EmptyExplanation | NoSupervisor | None = getattr(self, "explanation", None)
+        return None if isinstance(explanation, NoSupervisor) else explanation
 
     def __repr__(self) -> str:
         made = self._made()
@@ -155,11 +157,11 @@ class Generation(Outcome):
     status: SynthesisStatus
     diagnostics: tuple[Diagnostic, ...]
     reason: str
-    files: GeneratedFiles | None
-    explanation: EmptyExplanation | None = None
+    files: "GeneratedFiles | None"
+    explanation: "EmptyExplanation | None" = None
     target: str = ""
 
-    def write(self, folder: FileName, *, force: bool = False) -> Written:
+    def write(self, folder: FileName, *, force: bool = False) -> "Written":
         """Write the files into a folder, as `robosc generate` does.
 
         Args:
@@ -172,6 +174,8 @@ class Generation(Outcome):
         """
         if self.files is None:
             raise NothingGeneratedError(f"nothing was generated: {self.reason or self.status}")
+        from robosc.targets import write_generated
+
         return write_generated(self.files, self.target, given_path(folder), force=force)
 
     def _made(self) -> object:

@@ -5,7 +5,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -16,7 +16,6 @@ from robosc.automata.state import subjects, whole_names
 from robosc.certification import Progress
 from robosc.conditions.rendering import Formulas
 from robosc.errors import InvalidSupervisorError, InvalidSystemError, NodeLimitError, UnsupportedModelError
-from robosc.explanation import EmptyExplanation, SystemWords, explain_empty
 from robosc.pipeline.conditions import Condition, Conditions, condition_of, conditions_of
 from robosc.pipeline.files import given_path, read_bounded, write_whole
 from robosc.pipeline.findings import Findings
@@ -33,7 +32,10 @@ from robosc.supervisor.validation import validate_added, validate_condition
 from robosc.synthesis import EngineOptions, Statistics, SynthesisProgress, synthesize
 from robosc.synthesis import SynthesisStatus as CoreStatus
 from robosc.tables import html_table
-from robosc.verification import CheckOutcome, Limits, VerificationReport, verify
+
+if TYPE_CHECKING:
+    from robosc.explanation import EmptyExplanation, SystemWords
+    from robosc.verification import Limits, VerificationReport
 
 _CHECKS = ("safe", "controllable", "nonblocking", "maximally_permissive")
 MAXIMUM_NAMES = 20
@@ -215,7 +217,7 @@ class SystemSynthesis(Outcome):
     supervisor: SystemSupervisor | None
     statistics: Statistics | None
     diagnostics: Findings = field(default_factory=Findings)
-    explanation: EmptyExplanation | NoSupervisor | None = None
+    explanation: "EmptyExplanation | NoSupervisor | None" = None
 
     def _made(self) -> object:
         return self.supervisor
@@ -253,6 +255,8 @@ def synthesize_system(
     except UnsupportedModelError as error:
         return _unsupported(error)
     if found.status is CoreStatus.EMPTY:
+        from robosc.explanation import SystemWords
+
         words, reason = SystemWords(system, places or SystemPlaces()), f"no supervisor exists: {found.reason}"
         return _empty(words, reason, found.statistics, engine, on_progress, should_stop)
     supervisor = SystemSupervisor(system, found.added, found.initial, found.statistics)
@@ -280,6 +284,8 @@ def _synthesized_in_modules(
         return _unsupported(error)
     if found.lost is not None:
         names = ", ".join(found.lost.automata[:MAXIMUM_NAMES]) + ", ..." * (len(found.lost.automata) > MAXIMUM_NAMES)
+        from robosc.explanation import SystemWords
+
         reason = f"no supervisor exists: {names}: {found.lost.result.reason}"
         words = SystemWords(*found.partition.problem_of(found.lost.module, places))
         return _empty(words, reason, found.lost.result.statistics, engine, on_progress, should_stop)
@@ -290,6 +296,8 @@ def _synthesized_in_modules(
         iterations=max(item.iterations for item in figures),
         peak_nodes=max(item.peak_nodes for item in figures),
         states=found.states or 0,
+        search=max(item.search for item in figures),
+        closure=figures[0].closure,
     )
     group_of = {place: number for number, group in enumerate(found.groups, start=1) for place in group}
     modules = tuple(
@@ -307,13 +315,15 @@ def _unsupported(error: UnsupportedModelError) -> SystemSynthesis:
 
 
 def _empty(
-    words: SystemWords,
+    words: "SystemWords",
     reason: str,
     statistics: Statistics,
     engine: EngineOptions,
     on_progress: Callable[[Progress], None],
     should_stop: Callable[[], bool],
 ) -> SystemSynthesis:
+    from robosc.explanation import explain_empty
+
     explanation: EmptyExplanation | NoSupervisor = NoSupervisor(reason, ())
     # Whatever the limit of nodes, that there is no supervisor is known.
     with suppress(NodeLimitError):
@@ -329,13 +339,15 @@ def _empty(
 def verify_system(
     supervisor: SystemSupervisor,
     options: SynthesisOptions,
-    limits: Limits,
+    limits: "Limits",
     on_progress: Callable[[Progress], None],
     should_stop: Callable[[], bool],
     *,
     is_strict: bool,
 ) -> Verification:
     """Verify independently that a supervisor of automata is right."""
+    from robosc.verification import CheckOutcome
+
     verified = _verified(supervisor, options, limits, on_progress, should_stop)
     found = verified.verification
     outcomes = {name: getattr(found, name) for name in _CHECKS}
@@ -393,10 +405,12 @@ def system_verification_text(report: Mapping[str, Any]) -> str:
 def _verified(
     supervisor: SystemSupervisor,
     options: SynthesisOptions,
-    limits: Limits,
+    limits: "Limits",
     on_progress: Callable[[Progress], None],
     should_stop: Callable[[], bool],
-) -> VerificationReport:
+) -> "VerificationReport":
+    from robosc.verification import verify
+
     system, added = supervisor.system, state_predicates(supervisor.system, supervisor.added)
 
     def report(message: str) -> None:

@@ -81,7 +81,7 @@ class Causes:
         """Good states, and states of the controlled system, if nothing had to hold always."""
         fixed_point = FixedPoint(self._encoding, self._monitor)
         problem = Problem(self._problem.steps, safe_states(self._encoding, ()))
-        good = fixed_point.good_states(problem, known=self._good).states
+        good = fixed_point.solution(problem, known=self._good).states
         return good, fixed_point.reachable_states(problem, good)
 
     def _broken(self, states: Any) -> tuple[int, ...]:

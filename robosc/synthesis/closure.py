@@ -9,9 +9,11 @@ from collections.abc import Iterable
 from typing import Any
 
 from robosc.synthesis.chaining import Chaining
+from robosc.synthesis.compiled import kernel_of
 from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.engines import is_reordering
+from robosc.synthesis.engines import Manager, is_reordering
 from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.result import Closure
 from robosc.synthesis.saturation import CompiledSaturation, Saturation, saturation
 from robosc.synthesis.step import Step
 
@@ -31,3 +33,10 @@ def closure_under(
     if is_reordering(encoding.manager):
         return Chaining(levels, tuple(steps), within, monitor)
     return saturation(encoding.manager, levels, tuple(steps), within, monitor)
+
+
+def closure_in(manager: Manager) -> Closure:
+    """Return the order of steps that `closure_under` chooses for a manager."""
+    if is_reordering(manager):
+        return Closure.CHAINING
+    return Closure.SATURATION if kernel_of(manager) is None else Closure.COMPILED_SATURATION

@@ -67,7 +67,7 @@ class Kernel:
         within: Any,
         groups: tuple[Any, ...],
         until: Any,
-        pause: Callable[[], None],
+        pause: Callable[[int], None],
         tell: Callable[[int, int], None],
     ) -> Any:
         """Return a set of states closed under some steps.
@@ -77,7 +77,7 @@ class Kernel:
             within: Predicate that added states satisfy.
             groups: Steps as `saturation` has them for the kernel.
             until: States once all of which are found the rest is not; or None.
-            pause: Called again and again; what it raises ends the work.
+            pause: Called again and again with the number of steps since the last call; what it raises ends the work.
             tell: Called with the number of the round and the address of the states that are found then.
         """
         begin, inside, enough = self.address(states), self.address(within), self.address(until)

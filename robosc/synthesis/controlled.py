@@ -142,7 +142,7 @@ class ControlledSystem:
     def _is_the_same_without(self, restrictions: Sequence[Restriction]) -> bool:
         """Return True if the controlled system of the problem without some restrictions allows nothing more."""
         problem = self._without(restrictions)
-        good = FixedPoint(self._encoding, self._monitor).good_states(problem, known=self._good)
+        good = FixedPoint(self._encoding, self._monitor).solution(problem, known=self._good)
         return all(
             self._reachable & steps.plant & allowed(steps, good.states) == self._possible(steps.event.name)
             for steps in problem.steps

@@ -6,8 +6,9 @@ guards. Predecessors are found by substitution, forward images with a relation f
 order.
 """
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from copy import copy
+from dataclasses import dataclass, replace
 from typing import Any
 
 from robosc.expressions import Expression
@@ -15,10 +16,13 @@ from robosc.synthesis.chaining import Chaining
 from robosc.synthesis.closure import closure_under
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
-from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
 from robosc.synthesis.saturation import CompiledSaturation, Saturation
 from robosc.synthesis.step import Step
 from robosc.synthesis.transitions import Steps
+
+_FIRST_STEPS = 16_000
+"""Steps that each of two ways is tried with at first; most systems need fewer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,11 +46,13 @@ class GoodStates:
         states: The states; where the initial one is none of them, what was left when that was found.
         rounds: Rounds of the fixed point.
         reason: Reason why the initial state is none of them; empty if it is one.
+        is_of_reached: True if they are those alone that runs of the problem reach.
     """
 
     states: Any
     rounds: int
     reason: str = ""
+    is_of_reached: bool = False
 
 
 def safe_states(encoding: Encoding, invariants: Iterable[Expression]) -> Any:
@@ -82,6 +88,36 @@ class FixedPoint:
         """The initial states."""
         self.marked = marked_states(encoding)
         """The marked states."""
+
+    def solution(self, problem: Problem, known: Any) -> GoodStates:
+        """The good states, of which some that no run reaches may be left out.
+
+        From the marked states backwards there may be very many that no run reaches, with large diagrams; onwards from
+        the initial ones there may be very many that are not good. Neither is known beforehand, so both are tried in
+        turn, each time with more steps, until one of them comes to its end: then so does the other within what it has
+        found, or need not. A step is the same for every engine, and so is the result.
+
+        Args:
+            problem: The problem.
+            known: States that are told beforehand to be good.
+        """
+        limit, start = _FIRST_STEPS, self.initial & problem.safe
+        while True:
+            found = self._bounded(limit, lambda solver: solver.good_states(problem, known))
+            if found is not None:
+                return found
+            reached = self._bounded(limit, lambda solver: solver.states_from(problem, start, problem.safe))
+            if reached is not None:
+                break
+            limit *= 2
+        found = self.good_states(Problem(problem.steps, reached), known & reached)
+        return replace(found, is_of_reached=True)
+
+    def _bounded[T](self, limit: int, work: Callable[["FixedPoint"], T]) -> T | None:
+        """Return the result of some work, or None if it takes more steps than a limit."""
+        solver, monitor = copy(self), BoundedMonitor(self._monitor, limit)
+        solver._monitor = monitor
+        return monitor.result_of(lambda: work(solver))
 
     def good_states(self, problem: Problem, known: Any) -> GoodStates:
         """The states from which a supervisor can solve a problem; `known` ones are told beforehand to be such."""

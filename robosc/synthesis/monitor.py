@@ -30,8 +30,11 @@ class ProgressMonitor:
         self._check_nodes = check_nodes
         self.peak_nodes = 0
 
-    def check_stop(self) -> None:
+    def check_stop(self, steps: int = 1) -> None:
         """Before each step.
+
+        Args:
+            steps: Number of steps since the last call, which may stand for several.
 
         Raises:
             SynthesisCancelled: The work is to end.
@@ -46,3 +49,67 @@ class ProgressMonitor:
         nodes = states.dag_size
         self.peak_nodes = max(self.peak_nodes, nodes)
         self._on_progress(SynthesisProgress(phase, rounds, nodes))
+
+
+class EffortSpentError(Exception):
+    """The work has taken more steps than it may.
+
+    Args:
+        monitor: Monitor whose limit ended it.
+    """
+
+    def __init__(self, monitor: "BoundedMonitor") -> None:
+        super().__init__(f"more than {monitor.limit} steps")
+        self.monitor = monitor
+
+
+class BoundedMonitor(ProgressMonitor):
+    """A monitor that counts steps, and ends the work at a limit once one is set.
+
+    Args:
+        monitor: Monitor of the waiting caller.
+        limit: Steps beyond which the work ends; None for no limit.
+
+    Attributes:
+        steps: Steps so far; the same for every engine.
+        limit: Steps beyond which the work ends.
+    """
+
+    def __init__(self, monitor: ProgressMonitor, limit: int | None = None) -> None:
+        super().__init__(lambda: False, lambda progress: None)
+        self._monitor = monitor
+        self.steps = 0
+        self.limit = limit
+
+    def check_stop(self, steps: int = 1) -> None:
+        """Before each step.
+
+        Args:
+            steps: Number of steps since the last call, which may stand for several.
+
+        Raises:
+            SynthesisCancelled: The work is to end.
+            NodeLimitError: There are more nodes than there may be.
+            EffortSpentError: It has taken more steps than it may.
+        """
+        self.steps += steps
+        # What asks less often goes a little beyond the limit; that is nothing to count.
+        beyond = 0 if self.limit is None else max(0, self.steps - self.limit - 1)
+        self.steps -= beyond
+        self._monitor.check_stop(steps - beyond)
+        if self.limit is not None and self.steps > self.limit:
+            raise EffortSpentError(self)
+
+    def tell(self, phase: str, rounds: int, states: Any) -> None:
+        """Pass on progress."""
+        self._monitor.tell(phase, rounds, states)
+
+    def result_of[T](self, work: Callable[[], T]) -> T | None:
+        """Return the result of some work that asks this monitor, or None if its limit has ended the work."""
+        # No context manager: those of contextlib keep the frames of an error, and their predicates, in a cycle.
+        try:
+            return work()
+        except EffortSpentError as error:
+            if error.monitor is not self:
+                raise
+            return None

@@ -35,6 +35,23 @@ class SynthesisProgress:
         return f"{self.phase}, {unit} {self.iteration}, {self.nodes} nodes"
 
 
+class Search(StrEnum):
+    """Direction in which synthesis has found the good states; `FixedPoint.solution` chooses."""
+
+    BACKWARDS = "backwards"
+    """From the marked states, whatever is reachable."""
+    REACHABLE_FIRST = "reachable states first"
+    """Within the states that plants and requirements let runs reach."""
+
+
+class Closure(StrEnum):
+    """Order in which the steps of events are applied to sets of states; `closure_under` chooses."""
+
+    COMPILED_SATURATION = "saturation in C"
+    SATURATION = "saturation"
+    CHAINING = "chaining"
+
+
 @dataclass(frozen=True, slots=True)
 class Statistics:
     """Figures of one synthesis.
@@ -45,6 +62,8 @@ class Statistics:
         iterations: Rounds of the fixed point.
         peak_nodes: Most nodes that such a predicate took at the end of a round; the same for every engine.
         states: Reachable states of the controlled system, exact; 0 where there is no supervisor.
+        search: Direction of the search for good states.
+        closure: Order of steps.
     """
 
     engine: str
@@ -52,6 +71,8 @@ class Statistics:
     iterations: int
     peak_nodes: int
     states: int
+    search: Search = Search.BACKWARDS
+    closure: Closure = Closure.SATURATION
 
 
 @dataclass(frozen=True, slots=True)

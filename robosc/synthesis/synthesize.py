@@ -5,12 +5,20 @@ from typing import Any
 
 from robosc.automata.structure import System
 from robosc.supervisor import AddedCondition, DecisionDiagram
+from robosc.synthesis.closure import closure_in
 from robosc.synthesis.controlled import ControlledSystem
 from robosc.synthesis.engines import EngineOptions
-from robosc.synthesis.fixed_point import FixedPoint, Problem, safe_states
+from robosc.synthesis.fixed_point import FixedPoint, GoodStates, Problem, safe_states
 from robosc.synthesis.nodes import count_models
 from robosc.synthesis.questions import Questions
-from robosc.synthesis.result import Statistics, SynthesisProgress, SynthesisResult, SynthesisStatus
+from robosc.synthesis.result import (
+    Closure,
+    Search,
+    Statistics,
+    SynthesisProgress,
+    SynthesisResult,
+    SynthesisStatus,
+)
 from robosc.synthesis.simplify import Simplifier
 from robosc.synthesis.transitions import Steps, transition_of
 from robosc.synthesis.workspace import Workspace, workspace
@@ -75,10 +83,11 @@ class _Synthesis:
         """The supervisor, or why there is none."""
         fixed_point = FixedPoint(self._encoding, self._monitor)
         with self._place.reordering():
-            good = fixed_point.good_states(self._problem, self._manager.false)
+            good = fixed_point.solution(self._problem, self._manager.false)
             reachable = None if good.reason else fixed_point.reachable_states(self._problem, good.states)
+            closure = closure_in(self._manager)
         if good.reason:
-            statistics = self._statistics(good.rounds, 0)
+            statistics = self._statistics(good, 0, closure)
             return SynthesisResult(SynthesisStatus.EMPTY, (), statistics, good.reason)
         states = count_models(self._manager, reachable, self._encoding.state_names)
         added: list[AddedCondition] = []
@@ -89,7 +98,7 @@ class _Synthesis:
             if condition is not None:
                 added.append(AddedCondition(steps.event.name, condition))
         # The figures are those of the synthesis: what the questions take on top is not in them.
-        statistics = self._statistics(good.rounds, states)
+        statistics = self._statistics(good, states, closure)
         controlled = ControlledSystem(self._encoding, self._monitor, self._problem, good.states, reachable)
         return SynthesisResult(
             SynthesisStatus.SUPERVISOR,
@@ -99,8 +108,16 @@ class _Synthesis:
             initial=simplifier.condition(good.states, fixed_point.initial),
         )
 
-    def _statistics(self, rounds: int, states: int) -> Statistics:
-        return Statistics(self._place.engine, len(self._encoding.state_names), rounds, self._monitor.peak_nodes, states)
+    def _statistics(self, good: GoodStates, states: int, closure: Closure) -> Statistics:
+        return Statistics(
+            engine=self._place.engine,
+            state_bits=len(self._encoding.state_names),
+            iterations=good.rounds,
+            peak_nodes=self._monitor.peak_nodes,
+            states=states,
+            search=Search.REACHABLE_FIRST if good.is_of_reached else Search.BACKWARDS,
+            closure=closure,
+        )
 
     def _added(self, simplifier: Simplifier, steps: Steps, good: Any, reachable: Any) -> DecisionDiagram | None:
         """The condition to add to an event, simplified where it does not matter; None if there is nothing to add."""

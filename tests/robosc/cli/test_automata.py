@@ -110,6 +110,24 @@ def test_synth(model: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert (document["states"], list(document["conditions"])) == (3, ["tank.c_fill"])
 
 
+def test_figures_of_the_synthesis(model: str, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = run(capsys, "synth", model, "--statistics")
+    assert status == 0
+    lines = [line.split(maxsplit=1) for line in out.splitlines()[-7:]]
+    assert ["search", "backwards"] in lines
+    assert ["rounds", "1"] in lines
+    status, out, _ = run(capsys, "synth", model, "--json", "--statistics")
+    found = json.loads(out)["statistics"]
+    assert (found["search"], found["state_bits"], found["iterations"]) == ("backwards", 2, 1)
+    assert found["seconds"] >= 0
+    Path(model).write_text(f"{TANK}marked false;\n")
+    status, out, _ = run(capsys, "synth", model, "--statistics")
+    assert status == 1
+    assert "search" in out
+    Path(model).write_text(f"{TANK}marked nothing;\n")
+    assert json.loads(run(capsys, "synth", model, "--json", "--statistics")[1])["statistics"] is None
+
+
 def test_synth_in_modules(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model = tmp_path / "two.cif"
     model.write_text(TANK.replace("level in any", "level = 1") + TANK.replace("tank", "tub").replace(" in any", " = 1"))

@@ -15,7 +15,7 @@ import pytest
 from robosc.cli import format as format_
 from robosc.cli.main import main
 from robosc.cli.output import UsageError, write_bytes
-from robosc.language import bundle
+from robosc.language import reading
 
 UNTIDY = "robot R{component C{}\n\n\n}// end"
 TIDY = "robot R {\n    component C { }\n}  // end\n"
@@ -231,7 +231,7 @@ def test_what_is_no_text_is_left_alone(files: Files, capsys: pytest.CaptureFixtu
 def test_what_is_or_becomes_too_large_is_left_alone(
     files: Files, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], limit: int
 ) -> None:
-    monkeypatch.setattr(bundle, "MAXIMUM_BYTES", limit)
+    monkeypatch.setattr(reading, "MAXIMUM_BYTES", limit)
     files({"a.rscd": UNTIDY})
     assert main(["format", "a.rscd"]) == 1
     captured = capsys.readouterr()

@@ -98,7 +98,7 @@ def test_all_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_built_in_commands_are_those_that_the_parser_has() -> None:
     (found,) = (item for item in make_parser()._actions if isinstance(item, argparse._SubParsersAction))
-    assert sorted(found.choices) == sorted(main_module._NAMES)
+    assert sorted(found.choices) == sorted(main_module.COMMANDS)
 
 
 def test_who_calls_a_built_in_command_does_not_even_look(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -107,7 +107,7 @@ def test_who_calls_a_built_in_command_does_not_even_look(monkeypatch: pytest.Mon
 
     monkeypatch.setattr("importlib.metadata.entry_points", refuse)
     for argv in (["check", "x"], ["synth"], ["--version"], ["check-log", "--help"]):
-        assert wanted_plugins(argv, main_module._NAMES) == ()
+        assert wanted_plugins(argv, main_module.COMMANDS) == ()
 
 
 def test_check_loads_nothing_of_it() -> None:
@@ -116,3 +116,15 @@ def test_check_loads_nothing_of_it() -> None:
         "sys.exit(bool({'robosc.event_logs', 'matplotlib', 'dd'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", program], check=False, stderr=subprocess.DEVNULL).returncode == 0
+
+
+def test_automata_load_no_parser_or_check_of_models(tmp_path: Path) -> None:
+    model = tmp_path / "lamp.cif"
+    model.write_text("plant lamp: controllable c; location: initial; marked; edge c; end")
+    program = (
+        f"import sys\nfrom robosc.cli.main import main\nmain(['synth', {str(model)!r}])\nprint(*sys.modules, sep='\\n')"
+    )
+    done = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+    found = set(done.stdout.splitlines())
+    assert "robosc.cif.parser" in found
+    assert not {"robosc.language.parser", "robosc.model.check", "robosc.verification", "robosc.targets"} & found

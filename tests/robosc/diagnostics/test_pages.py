@@ -17,8 +17,8 @@ from robosc.editing.findings import no_supervisor
 from robosc.errors import Diagnostic, InternalError, LanguageError, Severity
 from robosc.explanation import ModelWords, explain_synthesis
 from robosc.language import parse
-from robosc.language.bundle import MAXIMUM_BYTES, decode_source
 from robosc.language.interfaces import find_interfaces, interface_folders
+from robosc.language.reading import MAXIMUM_BYTES, decode_source
 from robosc.model.check import check
 from robosc.model.structure import Deployment
 from robosc.plain_automata import check_automata

@@ -10,11 +10,11 @@ from robosc.automata.compile import NO_DATA, State, compile_expression
 from robosc.automata.state import Subject, subjects
 from robosc.explanation.analysis import Analysis, Hindrance, HindranceKind
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, relaxable_constraints, without_ranges
-from robosc.explanation.problems import BoundedMonitor, Problems
+from robosc.explanation.problems import Problems
 from robosc.explanation.requirement_automata import as_conditions
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
-from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
 from support.effort import seeds
 from support.random_systems import explicit_supervisor, random_system, wide_system
 

@@ -14,12 +14,12 @@ from robosc.errors import SynthesisCancelled
 from robosc.explanation.analysis import Analysis, Counterexample, HindranceKind
 from robosc.explanation.blame import find_blame
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, relaxable_constraints, without
-from robosc.explanation.problems import BoundedMonitor, Problems
+from robosc.explanation.problems import Problems
 from robosc.explanation.requirement_automata import as_conditions
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.fixed_point import initial_states
-from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
 from robosc.verification import synthesize_explicit
 from support.effort import seeds
 from support.empty_systems import empty_system

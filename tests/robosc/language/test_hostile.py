@@ -8,7 +8,7 @@ import pytest
 from robosc.cli.main import main
 from robosc.errors import LanguageError
 from robosc.language import decode_source
-from robosc.language.bundle import MAXIMUM_BYTES
+from robosc.language.reading import MAXIMUM_BYTES
 from robosc.model.check import check
 from robosc.source import Bundle, SourceFile
 

@@ -23,7 +23,7 @@ from robosc.synthesis import SynthesisProgress, compiled, nodes
 from robosc.synthesis.compiled import kernel_of
 from robosc.synthesis.engines import Manager, limited, make_manager
 from robosc.synthesis.image import Image
-from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
 from robosc.synthesis.saturation import CompiledSaturation, Saturation, saturation
 from robosc.synthesis.step import Step
 from support.effort import examples
@@ -100,7 +100,7 @@ def monitor_of(told: Told) -> ProgressMonitor:
 @settings(max_examples=examples(90))
 @given(seed=st.integers(0, 2**32))
 def test_it_saturates_as_python_does(seed: int) -> None:
-    """The same states, the same progress after the same steps."""
+    """The same states, the same progress after the same steps, and the same end at a limit of steps."""
     dice = Random(seed)
     manager = manager_with(ORDER)
     steps = [random_step(manager, dice) for _ in range(dice.randint(1, 6))]
@@ -109,11 +109,17 @@ def test_it_saturates_as_python_does(seed: int) -> None:
     until = random_predicate(manager, dice, PLACES, 2) if dice.random() < 0.3 else None
     expected_told: Told = []
     told: Told = []
-    expected = Saturation(manager, LEVELS, steps, within, monitor_of(expected_told)).of(begin, "test", until)
-    found = saturation(manager, LEVELS, steps, within, monitor_of(told))
+    limit = dice.randint(1, 60) if dice.random() < 0.5 else None
+    around, expected_around = (BoundedMonitor(monitor_of(item)) for item in (told, expected_told))
+    inner, expected_inner = (BoundedMonitor(item, limit) for item in (around, expected_around))
+    expected = Saturation(manager, LEVELS, steps, within, expected_inner)
+    found = saturation(manager, LEVELS, steps, within, inner)
     assert isinstance(found, CompiledSaturation)
-    assert found.of(begin, "test", until) == expected
-    assert told == expected_told
+    states = inner.result_of(lambda: found.of(begin, "test", until))
+    assert states == expected_inner.result_of(lambda: expected.of(begin, "test", until))
+    assert (inner.steps, around.steps) == (expected_inner.steps, expected_around.steps)
+    if states is not None:
+        assert told == expected_told
 
 
 @settings(max_examples=examples(120))

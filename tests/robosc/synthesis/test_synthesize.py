@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -9,12 +10,21 @@ from robosc.automata import Automaton, Edge, Event, InputVariable, System, to_au
 from robosc.automata.controlled import controlled_graph
 from robosc.automata.semantics import Semantics
 from robosc.automata.structure import Assignment, DiscreteVariable, EventCondition
+from robosc.cif import check_cif, load_cif
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import BooleanType, IntegerType, Received
 from robosc.expressions.tree import Binary, Constant, VariableRead
 from robosc.model.structure import Deployment
 from robosc.supervisor.predicates import state_predicate, state_predicates
-from robosc.synthesis import SynthesisProgress, SynthesisResult, SynthesisStatus, UnknownEngineError, synthesize
+from robosc.synthesis import (
+    SynthesisProgress,
+    SynthesisResult,
+    SynthesisStatus,
+    UnknownEngineError,
+    fixed_point,
+    synthesize,
+)
+from robosc.synthesis.result import Search
 from robosc.verification import CheckOutcome, verify_explicitly
 from robosc.verification.symbolic import verify_symbolically
 from support.effort import seeds
@@ -83,12 +93,29 @@ def assert_verified(system: System, result: SynthesisResult) -> None:
 @pytest.mark.random
 @pytest.mark.parametrize("part", range(PARTS))
 @pytest.mark.parametrize("make", [random_system, wide_system])
-def test_random_systems(make: Callable[[int], System], part: int) -> None:
+def test_random_systems(make: Callable[[int], System], part: int, monkeypatch: pytest.MonkeyPatch) -> None:
     for seed in seeds(15):
+        # With so few steps at first, small systems are searched either way, too.
+        monkeypatch.setattr(fixed_point, "_FIRST_STEPS", (16_000, 1, 2, 5)[seed % 4])
         # The seeds are the same in every part, the systems are not.
         system = make(seed * PARTS + part)
         # The plain engine is slow: every other time will do.
         assert agree(system, ENGINES if seed % 2 else ENGINES[:1]) == kind(system), seed
+
+
+@pytest.mark.random
+def test_either_search_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fixed_point, "_FIRST_STEPS", 1)
+    assert {synthesize(random_system(seed)).statistics.search for seed in seeds(40)} == set(Search)
+
+
+def test_states_that_no_run_reaches_do_not_hold_up_synthesis() -> None:
+    # From the marked states backwards this takes a minute and a half.
+    found = check_cif(load_cif(Path(__file__).parents[2] / "models" / "wafer_handling.cif"))
+    assert found.system is not None
+    result = synthesize(found.system, engine="cudd")
+    assert result.statistics.search is Search.REACHABLE_FIRST
+    assert result.statistics.states == 468_979_718
 
 
 @pytest.mark.parametrize("deployment", list(Deployment))

@@ -1,0 +1,49 @@
+"""Figures of a synthesis, as `robosc synth --statistics` prints them."""
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from robosc.synthesis import Statistics
+
+_NAMES = {
+    "engine": "engine",
+    "search": "search",
+    "closure": "order of steps",
+    "state_bits": "state bits",
+    "iterations": "rounds",
+    "peak_nodes": "peak nodes",
+    "seconds": "seconds",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """Figures of a synthesis.
+
+    Attributes:
+        statistics: Those that it tells itself, or None where there was none.
+        seconds: Time that it took, with the certification of its result if there was one.
+    """
+
+    statistics: "Statistics | None"
+    seconds: float
+
+    def document(self) -> dict[str, object] | None:
+        """Return the figures as JSON values; None without a synthesis."""
+        if self.statistics is None:
+            return None
+        figures = asdict(self.statistics) | {"seconds": round(self.seconds, 3)}
+        return {name: figures[name] for name in _NAMES}
+
+    def __str__(self) -> str:
+        figures, width = self.document() or {}, max(map(len, _NAMES.values()))
+        return "".join(f"  {_NAMES[name]:<{width}}  {figure}\n" for name, figure in figures.items())
+
+
+def timed[T](work: Callable[[], T]) -> tuple[T, float]:
+    """Return the result of some work, and the seconds that it took."""
+    begin = time.monotonic()
+    return work(), time.monotonic() - begin

@@ -132,6 +132,12 @@ class TestCommands:
             assert (status, json.loads(told[1]) != {}) == (told[0], True)
             assert out or err or command == "verify --quiet"
 
+    def test_a_model_of_a_machine(self, both: Run) -> None:
+        """Groups, enums, inputs and components as a factory's model has them; its states are too many to list."""
+        model = Path(__file__).parents[1] / "models" / "wafer_handling.cif"
+        assert json.loads(both("synth", model, "--json")[1])["states"] == 468979718
+        assert both("explore", model, "--limit", "1000")[0] == 1
+
     @pytest.mark.parametrize("target", ["cif", "c99", "python"])
     @pytest.mark.parametrize("name", ["tank.cif", "grouped.cif", "imports.cif", "empty.cif", "several.cif", "line.gen"])
     def test_they_generate_the_same(self, target: str, name: str, folder: Path, both: Run) -> None:

@@ -89,11 +89,6 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_deployment_argument(parser)
     add_engine_options(parser)
     add_livelock_argument(parser)
-    parser.add_argument(
-        "--initial",
-        metavar="STATE",
-        help="state in which automata begin that may begin in several: 'p.x = 1, q = on'",
-    )
     parser.set_defaults(run=run)
 
 
@@ -144,7 +139,17 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
         "message of the package robosc_msgs (--target ros2-msgs) on ~/state; both (default: stateMessage of "
         "controller-config.json; json). Nodes for ROS 1 have the text only",
     )
+    add_initial_argument(parser)
     parser.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")
+
+
+def add_initial_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the option for where automata begin."""
+    parser.add_argument(
+        "--initial",
+        metavar="STATE",
+        help="state in which automata begin that may begin in several: 'p.x = 1, q = on'",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -153,37 +158,25 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc.targets import require_generatable
 
     require_generatable(arguments.target)
-    if automata.is_given(arguments):
-        return _generate_automata(arguments)
-    if arguments.initial is not None:
-        raise UsageError("--initial chooses where automata begin: a robot begins in one state")
     options = generate_options(arguments)
+    if automata.is_given(arguments):
+        model, made = automata.generate(arguments, options.package)
+        return report_generated(arguments, made, made.files, model)
+    refuse_initial(arguments)
     bundle = read_bundle(arguments)
     outcome = synth.make(arguments, bundle, allow_livelock=arguments.allow_livelock)
     generation = generation_of(outcome, arguments.target, options)
     return report_generated(arguments, generation, generation.files, bundle)
 
 
-def _generate_automata(arguments: argparse.Namespace) -> ExitCode:
-    """Generate from automata.
+def refuse_initial(arguments: argparse.Namespace) -> None:
+    """Do nothing unless a robot is to begin elsewhere.
 
     Raises:
-        UsageError: An argument means nothing for it, or it cannot be read.
+        UsageError: It is.
     """
-    from robosc.targets import ALL, generate_automata
-
-    automata.refuse(arguments.target == ALL, "--target all: of automata name one target: c99, cif or python")
-    automata.refuse(
-        arguments.target == "cif" and arguments.package is not None,
-        "--package: of automata, --target cif makes one file and no package",
-    )
-    automata.refuse(arguments.allow_livelock, "--allow-livelock: automata have no silent steps of a controller")
-    options = generate_options(arguments)
-    made = automata.synthesized(arguments, arguments.initial)
-    files = None
-    if (found := made.supervisor) is not None:
-        files = generate_automata(found, arguments.target, options)
-    return report_generated(arguments, made, files, made.bundle)
+    if arguments.initial is not None:
+        raise UsageError("--initial chooses where automata begin: a robot begins in one state")
 
 
 def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":

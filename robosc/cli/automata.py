@@ -302,7 +302,7 @@ def verify(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Ex
         except (InvalidSupervisorError, SignatureError) as error:
             return report_malformed(arguments, error)
     require_supported(found)
-    if found.status is VerificationStatus.NOSUPERVISOR:
+    if found.status is VerificationStatus.NO_SUPERVISOR:
         blame = found.report["explanation"]
         explanation = from_text(json_text(blame)) if blame else None
         status = SynthesisStatus(found.report["status"])

@@ -312,7 +312,7 @@ def _synthesize(message: Any, reader: _RequestReader) -> object:
     return reader.bundle(message.bundle), reader.options(message.options)
 
 
-_METADATA = ("maintainer", "email", "license", "version")
+_METADATA = ("maintainer", "email", "license", "version", "copyright")
 
 
 def _generate(message: Any, reader: _RequestReader) -> object:

@@ -202,6 +202,7 @@ def _metadata(metadata: PackageMetadata) -> pb.PackageMetadata:
         email=metadata.email,
         license=metadata.license,
         version=metadata.version or "",
+        copyright=metadata.copyright or "",
     )
 
 

@@ -271,16 +271,18 @@ class GenerateOptions(_message.Message):
     def __init__(self, package: _Optional[str] = ..., publish_state: _Optional[bool] = ..., log_events: _Optional[bool] = ..., supervised: _Optional[_Union[SupervisedController, _Mapping]] = ..., metadata: _Optional[_Union[PackageMetadata, _Mapping]] = ..., state_message: _Optional[str] = ...) -> None: ...
 
 class PackageMetadata(_message.Message):
-    __slots__ = ("maintainer", "email", "license", "version")
+    __slots__ = ("maintainer", "email", "license", "version", "copyright")
     MAINTAINER_FIELD_NUMBER: _ClassVar[int]
     EMAIL_FIELD_NUMBER: _ClassVar[int]
     LICENSE_FIELD_NUMBER: _ClassVar[int]
     VERSION_FIELD_NUMBER: _ClassVar[int]
+    COPYRIGHT_FIELD_NUMBER: _ClassVar[int]
     maintainer: str
     email: str
     license: str
     version: str
-    def __init__(self, maintainer: _Optional[str] = ..., email: _Optional[str] = ..., license: _Optional[str] = ..., version: _Optional[str] = ...) -> None: ...
+    copyright: str
+    def __init__(self, maintainer: _Optional[str] = ..., email: _Optional[str] = ..., license: _Optional[str] = ..., version: _Optional[str] = ..., copyright: _Optional[str] = ...) -> None: ...
 
 class SupervisedController(_message.Message):
     __slots__ = ("package", "executable", "launch_file")

@@ -361,7 +361,7 @@ def _synthesize(message: Any, reader: _RequestReader) -> object:
     return bundle, reader.options(message.options), message.modular
 
 
-_METADATA = ("maintainer", "email", "license", "version")
+_METADATA = ("maintainer", "email", "license", "version", "copyright")
 
 
 def _generate(message: Any, reader: _RequestReader) -> object:

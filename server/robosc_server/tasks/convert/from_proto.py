@@ -98,7 +98,8 @@ def generation(options: pb.GenerateOptions) -> GenerateOptions:
 
 
 def _metadata(metadata: pb.PackageMetadata) -> PackageMetadata:
-    given = {name: getattr(metadata, name) for name in ("maintainer", "email", "license", "version")}
+    names = ("maintainer", "email", "license", "version", "copyright")
+    given = {name: getattr(metadata, name) for name in names}
     try:
         return PackageMetadata(**{name: text for name, text in given.items() if text})
     except ValueError as error:

@@ -159,7 +159,7 @@ EXTRAS := server postgresql dask tracing client signing ros2 examples bridge plo
 
 lock: $(READY) ## choose new versions and write the locks
 	$(COMPILE) $(EXTRAS:%=--extra %) --output-file requirements.lock pyproject.toml
-	for tools in colcon checkers soak; do \
+	for tools in colcon kilted checkers soak; do \
 	  $(COMPILE) --output-file deploy/requirements-$$tools.txt deploy/requirements-$$tools.in || exit 1; \
 	done
 	$(LOCK) --universal --python-version 3.10 --output-file deploy/requirements-rclpy.txt deploy/requirements-rclpy.in

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from robosc.pipeline.findings import Findings
     from robosc.pipeline.generating import generate
     from robosc.pipeline.led_run import EventNotPossibleError, Step, UnknownEventError
-    from robosc.pipeline.loading import LoadedModel, load
+    from robosc.pipeline.loading import LoadedAutomata, LoadedModel, load
     from robosc.pipeline.options import SynthesisOptions
     from robosc.pipeline.received_data import DataError
     from robosc.pipeline.results import (
@@ -87,6 +87,7 @@ _HOMES = {
     "InvalidSupervisorError": "errors",
     "InvalidSystemError": "errors",
     "LanguageError": "errors",
+    "LoadedAutomata": "pipeline.loading",
     "LoadedModel": "pipeline.loading",
     "NoSupervisor": "pipeline.results",
     "NodeLimitError": "errors",
@@ -146,6 +147,7 @@ __all__ = [
     "InvalidSupervisorError",
     "InvalidSystemError",
     "LanguageError",
+    "LoadedAutomata",
     "LoadedModel",
     "NoSupervisor",
     "NodeLimitError",

@@ -10,6 +10,7 @@ import pytest
 from robosc.targets import generate, write_files
 from support.execution import supervisor_of
 from support.models import model_of
+from support.other_rclpy import DISTRIBUTIONS, distribution_command
 from support.ros2 import Peer, RosProcess, environment, own_domain
 
 pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
@@ -138,14 +139,15 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture
-def start(workspace: Path, tmp_path: Path) -> Iterator[Callable[..., Stage]]:
+@pytest.fixture(params=DISTRIBUTIONS)
+def start(request: pytest.FixtureRequest, workspace: Path, tmp_path: Path) -> Iterator[Callable[..., Stage]]:
     from std_srvs.srv import SetBool
 
     def grant(request: Any, response: Any) -> Any:
         response.success = request.data
         return response
 
+    program, *words = distribution_command(request.param)
     with own_domain() as domain:
         variables = environment(domain, tmp_path)
         with Peer(domain, variables) as peer:
@@ -155,8 +157,9 @@ def start(workspace: Path, tmp_path: Path) -> Iterator[Callable[..., Stage]]:
             def start_node(*parameters: str) -> Stage:
                 parameters = ("period:=0.02", "server_wait:=0.0", *parameters)
                 arguments = itertools.chain.from_iterable(("-p", parameter) for parameter in parameters)
-                command = ["-m", f"{PACKAGE}.node", "--ros-args", *arguments]
-                nodes.append(RosProcess(command, variables, tmp_path / str(len(nodes)), [workspace]))
+                command = [*words, "-m", f"{PACKAGE}.node", "--ros-args", *arguments]
+                folder = tmp_path / str(len(nodes))
+                nodes.append(RosProcess(command, variables, folder, [workspace], program=program))
                 return Stage(peer, nodes[-1])
 
             yield start_node

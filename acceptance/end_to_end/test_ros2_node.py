@@ -17,6 +17,7 @@ from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets import generate, write_files
 from support.models import EXAMPLES, model_of
+from support.other_rclpy import DISTRIBUTIONS, distribution_command
 from support.random_supervisors import CERTIFICATE
 from support.ros2 import Peer, RosProcess, environment, own_domain
 from support.service import server_process
@@ -56,16 +57,18 @@ def domain() -> Iterator[int]:
         yield number
 
 
-@pytest.fixture
-def start(workspace: Path, domain: int, tmp_path: Path) -> Iterator[StartNode]:
+@pytest.fixture(params=DISTRIBUTIONS)
+def start(request: pytest.FixtureRequest, workspace: Path, domain: int, tmp_path: Path) -> Iterator[StartNode]:
     """Starts the node; every started one is killed at the end."""
+    program, *words = distribution_command(request.param)
     nodes: list[RosProcess] = []
 
     def start_node(*parameters: str) -> RosProcess:
         arguments = itertools.chain.from_iterable(("-p", parameter) for parameter in parameters)
         file = workspace / "config/parameters.yaml"
-        command = ["-m", f"{PACKAGE}.node", "--ros-args", "--params-file", str(file), *arguments]
-        nodes.append(RosProcess(command, environment(domain, tmp_path), tmp_path / str(len(nodes)), [workspace]))
+        command = [*words, "-m", f"{PACKAGE}.node", "--ros-args", "--params-file", str(file), *arguments]
+        variables, folder = environment(domain, tmp_path), tmp_path / str(len(nodes))
+        nodes.append(RosProcess(command, variables, folder, [workspace], program=program))
         return nodes[-1]
 
     yield start_node

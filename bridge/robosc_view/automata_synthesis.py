@@ -14,8 +14,10 @@ import msgspec
 from robosc.cli import automata
 from robosc.cli.output import CommandError
 from robosc.errors import RoboscError, Severity
-from robosc.explanation import empty_text
+from robosc.explanation import EmptyExplanation, empty_text
+from robosc.pipeline.loading import LoadedAutomata
 from robosc.pipeline.system_runs import beginnings
+from robosc.pipeline.systems import SystemSynthesis
 from robosc_view.automata import distinct_beginnings, too_large
 from robosc_view.watched_model import MadeModel, finding_text
 
@@ -23,7 +25,7 @@ MAXIMUM_FINDINGS = 10
 """Errors that are told; of more the rest is counted."""
 
 
-def made_of(found: automata.Synthesized) -> MadeModel | str:
+def made_of(model: LoadedAutomata, found: SystemSynthesis) -> MadeModel | str:
     """Return what a page plays with; or the reason why there is nothing, a line for each part of it.
 
     Raises:
@@ -31,9 +33,9 @@ def made_of(found: automata.Synthesized) -> MadeModel | str:
     """
     if found.supervisor is None:
         return _reason(found)
-    whole = None if found.bundle.libraries else found.bundle.main.text
+    whole = None if model.libraries else model.main.text
     told = tuple(finding_text(item.severity, item.message, item.code) for item in found.diagnostics)
-    language = Path(found.bundle.main.name).suffix.removeprefix(".")
+    language = Path(model.main.name).suffix.removeprefix(".")
     system = found.supervisor.system
     why_not = too_large(system)
     if why_not:
@@ -43,13 +45,13 @@ def made_of(found: automata.Synthesized) -> MadeModel | str:
     return MadeModel(found.supervisor, told, whole, language, begin)
 
 
-def _reason(found: automata.Synthesized) -> str:
+def _reason(found: SystemSynthesis) -> str:
     wrong = [str(item) for item in found.diagnostics if item.severity is Severity.ERROR]
     more = len(wrong) - MAXIMUM_FINDINGS
     lines = [*wrong[:MAXIMUM_FINDINGS], *([f"and {more} errors more"] if more > 0 else [])]
     if found.reason:
         lines.append(found.reason)
-    if found.explanation is not None:
+    if isinstance(found.explanation, EmptyExplanation):
         lines += empty_text(found.explanation).splitlines()
     return "\n".join(lines)
 
@@ -62,7 +64,7 @@ def main() -> None:
         **{**wanted, "model": Path(wanted["model"]), "library_path": (), "interface_path": (), "deployment": None}
     )
     try:
-        made = made_of(automata.synthesized(arguments, text=text))
+        made = made_of(*automata.synthesized(arguments, text=text))
     except (CommandError, RoboscError) as error:
         made = str(error)
     sys.stdout.buffer.write(pickle.dumps(made))

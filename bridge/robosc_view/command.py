@@ -407,15 +407,15 @@ def _watched_automata(arguments: argparse.Namespace) -> "WatchedModel":
 
     model: Path = arguments.model
     text: str | None = arguments.text
-    found = automata.synthesized(arguments, text=text)
+    loaded, found = automata.synthesized(arguments, text=text)
     if found.supervisor is None:
-        automata.report_none(argparse.Namespace(model=model, json=False), found)
+        automata.report_none(argparse.Namespace(model=model, json=False), found, loaded)
         raise CommandError(f"there is no supervisor of {model}", ExitCode.FAILED)
-    print_diagnostics(found.diagnostics, found.bundle)
-    made = made_of(found)
+    print_diagnostics(found.diagnostics, loaded)
+    made = made_of(loaded, found)
     if isinstance(made, str):
         raise UsageError(made)
-    seen = found.bundle.digest
+    seen = loaded.digest
 
     def digest() -> str:
         if text is not None:

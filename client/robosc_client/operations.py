@@ -62,7 +62,7 @@ type SupervisorLike = Supervisor | bytes | FileName
 
 
 def check(bundle: ModelLike, *, deadline_s: float | None = None) -> Operation[Findings]:
-    """Every finding about a model or library, sorted by place."""
+    """Every finding about a model, library or automata, sorted by place."""
     model = loaded(bundle)
     return Operation("Check", request_of(Check(model)), lambda: check_reader(model), deadline_s=deadline_s)
 
@@ -71,11 +71,13 @@ def synthesize(
     bundle: ModelLike,
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
+    is_modular: bool = False,
     deadline_s: float | None = None,
     on_progress: OnProgress = ignore_progress,
 ) -> Operation[Synthesis]:
-    """Synthesize and certify a supervisor."""
-    return _streaming_task("Synthesize", Synthesize(loaded(bundle), options), SynthesisReader, deadline_s, on_progress)
+    """Synthesize and certify a supervisor; `is_modular` synthesizes automata in modules."""
+    task = Synthesize(loaded(bundle), options, is_modular)
+    return _streaming_task("Synthesize", task, SynthesisReader, deadline_s, on_progress)
 
 
 def generate(
@@ -84,6 +86,7 @@ def generate(
     generation: GenerateOptions = DEFAULT_GENERATION,
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
+    initial: str | None = None,
     deadline_s: float | None = None,
     on_progress: OnProgress = ignore_progress,
 ) -> Operation[Generation]:
@@ -94,10 +97,11 @@ def generate(
         target: Name of the target, or `all`.
         generation: Choices about the files.
         options: Options for making the supervisor.
+        initial: Description of the state in which automata begin that may begin in several, such as `tank.level = 1`.
         deadline_s: See the class.
         on_progress: See the class.
     """
-    task = Generate(loaded(bundle), target, generation, options)
+    task = Generate(loaded(bundle), target, generation, options, initial)
     return _streaming_task("Generate", task, lambda: GenerationReader(target), deadline_s, on_progress)
 
 
@@ -109,7 +113,7 @@ def explore(
     deadline_s: float | None = None,
     on_progress: OnProgress = ignore_progress,
 ) -> Operation[Exploration]:
-    """Explore the robot under its supervisor, up to a maximum number of states."""
+    """Explore the robot, or automata, under their supervisor, up to a maximum number of states."""
     task = Explore(loaded(bundle), options, maximum_states)
     return _streaming_task("Explore", task, ExplorationReader, deadline_s, on_progress)
 

@@ -1,26 +1,44 @@
 """Conversion of responses to the values of the core, so that client and `robosc` print and write the same."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import msgspec
 from msgspec import UNSET, UnsetType
 
 from robosc.automata import to_automata
+from robosc.automata.semantics import Semantics
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.automata.structure import System
 from robosc.certification import OutcomeStatus, SynthesisOutcome
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.exploration import Graph, GraphState, graph_columns, marks
 from robosc.expressions import Value
+from robosc.json_documents import json_text
 from robosc.model.check import check
 from robosc.model.structure import Deployment, Model
 from robosc.model_checking import Property, Verdict, properties_of
 from robosc.model_checking.outcome import EvidenceRun, Remainder, RunKind
+from robosc.pipeline.automata_files import check_automata_file
+from robosc.pipeline.exploring import Exploration as AutomataExploration
+from robosc.pipeline.findings import Findings
+from robosc.pipeline.loading import LoadedAutomata
+from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis, decode_system
 from robosc.source import Bundle, SourceFile, visible
 from robosc.supervisor import Supervisor, decode
+from robosc_client.convert.response_fields import explanation_of
 from robosc_client.errors import ServiceError, malformed
-from robosc_client.results import Exploration, Generation, StateGraph, Synthesis, SynthesisStatus
+from robosc_client.results import (
+    Exploration,
+    Generation,
+    StateGraph,
+    StateValues,
+    Synthesis,
+    SynthesisStatus,
+    Verification,
+    VerificationStatus,
+)
 
 
 def outcome_from_response(result: Synthesis | Generation | Exploration, content: bytes = b"") -> SynthesisOutcome:
@@ -55,6 +73,129 @@ def decoded(content: bytes) -> Supervisor:
         return decode(content)
     except InvalidSupervisorError as error:
         raise ServiceError(f"the server's supervisor is refused: {error}") from error
+
+
+def automata_synthesis_of(found: Synthesis, model: LoadedAutomata) -> SystemSynthesis:
+    """Return the synthesis of automata that the server made.
+
+    Raises:
+        ServiceError: The supervisor is no valid one, or of other automata.
+    """
+    supervisor = automata_supervisor_of(found.supervisor) if found.supervisor else None
+    if supervisor is not None and supervisor.system != check_automata_file(model).system:
+        raise ServiceError("the server's supervisor is refused: it was made of other automata")
+    diagnostics, reason = Findings(found.diagnostics, model), visible(found.reason)
+    statistics = None if supervisor is None else supervisor.statistics
+    return SystemSynthesis(found.status, reason, supervisor, statistics, diagnostics, found.explanation)
+
+
+def automata_supervisor_of(content: bytes) -> SystemSupervisor:
+    """The supervisor of automata in a file that a server has made.
+
+    Raises:
+        ServiceError: It is no valid one.
+    """
+    try:
+        return decode_system(content)
+    except InvalidSupervisorError as error:
+        raise ServiceError(f"the server's supervisor is refused: {error}") from error
+
+
+def automata_exploration_of(found: Exploration, model: LoadedAutomata) -> AutomataExploration:
+    """Return the exploration of automata that the server made.
+
+    Raises:
+        ServiceError: The graph is of other automata.
+    """
+    graph = None
+    if found.graph is not None:
+        system = check_automata_file(model).system
+        if system is None:
+            raise malformed("it has a result for a model that has errors")
+        graph = _automata_graph(found.graph, system)
+    diagnostics = Findings(found.diagnostics, model)
+    return AutomataExploration(found.status, diagnostics, visible(found.reason), graph, found.explanation)
+
+
+def _automata_graph(found: StateGraph, system: System) -> Graph:
+    semantics, places = Semantics(system), subjects(system)
+    domains = [subject_domain(system, subject) for subject in places]
+    names = {event.name for event in system.events}
+
+    def graph_state(given: StateValues) -> GraphState:
+        read: dict[Subject | str, Value] = {}
+        read.update(given.variables.items())
+        read.update((Subject(name), place) for name, place in given.components.items())
+        try:
+            state = tuple(read[subject if subject.variable is None else str(subject)] for subject in places)
+        except KeyError as error:
+            raise malformed("the graph belongs to other automata") from error
+        is_whole = len(read) == len(places) and not given.communications and names.issuperset(given.enabled)
+        if not is_whole or not all(value in domain for value, domain in zip(state, domains, strict=True)):
+            raise malformed("the graph belongs to other automata")
+        values = dict(zip(places, state, strict=True))
+        return GraphState(
+            components={name.automaton: str(value) for name, value in values.items() if name.variable is None},
+            variables={str(name): value for name, value in values.items() if name.variable is not None},
+            communications={},
+            enabled=given.enabled,
+            is_marked=semantics.is_marked(state),
+        )
+
+    if not names.issuperset(event for _, event, _ in found.transitions):
+        raise malformed("the graph belongs to other automata")
+    return Graph(
+        system.name,
+        found.initial_states or (found.initial,),
+        graph_columns(system, None),
+        tuple(map(graph_state, found.states)),
+        found.transitions,
+    )
+
+
+class _AutomataFault(msgspec.Struct):
+    """A fault in a report about a supervisor of automata."""
+
+    check: str
+    message: str
+    trace: list[str]
+
+
+class _AutomataReport(msgspec.Struct):
+    """A report about a supervisor of automata."""
+
+    status: Literal["passed", "failed", "not checked"]
+    system: str
+    checks: dict[str, Literal["passed", "failed", "not checked"]]
+    faults: list[_AutomataFault]
+    method: str
+
+
+class _NoReport(msgspec.Struct):
+    """A report that there is no supervisor of automata to verify."""
+
+    status: Literal["empty", "model errors"]
+    explanation: dict[str, Any] | None
+
+
+def require_automata_report(found: Verification) -> Verification:
+    """A verification of automata, whose report is one.
+
+    Raises:
+        ServiceError: It is another one.
+    """
+    if found.status is VerificationStatus.UNSUPPORTED_MODEL:
+        return found
+    is_none = found.status is VerificationStatus.NO_SUPERVISOR
+    try:
+        if is_none:
+            blame = msgspec.convert(found.report, type=_NoReport).explanation
+            explanation_of("" if blame is None else json_text(blame))
+        elif msgspec.convert(found.report, type=_AutomataReport).status != str(found.status):
+            raise malformed("its status contradicts its report")
+    except msgspec.ValidationError as error:
+        raise malformed(f"the report is invalid: {error}") from error
+    return replace(found, reason=visible(found.reason))
 
 
 def require_made_for(supervisor: Supervisor, bundle: Bundle, deployment: Deployment) -> None:

@@ -56,7 +56,8 @@ class Synthesis(Outcome):
         diagnostics: Every finding about the model, sorted by place.
         reason: Reason why there is no supervisor, in one sentence; empty where there is one.
         supervisor: The supervisor's file (`.rsup`), as the server meant it: its digest was checked; empty where there
-            is none. Untrusted: decode it with `robosc.supervisor.decode`, which validates it.
+            is none. Untrusted: decode it with `robosc.supervisor.decode`, which validates it, or read that of automata
+            with `robosc.SystemSupervisor.read`.
         summary: The supervisor in figures and words, or None where there is none.
         statistics: Figures of the work, or None where there was no synthesis.
         explanation: Explanation of why no supervisor exists, or None where there is nothing to explain.
@@ -78,10 +79,10 @@ class Synthesis(Outcome):
 
 
 class StateValues(msgspec.Struct, frozen=True, gc=False):
-    """One state of the robot under its supervisor.
+    """One state of the robot, or of automata, under their supervisor.
 
     Attributes:
-        components: State of every component with a behaviour, by its name.
+        components: State of every component with a behaviour, by its name; of automata the location of each.
         variables: Value of every synthesis variable, by `Component.variable`.
         communications: Location of every service and action, by its name.
         enabled: Events that can happen here, sorted by name.
@@ -93,18 +94,20 @@ class StateValues(msgspec.Struct, frozen=True, gc=False):
     enabled: tuple[str, ...]
 
 
-class StateGraph(msgspec.Struct, frozen=True):
-    """States and events of the robot under its supervisor.
+class StateGraph(msgspec.Struct, frozen=True, omit_defaults=True):
+    """States and events of the robot, or of automata, under their supervisor.
 
     Attributes:
-        initial: Number of the initial state.
+        initial: Number of the initial state; of several, the first.
         states: The states; a state's number is its place.
         transitions: State, event, state.
+        initial_states: Numbers of the initial states of automata that have several; else none.
     """
 
     initial: int
     states: tuple[StateValues, ...]
     transitions: tuple[tuple[int, str, int], ...]
+    initial_states: tuple[int, ...] = ()
 
     def __repr__(self) -> str:
         return f"<graph: {len(self.states)} states, {len(self.transitions)} transitions>"

@@ -19,20 +19,32 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Synthesize:
-    """Synthesize and certify a supervisor."""
+    """Synthesize and certify a supervisor.
+
+    Attributes:
+        bundle: The model and its libraries, or automata.
+        options: Options for making the supervisor; of automata, those about the engine.
+        is_modular: True if automata are to be synthesized in modules.
+    """
 
     bundle: Bundle
     options: SynthesisOptions = DEFAULT_OPTIONS
+    is_modular: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Generate:
-    """Synthesize a supervisor, and generate the files of a target around it."""
+    """Synthesize a supervisor, and generate the files of a target around it.
+
+    Attributes:
+        initial: Description of the state in which automata begin that may begin in several; None: as the model says.
+    """
 
     bundle: Bundle
     target: str
     generation: GenerateOptions = DEFAULT_GENERATION
     options: SynthesisOptions = DEFAULT_OPTIONS
+    initial: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +63,8 @@ class Explore:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verify:
     """Check of a supervisor against its model, or verification of properties of the robot under its supervisor.
+
+    Of automata the supervisor is made, and verified by other means; they have no properties and no supervisor's file.
 
     Attributes:
         bundle: The model and its libraries.

@@ -24,18 +24,22 @@ SUFFIX = ".cif"
 _LEVELS, _FRAMES = 5_000, 4
 
 
-def load_cif(path: Path) -> Bundle:
-    """Read a CIF model, with the files that it imports as far as they are there.
+def load_cif(path: Path, text: str | None = None) -> Bundle:
+    """Read a CIF model, with the files that it imports as far as they are there, named from the model's folder.
+
+    Args:
+        path: File of the model.
+        text: Text of the model, which then need not be a file.
 
     Raises:
         LanguageError: A file is too large or not UTF-8.
         OSError: The model cannot be read.
     """
-    main = SourceFile(str(path), read_source(path, str(path)))
+    main = SourceFile(path.name, read_source(path, path.name) if text is None else text)
 
     def read(name: str) -> SourceFile | None:
         try:
-            return SourceFile(name, read_source(Path(name), name))
+            return SourceFile(name, read_source(path.parent / name, name))
         except OSError:
             # `check_cif` tells where it is imported.
             return None

@@ -2,10 +2,10 @@
 
 import argparse
 import sys
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
 
+from robosc.cli.arguments import SYNTHESIS_STATES
 from robosc.cli.output import (
     CommandError,
     ExitCode,
@@ -19,23 +19,116 @@ from robosc.cli.output import (
 )
 from robosc.cli.statistics import Figures, timed
 from robosc.errors import Diagnostic, InvalidSupervisorError, UnsupportedModelError
-from robosc.json_documents import counts_text, diagnostics_json
+from robosc.json_documents import counts_text, diagnostics_json, json_text
 from robosc.model.structure import Deployment
 from robosc.pipeline.automata_files import SUFFIXES, is_automata
-from robosc.source import Bundle, SourceFile, visible
+from robosc.source import SourceFile, visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from enum import StrEnum
+    from pathlib import Path
 
-    from robosc.automata import CheckedSystem
     from robosc.explanation import EmptyExplanation
+    from robosc.pipeline.exploring import Exploration
+    from robosc.pipeline.findings import Findings
+    from robosc.pipeline.loading import LoadedAutomata
     from robosc.pipeline.options import SynthesisOptions
-    from robosc.pipeline.results import SynthesisStatus
+    from robosc.pipeline.results import Generation, SynthesisStatus, Verification
     from robosc.pipeline.synthesis import OnProgress
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
+    from robosc.targets import GenerateOptions
 
 
-_SUPERVISOR = ".rsup"
+class Machine(Protocol):
+    """Machine that does the work on automata: this one, or a server; its functions are those of `robosc`."""
+
+    def check(self, model: "LoadedAutomata") -> "Findings":
+        """Return every finding."""
+
+    def synthesize(
+        self, model: "LoadedAutomata", options: "SynthesisOptions", *, is_modular: bool
+    ) -> "SystemSynthesis":
+        """Synthesize the supervisor."""
+
+    def explore(self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int) -> "Exploration":
+        """Return the graph of the controlled system."""
+
+    def verify(
+        self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int, is_strict: bool
+    ) -> "Verification":
+        """Synthesize the supervisor, and verify it."""
+
+    def generate(
+        self,
+        model: "LoadedAutomata",
+        target: str,
+        generation: "GenerateOptions",
+        options: "SynthesisOptions",
+        *,
+        initial: str | None,
+    ) -> "Generation":
+        """Generate the files of a target."""
+
+
+class ThisMachine:
+    """Machine that the command runs on."""
+
+    def check(self, model: "LoadedAutomata") -> "Findings":
+        """Return every finding."""
+        from robosc.pipeline.checking import check
+
+        return check(model)
+
+    def synthesize(
+        self, model: "LoadedAutomata", options: "SynthesisOptions", *, is_modular: bool
+    ) -> "SystemSynthesis":
+        """Synthesize the supervisor."""
+        # Not `robosc.synthesize`: it loads what models of RoboSC need.
+        from robosc.pipeline.automata_models import automata_synthesis
+
+        return _watched(lambda told: automata_synthesis(model, options, told, lambda: False, is_modular=is_modular))
+
+    def explore(self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int) -> "Exploration":
+        """Return the graph of the controlled system."""
+        from robosc.pipeline.exploring import explore
+
+        return _watched(lambda told: explore(model, options, maximum_states=maximum_states, on_progress=told))
+
+    def verify(
+        self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int, is_strict: bool
+    ) -> "Verification":
+        """Synthesize the supervisor, and verify it."""
+        from robosc.pipeline.verifying import verify
+
+        return _watched(
+            lambda told: verify(
+                model, options=options, maximum_states=maximum_states, is_strict=is_strict, on_progress=told
+            )
+        )
+
+    def generate(
+        self,
+        model: "LoadedAutomata",
+        target: str,
+        generation: "GenerateOptions",
+        options: "SynthesisOptions",
+        *,
+        initial: str | None,
+    ) -> "Generation":
+        """Generate the files of a target."""
+        from robosc.pipeline.generating import generate
+
+        return _watched(lambda told: generate(model, target, generation, options, initial=initial, on_progress=told))
+
+
+THIS_MACHINE = ThisMachine()
+
+
+NO_FILE = "FILE.rsup: 'robosc verify' verifies a supervisor's file of automata, and no server does"
+"""Refusal of such a file for a server."""
+
+SUPERVISOR = ".rsup"
 """Ending of a supervisor's file."""
 
 
@@ -44,74 +137,33 @@ def is_given(arguments: argparse.Namespace) -> bool:
     return is_automata(arguments.model)
 
 
-@dataclass(frozen=True, slots=True)
-class Synthesized:
-    """Result of checking and synthesis.
-
-    Attributes:
-        bundle: The model, with the files that it imports.
-        status: Outcome of the synthesis.
-        diagnostics: Every finding.
-        reason: Reason why there is no supervisor; empty if there is one, or the findings tell.
-        supervisor: The supervisor, or None.
-        explanation: Explanation of what is to blame if no supervisor exists.
-        figures: Figures of the synthesis; None if there was none.
-    """
-
-    bundle: Bundle
-    status: "SynthesisStatus"
-    diagnostics: tuple[Diagnostic, ...]
-    reason: str
-    supervisor: "SystemSupervisor | None"
-    explanation: "EmptyExplanation | None" = None
-    figures: Figures | None = None
-
-
-def synthesized(arguments: argparse.Namespace, initial: str | None = None, text: str | None = None) -> Synthesized:
-    """Check the model of a command, and synthesize if it has no errors.
+def synthesized(arguments: argparse.Namespace, text: str | None = None) -> "tuple[LoadedAutomata, SystemSynthesis]":
+    """Read the model of a command, check it, and synthesize on this machine if it has no errors.
 
     Args:
         arguments: Arguments of the command.
-        initial: Description of the states in which automata begin, such as `tank.level = 1`; None: as the model says.
         text: All of the model, whose file only gives it a name then; None: the file's.
 
     Raises:
-        UsageError: An argument means nothing for it, it cannot be read, or the initial states name what is not there.
+        UsageError: An argument means nothing for it, or it cannot be read.
     """
-    from robosc.pipeline.results import NoSupervisor, SynthesisStatus
-
-    bundle, found = _checked(arguments, text)
-    if found.system is None:
-        return Synthesized(bundle, SynthesisStatus.MODEL_ERRORS, found.diagnostics, "", None)
-    if initial is not None:
-        found = _beginning(found, initial)
-    made, seconds = timed(lambda: _synthesis(arguments, found))
-    explanation = None if isinstance(made.explanation, NoSupervisor) else made.explanation
-    figures = Figures(made.statistics, seconds)
-    return Synthesized(bundle, made.status, found.diagnostics, made.reason, made.supervisor, explanation, figures)
+    model = loaded(arguments, text)
+    return model, THIS_MACHINE.synthesize(model, synthesis_options(arguments), is_modular=False)
 
 
-def _beginning(found: "CheckedSystem", initial: str) -> "CheckedSystem":
-    from robosc.explanation import RequestError
-    from robosc.explanation.requests import SystemRequests
-    from robosc.expressions import conjunction
+def file_of(supervisor: "SystemSupervisor", suffix: str) -> bytes:
+    """Return the content of a file whose name ends so.
 
-    system = found.system
-    assert system is not None  # noqa: S101 - asked only of models without errors
-    try:
-        condition = SystemRequests(system).state(initial)
-    except RequestError as error:
-        raise UsageError(f"--initial: {error}") from error
-    return replace(found, system=replace(system, initial=conjunction(system.initial, condition)))
-
-
-def controlled_system(supervisor: "SystemSupervisor", suffix: str) -> str:
-    """The controlled system as the text of a file: a CIF model, or one automaton of libFAUDES or Supremica.
+    It is the supervisor's own file, or the controlled system: a CIF model, or one automaton of libFAUDES or Supremica.
 
     Raises:
         CommandError: It has too many states for one automaton.
-        UnsupportedModelError: A name in it is none of that format.
+        UnsupportedModelError: A name in it is none of that format, or it is too large.
     """
+    return supervisor.encode() if suffix == SUPERVISOR else _controlled_system(supervisor, suffix).encode()
+
+
+def _controlled_system(supervisor: "SystemSupervisor", suffix: str) -> str:
     from robosc.exploration import DEFAULT_LIMIT, graph_automaton
     from robosc.pipeline.exploring import graph_of
     from robosc.plain_automata import WRITERS
@@ -127,55 +179,56 @@ def controlled_system(supervisor: "SystemSupervisor", suffix: str) -> str:
     return WRITERS[suffix](graph_automaton(graph, supervisor.system))
 
 
-def check(arguments: argparse.Namespace) -> ExitCode:
+def check(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> ExitCode:
     """Check automata, and synthesize if that is asked for; 0 without errors, else 1.
 
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
     """
-    bundle, found = _checked(arguments)
+    from robosc.pipeline.results import SynthesisStatus
+
+    model = loaded(arguments)
     told: dict[str, object] = {}
     synthesis = None
-    if arguments.synthesize and found.system is not None:
-        synthesis = _synthesis(arguments, found)
-        told = {"status": str(synthesis.status), "reason": synthesis.reason}
+    if arguments.synthesize:
+        synthesis = machine.synthesize(model, synthesis_options(arguments), is_modular=False)
+        if synthesis.status is not SynthesisStatus.MODEL_ERRORS:
+            told = {"status": str(synthesis.status), "reason": synthesis.reason}
+    diagnostics = machine.check(model) if synthesis is None else synthesis.diagnostics
     if arguments.json:
-        print_json({"file": str(arguments.model), **told, **diagnostics_json(found.diagnostics)})
-    elif found.diagnostics:
-        print_diagnostics(found.diagnostics, bundle)
+        print_json({"file": str(arguments.model), **told, **diagnostics_json(diagnostics)})
+    elif diagnostics:
+        print_diagnostics(diagnostics, model)
     else:
-        sys.stdout.write(f"{arguments.model}: {counts_text(found.diagnostics)}\n")
-    if synthesis is not None and synthesis.supervisor is None:
+        sys.stdout.write(f"{arguments.model}: {counts_text(diagnostics)}\n")
+    if told and synthesis is not None and synthesis.supervisor is None:
         if not arguments.json:
-            sys.stderr.write(f"{arguments.model}: {synthesis.reason}\n")
+            sys.stderr.write(f"{arguments.model}: {visible(synthesis.reason)}\n")
         return ExitCode.FAILED
-    return ExitCode.FAILED if has_errors(found.diagnostics, strict=arguments.strict) else ExitCode.OK
+    return ExitCode.FAILED if has_errors(diagnostics, strict=arguments.strict) else ExitCode.OK
 
 
-def synth(arguments: argparse.Namespace) -> ExitCode:
+def synth(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> ExitCode:
     """Synthesize, and print what the supervisor adds to each event; 0 with a supervisor, 1 without.
 
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
     """
+    from robosc.pipeline.systems import system_summary_text
+
     output = arguments.output
-    refuse(
-        output is not None and output.suffix not in {*SUFFIXES, _SUPERVISOR},
-        f"-o: the supervisor of automata is written to a file that ends in {_SUPERVISOR}, and the controlled system "
-        f"to one that ends in {', '.join(sorted(SUFFIXES))}",
-    )
-    refuse(arguments.allow_livelock, "--allow-livelock: automata have no silent steps of a controller")
-    made = synthesized(arguments)
+    refuse_output(output)
+    model = loaded_for_synthesis(arguments)
+    options = synthesis_options(arguments)
+    made, seconds = timed(lambda: machine.synthesize(model, options, is_modular=arguments.modular))
+    # A server has no option for figures.
+    figures = Figures(made.statistics, seconds) if getattr(arguments, "statistics", False) else None
     if made.supervisor is None:
-        return report_none(arguments, made)
+        return report_none(arguments, made, model, figures)
     if output is not None:
-        for file in (made.bundle.main, *made.bundle.libraries):
-            require_other_file(output, Path(file.name))
-        is_supervisor = output.suffix == _SUPERVISOR
-        write_bytes(
-            output,
-            made.supervisor.encode() if is_supervisor else controlled_system(made.supervisor, output.suffix).encode(),
-        )
+        for file in model.files:
+            require_other_file(output, arguments.model.parent / file.name)
+        write_bytes(output, file_of(made.supervisor, output.suffix))
     initial = made.supervisor.initial_condition
     if arguments.json:
         print_json(
@@ -191,81 +244,80 @@ def synth(arguments: argparse.Namespace) -> ExitCode:
                 ],
                 "conditions": {name: str(item) for name, item in made.supervisor.conditions.items()},
                 "initial": None if initial is None else str(initial),
-                **_statistics_json(arguments, made),
+                **({} if figures is None else {"statistics": figures.document()}),
                 **diagnostics_json(made.diagnostics),
             }
         )
         return ExitCode.OK
-    print_diagnostics(made.diagnostics, made.bundle)
-    told = [str(made.supervisor)] if initial is None else [str(made.supervisor), f"it begins only where {initial}"]
-    # Names of plain automata may be anything.
-    sys.stdout.write("".join(f"{visible(line)}\n" for text in told for line in text.split("\n")))
+    print_diagnostics(made.diagnostics, model)
+    sys.stdout.write(system_summary_text(made.supervisor))
     if output is not None:
         sys.stdout.write(f"written to {output}\n")
-    sys.stdout.write(_statistics_text(arguments, made))
+    sys.stdout.write("" if figures is None else str(figures))
     return ExitCode.OK
 
 
-def explore(arguments: argparse.Namespace) -> ExitCode:
+def explore(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> ExitCode:
     """Print the graph of the controlled system; 0 with one, 1 without.
 
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
+        UnsupportedModelError: There are too many states.
     """
     from robosc.exploration import graph_dot, graph_json, graph_text
-    from robosc.pipeline.exploring import graph_of
 
-    made = synthesized(arguments)
-    if made.supervisor is None:
-        return report_none(arguments, made)
-    graph = graph_of(made.supervisor, limit=arguments.limit)
+    model = loaded(arguments)
+    found = machine.explore(model, synthesis_options(arguments), maximum_states=arguments.limit)
+    require_supported(found)
+    if found.graph is None:
+        return report_none(arguments, found, model)
     if arguments.json:
-        print_json(graph_json(graph))
+        print_json(graph_json(found.graph))
     else:
-        print_diagnostics(made.diagnostics, made.bundle)
-        sys.stdout.write(graph_dot(graph) if arguments.dot else graph_text(graph))
+        print_diagnostics(found.diagnostics, model)
+        sys.stdout.write(graph_dot(found.graph) if arguments.dot else graph_text(found.graph))
     return ExitCode.OK
 
 
-def verify(arguments: argparse.Namespace) -> ExitCode:
-    """Synthesize, and verify the supervisor by other means; 0 if it passed, else 1.
+def verify(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> ExitCode:
+    """Synthesize, or read a supervisor's file, and verify the supervisor by other means; 0 if it passed, else 1.
 
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
+        UnsupportedModelError: The automata cannot be handled.
     """
-    from robosc.pipeline.results import VerificationStatus
-    from robosc.pipeline.systems import verify_system
+    from robosc.cli.verify import report_malformed
+    from robosc.explanation import from_text
+    from robosc.pipeline.results import SynthesisStatus, VerificationStatus
+    from robosc.pipeline.systems import system_verification_text
     from robosc.signatures import SignatureError
-    from robosc.verification import Limits
 
-    refuse(bool(arguments.property or arguments.properties), "--property: properties are of robots, not of automata")
-    refuse(arguments.supervisor is None and bool(arguments.signed_by), "--signed-by: it needs FILE.rsup")
-    try:
-        made = synthesized(arguments) if arguments.supervisor is None else _read(arguments)
-    except (InvalidSupervisorError, SignatureError) as error:
-        from robosc.cli.verify import report_malformed
-
-        return report_malformed(arguments, error)
-    if made.supervisor is None:
-        return report_none(arguments, made)
-    supervisor, options, limits = made.supervisor, _options(arguments), Limits.of(arguments.limit)
-    result = _watched(
-        lambda on_progress: verify_system(
-            supervisor, options, limits, on_progress, lambda: False, is_strict=arguments.strict
-        )
-    )
-    has_passed = result.status is VerificationStatus.PASSED
-    if arguments.json:
-        print_json({**result.report, **diagnostics_json(made.diagnostics)})
+    model, options = loaded_for_verification(arguments), synthesis_options(arguments)
+    if arguments.supervisor is None:
+        found = machine.verify(model, options, maximum_states=arguments.limit, is_strict=arguments.strict)
     else:
-        print_diagnostics(made.diagnostics, made.bundle)
-        if not (has_passed and arguments.quiet):
-            sys.stdout.write(str(result) if str(result).endswith("\n") else f"{result}\n")
-    return ExitCode.OK if has_passed else ExitCode.FAILED
+        refuse(machine is not THIS_MACHINE, NO_FILE)
+        try:
+            found = _verified(arguments, model, options)
+        except (InvalidSupervisorError, SignatureError) as error:
+            return report_malformed(arguments, error)
+    require_supported(found)
+    if found.status is VerificationStatus.NO_SUPERVISOR:
+        blame = found.report["explanation"]
+        explanation = from_text(json_text(blame)) if blame else None
+        status = SynthesisStatus(found.report["status"])
+        return report_none(arguments, _None(status, found.diagnostics, found.reason, explanation), model)
+    if arguments.json:
+        print_json(found.report)
+    else:
+        print_diagnostics(found.diagnostics, model)
+        if not (found.passed and arguments.quiet):
+            sys.stdout.write(system_verification_text(found.report))
+    return ExitCode.OK if found.passed else ExitCode.FAILED
 
 
-def _read(arguments: argparse.Namespace) -> Synthesized:
-    """Read the supervisor's file of a command, which has to be of the automata of its model.
+def _verified(arguments: argparse.Namespace, model: "LoadedAutomata", options: "SynthesisOptions") -> "Verification":
+    """Verify the supervisor's file of a command, which has to be of the automata of its model.
 
     Raises:
         InvalidSupervisorError: It is malformed, or one of other automata.
@@ -274,19 +326,59 @@ def _read(arguments: argparse.Namespace) -> Synthesized:
     """
     from robosc.cli.sign import read_supervisor, signer_of
     from robosc.cli.verify import tell_signer
-    from robosc.pipeline.results import SynthesisStatus
+    from robosc.pipeline.automata_models import file_verification
     from robosc.pipeline.systems import decode_system
+    from robosc.verification import Limits
 
     content = read_supervisor(arguments.supervisor)
-    bundle, found = _checked(arguments)
-    if found.system is None:
-        return Synthesized(bundle, SynthesisStatus.MODEL_ERRORS, found.diagnostics, "", None)
     if arguments.signed_by:
         tell_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
-    supervisor = decode_system(content)
-    if supervisor.system != found.system:
-        raise InvalidSupervisorError(f"the supervisor is one of other automata than those of {bundle.main.name}")
-    return Synthesized(bundle, SynthesisStatus.SUPERVISOR, found.diagnostics, "", supervisor)
+    supervisor, limits = decode_system(content), Limits.of(arguments.limit)
+    return _watched(
+        lambda told: file_verification(
+            model, supervisor, options, limits, told, lambda: False, is_strict=arguments.strict
+        )
+    )
+
+
+def generate(
+    arguments: argparse.Namespace, package: str | None, machine: Machine = THIS_MACHINE
+) -> "tuple[LoadedAutomata, Generation]":
+    """Generate the files of a target from automata, which may be called as a package is.
+
+    Raises:
+        UsageError: An argument means nothing for it, or it cannot be read.
+        UnsupportedModelError: The target cannot do the automata.
+    """
+    from robosc.targets import GenerateOptions
+
+    model = loaded_for_generation(arguments)
+    made = machine.generate(
+        model,
+        arguments.target,
+        GenerateOptions(package=package),
+        synthesis_options(arguments),
+        initial=arguments.initial,
+    )
+    require_supported(made)
+    return model, made
+
+
+def _require_beginning(model: "LoadedAutomata", initial: str) -> None:
+    """Do nothing if a description of where automata begin can be understood.
+
+    Raises:
+        UsageError: It names what is not there.
+    """
+    from robosc.explanation import RequestError
+    from robosc.pipeline.automata_models import begun, checked_automata
+
+    system = checked_automata(model).system
+    try:
+        if system is not None:
+            begun(system, initial)
+    except RequestError as error:
+        raise UsageError(f"--initial: {error}") from error
 
 
 def explain_synthesis(arguments: argparse.Namespace) -> ExitCode:
@@ -295,43 +387,100 @@ def explain_synthesis(arguments: argparse.Namespace) -> ExitCode:
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
     """
-    from robosc.explanation import Explanation, SystemWords, document, explanation_text
-    from robosc.pipeline.explaining import ExplanationSubject, explained_system
-    from robosc.pipeline.results import SynthesisStatus
+    from robosc.explanation import Explanation, document, explanation_text
+    from robosc.pipeline.explaining import explain
 
-    bundle, found = _checked(arguments)
-    if found.system is None:
-        return report_none(arguments, Synthesized(bundle, SynthesisStatus.MODEL_ERRORS, found.diagnostics, "", None))
-    words, engine = SystemWords(found.system, found.places), _options(arguments).engine_options()
-    asked = ExplanationSubject(arguments.event, arguments.state, arguments.after)
-    made = _watched(lambda on_progress: explained_system(words, engine, asked, on_progress))
+    model, options = loaded(arguments), synthesis_options(arguments)
+    made = _watched(
+        lambda told: explain(
+            model, options, event=arguments.event, state=arguments.state, after=arguments.after, on_progress=told
+        )
+    )
     if not isinstance(made.explanation, Explanation):
-        return report_none(arguments, Synthesized(bundle, made.status, found.diagnostics, made.reason, None))
+        return report_none(arguments, made, model)
     is_empty = made.explanation.empty is not None
     if arguments.json:
         explanation = document(made.explanation)
-        print_json({"status": str(made.status), "explanation": explanation, **diagnostics_json(found.diagnostics)})
+        print_json({"status": str(made.status), "explanation": explanation, **diagnostics_json(made.diagnostics)})
     else:
-        print_diagnostics(found.diagnostics, bundle)
+        print_diagnostics(made.diagnostics, model)
         if is_empty:
             sys.stdout.write(f"{arguments.model}: no supervisor exists\n")
         sys.stdout.write(explanation_text(made.explanation))
     return ExitCode.FAILED if is_empty else ExitCode.OK
 
 
-def _checked(arguments: argparse.Namespace, text: str | None = None) -> "tuple[Bundle, CheckedSystem]":
-    from robosc.pipeline.automata_files import check_automata_file, load_automata_file
+def loaded_for_synthesis(arguments: argparse.Namespace) -> "LoadedAutomata":
+    """Read the model of a command that synthesizes; raises as `loaded`."""
+    refuse(arguments.allow_livelock, "--allow-livelock: automata have no silent steps of a controller")
+    refuse(
+        arguments.verify_limit != SYNTHESIS_STATES,
+        "--verify-limit: the supervisor of automata is verified by the command verify",
+    )
+    return loaded(arguments)
+
+
+def loaded_for_verification(arguments: argparse.Namespace) -> "LoadedAutomata":
+    """Read the model of a command that verifies; raises as `loaded`."""
+    refuse(bool(arguments.property or arguments.properties), "--property: properties are of robots, not of automata")
+    refuse(arguments.supervisor is None and bool(arguments.signed_by), "--signed-by: automata need FILE.rsup for it")
+    return loaded(arguments)
+
+
+def loaded_for_generation(arguments: argparse.Namespace) -> "LoadedAutomata":
+    """Read the model of a command that generates; raises as `loaded`."""
+    from robosc.targets import ALL
+
+    refuse(arguments.target == ALL, "--target all: of automata name one target: c99, cif or python")
+    refuse(
+        arguments.target == "cif" and arguments.package is not None,
+        "--package: of automata, --target cif makes one file and no package",
+    )
+    refuse(arguments.allow_livelock, "--allow-livelock: automata have no silent steps of a controller")
+    model = loaded(arguments)
+    if arguments.initial is not None:
+        _require_beginning(model, arguments.initial)
+    return model
+
+
+def loaded(arguments: argparse.Namespace, text: str | None = None) -> "LoadedAutomata":
+    """Read the model of a command.
+
+    Args:
+        arguments: Arguments of the command.
+        text: All of the model, which imports nothing then: its file only gives it a name; None: the file's.
+
+    Raises:
+        UsageError: An argument means nothing for it, or it cannot be read.
+    """
+    from robosc.pipeline.files import FileAccessError
+    from robosc.pipeline.loading import LoadedAutomata, load
 
     refuse(bool(arguments.library_path), "-L: automata import no libraries, and CIF models files by their places")
     refuse(bool(arguments.interface_path), "-I: automata have no types of ROS")
-    refuse(arguments.deployment == str(Deployment.LAYER), "--deployment: automata are no node of a robot")
-    from robosc.pipeline.files import FileAccessError
-
+    deployment = getattr(arguments, "deployment", None)
+    refuse(deployment == str(Deployment.LAYER), "--deployment: automata are no node of a robot")
+    if text is not None:
+        return LoadedAutomata(SourceFile(str(arguments.model), text))
     try:
-        bundle = load_automata_file(arguments.model) if text is None else Bundle(SourceFile(str(arguments.model), text))
+        model = load(arguments.model)
     except FileAccessError as error:
         raise UsageError(str(error)) from error
-    return bundle, check_automata_file(bundle)
+    assert isinstance(model, LoadedAutomata)  # noqa: S101 - asked only of models whose name says so
+    return model
+
+
+def refuse_output(output: "Path | None") -> None:
+    """Do nothing if a supervisor of automata, or its controlled system, can be written to a file of this name.
+
+    Raises:
+        UsageError: It cannot.
+    """
+    refuse(
+        output is not None and output.suffix not in {*SUFFIXES, SUPERVISOR},
+        f"-o: the supervisor of automata is written to a file that ends in {SUPERVISOR}, and the controlled system "
+        f"to one that ends in {', '.join(sorted(SUFFIXES))}",
+    )
 
 
 def refuse(is_given: bool, message: str) -> None:
@@ -344,7 +493,8 @@ def refuse(is_given: bool, message: str) -> None:
         raise UsageError(message)
 
 
-def _options(arguments: argparse.Namespace) -> "SynthesisOptions":
+def synthesis_options(arguments: argparse.Namespace) -> "SynthesisOptions":
+    """Return the options of a command that are for the synthesis of automata."""
     from robosc.pipeline.options import SynthesisOptions
 
     return SynthesisOptions(
@@ -352,19 +502,6 @@ def _options(arguments: argparse.Namespace) -> "SynthesisOptions":
         allow_reordering=arguments.reorder,
         maximum_nodes=arguments.max_nodes,
         condition_seconds=getattr(arguments, "condition_seconds", None),
-    )
-
-
-def _synthesis(arguments: argparse.Namespace, found: "CheckedSystem") -> "SystemSynthesis":
-    from robosc.pipeline.systems import synthesize_system
-
-    system, options = found.system, _options(arguments)
-    assert system is not None  # noqa: S101 - asked only of models without errors
-    is_modular = getattr(arguments, "modular", False)
-    return _watched(
-        lambda on_progress: synthesize_system(
-            system, options, on_progress, lambda: False, found.places, is_modular=is_modular
-        )
     )
 
 
@@ -377,28 +514,66 @@ def _watched[T](work: "Callable[[OnProgress], T]") -> T:
         progress.clear()
 
 
-def report_none(arguments: argparse.Namespace, made: Synthesized) -> ExitCode:
-    """Report that there is no supervisor, and what is to blame."""
-    from robosc.explanation import document, empty_text
+class _Outcome(Protocol):
+    """Outcome without a supervisor."""
 
+    @property
+    def status(self) -> "StrEnum":
+        """Outcome of the synthesis."""
+
+    @property
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
+        """Every finding."""
+
+    @property
+    def reason(self) -> str:
+        """Reason why there is no supervisor; empty if the findings tell."""
+
+    @property
+    def explanation(self) -> object:
+        """Explanation of what is to blame."""
+
+
+@dataclass(frozen=True, slots=True)
+class _None:
+    """Outcome of a verification that had no supervisor to verify."""
+
+    status: "SynthesisStatus"
+    diagnostics: tuple[Diagnostic, ...]
+    reason: str
+    explanation: "EmptyExplanation | None"
+
+
+def require_supported(outcome: "Exploration | Generation | Verification") -> None:
+    """Do nothing unless automata are outside of what can be done.
+
+    Raises:
+        UnsupportedModelError: They are.
+    """
+    if outcome.status == "unsupported model":
+        raise UnsupportedModelError(outcome.reason)
+
+
+def report_none(
+    arguments: argparse.Namespace, made: _Outcome, model: "LoadedAutomata", figures: Figures | None = None
+) -> ExitCode:
+    """Report that there is no supervisor, what is to blame, and the figures of the synthesis if they are asked for."""
+    from robosc.explanation import EmptyExplanation, document, empty_text
+
+    explanation = made.explanation if isinstance(made.explanation, EmptyExplanation) else None
     if arguments.json:
-        explanation = document(made.explanation) if made.explanation else None
-        told = {"status": str(made.status), "reason": made.reason, "explanation": explanation}
-        print_json({**told, **_statistics_json(arguments, made), **diagnostics_json(made.diagnostics)})
+        told = {
+            "status": str(made.status),
+            "reason": made.reason,
+            "explanation": document(explanation) if explanation else None,
+            **({} if figures is None else {"statistics": figures.document()}),
+        }
+        print_json({**told, **diagnostics_json(made.diagnostics)})
     else:
-        print_diagnostics(made.diagnostics, made.bundle)
+        print_diagnostics(made.diagnostics, model)
         if made.reason:
             sys.stderr.write(f"{arguments.model}: {visible(made.reason)}\n")
-        if made.explanation is not None:
-            sys.stderr.write(empty_text(made.explanation))
-        sys.stdout.write(_statistics_text(arguments, made))
+        if explanation is not None:
+            sys.stderr.write(empty_text(explanation))
+        sys.stdout.write("" if figures is None else str(figures))
     return ExitCode.FAILED
-
-
-def _statistics_json(arguments: argparse.Namespace, made: Synthesized) -> dict[str, object]:
-    is_asked = getattr(arguments, "statistics", False)
-    return {"statistics": made.figures.document() if made.figures else None} if is_asked else {}
-
-
-def _statistics_text(arguments: argparse.Namespace, made: Synthesized) -> str:
-    return str(made.figures or "") if getattr(arguments, "statistics", False) else ""

@@ -44,7 +44,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def run(arguments: argparse.Namespace) -> int:
     """Check the model; 0 without errors (and, where it was asked for, with a supervisor), else 1."""
-    _require_synthesis(arguments)
+    require_synthesis(arguments)
     if automata.is_given(arguments):
         return automata.check(arguments)
     return run_with(arguments, _checked, lambda bundle: synth.make(arguments, bundle, allow_livelock=False))
@@ -65,7 +65,7 @@ def run_with(
     Raises:
         UsageError: The arguments say how to synthesize, and not to; or a file is not there.
     """
-    _require_synthesis(arguments)
+    require_synthesis(arguments)
     try:
         bundle = read_bundle(arguments)
     except LanguageError as error:
@@ -80,7 +80,7 @@ def run_with(
     return _report_synthesized(arguments, found, bundle)
 
 
-def _require_synthesis(arguments: argparse.Namespace) -> None:
+def require_synthesis(arguments: argparse.Namespace) -> None:
     """Do nothing unless the arguments say how to synthesize, and not to.
 
     Raises:

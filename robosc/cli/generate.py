@@ -32,6 +32,9 @@ nothing is written: the model has errors, no supervisor exists, the target canno
 _WITH_TYPED_STATE = ("ros2", "ros2-cpp")
 """Targets whose nodes can publish their state as a typed message."""
 
+_PLACEHOLDER = '<maintainer email="maintainer@example.org">Maintainer</maintainer>'
+"""Maintainer in the `package.xml` of a package whose user named none."""
+
 _EPILOG = f"exit status:\n  0  {WRITTEN}\n  1  {NOT_WRITTEN}\n  2  wrong use\n"
 
 
@@ -89,11 +92,6 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_deployment_argument(parser)
     add_engine_options(parser)
     add_livelock_argument(parser)
-    parser.add_argument(
-        "--initial",
-        metavar="STATE",
-        help="state in which automata begin that may begin in several: 'p.x = 1, q = on'",
-    )
     parser.set_defaults(run=run)
 
 
@@ -133,6 +131,12 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
         help="licence of a generated ROS package, such as Apache-2.0 (default: license of controller-config.json; MIT)",
     )
     parser.add_argument(
+        "--copyright",
+        metavar="TEXT",
+        help="copyright of a generated ROS package, as '2026 Jane Doe' (default: copyright of controller-config.json; "
+        "the maintainer)",
+    )
+    parser.add_argument(
         "--package-version",
         metavar="X.Y.Z",
         help="version of a generated ROS package (default: version of controller-config.json; that of RoboSC)",
@@ -144,7 +148,17 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
         "message of the package robosc_msgs (--target ros2-msgs) on ~/state; both (default: stateMessage of "
         "controller-config.json; json). Nodes for ROS 1 have the text only",
     )
+    add_initial_argument(parser)
     parser.add_argument("--force", action="store_true", help="overwrite generated files even where you changed them")
+
+
+def add_initial_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the option for where automata begin."""
+    parser.add_argument(
+        "--initial",
+        metavar="STATE",
+        help="state in which automata begin that may begin in several: 'p.x = 1, q = on'",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -153,45 +167,33 @@ def run(arguments: argparse.Namespace) -> int:
     from robosc.targets import require_generatable
 
     require_generatable(arguments.target)
-    if automata.is_given(arguments):
-        return _generate_automata(arguments)
-    if arguments.initial is not None:
-        raise UsageError("--initial chooses where automata begin: a robot begins in one state")
     options = generate_options(arguments)
+    if automata.is_given(arguments):
+        model, made = automata.generate(arguments, options.package)
+        return report_generated(arguments, made, made.files, model)
+    refuse_initial(arguments)
     bundle = read_bundle(arguments)
     outcome = synth.make(arguments, bundle, allow_livelock=arguments.allow_livelock)
     generation = generation_of(outcome, arguments.target, options)
     return report_generated(arguments, generation, generation.files, bundle)
 
 
-def _generate_automata(arguments: argparse.Namespace) -> ExitCode:
-    """Generate from automata.
+def refuse_initial(arguments: argparse.Namespace) -> None:
+    """Do nothing unless a robot is to begin elsewhere.
 
     Raises:
-        UsageError: An argument means nothing for it, or it cannot be read.
+        UsageError: It is.
     """
-    from robosc.targets import ALL, generate_automata
-
-    automata.refuse(arguments.target == ALL, "--target all: of automata name one target: c99, cif or python")
-    automata.refuse(
-        arguments.target == "cif" and arguments.package is not None,
-        "--package: of automata, --target cif makes one file and no package",
-    )
-    automata.refuse(arguments.allow_livelock, "--allow-livelock: automata have no silent steps of a controller")
-    options = generate_options(arguments)
-    made = automata.synthesized(arguments, arguments.initial)
-    files = None
-    if (found := made.supervisor) is not None:
-        files = generate_automata(found, arguments.target, options)
-    return report_generated(arguments, made, files, made.bundle)
+    if arguments.initial is not None:
+        raise UsageError("--initial chooses where automata begin: a robot begins in one state")
 
 
 def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
     """Return the options for the target; the folder to write to is set where it is not given.
 
     Raises:
-        UsageError: The package cannot be called so, or cannot have such a maintainer, licence or version, an option is
-            for other targets, the file beside the model cannot be used, or there is no folder to write to.
+        UsageError: The package cannot be called so, or cannot have such a maintainer, licence, version or copyright, an
+            option is for other targets, the file beside the model cannot be used, or there is no folder to write to.
     """
     from robosc.targets import CONFIG_FILE, ControllerConfigError, StateMessage, read_controller_config
     from robosc.targets.code.naming import require_package_name
@@ -225,8 +227,13 @@ def _refuse_options_of_others(arguments: argparse.Namespace) -> None:
     from robosc.targets import ALL
 
     target = arguments.target
-    about_packages = (arguments.maintainer, arguments.license, arguments.package_version)
-    for option, value in zip(("--maintainer", "--license", "--package-version"), about_packages, strict=True):
+    about_packages = {
+        "--maintainer": arguments.maintainer,
+        "--license": arguments.license,
+        "--package-version": arguments.package_version,
+        "--copyright": arguments.copyright,
+    }
+    for option, value in about_packages.items():
         if value is not None and target != ALL and not target.startswith("ros"):
             raise UsageError(f"{option} is for ROS packages, and --target {target} makes none: leave it out")
     if arguments.state_message not in (None, "json") and target not in (ALL, *_WITH_TYPED_STATE):
@@ -238,7 +245,7 @@ def _refuse_options_of_others(arguments: argparse.Namespace) -> None:
 
 def _metadata(arguments: argparse.Namespace, found: "PackageMetadata") -> "PackageMetadata":
     """Return what the command line says of a package, and what the file says where it says nothing."""
-    given = {"license": arguments.license, "version": arguments.package_version}
+    given = {"license": arguments.license, "version": arguments.package_version, "copyright": arguments.copyright}
     try:
         if arguments.maintainer is not None:
             found = found.with_maintainer(arguments.maintainer)
@@ -251,7 +258,7 @@ def report_generated(
     arguments: argparse.Namespace, outcome: synth.Outcome, files: "GeneratedFiles | None", bundle: Bundle
 ) -> ExitCode:
     """Write the files, print the outcome as asked and return the exit status."""
-    from robosc.targets import Written, write_generated
+    from robosc.targets import CONFIG_FILE, Written, write_generated
 
     done = Written(())
     if files is not None:
@@ -281,4 +288,9 @@ def report_generated(
             sys.stderr.write(f"removed, because it was of an earlier model: {place}\n")
         for place in removal.kept:
             sys.stderr.write(f"not removed, because changed since generated; it is of an earlier model: {place}\n")
+        if files is not None and any(_PLACEHOLDER in text for text in files.values()):
+            sys.stderr.write(
+                "note: package.xml has a placeholder for its maintainer: give --maintainer "
+                f"'Jane Doe <jane@example.org>', or maintainer in {CONFIG_FILE}\n"
+            )
     return ExitCode.OK if files is not None else ExitCode.FAILED

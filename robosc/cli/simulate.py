@@ -156,9 +156,9 @@ def _run_automata(arguments: argparse.Namespace, *, is_scripted: bool) -> int:
     from robosc.pipeline.system_runs import ChoiceError, SystemRun, asked_parts
 
     automata.refuse(bool(arguments.save), "--save: event logs and tests are of robots, not of automata")
-    made = automata.synthesized(arguments)
+    model, made = automata.synthesized(arguments)
     if made.supervisor is None:
-        return automata.report_none(arguments, made)
+        return automata.report_none(arguments, made, model)
     try:
         initial = None if arguments.initial is None else asked_parts(made.supervisor.system, arguments.initial)
         run_ = SystemRun(made.supervisor, initial)

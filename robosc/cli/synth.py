@@ -78,17 +78,22 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_condition_seconds_argument(parser)
     add_verify_limit_argument(parser, "--verify-limit", SYNTHESIS_STATES)
     add_livelock_argument(parser)
-    parser.add_argument(
-        "--modular",
-        action="store_true",
-        help="synthesize automata in modules: for systems of many parts, of which one diagram cannot hold the states",
-    )
+    add_modular_argument(parser)
     parser.add_argument(
         "--statistics",
         action="store_true",
         help="also print the figures of the synthesis: how it went about the search, its size and its time",
     )
     parser.set_defaults(run=run)
+
+
+def add_modular_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the option for a synthesis in modules."""
+    parser.add_argument(
+        "--modular",
+        action="store_true",
+        help="synthesize automata in modules: for systems of many parts, of which one diagram cannot hold the states",
+    )
 
 
 def add_output_argument(parser: argparse.ArgumentParser) -> None:
@@ -104,8 +109,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     if automata.is_given(arguments):
         return automata.synth(arguments)
-    if arguments.modular:
-        raise UsageError("--modular is for automata (FILE.cif, .gen, .wmod): a robot's model is synthesized as a whole")
+    refuse_modular(arguments)
     require_other_file(arguments.output, arguments.model)
     bundle = read_bundle(arguments)
     allow_livelock, verify_limit = arguments.allow_livelock, arguments.verify_limit
@@ -114,6 +118,16 @@ def run(arguments: argparse.Namespace) -> int:
         write_bytes(arguments.output, encode(outcome.supervisor))
     figures = Figures(outcome.statistics, seconds) if arguments.statistics else None
     return report_written(arguments, outcome, bundle, figures)
+
+
+def refuse_modular(arguments: argparse.Namespace) -> None:
+    """Do nothing unless a robot's model is to be synthesized in modules.
+
+    Raises:
+        UsageError: It is.
+    """
+    if arguments.modular:
+        raise UsageError("--modular is for automata (FILE.cif, .gen, .wmod): a robot's model is synthesized as a whole")
 
 
 def make(

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from robosc.expressions.types import Name, ScopedName, Value
+from robosc.expressions.types import Name, PartName, QualifiedName, Value
 
 UnaryOperator = Literal["not", "-", "holds"]
 BinaryOperator = Literal["or", "and", "implies", "=", "!=", "<", "<=", ">", ">=", "+", "-", "*", "/", "div", "mod"]
@@ -28,22 +28,22 @@ class Constant(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="con
 class EnumValue(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="enum"):
     """A value of an enum."""
 
-    enum: ScopedName
+    enum: QualifiedName
     value: Name
 
 
 class VariableRead(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="variable"):
     """The value of a component's variable."""
 
-    component: Name
-    variable: Name
+    component: PartName
+    variable: PartName
 
 
 class StateTest(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="state"):
     """Test of whether a component is in a state."""
 
-    component: Name
-    state: Name
+    component: PartName
+    state: PartName
 
 
 class Received(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="received"):

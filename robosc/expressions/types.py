@@ -19,6 +19,14 @@ ScopedName = Annotated[
 ]
 """A type's name: `Twist` of the robot's own, `Library.Twist` of a library's."""
 
+QualifiedName = Annotated[
+    str, msgspec.Meta(pattern=r"^[A-Za-z_][A-Za-z_0-9]*(\.[A-Za-z_][A-Za-z_0-9]*)*\Z", max_length=4095)
+]
+"""A type's name in automata, where groups may stand in groups: `Factory.Line.Mode`."""
+
+PartName = Annotated[str, msgspec.Meta(max_length=4095)]
+"""Name of a part of automata: `Sensor`, `Factory.Line`, or any text; in a model only those of its own are valid."""
+
 Integer32 = Annotated[int, msgspec.Meta(ge=MINIMUM_INTEGER, le=MAXIMUM_INTEGER)]
 
 
@@ -53,7 +61,7 @@ class NoneType(msgspec.Struct, frozen=True, gc=False, tag_field="type", tag="non
 class EnumType(msgspec.Struct, frozen=True, gc=False, tag_field="type", tag="enum"):
     """One of finitely many names, in the order of their rules (each name once), the default included."""
 
-    name: ScopedName
+    name: QualifiedName
     values: tuple[Name, ...]
 
 

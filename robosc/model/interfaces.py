@@ -1,7 +1,9 @@
 """Communications against the definitions of their middleware types (language A.5).
 
 Whatever a generated node would refuse at its start is told here, and is an error for the packages of ROS that have such
-nodes (`robosc.targets.ros.errors`): a supervisor can be made all the same, for whatever runs without ROS.
+nodes (`robosc.targets.ros.errors`): a supervisor can be made all the same, for whatever runs without ROS. That holds
+for definitions of the user's own, too, which say for certain that a node would not start: what a model means does not
+depend on the packages that are installed where it is read.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -19,24 +19,33 @@ def is_automata(path: Path) -> bool:
     return path.suffix in SUFFIXES
 
 
-def load_automata_file(path: Path) -> Bundle:
+def load_automata_file(path: Path, text: str | None = None) -> Bundle:
     """Read a file of automata; a CIF model with the files that it imports.
+
+    Args:
+        path: The file.
+        text: Text of the file, which then need not be there.
 
     Raises:
         FileAccessError: The file is not there or cannot be read.
         LanguageError: A file is too large or not UTF-8.
     """
     from robosc.cif import load_cif
-    from robosc.language.reading import read_source
+    from robosc.language.reading import decode_source, read_source
     from robosc.pipeline.files import FileAccessError
     from robosc.source import SourceFile
 
     try:
-        if path.is_dir():
+        if text is not None:
+            # Text that is not UTF-8 is refused, as in a file.
+            text = decode_source(text.encode("utf-8", "surrogatepass"), path.name)
+        elif path.is_dir():
             raise FileAccessError(f"{path} is a folder, not a model's file")
-        if not path.exists():
+        elif not path.exists():
             raise FileAccessError(f"there is no file {path}")
-        return load_cif(path) if path.suffix == _CIF else Bundle(SourceFile(str(path), read_source(path, str(path))))
+        if path.suffix == _CIF:
+            return load_cif(path, text)
+        return Bundle(SourceFile(path.name, read_source(path, path.name) if text is None else text))
     except FileAccessError:
         raise
     except OSError as error:

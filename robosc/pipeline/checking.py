@@ -1,11 +1,12 @@
 """Checking of models."""
 
+from robosc.pipeline.automata_files import check_automata_file
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.loading import ModelLike, loaded
+from robosc.pipeline.loading import LoadedAutomata, ModelLike, loaded
 
 
 def check(model: ModelLike) -> Findings:
-    """Return everything that is wrong with a model or library, sorted by place.
+    """Return everything that is wrong with a model, library or automata, sorted by place.
 
     Args:
         model: The model, as `load` returns it, or the path of one.
@@ -17,4 +18,5 @@ def check(model: ModelLike) -> Findings:
     from robosc.model.check import check as check_bundle
 
     bundle = loaded(model)
-    return Findings(check_bundle(bundle).diagnostics, bundle)
+    found = check_automata_file(bundle) if isinstance(bundle, LoadedAutomata) else check_bundle(bundle)
+    return Findings(found.diagnostics, bundle)

@@ -1,6 +1,6 @@
 """Explanation: of what synthesis did to a model, and of findings."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import overload
 
 from robosc.automata import System, check_system
@@ -14,8 +14,9 @@ from robosc.explanation import (
     explain_synthesis,
 )
 from robosc.model.structure import Deployment
+from robosc.pipeline.automata_models import checked_automata
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.loading import ModelLike, loaded
+from robosc.pipeline.loading import LoadedAutomata, ModelLike, loaded
 from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, Outcome, SynthesisStatus
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, never
@@ -110,6 +111,8 @@ def explain(
         check_system(model)
         return explained_system(SystemWords(model), options.engine_options(), asked, on_progress, should_stop)
     bundle = loaded(model)
+    if isinstance(bundle, LoadedAutomata):
+        return _explained_automata(bundle, options, asked, on_progress, should_stop)
     try:
         found = explained(bundle, options.deployment, options.engine_options(), asked, on_progress, should_stop)
     except UnsupportedModelError as error:
@@ -176,6 +179,22 @@ def explained_system(
         reason = str(error)
         return Explained(SynthesisStatus.UNSUPPORTED_MODEL, Findings(), reason, NoSupervisor(reason, ()))
     return Explained(_status(explanation), Findings(), "", explanation)
+
+
+def _explained_automata(
+    model: LoadedAutomata,
+    options: SynthesisOptions,
+    asked: ExplanationSubject,
+    on_progress: OnProgress,
+    should_stop: ShouldStop,
+) -> Explained:
+    found = checked_automata(model, options)
+    diagnostics = Findings(found.diagnostics, model)
+    if found.system is None:
+        return Explained(SynthesisStatus.MODEL_ERRORS, diagnostics, "", NoSupervisor("", diagnostics))
+    words = SystemWords(found.system, found.places)
+    made = explained_system(words, options.engine_options(), asked, on_progress, should_stop)
+    return replace(made, diagnostics=diagnostics)
 
 
 def _explanation(

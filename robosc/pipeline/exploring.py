@@ -11,14 +11,15 @@ from robosc.exploration import DEFAULT_LIMIT, Graph
 from robosc.exploration import explore as explore_system
 from robosc.graphviz import FORMATS, drawn
 from robosc.json_documents import json_text
+from robosc.pipeline.automata_models import automata_synthesis
 from robosc.pipeline.files import FileAccessError, given_path, write_whole
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.loading import FileName, ModelLike, loaded
+from robosc.pipeline.loading import FileName, LoadedAutomata, ModelLike, loaded
 from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, NothingGeneratedError, Outcome, SynthesisStatus
 from robosc.pipeline.supervisors import Supervisor
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, findings_of, ignored, make, never, status_of, why_not
-from robosc.pipeline.systems import SystemSupervisor, synthesize_system
+from robosc.pipeline.systems import SystemSupervisor
 from robosc.supervisor import Supervisor as CoreSupervisor
 from robosc.supervisor.predicates import state_predicates
 
@@ -105,7 +106,7 @@ def explore(
         NodeLimitError: Decision diagrams became larger than the options allow.
         UnknownEngineError: There is no such engine.
         SynthesisCancelled: `should_stop` became true.
-        ValueError: `maximum_states` is less than 1.
+        ValueError: `maximum_states` is less than 1; or an option is for models of robots, and the file holds automata.
     """
     limit = DEFAULT_LIMIT if maximum_states is None else maximum_states
     if limit < 1:
@@ -113,14 +114,14 @@ def explore(
     if isinstance(model, CoreSupervisor):
         known = model.diagnostics if isinstance(model, Supervisor) else None
         return _explored(model, limit, known or Findings(), on_progress, should_stop)
-    if isinstance(model, System):
-        made = synthesize_system(model, options, on_progress, should_stop)
-        if made.supervisor is None:
-            return Exploration(made.status, Findings(), made.reason, None, made.explanation)
-        model = made.supervisor
     if isinstance(model, SystemSupervisor):
         return _explored(model, limit, Findings(), on_progress, should_stop)
-    bundle = loaded(model)
+    bundle = model if isinstance(model, System) else loaded(model)
+    if isinstance(bundle, System | LoadedAutomata):
+        made = automata_synthesis(bundle, options, on_progress, should_stop)
+        if made.supervisor is None:
+            return Exploration(made.status, made.diagnostics, made.reason, None, made.explanation)
+        return _explored(made.supervisor, limit, made.diagnostics, on_progress, should_stop)
     # The graph is of everything allowed, whatever an executor would choose.
     attempt = make(bundle, options, on_progress, should_stop, allow_livelock=True)
     diagnostics = findings_of(attempt, bundle)

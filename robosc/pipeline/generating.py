@@ -6,13 +6,14 @@ from robosc.automata import System
 from robosc.certification import OutcomeStatus, Progress, SynthesisOutcome
 from robosc.errors import UnsupportedModelError
 from robosc.explanation import EmptyExplanation
+from robosc.pipeline.automata_models import automata_synthesis
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.loading import ModelLike, loaded
+from robosc.pipeline.loading import LoadedAutomata, ModelLike, loaded
 from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import Generation, SynthesisStatus
 from robosc.pipeline.supervisors import Supervisor
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, make, never, status_of
-from robosc.pipeline.systems import SystemSupervisor, synthesize_system
+from robosc.pipeline.systems import SystemSupervisor
 from robosc.supervisor import Supervisor as CoreSupervisor
 from robosc.targets import GenerateOptions, TargetRefusal, generate_automata, generate_or_refuse, require_generatable
 
@@ -29,6 +30,7 @@ def generate(
     generation: GenerateOptions = DEFAULT_GENERATION,
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
+    initial: str | None = None,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Generation:
@@ -43,11 +45,15 @@ def generate(
         target: Name of the target, or `all`.
         generation: Choices about the files.
         options: Options for making the supervisor of a model.
+        initial: Description of the state in which automata begin that may begin in several, such as `tank.level = 1`.
         on_progress: Function called with the progress of the work.
         should_stop: Function called again and again; once it returns true, the work ends.
 
     Raises:
         UnknownTargetError: There is no such target.
+        TypeError: `initial` is given for a model of a robot or for a supervisor.
+        ValueError: An option is for models of robots, and the file holds automata.
+        RequestError: `initial` names what is not there.
         FileAccessError: The file is not there or cannot be read.
         LanguageError: A file is too large or not UTF-8.
         InvalidSystemError: The automata do not fit together.
@@ -63,26 +69,40 @@ def generate(
         return _generation(
             SynthesisOutcome(OutcomeStatus.SUPERVISOR, model, diagnostics), target, generation, on_progress
         )
-    if isinstance(model, System):
-        made = synthesize_system(model, options, on_progress, should_stop)
+    if isinstance(model, SystemSupervisor):
+        if initial is not None:
+            raise TypeError("initial= chooses before the synthesis where automata begin: give the automata")
+        return _of_automata(model, Findings(), target, generation, on_progress)
+    bundle = model if isinstance(model, System) else loaded(model)
+    if isinstance(bundle, System | LoadedAutomata):
+        made = automata_synthesis(bundle, options, on_progress, should_stop, initial=initial)
         if made.supervisor is None:
             explanation = made.explanation if isinstance(made.explanation, EmptyExplanation) else None
-            return Generation(made.status, (), made.reason, None, explanation, target)
-        model = made.supervisor
-    if isinstance(model, SystemSupervisor):
-        on_progress(Progress("generation", target))
-        try:
-            files = generate_automata(model, target, generation)
-        except UnsupportedModelError as error:
-            return Generation(SynthesisStatus.UNSUPPORTED_MODEL, (), str(error), None, target=target)
-        return Generation(SynthesisStatus.SUPERVISOR, (), "", files, target=target)
-    bundle = loaded(model)
+            return Generation(made.status, made.diagnostics, made.reason, None, explanation, target)
+        return _of_automata(made.supervisor, made.diagnostics, target, generation, on_progress)
+    if initial is not None:
+        raise TypeError("initial= chooses where automata begin: a robot begins in one state")
     attempt = make(bundle, options, on_progress, should_stop, allow_livelock=options.allow_livelock)
     if isinstance(attempt, Unsupported):
         status, reason = status_of(attempt)
         return Generation(status, findings_of(attempt, bundle), reason, None, target=target)
     found = _generation(attempt, target, generation, on_progress)
     return replace(found, diagnostics=Findings(found.diagnostics, bundle))
+
+
+def _of_automata(
+    supervisor: SystemSupervisor,
+    diagnostics: Findings,
+    target: str,
+    options: GenerateOptions,
+    on_progress: OnProgress,
+) -> Generation:
+    on_progress(Progress("generation", target))
+    try:
+        files = generate_automata(supervisor, target, options)
+    except UnsupportedModelError as error:
+        return Generation(SynthesisStatus.UNSUPPORTED_MODEL, diagnostics, str(error), None, target=target)
+    return Generation(SynthesisStatus.SUPERVISOR, diagnostics, "", files, target=target)
 
 
 def generation_of(outcome: SynthesisOutcome, target: str, options: GenerateOptions) -> Generation:

@@ -4,7 +4,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from robosc.pipeline.automata_files import is_automata
+from robosc.pipeline.automata_files import is_automata, load_automata_file
 from robosc.pipeline.files import FileAccessError, given_path
 from robosc.source import Bundle, SourceFile
 
@@ -49,6 +49,18 @@ class LoadedModel(Bundle):
         return page(checked.model, checked.diagnostics)
 
 
+class LoadedAutomata(LoadedModel):
+    """Text of automata (CIF, libFAUDES, Supremica), with the files that it imports: what `load` makes of such a file.
+
+    Its synthesis is a `SystemSynthesis`.
+    """
+
+    __slots__ = ()
+
+    def _repr_markdown_(self) -> str:
+        return f"```\n{self.main.text.rstrip()}\n```\n"
+
+
 type ModelLike = Bundle | FileName
 """A model where one is wanted: what `load` returns, or the name of a file."""
 
@@ -61,10 +73,11 @@ def load(
     library_paths: Sequence[FileName] = (),
     interface_paths: Sequence[FileName] = (),
 ) -> LoadedModel:
-    """Load a model or library, with the libraries that it imports; `check` tells what is wrong with it.
+    """Load a model, library or automata, with all that is imported; `check` tells what is wrong with it.
 
     Libraries are looked for in the model's folder, in its sibling `../shared` and in `library_paths`; those of a text
-    as if it were a file of the current folder.
+    as if it were a file of the current folder. A name that ends in `.cif`, `.gen` or `.wmod` is that of automata, which
+    are a `LoadedAutomata`; files that a CIF model imports are found from the folder of the file that imports them.
 
     Args:
         path: File of the model.
@@ -75,18 +88,19 @@ def load(
             `-I` of the command line; those of an installed ROS and around the model are always searched.
 
     Raises:
-        TypeError: Neither a file nor a text is given, or both are.
+        TypeError: Neither a file nor a text is given, or both are; or automata are to have libraries or ROS packages.
         FileAccessError: A file or folder is not there or cannot be read.
         LanguageError: A file is too large or not UTF-8.
     """
     if (path is None) == (text is None):
         raise TypeError("load takes either the path of a model or text=..., the model itself")
     libraries, interfaces = ([given_path(item) for item in paths] for paths in (library_paths, interface_paths))
-    if path is None:
-        bundle = read_model(given_path(name), libraries, interfaces, text)
-    else:
-        bundle = read_model(_model_path(path), libraries, interfaces)
-    return _loaded(bundle)
+    file = given_path(name) if path is None else _model_path(path)
+    if not is_automata(file):
+        return _loaded(read_model(file, libraries, interfaces, text))
+    if libraries or interfaces:
+        raise TypeError("library_paths and interface_paths are for RoboSC models: automata have no libraries or types")
+    return _loaded(load_automata_file(file, text))
 
 
 def loaded(model: ModelLike) -> LoadedModel:
@@ -172,7 +186,8 @@ def _model_path(path: FileName) -> Path:
 
 
 def _loaded(bundle: Bundle) -> LoadedModel:
-    return LoadedModel(bundle.main, bundle.libraries, bundle.searched, bundle.interfaces)
+    kind = LoadedAutomata if is_automata(Path(bundle.main.name)) else LoadedModel
+    return kind(bundle.main, bundle.libraries, bundle.searched, bundle.interfaces)
 
 
 def property_file(file: FileName | SourceFile) -> SourceFile:

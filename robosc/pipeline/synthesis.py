@@ -9,12 +9,13 @@ from robosc.certification import Progress, SynthesisOutcome, make_supervisor
 from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.explanation import EmptyExplanation
 from robosc.model.check import check
+from robosc.pipeline.automata_models import automata_synthesis
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.loading import LoadedModel, ModelLike, loaded
+from robosc.pipeline.loading import LoadedAutomata, LoadedModel, ModelLike, loaded
 from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, Outcome, Summary, SynthesisStatus
 from robosc.pipeline.supervisors import Supervisor
-from robosc.pipeline.systems import SystemSynthesis, synthesize_system
+from robosc.pipeline.systems import SystemSynthesis
 from robosc.synthesis import Statistics
 from robosc.verification import DEFAULT_STATES
 
@@ -61,9 +62,10 @@ class Synthesis(Outcome):
         return self.supervisor
 
 
+# Automata in a file are a kind of model that gives another result.
 @overload
-def synthesize(
-    model: System,
+def synthesize(  # type: ignore[overload-overlap]
+    model: System | LoadedAutomata,
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     is_modular: bool = False,
@@ -94,14 +96,15 @@ def synthesize(
 
     Args:
         model: The model, as `load` returns it, the path of one, or a `robosc.automata.System`.
-        options: Options for making the supervisor. Of automata, those about the engine count.
+        options: Options for making the supervisor. For automata, those about the engine.
         is_modular: True if automata are to be synthesized in modules: for systems of many parts, of which one diagram
             cannot hold the states.
         on_progress: Function called with the progress of the work.
         should_stop: Function called again and again; once it returns true, the work ends.
 
     Raises:
-        TypeError: `is_modular` is given for a model.
+        TypeError: `is_modular` is given for a model of a robot.
+        ValueError: An option is for models of robots, and the file holds automata.
         FileAccessError: The file is not there or cannot be read.
         LanguageError: A file is too large or not UTF-8.
         InvalidSystemError: The automata do not fit together.
@@ -109,11 +112,11 @@ def synthesize(
         UnknownEngineError: There is no such engine.
         SynthesisCancelled: `should_stop` became true.
     """
-    if isinstance(model, System):
-        return synthesize_system(model, options, on_progress, should_stop, is_modular=is_modular)
+    bundle = model if isinstance(model, System) else loaded(model)
+    if isinstance(bundle, System | LoadedAutomata):
+        return automata_synthesis(bundle, options, on_progress, should_stop, is_modular=is_modular)
     if is_modular:
         raise TypeError("is_modular is for automata: a model of a robot is synthesized as a whole")
-    bundle = loaded(model)
     attempt = make(bundle, options, on_progress, should_stop, allow_livelock=options.allow_livelock)
     return _result(attempt, bundle)
 

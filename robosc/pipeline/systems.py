@@ -18,6 +18,7 @@ from robosc.conditions.rendering import Formulas
 from robosc.errors import InvalidSupervisorError, InvalidSystemError, NodeLimitError, UnsupportedModelError
 from robosc.pipeline.conditions import Condition, Conditions, condition_of, conditions_of
 from robosc.pipeline.files import given_path, read_bounded, write_whole
+from robosc.pipeline.findings import Findings
 from robosc.pipeline.loading import FileName
 from robosc.pipeline.options import SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, Outcome, SynthesisStatus, Verification, VerificationStatus
@@ -35,6 +36,9 @@ from robosc.tables import html_table
 if TYPE_CHECKING:
     from robosc.explanation import EmptyExplanation, SystemWords
     from robosc.verification import Limits, VerificationReport
+
+_MISCOUNT = "states"
+"""Fault of a supervisor that tells of more or fewer states than there are."""
 
 _CHECKS = ("safe", "controllable", "nonblocking", "maximally_permissive")
 MAXIMUM_NAMES = 20
@@ -125,8 +129,7 @@ class SystemSupervisor:
 
         Raises:
             FileAccessError: The place cannot be written.
-            UnsupportedModelError: The file would become too large, an expression is nested too deeply, or an automaton
-                or a variable has a name that is no identifier.
+            UnsupportedModelError: The file would become too large, or an expression is nested too deeply.
         """
         path = given_path(file)
         write_whole(path, self.encode())
@@ -208,7 +211,7 @@ class SystemSynthesis(Outcome):
         reason: Reason why there is no supervisor; empty where there is one.
         supervisor: The supervisor, or None.
         statistics: Figures of the work; None where the automata cannot be handled.
-        diagnostics: Always empty: automata have no text that findings could be about.
+        diagnostics: Every finding about the file of the automata, sorted by place; empty where there is no file.
         explanation: Explanation of why there is no supervisor, or None where there is one.
     """
 
@@ -216,7 +219,7 @@ class SystemSynthesis(Outcome):
     reason: str
     supervisor: SystemSupervisor | None
     statistics: Statistics | None
-    diagnostics: tuple[()] = ()
+    diagnostics: Findings = field(default_factory=Findings)
     explanation: "EmptyExplanation | NoSupervisor | None" = None
 
     def _made(self) -> object:
@@ -379,19 +382,34 @@ def verify_system(
             }
             for item in found.failures
         ]
-        + [{"check": "states", "message": miscount, "trace": [], "shortest": True, "state": {}}] * bool(miscount),
+        + [{"check": _MISCOUNT, "message": miscount, "trace": [], "shortest": True, "state": {}}] * bool(miscount),
         "states": found.states,
         "transitions": found.transitions,
         "method": verified.method,
     }
-    lines = [f"{supervisor.system.name}: {status}"]
-    lines += [f"  {name.replace('_', ' '):<21} {outcome}" for name, outcome in outcomes.items()]
-    lines.append(f"  {'method':<21} {verified.method}")
-    lines += [
-        f"not {item.property}: {item.message}, after {', '.join(item.trace) or 'nothing'}" for item in found.failures
-    ]
-    lines += [f"wrong states: {miscount}"] if miscount else []
-    return Verification(status, (), "", report, "\n".join(lines) + "\n")
+    return Verification(status, (), "", report, system_verification_text(report))
+
+
+def system_summary_text(supervisor: SystemSupervisor) -> str:
+    """Return the supervisor of automata for people, as `robosc synth` prints it."""
+    initial = supervisor.initial_condition
+    told = str(supervisor) if initial is None else f"{supervisor}\nit begins only where {initial}"
+    # Names of plain automata may be anything.
+    return "".join(f"{visible(line)}\n" for line in told.split("\n"))
+
+
+def system_verification_text(report: Mapping[str, Any]) -> str:
+    """Return the report about a verified supervisor of automata, for people."""
+    lines = [f"{report['system']}: {report['status']}"]
+    lines += [f"  {name.replace('_', ' '):<21} {outcome}" for name, outcome in report["checks"].items()]
+    lines.append(f"  {'method':<21} {report['method']}")
+    for item in report["faults"]:
+        if item["check"] == _MISCOUNT:
+            lines.append(f"wrong states: {item['message']}")
+        else:
+            after = ", ".join(item["trace"]) or "nothing"
+            lines.append(f"not {item['check'].replace('_', ' ')}: {item['message']}, after {after}")
+    return "".join(f"{visible(line)}\n" for line in lines)
 
 
 def _verified(

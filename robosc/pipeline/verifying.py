@@ -20,8 +20,9 @@ from robosc.model_checking import (
     verdicts_json,
     verify_properties,
 )
+from robosc.pipeline.automata_models import automata_verification
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.loading import FileName, LoadedModel, ModelLike, loaded, property_file
+from robosc.pipeline.loading import FileName, LoadedAutomata, LoadedModel, ModelLike, loaded, property_file
 from robosc.pipeline.options import DEFAULT_OPTIONS, FOREIGN_STATES, SynthesisOptions
 from robosc.pipeline.results import Verification, VerificationStatus
 from robosc.pipeline.supervisors import SupervisorLike, supervisor_of
@@ -80,7 +81,8 @@ def verify(
 
     With `supervisor`, that is checked first, and nothing that it says of itself is believed; the properties are
     verified if it has passed. Without, the supervisor is made of the model, or is the one given as `model`; if there
-    are no properties either, it is checked against its model. A supervisor of automata is checked against these.
+    are no properties either, it is checked against its model. A supervisor of automata, which is made of them unless
+    it is given, is checked against these.
 
     Args:
         model: The model, as `load` returns it, the path of one, or a supervisor that was made.
@@ -114,19 +116,25 @@ def verify(
             raise TypeError("a supervisor of automata is verified by itself: properties and supervisor= need a model")
         return verify_system(model, chosen, limits, on_progress, should_stop, is_strict=is_strict)
     try:
+        bundle = None if isinstance(model, CoreSupervisor) else loaded(model)
+        if isinstance(bundle, LoadedAutomata):
+            if claims or supervisor is not None:
+                raise TypeError("automata are verified by themselves: properties and supervisor= need a robot's model")
+            return automata_verification(bundle, chosen, limits, on_progress, should_stop, is_strict=is_strict)
         if supervisor is not None:
-            if isinstance(model, CoreSupervisor):
+            if bundle is None:
                 raise TypeError("supervisor= is checked against a model: give the model as the first argument")
-            check = _SupervisorCheck(loaded(model), supervisor, options, limits, is_strict)
+            check = _SupervisorCheck(bundle, supervisor, options, limits, is_strict)
             return _checked(check, claims, on_progress, should_stop)
-        if not isinstance(model, CoreSupervisor):
-            found = _made(loaded(model), claims, chosen, on_progress, should_stop)
-            if isinstance(found, Verification):
-                return found
-            model = found
+        if isinstance(model, CoreSupervisor):
+            made: Verification | CoreSupervisor = model
+        else:
+            made = _made(bundle or loaded(model), claims, chosen, on_progress, should_stop)
+        if isinstance(made, Verification):
+            return made
         if claims:
-            return claims.verified(model, chosen.engine_options(), on_progress, should_stop)
-        return _checked(_SupervisorCheck(None, model, options, limits, is_strict), claims, on_progress, should_stop)
+            return claims.verified(made, chosen.engine_options(), on_progress, should_stop)
+        return _checked(_SupervisorCheck(None, made, options, limits, is_strict), claims, on_progress, should_stop)
     except UnsupportedModelError as error:
         return Verification(VerificationStatus.UNSUPPORTED_MODEL, (), str(error), {})
 

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 import msgspec
 
 from robosc.automata.executable import ExecutableSystem
-from robosc.expressions import Name
+from robosc.expressions.types import PartName
 from robosc.model.structure import Deployment, Model
 
 FORMAT = "robosc-supervisor"
@@ -18,9 +18,6 @@ FORMAT_VERSION = 1
 
 Digest = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{64}\Z")]
 Count = Annotated[int, msgspec.Meta(ge=0)]
-AutomatonName = Annotated[
-    str, msgspec.Meta(pattern=r"^((service|action|message) )?[A-Za-z_][A-Za-z_0-9]*\Z", max_length=270)
-]
 
 
 class DecisionNode(msgspec.Struct, frozen=True):
@@ -34,8 +31,8 @@ class DecisionNode(msgspec.Struct, frozen=True):
             A node's children are smaller than its own number, so a diagram has no cycle.
     """
 
-    automaton: AutomatonName
-    variable: Name | None
+    automaton: PartName
+    variable: PartName | None
     starts: tuple[Count, ...]
     children: tuple[Count, ...]
 

@@ -46,6 +46,7 @@ from robosc.model.structure import (
     Variable,
     is_tau,
 )
+from robosc.source import visible
 from robosc.supervisor.diagram import Domains, diagram_domains
 from robosc.supervisor.diagram import validate as validate_diagram
 from robosc.supervisor.structure import AddedCondition, Certificate, DecisionDiagram, Supervisor
@@ -116,7 +117,7 @@ def _at(place: str) -> Iterator[None]:
     try:
         yield
     except (InvalidSupervisorError, InvalidExpressionError) as error:
-        raise InvalidSupervisorError(f"{place}: {error}") from None
+        raise InvalidSupervisorError(f"{place}: {visible(str(error))}") from None
 
 
 def _require_unique(names: Iterable[str], what: str) -> None:
@@ -499,4 +500,4 @@ def validate_condition(condition: DecisionDiagram, domains: Domains) -> None:
     try:
         validate_diagram(condition, domains)
     except ValueError as error:
-        raise InvalidSupervisorError(str(error)) from None
+        raise InvalidSupervisorError(visible(str(error))) from None

@@ -19,7 +19,7 @@ _WRITES = "writeEventsToLog"
 _LOCATIONS = "outputLocations"
 _SUPERVISED = "supervisedController"
 _SUPERVISED_KEYS = ("package", "executable", "launchFile")
-_METADATA = ("maintainer", "license", "version")
+_METADATA = ("maintainer", "license", "version", "copyright")
 _STATE_MESSAGE = "stateMessage"
 _KEYS = (_PUBLISHES, _WRITES, _LOCATIONS, _SUPERVISED, *_METADATA, _STATE_MESSAGE)
 
@@ -39,7 +39,7 @@ class ControllerConfig:
         log_events: True if the event log is written.
         locations: Folder to generate into by target, below the folder of the file.
         supervised: The existing controller, or None.
-        metadata: Maintainer, licence and version of a generated ROS package.
+        metadata: Maintainer, licence, version and copyright of a generated ROS package.
         state_message: Form of the state of a generated ROS 2 node.
         warnings: Things that were found and not understood, one sentence each.
     """

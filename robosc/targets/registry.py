@@ -12,6 +12,7 @@ from difflib import get_close_matches
 from enum import StrEnum
 from typing import TYPE_CHECKING, Protocol
 
+from robosc._version import YEAR
 from robosc.automata.structure import System
 from robosc.errors import RoboscError, UnsupportedModelError
 from robosc.supervisor import AddedCondition, DecisionDiagram, Supervisor
@@ -27,6 +28,8 @@ _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+-]{0,199}\Z")
 _MAINTAINER = re.compile(r"(.*\S)\s*<([^<>]*)>\s*\Z")
 # As catkin_pkg, which reads package.xml, takes it.
 _EMAIL = re.compile(r"[-A-Za-z0-9_%+]+(\.[-A-Za-z0-9_%+]+)*@([-A-Za-z0-9]+\.)+[A-Za-z]{2,}\Z")
+# As ament_copyright takes it, after the word Copyright.
+_COPYRIGHT = re.compile(r"\d{4}(-\d{4})?(, *\d{4}(-\d{4})?)*,? +\S.*\Z", re.ASCII)
 _VERSION = re.compile(r"(0|[1-9][0-9]{0,8})(\.(0|[1-9][0-9]{0,8})){2}\Z")
 _MAXIMUM_TEXT = 200
 
@@ -60,13 +63,15 @@ class SupervisedController:
 
 @dataclass(frozen=True, slots=True)
 class PackageMetadata:
-    """Data of a generated ROS package about itself, which stand in its `package.xml`.
+    """Data of a generated ROS package about itself, which stand in its `package.xml` and in notices of its files.
 
     Attributes:
         maintainer: Name of who maintains it.
         email: E-mail address of the maintainer.
         license: Its licence, such as `Apache-2.0`.
         version: Its version, three numbers, or None for the version of RoboSC.
+        copyright: Years and name of who holds the copyright, such as `2026 Jane Doe`, or None for the maintainer and
+            the year of the version of RoboSC.
 
     Raises:
         ValueError: One of them is wrong; says which.
@@ -76,15 +81,28 @@ class PackageMetadata:
     email: str = "maintainer@example.org"
     license: str = "MIT"
     version: str | None = None
+    copyright: str | None = None
 
     def __post_init__(self) -> None:
-        for what, text in (("the maintainer's name", self.maintainer), ("the licence", self.license)):
+        given = {
+            "the maintainer's name": self.maintainer,
+            "the licence": self.license,
+            "the copyright": self.copyright or self.maintainer,
+        }
+        for what, text in given.items():
             if not text.strip() or not text.isprintable() or len(text) > _MAXIMUM_TEXT:
                 raise ValueError(f"{what} must be one line of at most {_MAXIMUM_TEXT} characters")
         if not _EMAIL.match(self.email) or len(self.email) > _MAXIMUM_TEXT:
             raise ValueError(f"the maintainer's e-mail address {self.email[:_MAXIMUM_TEXT]!a} is none")
         if self.version is not None and not _VERSION.match(self.version):
             raise ValueError("the version of the package must be three numbers, such as 1.0.0")
+        if self.copyright is not None and not _COPYRIGHT.match(self.copyright):
+            raise ValueError("the copyright must be years and a name, such as '2026 Jane Doe'")
+
+    @property
+    def holder(self) -> str:
+        """Years and name of who holds the copyright."""
+        return self.copyright or f"{YEAR} {self.maintainer}"
 
     def with_maintainer(self, text: str) -> "PackageMetadata":
         """Return the same with another maintainer.

@@ -707,11 +707,15 @@ class TestConversion:
                 supervised=pb.SupervisedController(package="p", executable="x"),
             ),
         )
-        metadata = PackageMetadata("Jane", "jane@example.org", "BSD-3-Clause", "1.2.3")
+        metadata = PackageMetadata("Jane", "jane@example.org", "BSD-3-Clause", "1.2.3", "2024 Jane")
         described = GenerateOptions(metadata=metadata, state_message=StateMessage.TYPED)
         found: Any = request_of(Generate(bundle, "ros2", described))
         assert found.generation.metadata == pb.PackageMetadata(
-            maintainer="Jane", email="jane@example.org", license="BSD-3-Clause", version="1.2.3"
+            maintainer="Jane",
+            email="jane@example.org",
+            license="BSD-3-Clause",
+            version="1.2.3",
+            copyright="2024 Jane",
         )
         assert found.generation.state_message == "typed"
         launched = GenerateOptions(supervised=SupervisedController("p", launch_file="x.launch.py"))

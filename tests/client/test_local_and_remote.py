@@ -159,10 +159,9 @@ def test_values_that_mean_the_same_are_the_same() -> None:
 def test_parameters_have_the_same_names(name: str) -> None:
     local = list(inspect.signature(getattr(robosc, name)).parameters)
     remote = list(inspect.signature(getattr(Client, name)).parameters)[1:]
-    # The first one keeps its older name; work here is stopped by a function, and there by a deadline. Modules are for
-    # automata, which a server does not take.
+    # The first one keeps its older name; work here is stopped by a function, and there by a deadline.
     assert remote[0] in ("bundle", "task")
-    assert [item for item in local[1:] if item not in ("is_modular", "should_stop", "on_progress")] == [
+    assert [item for item in local[1:] if item not in ("should_stop", "on_progress")] == [
         item for item in remote[1:] if item not in ("deadline_s", "on_progress")
     ]
 

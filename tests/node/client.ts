@@ -16,6 +16,7 @@ import {
   type Bundle,
   type ExploreResponse,
   type GenerateResponse,
+  Language,
   SynthesisServiceClient,
   type SynthesizeResponse,
   type VerifyResponse,
@@ -57,7 +58,7 @@ function require(condition: boolean, what: string): asserts condition {
 
 async function synthesize(bundle: Bundle) {
   const stages: string[] = [];
-  const stream = synthesis.synthesize({ bundle, options: undefined }, metadata, limits());
+  const stream = synthesis.synthesize({ bundle, options: undefined, modular: false }, metadata, limits());
   for await (const message of stream as AsyncIterable<SynthesizeResponse>) {
     if (message.event?.$case === "progress") {
       stages.push(message.event.value.stage);
@@ -81,7 +82,7 @@ async function generate(bundle: Bundle, target: string) {
   let listed: { path: string; size: bigint; digest: Uint8Array; executable: boolean }[] = [];
   let digest = "";
   const stream: ClientReadableStream<GenerateResponse> = synthesis.generate(
-    { bundle, options: undefined, target, generation: undefined },
+    { bundle, options: undefined, target, generation: undefined, initial: "" },
     metadata,
     limits(),
   );
@@ -139,7 +140,7 @@ async function verify(bundle: Bundle, properties: string[]) {
 
 async function submit(bundle: Bundle) {
   const submitted = await called(jobs.submitJob.bind(jobs) as never, {
-    task: { request: { $case: "synthesize", value: { bundle, options: undefined } } },
+    task: { request: { $case: "synthesize", value: { bundle, options: undefined, modular: false } } },
     idempotencyKey: "from TypeScript",
     label: "a job of another language",
     retention: undefined,
@@ -175,6 +176,7 @@ const bundle: Bundle = {
   libraries: [],
   searched: ["."],
   interfaces: [],
+  language: Language.LANGUAGE_ROBOSC,
 };
 const wrong: Bundle = { ...bundle, main: { name: basename(model), text: "robot R {" } };
 const outside: Bundle = { ...bundle, main: { name: "/etc/passwd", text } };

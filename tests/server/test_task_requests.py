@@ -462,6 +462,7 @@ class TestKeys:
                 {"generation": pb.GenerateOptions(state_message="typed")},
                 {"generation": pb.GenerateOptions(metadata=pb.PackageMetadata(license="x"))},
                 {"generation": pb.GenerateOptions(metadata=pb.PackageMetadata(version="x"))},
+                {"generation": pb.GenerateOptions(metadata=pb.PackageMetadata(copyright="x"))},
                 {"generation": pb.GenerateOptions(log_events=True)},
                 {"generation": pb.GenerateOptions(supervised=pb.SupervisedController())},
                 {"generation": pb.GenerateOptions(supervised=pb.SupervisedController(executable="x"))},

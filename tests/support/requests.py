@@ -40,6 +40,15 @@ def bundle_message(bundle: Bundle) -> pb.Bundle:
     )
 
 
+def automata_bundle(text: str, language: pb.Language, name: str, **imported: str) -> pb.Bundle:
+    """Automata, and the files that they import by name."""
+    return pb.Bundle(
+        main=pb.SourceFile(name=name, text=text),
+        libraries=[pb.SourceFile(name=key, text=imported[key]) for key in imported],
+        language=language,
+    )
+
+
 def bundle_at(model: Path) -> pb.Bundle:
     """A model's file and its libraries."""
     return bundle_message(load_bundle(model))

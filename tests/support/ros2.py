@@ -45,6 +45,8 @@ def environment(domain: int, folder: Path) -> dict[str, str]:
         "ROS_LOG_DIR": str(folder / "log"),
         "ROS_PYTHON_CHECK_FIELDS": "1",
         "FASTRTPS_DEFAULT_PROFILES_FILE": str(profile),
+        # The name that it has from Kilted on.
+        "FASTDDS_DEFAULT_PROFILES_FILE": str(profile),
     }
 
 

@@ -5,8 +5,10 @@ import sys
 from collections.abc import Callable, Collection, Mapping
 from datetime import datetime
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from robosc.cli import automata
 from robosc.cli.arguments import (
     MAXIMUM_LIMIT,
     SYNTHESIS_STATES,
@@ -17,14 +19,16 @@ from robosc.cli.arguments import (
     read_bundle,
     suggest,
 )
+from robosc.cli.generate import add_initial_argument, refuse_initial
 from robosc.cli.output import CommandError, ExitCode, UsageError, print_diagnostics, print_json, write_bytes
 from robosc.cli.properties import add_arguments as add_property_arguments
 from robosc.cli.properties import property_file
 from robosc.cli.sign import read_supervisor
-from robosc.cli.synth import reasons_json, report_reasons
+from robosc.cli.synth import add_modular_argument, reasons_json, refuse_modular, report_reasons
 from robosc.exploration import DEFAULT_LIMIT
 from robosc.json_documents import diagnostics_json, json_text
 from robosc.model.structure import Deployment
+from robosc.pipeline.automata_files import is_automata
 from robosc.pipeline.options import FOREIGN_STATES
 from robosc.source import Bundle, SourceFile, visible
 from robosc.targets import ControllerConfigError, GenerateOptions, read_controller_config, write_files
@@ -48,6 +52,7 @@ from robosc_client import (
     Verification,
     Verify,
 )
+from robosc_client.commands.automata import task_of
 from robosc_client.commands.connection import (
     SIGNED_SERVICE,
     add_connection_arguments,
@@ -56,20 +61,20 @@ from robosc_client.commands.connection import (
     seconds,
 )
 from robosc_client.commands.progress_line import ProgressLine
+from robosc_client.commands.signed import require_signature, trusted_keys
 from robosc_client.commands.supervisor_file import write_supervisor
 from robosc_client.commands.tasks import (
     add_signed_by_argument,
     add_synthesis_arguments,
     are_understood,
-    require_signature,
     run_verify,
     synthesis_options,
-    trusted_keys,
     verify_task,
 )
 from robosc_client.jobs import MAXIMUM_IDEMPOTENCY_KEY, MAXIMUM_LABEL
 
 if TYPE_CHECKING:
+    from robosc.pipeline.systems import SystemSupervisor
     from robosc.signatures import PublicKey
 
 _SUBMIT = """\
@@ -208,9 +213,11 @@ def _add_tasks(submit: argparse.ArgumentParser) -> None:
             add_synthesis_arguments(parser, has_choice=name != "explore")
         if name == "synth":
             add_verify_limit_argument(parser, "--verify-limit", SYNTHESIS_STATES)
+            add_modular_argument(parser)
         if name == "generate":
             parser.add_argument("--target", required=True, metavar="NAME", help="target to generate: see 'targets'")
             parser.add_argument("--package", metavar="NAME", help="name of the generated package")
+            add_initial_argument(parser)
         if name == "explore":
             parser.add_argument(
                 "--limit",
@@ -272,6 +279,8 @@ def _task(arguments: argparse.Namespace) -> Task | None:
     """Return the task to be done; None: it cannot be done, and the reason has been reported."""
     if arguments.task == "format":
         return Format(SourceFile(arguments.file.name, property_file(arguments.file).text))
+    if automata.is_given(arguments):
+        return task_of(arguments, _generation(arguments).package if arguments.task == "generate" else None)
     if arguments.task == "verify":
         return _verification(arguments)
     bundle = read_bundle(arguments)
@@ -279,8 +288,10 @@ def _task(arguments: argparse.Namespace) -> Task | None:
         case "check":
             return Check(bundle)
         case "synth":
+            refuse_modular(arguments)
             return Synthesize(bundle, synthesis_options(arguments))
         case "generate":
+            refuse_initial(arguments)
             return Generate(bundle, arguments.target, _generation(arguments), synthesis_options(arguments))
         case _:
             return Explore(bundle, synthesis_options(arguments), arguments.limit)
@@ -359,8 +370,12 @@ def _get(arguments: argparse.Namespace, client: Client) -> int:
     if job.state in (JobState.FAILED, JobState.CANCELLED):
         return _report_no_result(arguments, job)
     found = client.job_result(arguments.job, kind=job.kind, deadline_s=arguments.deadline)
-    _require_sound(arguments, found, keys)
-    has_nothing = arguments.output is not None and not _write(arguments, found)
+    if isinstance(found, Synthesis) and found.supervisor and is_automata(Path(job.main_file)):
+        written = _sound_automata(arguments, found, keys)
+    else:
+        _require_sound(arguments, found, keys)
+        written = None
+    has_nothing = arguments.output is not None and not _write(arguments, found, written)
     if arguments.json:
         print_json({"job": job_json(job), "result": result_json(found) if arguments.result or has_nothing else None})
     elif arguments.result:
@@ -414,6 +429,26 @@ def _require_sound(arguments: argparse.Namespace, found: TaskResult, keys: "Coll
         require_deployment(supervisor, Deployment(arguments.deployment))
     if keys:
         require_signature(keys, found.supervisor, found.signature)
+
+
+def _sound_automata(
+    arguments: argparse.Namespace, found: Synthesis, keys: "Collection[PublicKey]"
+) -> "SystemSupervisor":
+    """Return the supervisor of automata that a job has made, as the arguments want it.
+
+    Raises:
+        UsageError: An argument means nothing for it.
+        CommandError: None of the keys has signed it.
+        ServiceError: It is no valid one.
+    """
+    from robosc_client.outcomes import automata_supervisor_of
+
+    automata.refuse(bool(arguments.deployment), "--deployment: automata are no node of a robot")
+    automata.refuse_output(arguments.output)
+    supervisor = automata_supervisor_of(found.supervisor)
+    if keys:
+        require_signature(keys, found.supervisor, found.signature)
+    return supervisor
 
 
 def _cancel(arguments: argparse.Namespace, client: Client) -> int:
@@ -535,8 +570,13 @@ def _is_success(found: TaskResult) -> bool:
     return found.status == "supervisor"
 
 
-def _write(arguments: argparse.Namespace, found: TaskResult) -> bool:
+def _write(arguments: argparse.Namespace, found: TaskResult, supervisor: "SystemSupervisor | None") -> bool:
     """Write the result of a job; return False if there is nothing to write.
+
+    Args:
+        arguments: Arguments of the command.
+        found: The result.
+        supervisor: Supervisor of automata in the result, whose controlled system is written; None: there is none.
 
     Raises:
         UsageError: It cannot be written, or is never anything for a file.
@@ -546,6 +586,8 @@ def _write(arguments: argparse.Namespace, found: TaskResult) -> bool:
     match found:
         case tuple():
             raise UsageError("a check has no result file: use --result to print its findings")
+        case Synthesis() if supervisor is not None and arguments.output.suffix != automata.SUPERVISOR:
+            write_bytes(arguments.output, automata.file_of(supervisor, arguments.output.suffix))
         case Synthesis() if found.supervisor:
             write_supervisor(arguments.output, found.supervisor, found.signature)
         case Generation() if found.files is not None:

@@ -5,14 +5,14 @@ They print and write the same as the commands of `robosc`.
 
 import argparse
 import sys
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from robosc.cli import automata, properties, synth
 from robosc.cli import check as check_here
 from robosc.cli import explore as explore_here
 from robosc.cli import format as format_here
-from robosc.cli import properties, synth
 from robosc.cli import verify as verify_here
 from robosc.cli.arguments import (
     SYNTHESIS_STATES,
@@ -29,10 +29,10 @@ from robosc.cli.generate import (
     WRITTEN,
     add_generate_arguments,
     generate_options,
+    refuse_initial,
     report_generated,
 )
 from robosc.cli.output import (
-    CommandError,
     ExitCode,
     UsageError,
     print_diagnostics,
@@ -46,16 +46,16 @@ from robosc.json_documents import diagnostics_json
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, SourceFile, visible
 from robosc_client import Client, SynthesisOptions, Verification, VerificationStatus, Verify
+from robosc_client.commands.automata import Server
 from robosc_client.commands.connection import SERVICE, SIGNED_SERVICE, add_connection_arguments, exit_statuses
+from robosc_client.commands.numbers import checked_number
 from robosc_client.commands.progress_line import ProgressLine
+from robosc_client.commands.signed import require_signature, trusted_keys
 from robosc_client.commands.supervisor_file import write_supervisor
 from robosc_client.errors import malformed
 
 if TYPE_CHECKING:
     from robosc.certification import SynthesisOutcome
-    from robosc.signatures import PublicKey
-
-_MAXIMUM_SENDABLE = 2**64 - 1
 
 type Commands = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
@@ -67,6 +67,7 @@ def add_parsers(commands: Commands) -> None:
     add_output_argument(make)
     add_synthesis_arguments(make)
     add_verify_limit_argument(make, "--verify-limit", SYNTHESIS_STATES)
+    synth.add_modular_argument(make)
     add_signed_by_argument(make)
     make.set_defaults(run=_synth)
 
@@ -114,17 +115,6 @@ def add_signed_by_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def checked_number(number: int | None, option: str) -> int | None:
-    """Return a number of an option, if a request can contain it.
-
-    Raises:
-        UsageError: It cannot.
-    """
-    if number is not None and number > _MAXIMUM_SENDABLE:
-        raise UsageError(f"{option} must be at most {_MAXIMUM_SENDABLE}")
-    return number
-
-
 def synthesis_options(arguments: argparse.Namespace) -> SynthesisOptions:
     """Return the options that `add_synthesis_arguments` has read."""
     return SynthesisOptions(
@@ -168,6 +158,10 @@ def verify_task(arguments: argparse.Namespace, bundle: Bundle, supervisor: bytes
 def _check(arguments: argparse.Namespace, client: Client) -> int:
     from robosc_client.outcomes import outcome_from_response
 
+    check_here.require_synthesis(arguments)
+    if automata.is_given(arguments):
+        return automata.check(arguments, Server(client, arguments.deadline))
+
     def make(bundle: Bundle) -> "SynthesisOutcome":
         options = replace(synthesis_options(arguments), allow_livelock=False)
         with ProgressLine() as line:
@@ -182,6 +176,9 @@ def _synth(arguments: argparse.Namespace, client: Client) -> int:
 
     if arguments.output is not None and not arguments.output.name:
         raise UsageError("-o needs a file path")
+    if automata.is_given(arguments):
+        return automata.synth(arguments, Server(client, arguments.deadline, trusted_keys(arguments)))
+    synth.refuse_modular(arguments)
     require_other_file(arguments.output, arguments.model)
     keys = trusted_keys(arguments)
     bundle = read_bundle(arguments)
@@ -198,49 +195,14 @@ def _synth(arguments: argparse.Namespace, client: Client) -> int:
     return report_written(arguments, made, bundle)
 
 
-def trusted_keys(arguments: argparse.Namespace) -> "tuple[PublicKey, ...]":
-    """Read the keys of `--signed-by`, before the server is called.
-
-    Raises:
-        UsageError: A file cannot be read or holds no key, or the package for keys is not installed.
-    """
-    if not arguments.signed_by:
-        return ()
-    from robosc.signatures import MAXIMUM_KEY_BYTES, SignatureError, SigningUnavailableError, read_public_keys
-
-    keys: list[PublicKey] = []
-    for path in arguments.signed_by:
-        try:
-            with path.open("rb") as stream:
-                text = stream.read(MAXIMUM_KEY_BYTES + 1).decode("utf-8", "replace")
-            keys += read_public_keys(text, str(path))
-        except OSError as error:
-            raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
-        except (SignatureError, SigningUnavailableError) as error:
-            raise UsageError(str(error)) from error
-    return tuple(keys)
-
-
-def require_signature(keys: "Collection[PublicKey]", supervisor: bytes, signature: bytes) -> None:
-    """Do nothing if one of the keys has signed a supervisor file.
-
-    Raises:
-        CommandError: None has.
-    """
-    from robosc.signatures import SignatureError, signer
-
-    if not signature:
-        raise CommandError("the server has not signed the supervisor", ExitCode.SERVICE)
-    try:
-        signer(supervisor, signature, keys)
-    except SignatureError as error:
-        raise CommandError(f"the server's supervisor: {error}", ExitCode.SERVICE) from error
-
-
 def _generate(arguments: argparse.Namespace, client: Client) -> int:
     from robosc_client.outcomes import outcome_from_response
 
     generation = generate_options(arguments)
+    if automata.is_given(arguments):
+        model, made = automata.generate(arguments, generation.package, Server(client, arguments.deadline))
+        return report_generated(arguments, made, made.files, model)
+    refuse_initial(arguments)
     bundle = read_bundle(arguments)
     with ProgressLine() as line:
         found = client.generate(
@@ -258,6 +220,8 @@ def _explore(arguments: argparse.Namespace, client: Client) -> int:
     from robosc.exploration import graph_dot, graph_json, graph_text
     from robosc_client.outcomes import graph_of, outcome_from_response
 
+    if automata.is_given(arguments):
+        return automata.explore(arguments, Server(client, arguments.deadline))
     bundle = read_bundle(arguments)
     options, limit = synthesis_options(arguments), checked_number(arguments.limit, "--limit")
     with ProgressLine() as line:
@@ -284,6 +248,8 @@ def _explore(arguments: argparse.Namespace, client: Client) -> int:
 
 
 def _verify(arguments: argparse.Namespace, client: Client) -> int:
+    if automata.is_given(arguments):
+        return automata.verify(arguments, Server(client, arguments.deadline))
     return run_verify(
         arguments,
         "robosc-client verify",

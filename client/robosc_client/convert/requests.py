@@ -28,6 +28,9 @@ _DEPLOYMENTS = {
     Deployment.CONTROLLER: pb.DEPLOYMENT_CONTROLLER,
     Deployment.LAYER: pb.DEPLOYMENT_LAYER,
 }
+_LANGUAGES = {".cif": pb.LANGUAGE_CIF, ".gen": pb.LANGUAGE_FAUDES, ".wmod": pb.LANGUAGE_SUPREMICA}
+"""Language of automata, by the ending of the main file's name."""
+
 _STATES = {
     JobState.QUEUED: jobs_pb2.JOB_STATE_QUEUED,
     JobState.RUNNING: jobs_pb2.JOB_STATE_RUNNING,
@@ -65,13 +68,16 @@ def _request(task: Task) -> Request:
         case Check():
             return pb.CheckRequest(bundle=_bundle(task.bundle))
         case Synthesize():
-            return pb.SynthesizeRequest(bundle=_bundle(task.bundle), options=_options(task.options))
+            return pb.SynthesizeRequest(
+                bundle=_bundle(task.bundle), options=_options(task.options), modular=task.is_modular
+            )
         case Generate():
             return pb.GenerateRequest(
                 bundle=_bundle(task.bundle),
                 options=_options(task.options),
                 target=task.target,
                 generation=_generate_options(task.generation),
+                initial=task.initial or "",
             )
         case Explore():
             return pb.ExploreRequest(
@@ -196,6 +202,7 @@ def _metadata(metadata: PackageMetadata) -> pb.PackageMetadata:
         email=metadata.email,
         license=metadata.license,
         version=metadata.version or "",
+        copyright=metadata.copyright or "",
     )
 
 
@@ -205,6 +212,7 @@ def _bundle(bundle: Bundle) -> pb.Bundle:
         libraries=map(_file, bundle.libraries),
         searched=list(bundle.searched),
         interfaces=map(_file, bundle.interfaces),
+        language=_LANGUAGES.get(PurePath(bundle.main.name).suffix),
     )
 
 

@@ -306,7 +306,9 @@ class ExplorationReader(_StreamReader):
         except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
             raise malformed(f"the graph is invalid: {error}") from error
         numbers = range(len(graph.states))
-        is_whole = graph.initial in numbers and all(a in numbers and b in numbers for a, _, b in graph.transitions)
+        begins = (graph.initial, *graph.initial_states)
+        ends = (number for source, _, target in graph.transitions for number in (source, target))
+        is_whole = all(number in numbers for number in (*begins, *ends))
         if not is_whole or (len(graph.states), len(graph.transitions)) != (self._head.states, self._head.transitions):
             raise malformed("the graph lacks states or transitions")
         return graph

@@ -7,6 +7,14 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 
 DESCRIPTOR: _descriptor.FileDescriptor
 
+class Language(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    LANGUAGE_UNSPECIFIED: _ClassVar[Language]
+    LANGUAGE_ROBOSC: _ClassVar[Language]
+    LANGUAGE_CIF: _ClassVar[Language]
+    LANGUAGE_FAUDES: _ClassVar[Language]
+    LANGUAGE_SUPREMICA: _ClassVar[Language]
+
 class Severity(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     __slots__ = ()
     SEVERITY_UNSPECIFIED: _ClassVar[Severity]
@@ -37,6 +45,11 @@ class VerificationStatus(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     VERIFICATION_STATUS_PROPERTY_ERRORS: _ClassVar[VerificationStatus]
     VERIFICATION_STATUS_NO_SUPERVISOR: _ClassVar[VerificationStatus]
     VERIFICATION_STATUS_UNSUPPORTED_MODEL: _ClassVar[VerificationStatus]
+LANGUAGE_UNSPECIFIED: Language
+LANGUAGE_ROBOSC: Language
+LANGUAGE_CIF: Language
+LANGUAGE_FAUDES: Language
+LANGUAGE_SUPREMICA: Language
 SEVERITY_UNSPECIFIED: Severity
 SEVERITY_ERROR: Severity
 SEVERITY_WARNING: Severity
@@ -66,16 +79,18 @@ class SourceFile(_message.Message):
     def __init__(self, name: _Optional[str] = ..., text: _Optional[str] = ...) -> None: ...
 
 class Bundle(_message.Message):
-    __slots__ = ("main", "libraries", "searched", "interfaces")
+    __slots__ = ("main", "libraries", "searched", "interfaces", "language")
     MAIN_FIELD_NUMBER: _ClassVar[int]
     LIBRARIES_FIELD_NUMBER: _ClassVar[int]
     SEARCHED_FIELD_NUMBER: _ClassVar[int]
     INTERFACES_FIELD_NUMBER: _ClassVar[int]
+    LANGUAGE_FIELD_NUMBER: _ClassVar[int]
     main: SourceFile
     libraries: _containers.RepeatedCompositeFieldContainer[SourceFile]
     searched: _containers.RepeatedScalarFieldContainer[str]
     interfaces: _containers.RepeatedCompositeFieldContainer[SourceFile]
-    def __init__(self, main: _Optional[_Union[SourceFile, _Mapping]] = ..., libraries: _Optional[_Iterable[_Union[SourceFile, _Mapping]]] = ..., searched: _Optional[_Iterable[str]] = ..., interfaces: _Optional[_Iterable[_Union[SourceFile, _Mapping]]] = ...) -> None: ...
+    language: Language
+    def __init__(self, main: _Optional[_Union[SourceFile, _Mapping]] = ..., libraries: _Optional[_Iterable[_Union[SourceFile, _Mapping]]] = ..., searched: _Optional[_Iterable[str]] = ..., interfaces: _Optional[_Iterable[_Union[SourceFile, _Mapping]]] = ..., language: _Optional[_Union[Language, str]] = ...) -> None: ...
 
 class Location(_message.Message):
     __slots__ = ("file", "line", "column", "length")
@@ -142,12 +157,14 @@ class CheckResponse(_message.Message):
     def __init__(self, diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ...) -> None: ...
 
 class SynthesizeRequest(_message.Message):
-    __slots__ = ("bundle", "options")
+    __slots__ = ("bundle", "options", "modular")
     BUNDLE_FIELD_NUMBER: _ClassVar[int]
     OPTIONS_FIELD_NUMBER: _ClassVar[int]
+    MODULAR_FIELD_NUMBER: _ClassVar[int]
     bundle: Bundle
     options: SynthesisOptions
-    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ...) -> None: ...
+    modular: bool
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., modular: _Optional[bool] = ...) -> None: ...
 
 class SynthesizeResponse(_message.Message):
     __slots__ = ("progress", "result")
@@ -224,16 +241,18 @@ class AddedCondition(_message.Message):
     def __init__(self, event: _Optional[str] = ..., condition: _Optional[str] = ...) -> None: ...
 
 class GenerateRequest(_message.Message):
-    __slots__ = ("bundle", "options", "target", "generation")
+    __slots__ = ("bundle", "options", "target", "generation", "initial")
     BUNDLE_FIELD_NUMBER: _ClassVar[int]
     OPTIONS_FIELD_NUMBER: _ClassVar[int]
     TARGET_FIELD_NUMBER: _ClassVar[int]
     GENERATION_FIELD_NUMBER: _ClassVar[int]
+    INITIAL_FIELD_NUMBER: _ClassVar[int]
     bundle: Bundle
     options: SynthesisOptions
     target: str
     generation: GenerateOptions
-    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., target: _Optional[str] = ..., generation: _Optional[_Union[GenerateOptions, _Mapping]] = ...) -> None: ...
+    initial: str
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., target: _Optional[str] = ..., generation: _Optional[_Union[GenerateOptions, _Mapping]] = ..., initial: _Optional[str] = ...) -> None: ...
 
 class GenerateOptions(_message.Message):
     __slots__ = ("package", "publish_state", "log_events", "supervised", "metadata", "state_message")
@@ -252,16 +271,18 @@ class GenerateOptions(_message.Message):
     def __init__(self, package: _Optional[str] = ..., publish_state: _Optional[bool] = ..., log_events: _Optional[bool] = ..., supervised: _Optional[_Union[SupervisedController, _Mapping]] = ..., metadata: _Optional[_Union[PackageMetadata, _Mapping]] = ..., state_message: _Optional[str] = ...) -> None: ...
 
 class PackageMetadata(_message.Message):
-    __slots__ = ("maintainer", "email", "license", "version")
+    __slots__ = ("maintainer", "email", "license", "version", "copyright")
     MAINTAINER_FIELD_NUMBER: _ClassVar[int]
     EMAIL_FIELD_NUMBER: _ClassVar[int]
     LICENSE_FIELD_NUMBER: _ClassVar[int]
     VERSION_FIELD_NUMBER: _ClassVar[int]
+    COPYRIGHT_FIELD_NUMBER: _ClassVar[int]
     maintainer: str
     email: str
     license: str
     version: str
-    def __init__(self, maintainer: _Optional[str] = ..., email: _Optional[str] = ..., license: _Optional[str] = ..., version: _Optional[str] = ...) -> None: ...
+    copyright: str
+    def __init__(self, maintainer: _Optional[str] = ..., email: _Optional[str] = ..., license: _Optional[str] = ..., version: _Optional[str] = ..., copyright: _Optional[str] = ...) -> None: ...
 
 class SupervisedController(_message.Message):
     __slots__ = ("package", "executable", "launch_file")

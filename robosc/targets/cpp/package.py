@@ -23,6 +23,7 @@ from robosc.targets.cpp.naming import require_namespace, require_package_name
 from robosc.targets.cpp.recording import PERIOD_S, record
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.registry import GenerateOptions, StateMessage
+from robosc.targets.ros.notices import is_known, with_notices
 from robosc.targets.ros.package import chosen, error_context, packages, release_identifiers, require_own_names
 from robosc.targets.ros.runtime.parameters import Parameter, declarations
 from robosc.targets.ros.topics import Topic, servers, shapes_of, topics
@@ -113,9 +114,9 @@ def _generate(supervisor: Supervisor, name: str, options: GenerateOptions, middl
     environment = _environment(middleware.module)
     context = _context(supervisor, unit, name, found, asked, options, middleware)
     for path, template in middleware.templates.items():
-        text = environment.get_template(template).render(context)
-        files[path.format(package=name)] = folded(text) if path.endswith(".py") else text
-    return GeneratedFiles(files)
+        files[path.format(package=name)] = environment.get_template(template).render(context)
+    noticed = with_notices(files, options.metadata)
+    return GeneratedFiles({path: folded(text) if path.endswith(".py") else text for path, text in noticed.items()})
 
 
 def _engine(supervisor: Supervisor) -> GeneratedFiles:
@@ -162,6 +163,7 @@ def _context(
         "has_services": any(item.kind is CommunicationKind.SERVICE for item in asked),
         "topics": [_topic(unit, topic, numbers, middleware) for topic in found],
         "servers": [_server(unit, number, item, middleware) for number, item in enumerate(asked)],
+        "is_known_license": is_known(options.metadata.license),
         "typed_state": typed_state and middleware.type_name("msg", typed_state),
         "topic_table": found,
         "server_table": asked,

@@ -18,6 +18,7 @@ from robosc.targets.code.python.package import beside_supervisor, python_text
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.registry import GenerateOptions, StateMessage
 from robosc.targets.ros.layer import Renamed, remapped_names, require_names_of_a_layer, require_own_topics
+from robosc.targets.ros.notices import is_known, with_notices
 from robosc.targets.ros.package import chosen, context, error_context, packages, release_identifiers, require_own_names
 from robosc.targets.ros.runtime.parameters import Parameter, declarations
 from robosc.targets.ros.runtime.supervised import callers_name, robots_name
@@ -123,6 +124,7 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
     values["parameters"] = [item for item in chosen(declared, options) if item.name not in middleware.without]
     values["not_in_file"] = middleware.not_in_file
     values["supervised"] = options.supervised
+    values["is_known_license"] = is_known(options.metadata.license)
     values["remapped"] = remapped_names(found, asked, middleware.remapped)
     files = _python_files(supervisor, name, middleware)
     get_template = _environment(middleware.package).get_template
@@ -135,7 +137,10 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
     for path, (module, purpose) in scripts.items():
         files[path] = get_template(middleware.script).render(values, module=module, purpose=purpose)
     return GeneratedFiles(
-        {path: folded(text) if path.endswith(".py") or path in scripts else text for path, text in files.items()},
+        {
+            path: folded(text) if path.endswith(".py") or path in scripts else text
+            for path, text in with_notices(files, options.metadata, scripts).items()
+        },
         frozenset(scripts),
     )
 

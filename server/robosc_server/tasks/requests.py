@@ -49,6 +49,9 @@ _ALL_REMEMBERED_BYTES = 4 * 2**20
 _ENTRY_BYTES = 500
 """Bytes that a remembered request takes besides its own."""
 
+_ENDINGS = {pb.LANGUAGE_CIF: ".cif", pb.LANGUAGE_FAUDES: ".gen", pb.LANGUAGE_SUPREMICA: ".wmod"}
+"""Ending of the main file's name, by the language of automata."""
+
 _DEFAULT_GRAPH_STATES = 100_000
 _DEFAULT_VERIFIED_STATES = 1_000_000
 _DEFAULT_MADE_STATES = 200_000
@@ -188,14 +191,16 @@ class _RequestReader:
 
     Attributes:
         main_file: Name of the main file.
+        is_automata: True if the bundle, which is read first, holds automata.
     """
 
-    __slots__ = ("_bytes", "_limits", "main_file")
+    __slots__ = ("_bytes", "_limits", "is_automata", "main_file")
 
     def __init__(self, limits: RequestLimits) -> None:
         self._limits = limits
         self._bytes = 0
         self.main_file = ""
+        self.is_automata = False
 
     def require_small(self) -> None:
         """Do nothing if all that was counted is within the limit.
@@ -223,6 +228,10 @@ class _RequestReader:
         Raises:
             RefusedError: Its names are invalid, or it has too much.
         """
+        language = message.language or pb.LANGUAGE_ROBOSC
+        if language != pb.LANGUAGE_ROBOSC and language not in _ENDINGS:
+            raise _malformed(f"the request has the unknown language {language}")
+        self.is_automata = language in _ENDINGS
         libraries, interfaces, searched = message.libraries, message.interfaces, message.searched
         self.require_few(1 + len(libraries) + len(interfaces), "files")
         self.require_few(len(searched), "searched places")
@@ -230,6 +239,8 @@ class _RequestReader:
             raise _malformed("the bundle has no main file")
         main = self.file(message.main)
         self.main_file = main[0]
+        if self.is_automata:
+            self._require_automata(message, _ENDINGS[language])
         others = sorted(map(self.file, libraries)), sorted(map(self.file, interfaces))
         names = {self.main_file}
         for group in others:
@@ -237,7 +248,38 @@ class _RequestReader:
                 if name in names:
                     raise _malformed(f"two files of the bundle have the name '{name}'")
                 names.add(name)
-        return main, *others, [self.text(place) for place in searched]
+        return language, main, *others, [self.text(place) for place in searched]
+
+    def _require_automata(self, message: Any, ending: str) -> None:
+        """Do nothing if a bundle has what automata may have.
+
+        Raises:
+            RefusedError: It has more, or its main file another ending.
+        """
+        if not self.main_file.endswith(ending):
+            raise _malformed(f"a file of this language has a name that ends in {ending}, not '{self.main_file[-80:]}'")
+        self.refuse_of_robots(searched=message.searched, interfaces=message.interfaces)
+        if message.libraries and ending != ".cif":
+            raise _malformed("libraries: plain automata import no files")
+
+    def refuse_of_robots(self, **given: object) -> None:
+        """Do nothing if a request about automata has none of the fields that are for RoboSC models.
+
+        Args:
+            **given: Value of each of these fields.
+
+        Raises:
+            RefusedError: It has.
+        """
+        for name, value in given.items():
+            if self.is_automata and value:
+                raise _malformed(f"{name} applies to RoboSC models, and the request has automata")
+
+    def refuse_of_automata(self, **given: object) -> None:
+        """The same for a request about a RoboSC model, and the fields that are for automata."""
+        for name, value in given.items():
+            if value and not self.is_automata:
+                raise _malformed(f"{name} applies to automata, and the request has a RoboSC model")
 
     def file(self, message: Any) -> tuple[str, str]:
         """Name of a file and digest of its text.
@@ -285,6 +327,11 @@ class _RequestReader:
         chosen = message.deployment or deployment
         if chosen not in _DEPLOYMENTS:
             raise _malformed(f"the request has the unknown deployment {chosen}")
+        self.refuse_of_robots(
+            deployment=chosen == pb.DEPLOYMENT_LAYER,
+            allow_livelock=message.allow_livelock,
+            verified_states=message.HasField("verified_states"),
+        )
         engine = self.name(message.engine, "the engine's name") or "auto"
         nodes = min(message.maximum_nodes or self._limits.nodes, self._limits.nodes)
         states = message.verified_states if message.HasField("verified_states") else _DEFAULT_MADE_STATES
@@ -309,16 +356,32 @@ def _check(message: Any, reader: _RequestReader) -> object:
 
 
 def _synthesize(message: Any, reader: _RequestReader) -> object:
-    return reader.bundle(message.bundle), reader.options(message.options)
+    bundle = reader.bundle(message.bundle)
+    reader.refuse_of_automata(modular=message.modular)
+    return bundle, reader.options(message.options), message.modular
 
 
-_METADATA = ("maintainer", "email", "license", "version")
+_METADATA = ("maintainer", "email", "license", "version", "copyright")
 
 
 def _generate(message: Any, reader: _RequestReader) -> object:
     if not message.target:
         raise _malformed("the request names no target")
     choices = message.generation
+    bundle, options = reader.bundle(message.bundle), reader.options(message.options)
+    reader.refuse_of_automata(initial=message.initial)
+    if reader.is_automata:
+        reader.refuse_of_robots(
+            publish_state=choices.publish_state,
+            log_events=choices.log_events,
+            supervised=choices.HasField("supervised"),
+            metadata=choices.HasField("metadata"),
+            state_message=choices.state_message,
+        )
+        if message.target == "all":
+            raise _malformed("the target all is for RoboSC models: of automata name c99, cif or python")
+        if message.target == "cif" and choices.package:
+            raise _malformed("package: of automata, the target cif makes one file and no package")
     supervised = None
     if choices.HasField("supervised"):
         named = choices.supervised
@@ -327,7 +390,9 @@ def _generate(message: Any, reader: _RequestReader) -> object:
             for text in (named.package, named.executable, named.launch_file)
         ]
     return (
-        _synthesize(message, reader),
+        bundle,
+        options,
+        reader.text(message.initial),
         reader.name(message.target, "the target's name"),
         reader.name(choices.package, "the package's name"),
         choices.publish_state,
@@ -339,16 +404,21 @@ def _generate(message: Any, reader: _RequestReader) -> object:
 
 
 def _explore(message: Any, reader: _RequestReader) -> object:
+    bundle = reader.bundle(message.bundle)
     deployment, engine, _, *rest = reader.options(message.options)
     # Silent steps are allowed, whatever the options say of them.
-    return reader.bundle(message.bundle), deployment, engine, rest, message.maximum_states or _DEFAULT_GRAPH_STATES
+    return bundle, deployment, engine, rest, message.maximum_states or _DEFAULT_GRAPH_STATES
 
 
 def _verify(message: Any, reader: _RequestReader) -> object:
-    is_given = bool(message.supervisor)
-    if not is_given and (message.maximum_states or message.strict):
+    bundle = reader.bundle(message.bundle)
+    reader.refuse_of_robots(
+        supervisor=message.supervisor, properties=message.properties, property_files=message.property_files
+    )
+    is_given, is_robot = bool(message.supervisor), not reader.is_automata
+    if is_robot and not is_given and (message.maximum_states or message.strict):
         raise _malformed("maximum_states and strict apply only to a given supervisor, and the request has none")
-    if not is_given and not message.properties and not message.property_files:
+    if is_robot and not is_given and not message.properties and not message.property_files:
         raise _malformed("the request has neither a supervisor nor properties")
     if message.maximum_states > _MAXIMUM_VERIFIED_STATES:
         raise _malformed(f"maximum_states is more than {_MAXIMUM_VERIFIED_STATES}")
@@ -358,7 +428,7 @@ def _verify(message: Any, reader: _RequestReader) -> object:
     unsaid = pb.DEPLOYMENT_UNSPECIFIED if is_given else pb.DEPLOYMENT_CONTROLLER
     deployment, engine, _, *rest, made_states = reader.options(message.options, deployment=unsaid)
     return (
-        reader.bundle(message.bundle),
+        bundle,
         # Where one is given, none is made.
         (deployment, engine, rest, None if is_given else made_states),
         reader.content(message.supervisor) if is_given else None,

@@ -12,21 +12,32 @@ from typing import Any
 
 from robosc.automata import to_automata
 from robosc.errors import LanguageError, NodeLimitError
+from robosc.explanation import RequestError
 from robosc.exploration import DEFAULT_LIMIT, Graph, explore, graph_json
 from robosc.formatting import format_text
 from robosc.json_documents import json_pieces
 from robosc.model.check import check
+from robosc.pipeline.automata_files import check_automata_file
+from robosc.pipeline.loading import LoadedAutomata
 from robosc.supervisor import Supervisor, encode
 from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import UnknownEngineError
 from robosc.synthesis.engines import keep_ready, resolve_engine
-from robosc.targets import GeneratedFiles, TargetRefusal, UnknownTargetError, generate_or_refuse, require_generatable
+from robosc.targets import (
+    GeneratedFiles,
+    GenerateOptions,
+    TargetRefusal,
+    UnknownTargetError,
+    generate_or_refuse,
+    require_generatable,
+)
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.clock import monotonic
+from robosc_server.tasks.automata import Automata
 from robosc_server.tasks.convert import chunks, from_proto, to_proto
 from robosc_server.tasks.synthesis_attempt import OnReport, SynthesisAttempt
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
-from robosc_server.tasks.verify import NoPropertyError, verification
+from robosc_server.tasks.verify import DEFAULT_STATES, NoPropertyError, verification
 
 _WARM_UP_MODEL = """
 robot Rehearsal {
@@ -95,6 +106,9 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
         return Failure(Reason.RESULT_TOO_LARGE, f"the result has more than {limits.result_bytes} bytes")
     except (UnknownTargetError, UnknownEngineError, from_proto.OptionError, NoPropertyError) as error:
         return Failure(Reason.MALFORMED_REQUEST, str(error))
+    except RequestError:
+        # Its sentence names parts of the model.
+        return Failure(Reason.MALFORMED_REQUEST, "initial names what the automata do not have")
     except Exception as error:  # The boundary of the worker: the server logs any error and continues.
         return Failure(Reason.INTERNAL_FAULT, "the server has an internal error", _code_locations(error))
 
@@ -102,7 +116,7 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
 PRELOADED = ("robosc",)
 """Packages that are loaded, with all that is in them, before processes are forked that do tasks."""
 
-NOT_PRELOADED = ("robosc.cli", "robosc.event_logs", "robosc.pipeline", "robosc.starter")
+NOT_PRELOADED = ("robosc.cli", "robosc.event_logs", "robosc.starter")
 """Packages that no task needs; drawing libraries start threads."""
 
 
@@ -143,11 +157,25 @@ def _check(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[
     request = pb.CheckRequest.FromString(content)
     bundle = from_proto.bundle(request.bundle)
     on_report(Report("check", bundle.main.name))
-    yield pb.CheckResponse(diagnostics=to_proto.findings(check(bundle).diagnostics))
+    found = check_automata_file(bundle) if isinstance(bundle, LoadedAutomata) else check(bundle)
+    yield pb.CheckResponse(diagnostics=to_proto.findings(found.diagnostics))
+
+
+def _automata(
+    request: pb.SynthesizeRequest | pb.GenerateRequest | pb.ExploreRequest | pb.VerifyRequest,
+    limits: TaskLimits,
+    on_report: OnReport,
+) -> Automata | None:
+    """The automata of a request; None: it is about a RoboSC model."""
+    model = from_proto.bundle(request.bundle)
+    return Automata(model, request.options, limits.nodes, on_report) if isinstance(model, LoadedAutomata) else None
 
 
 def _synthesize(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.SynthesizeResponse]:
     request = pb.SynthesizeRequest.FromString(content)
+    if (automata := _automata(request, limits, on_report)) is not None:
+        yield pb.SynthesizeResponse(result=automata.synthesis(is_modular=request.modular))
+        return
     attempt = SynthesisAttempt()
     result = pb.SynthesisResult()
     with attempt:
@@ -166,6 +194,21 @@ def _generate(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterat
     request = pb.GenerateRequest.FromString(content)
     require_generatable(request.target)
     choices = from_proto.generation(request.generation)
+    if (automata := _automata(request, limits, on_report)) is not None:
+        files, fields = automata.generation(request.target, choices, request.initial or None)
+    else:
+        files, fields = _generated(request, choices, limits, on_report)
+    listing = [] if files is None else chunks.listing(files)
+    digest = chunks.digest_of(listing) if listing else b""
+    yield pb.GenerateResponse(result=pb.GenerationResult(files=listing, digest=digest, **fields))
+    if files is not None:
+        yield from (pb.GenerateResponse(chunk=chunk) for chunk in chunks.file_chunks(files))
+
+
+def _generated(
+    request: pb.GenerateRequest, choices: GenerateOptions, limits: TaskLimits, on_report: OnReport
+) -> tuple[GeneratedFiles | None, dict[str, Any]]:
+    """The files for a robot, or None, and the fields of the result."""
     attempt = SynthesisAttempt()
     files: GeneratedFiles | None = None
     with attempt:
@@ -176,15 +219,31 @@ def _generate(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterat
             attempt.refusal = found
         else:
             files = found
-    listing = [] if files is None else chunks.listing(files)
-    digest = chunks.digest_of(listing) if listing else b""
-    yield pb.GenerateResponse(result=pb.GenerationResult(files=listing, digest=digest, **attempt.result_fields()))
-    if files is not None:
-        yield from (pb.GenerateResponse(chunk=chunk) for chunk in chunks.file_chunks(files))
+    return files, attempt.result_fields()
 
 
 def _explore(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.ExploreResponse]:
     request = pb.ExploreRequest.FromString(content)
+    if (automata := _automata(request, limits, on_report)) is not None:
+        graph, fields = automata.exploration(request.maximum_states or DEFAULT_LIMIT)
+    else:
+        graph, fields = _explored(request, limits, on_report)
+    if graph is None:
+        yield pb.ExploreResponse(result=pb.ExplorationResult(**fields))
+        return
+    text = _bounded_text(json_pieces(graph_json(graph)), limits.result_bytes)
+    digest = hashlib.sha256(text).digest()
+    states, transitions = len(graph.states), len(graph.transitions)
+    yield pb.ExploreResponse(
+        result=pb.ExplorationResult(states=states, transitions=transitions, size=len(text), digest=digest, **fields)
+    )
+    yield from (pb.ExploreResponse(chunk=chunk) for chunk in chunks.content_chunks(text))
+
+
+def _explored(
+    request: pb.ExploreRequest, limits: TaskLimits, on_report: OnReport
+) -> tuple[Graph | None, dict[str, Any]]:
+    """The graph of a robot under its supervisor, or None, and the fields of the result."""
     attempt = SynthesisAttempt()
     graph: Graph | None = None
     with attempt:
@@ -193,18 +252,7 @@ def _explore(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterato
         if made.supervisor is not None:
             on_report(Report("exploration", f"{made.supervisor.certificate.states} states"))
             graph = _graph(made.supervisor, request.maximum_states or DEFAULT_LIMIT)
-    if graph is None:
-        yield pb.ExploreResponse(result=pb.ExplorationResult(**attempt.result_fields()))
-        return
-    text = _bounded_text(json_pieces(graph_json(graph)), limits.result_bytes)
-    digest = hashlib.sha256(text).digest()
-    states, transitions = len(graph.states), len(graph.transitions)
-    yield pb.ExploreResponse(
-        result=pb.ExplorationResult(
-            states=states, transitions=transitions, size=len(text), digest=digest, **attempt.result_fields()
-        )
-    )
-    yield from (pb.ExploreResponse(chunk=chunk) for chunk in chunks.content_chunks(text))
+    return graph, attempt.result_fields()
 
 
 def _graph(supervisor: Supervisor, maximum_states: int) -> Graph:
@@ -233,7 +281,11 @@ def _bounded_text(texts: Iterable[str], maximum_bytes: int) -> bytes:
 
 def _verify(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.VerifyResponse]:
     request = pb.VerifyRequest.FromString(content)
-    yield pb.VerifyResponse(result=verification(request, limits.nodes, on_report))
+    if (automata := _automata(request, limits, on_report)) is None:
+        result = verification(request, limits.nodes, on_report)
+    else:
+        result = automata.verification(request.maximum_states or DEFAULT_STATES, is_strict=request.strict)
+    yield pb.VerifyResponse(result=result)
 
 
 def _format(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.FormatResponse]:

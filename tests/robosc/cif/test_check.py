@@ -139,7 +139,7 @@ def test_files_are_read_from_their_folders(tmp_path: Path) -> None:
     (tmp_path / "sub" / "a.cif").write_text('import "../main.cif", "b.cif";')
     (tmp_path / "sub" / "b.cif").write_text("controllable e;")
     bundle = load_cif(tmp_path / "main.cif")
-    assert [Path(file.name).name for file in bundle.files] == ["main.cif", "a.cif", "b.cif"]
+    assert [file.name for file in bundle.files] == ["main.cif", "sub/a.cif", "sub/b.cif"]
     (finding,) = check_cif(bundle).diagnostics
     assert (finding.code, finding.location and finding.location.column) == ("cif-import", 21)
 

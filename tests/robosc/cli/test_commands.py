@@ -260,6 +260,31 @@ def test_what_is_only_a_warning_of_the_check_stops_a_target_at_its_place(
 
 
 @pytest.mark.parametrize(
+    ("interface", "code"), [("Cell from power_msgs", "unknown-ros-type"), ("Battery from power_msgs", "unknown-field")]
+)
+def test_definitions_of_one_s_own_refuse_packages_and_no_model(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, interface: str, code: str
+) -> None:
+    messages = tmp_path / "power_msgs" / "msg"
+    messages.mkdir(parents=True)
+    (tmp_path / "power_msgs/package.xml").write_text("<package format='3'><name>power_msgs</name></package>")
+    (messages / "Battery.msg").write_text("float32 charge\n")
+    path = tmp_path / "model" / "robot.rscd"
+    path.parent.mkdir()
+    path.write_text(
+        f"robot R {{ interface i use {interface} datatype object O {{ level: double }}\n"
+        "component C { outgoing message m with type: O links i } }"
+    )
+    given = [str(path), "-I", str(tmp_path / "power_msgs")]
+    assert main(["check", *given]) == 0
+    assert "warning: power_msgs" in (told := capsys.readouterr().err)
+    assert f"[{code}]" in told
+    assert main(["synth", *given, "-o", str(tmp_path / "robot.rsup")]) == 0
+    assert main(["check", "--strict", *given]) == 1
+    assert main(["generate", *given, "--target", "ros2", "-o", str(tmp_path / "out")]) == 1
+
+
+@pytest.mark.parametrize(
     ("body", "target"),
     [
         ('component C { incoming message a with identifier: "", type: double }', "python"),

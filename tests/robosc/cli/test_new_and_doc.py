@@ -46,8 +46,8 @@ def test_what_new_makes_passes_every_command(name: str, tmp_path: Path, capsys: 
     assert main(["check", "--strict", model]) == 0
     assert capsys.readouterr().out == f"{model}: no findings\n"
     assert main(["synth", model, "-o", "x.rsup"]) == 0
-    for target in ("python", "ros2"):
-        assert main(["generate", model, "--target", target, "-o", f"out_{target}"]) == 0
+    for target, chosen in (("python", ()), ("ros2", ("--maintainer", "Jane Doe <jane@example.org>"))):
+        assert main(["generate", model, "--target", target, "-o", f"out_{target}", *chosen]) == 0
     assert main(["doc", model, "-o", "page.md"]) == 0
     assert capsys.readouterr().err == ""
     assert read_page(Path("page.md").read_text(encoding="utf-8"))[0].title == name

@@ -11,8 +11,16 @@ import robosc
 FUNCTIONS = ["check", "explain", "explore", "generate", "load", "simulate", "synthesize", "verify"]
 VALUES = [
     *("Condition", "Conditions", "Deployment", "Diagnostic", "Explained", "Exploration", "Findings", "GenerateOptions"),
-    *("Generation", "LoadedModel", "NoSupervisor", "Progress", "Run", "Severity", "Step", "Summary", "Supervisor"),
-    *("Synthesis", "SynthesisOptions", "SynthesisStatus", "SystemRun", "SystemSupervisor", "SystemSynthesis"),
+    *("Generation", "LoadedAutomata", "LoadedModel", "NoSupervisor", "Progress", "Run", "Severity", "Step", "Summary"),
+    *(
+        "Supervisor",
+        "Synthesis",
+        "SynthesisOptions",
+        "SynthesisStatus",
+        "SystemRun",
+        "SystemSupervisor",
+        "SystemSynthesis",
+    ),
     *("Trouble", "TroubleKind", "Verification", "VerificationStatus"),
 ]
 ERRORS = [

@@ -15,6 +15,7 @@ from robosc.automata import System
 from robosc.errors import InvalidSupervisorError, InvalidSystemError, UnsupportedModelError
 from robosc.expressions import Expression, StateTest, Unary
 from robosc.pipeline.systems import decode_system
+from support.automata_models import BUFFER, DOOR, TANK
 from support.damaged_json import change_value
 from support.effort import examples
 from support.generated import example_supervisor
@@ -94,6 +95,41 @@ def survives(data: bytes) -> bool:
     return True
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("tank.cif", f"group yard: {TANK} end requirement yard.tank.c_fill needs yard.tank.level < 3;"),
+        (
+            "modes.cif",
+            "group a: group b: enum E = X, Y; plant p: disc E e = X; controllable c; location s: initial; marked; "
+            "edge c when e = X do e := Y goto t; location t: marked; end end end "
+            "requirement a.b.p.c needs a.b.p.e = a.b.X and a.b.p.s;",
+        ),
+        ("line.gen", BUFFER.replace('"Buffer"', '"My\x1bbuffer"').replace("full", "no.1")),
+        (
+            "door.wmod",
+            DOOR.replace('"wide"/>', '"wide"><EventList><SimpleIdentifier Name=":forbidden"/></EventList></SimpleNode>')
+            .replace('<EventDecl Kind="C', '<EventDecl Kind="PROPOSITION" Name=":forbidden"/><EventDecl Kind="C')
+            .replace('"wide"', '"wide {1}"'),
+        ),
+    ],
+)
+def test_names_are_those_of_the_language(name: str, text: str) -> None:
+    """Automata of CIF stand in groups, and names of other tools may be any text."""
+    model = robosc.load(text=text, name=name)
+    supervisor = robosc.synthesize(model).supervisor
+    assert isinstance(supervisor, robosc.SystemSupervisor)
+    assert decode_system(supervisor.encode()) == supervisor
+
+
+def test_names_that_are_not_there_move_no_cursor() -> None:
+    value = document()
+    value["system_supervisor"]["added"][0]["condition"]["nodes"][0]["automaton"] = "B\n\x1b[2J"
+    with pytest.raises(InvalidSupervisorError, match="does not exist") as raised:
+        decode_system(as_bytes(value))
+    assert str(raised.value).isprintable()
+
+
 def test_damaged_values() -> None:
     contents = [supervised(MACHINE).encode()]
     contents += [made.encode() for seed in range(4) if (made := robosc.synthesize(wide_system(seed)).supervisor)]
@@ -167,12 +203,9 @@ def test_what_no_file_can_hold_is_not_written(tmp_path: Path) -> None:
     deep: Expression = StateTest("M", "idle")
     for _ in range(500):
         deep = Unary("not", deep)
-    machine, buffer = MACHINE.automata
-    odd = replace(MACHINE, automata=(machine, replace(buffer, name="buffer-1")))
     for refused, words in (
         (replace(supervisor, system=replace(MACHINE, invariants=(deep,))), "nested more than 400 operators"),
         (replace(supervisor, added=supervisor.added * 2), "no file can hold the supervisor of by hand: .*twice"),
-        (supervised(odd), "no file can hold the supervisor of by hand: .*malformed"),
     ):
         with pytest.raises(UnsupportedModelError, match=words):
             refused.write(place)

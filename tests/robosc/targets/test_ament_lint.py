@@ -44,7 +44,7 @@ def test_a_package_in_cpp_can_have_all_common_linters() -> None:
     text = generate(example_supervisor(MAZE), "ros2-cpp")["CMakeLists.txt"]
     before, _, _ = text.partition("ament_lint_auto_find_test_dependencies()")
     assert "find_package(ament_lint_auto QUIET)" in before
-    for linter in ("copyright", "cpplint", "uncrustify"):
+    for linter in ("cpplint", "uncrustify"):
         assert f"set(ament_cmake_{linter}_FOUND TRUE)" in before
     # The longest line that lint_cmake takes.
     assert max(map(len, text.splitlines())) <= 140

@@ -51,6 +51,7 @@ def test_everything_that_it_may_say(tmp_path: Path) -> None:
             "maintainer": "Jane Doe <jane@example.org>",
             "license": "Apache-2.0",
             "version": "1.2.3",
+            "copyright": "2024-2026 Jane Doe",
             "stateMessage": "both",
         },
     )
@@ -60,7 +61,9 @@ def test_everything_that_it_may_say(tmp_path: Path) -> None:
     options = config.options("name")
     assert (options.package, options.publish_state, options.log_events) == ("name", True, True)
     assert options.supervised == SupervisedController("turtlebot3_example", launch_file="drive.launch.py")
-    assert options.metadata == PackageMetadata("Jane Doe", "jane@example.org", "Apache-2.0", "1.2.3")
+    assert options.metadata == PackageMetadata(
+        "Jane Doe", "jane@example.org", "Apache-2.0", "1.2.3", "2024-2026 Jane Doe"
+    )
     assert options.state_message is StateMessage.BOTH
 
 
@@ -97,6 +100,9 @@ def test_everything_that_it_may_say(tmp_path: Path) -> None:
         ({"license": "a\nb"}, "'license': the licence must be one line"),
         ({"version": "1.0"}, "'version': the version of the package must be three numbers, such as 1.0.0"),
         ({"version": "01.0.0"}, "three numbers"),
+        ({"copyright": "Jane Doe"}, "'copyright': the copyright must be years and a name, such as '2026 Jane Doe'"),
+        ({"copyright": "2026"}, "years and a name"),
+        ({"copyright": "2026 a\nb"}, "'copyright': the copyright must be one line"),
         (" " * (MAXIMUM_BYTES + 1), "more than"),
     ],
 )
@@ -168,12 +174,17 @@ class TestCommand:
         assert not (tmp_path / "there").exists()
 
     def test_a_flag_goes_before_what_the_file_says_of_the_package(self, model: Path, tmp_path: Path) -> None:
-        written(tmp_path, {"maintainer": "Ann <ann@example.org>", "license": "MIT", "version": "1.0.0"})
+        written(
+            tmp_path,
+            {"maintainer": "Ann <ann@example.org>", "license": "MIT", "version": "1.0.0", "copyright": "2024 Ann"},
+        )
         chosen = [
             "--maintainer",
             "Bo <bo@example.org>",
             "--package-version",
             "2.0.0",
+            "--copyright",
+            "2025 Bo",
             "--state-message",
             "typed",
             "-o",
@@ -184,12 +195,32 @@ class TestCommand:
         assert '<maintainer email="bo@example.org">Bo</maintainer>' in text
         assert "<license>MIT</license>" in text
         assert "<version>2.0.0</version>" in text
+        assert (tmp_path / "here/setup.py").read_text().startswith("# Copyright 2025 Bo\n")
         assert "<exec_depend>robosc_msgs</exec_depend>" in text
 
     def test_a_node_in_cpp_is_built_with_the_message_of_its_state(self, model: Path, tmp_path: Path) -> None:
         written(tmp_path, {"stateMessage": "typed"})
         assert main(["generate", str(model), "--target", "ros2-cpp", "-o", str(tmp_path / "here")]) == 0
         assert "<depend>robosc_msgs</depend>" in (tmp_path / "here/package.xml").read_text()
+
+    @pytest.mark.parametrize(
+        ("target", "chosen", "is_told"),
+        [
+            ("ros2", (), True),
+            ("all", (), True),
+            ("ros2", ("--maintainer", "Bo <bo@example.org>"), False),
+            ("ros2-msgs", (), False),
+            ("python", (), False),
+        ],
+    )
+    def test_a_placeholder_for_the_maintainer_is_told(
+        self, model: Path, capsys: pytest.CaptureFixture[str], target: str, chosen: tuple[str, ...], is_told: bool
+    ) -> None:
+        folder = str(model.parent / "here")
+        assert main(["generate", str(model), "--target", target, "-o", folder, *chosen]) == 0
+        assert ("note: package.xml has a placeholder for its maintainer" in capsys.readouterr().err) is is_told
+        assert main(["generate", str(model), "--target", target, "-o", folder, "--json", *chosen]) == 0
+        assert capsys.readouterr().err == ""
 
     def test_a_maintainer_without_an_address_is_wrong_use(
         self, model: Path, capsys: pytest.CaptureFixture[str]
@@ -202,6 +233,7 @@ class TestCommand:
         [
             ("c99", "--license", "MIT"),
             ("python", "--package-version", "1.0.0"),
+            ("python", "--copyright", "2026 Bo"),
             ("cif", "--maintainer", "Bo <bo@example.org>"),
             ("ros1", "--state-message", "typed"),
             ("ros1-cpp", "--state-message", "both"),

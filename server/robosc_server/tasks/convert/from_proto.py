@@ -6,6 +6,8 @@ Requests have been accepted: their names are right.
 from collections.abc import Iterable
 
 from robosc.model.structure import Deployment
+from robosc.pipeline.loading import LoadedAutomata
+from robosc.pipeline.options import SynthesisOptions
 from robosc.source import Bundle, SourceFile
 from robosc.synthesis import EngineOptions
 from robosc.targets import GenerateOptions, PackageMetadata, StateMessage, SupervisedController
@@ -22,7 +24,8 @@ _DEPLOYMENTS = {pb.DEPLOYMENT_CONTROLLER: Deployment.CONTROLLER, pb.DEPLOYMENT_L
 
 def bundle(message: pb.Bundle) -> Bundle:
     """The texts, libraries and interfaces by name: their order in a request means nothing."""
-    return Bundle(
+    kind = Bundle if message.language in (pb.LANGUAGE_UNSPECIFIED, pb.LANGUAGE_ROBOSC) else LoadedAutomata
+    return kind(
         main=source_file(message.main),
         libraries=_sorted_files(message.libraries),
         searched=tuple(message.searched),
@@ -53,6 +56,12 @@ def engine(options: pb.SynthesisOptions, maximum_nodes: int) -> EngineOptions:
     """Return the options for making decision diagrams, with no more nodes than `maximum_nodes`."""
     nodes = min(options.maximum_nodes or maximum_nodes, maximum_nodes)
     return EngineOptions(engine_name(options), options.allow_reordering, nodes)
+
+
+def automata_options(options: pb.SynthesisOptions, maximum_nodes: int) -> SynthesisOptions:
+    """Return the options for the synthesis of automata, with no more nodes than `maximum_nodes`."""
+    nodes = min(options.maximum_nodes or maximum_nodes, maximum_nodes)
+    return SynthesisOptions(engine=engine_name(options), allow_reordering=options.allow_reordering, maximum_nodes=nodes)
 
 
 def verified_states(options: pb.SynthesisOptions) -> int:
@@ -89,7 +98,8 @@ def generation(options: pb.GenerateOptions) -> GenerateOptions:
 
 
 def _metadata(metadata: pb.PackageMetadata) -> PackageMetadata:
-    given = {name: getattr(metadata, name) for name in ("maintainer", "email", "license", "version")}
+    names = ("maintainer", "email", "license", "version", "copyright")
+    given = {name: getattr(metadata, name) for name in names}
     try:
         return PackageMetadata(**{name: text for name, text in given.items() if text})
     except ValueError as error:

@@ -49,7 +49,7 @@ def test_the_package_tells_its_test() -> None:
     assert "ament_add_gtest(test_recorded_run test/test_recorded_run.cpp" in files["CMakeLists.txt"]
     assert "<test_depend>ament_cmake_gtest</test_depend>" in files["package.xml"]
     linters = re.findall(r"<test_depend>ament_cmake_(\w+)</test_depend>", files["package.xml"])
-    assert linters == ["flake8", "gtest", "lint_cmake", "pep257", "xmllint"]
+    assert linters == ["copyright", "flake8", "gtest", "lint_cmake", "pep257", "xmllint"]
     assert "ament_lint_auto_find_test_dependencies()" in files["CMakeLists.txt"]
     # The longest line that its linter takes.
     assert max(map(len, files["launch/controller.launch.py"].splitlines())) <= 99

@@ -1,0 +1,152 @@
+"""Automata (CIF, libFAUDES, Supremica) in the commands that take them, with a server that does the work."""
+
+import argparse
+from collections.abc import Collection
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from robosc.cli import automata
+from robosc.cli.output import UsageError
+from robosc.pipeline.options import SynthesisOptions
+from robosc_client import Check, Client, Explore, Generate, Synthesize, Task, Verify
+from robosc_client.commands.numbers import checked_number
+from robosc_client.commands.progress_line import ProgressLine
+from robosc_client.commands.signed import require_signature
+
+if TYPE_CHECKING:
+    from robosc.pipeline.exploring import Exploration
+    from robosc.pipeline.findings import Findings
+    from robosc.pipeline.loading import LoadedAutomata
+    from robosc.pipeline.results import Generation, Verification
+    from robosc.pipeline.systems import SystemSynthesis
+    from robosc.signatures import PublicKey
+    from robosc.targets import GenerateOptions
+
+
+class Server:
+    """Machine of `robosc.cli.automata` that is a server, whose answers are not believed.
+
+    Args:
+        client: Connection to the server.
+        deadline_s: Time for each call, in seconds; None: any.
+        keys: Keys of which one must have signed a supervisor; none: it need not be signed.
+    """
+
+    def __init__(self, client: Client, deadline_s: float | None, keys: "Collection[PublicKey]" = ()) -> None:
+        self._client = client
+        self._deadline_s = deadline_s
+        self._keys = keys
+
+    def check(self, model: "LoadedAutomata") -> "Findings":
+        """Return every finding."""
+        return self._client.check(model, deadline_s=self._deadline_s)
+
+    def synthesize(self, model: "LoadedAutomata", options: SynthesisOptions, *, is_modular: bool) -> "SystemSynthesis":
+        """Synthesize the supervisor."""
+        from robosc_client.outcomes import automata_synthesis_of
+
+        with ProgressLine() as line:
+            found = self._client.synthesize(
+                model,
+                _sendable(options),
+                is_modular=is_modular,
+                deadline_s=self._deadline_s,
+                on_progress=line.report,
+            )
+        made = automata_synthesis_of(found, model)
+        if made.supervisor is not None and self._keys:
+            require_signature(self._keys, found.supervisor, found.signature)
+        return made
+
+    def explore(self, model: "LoadedAutomata", options: SynthesisOptions, *, maximum_states: int) -> "Exploration":
+        """Return the graph of the controlled system."""
+        from robosc_client.outcomes import automata_exploration_of
+
+        with ProgressLine() as line:
+            found = self._client.explore(
+                model,
+                _sendable(options),
+                maximum_states=checked_number(maximum_states, "--limit"),
+                deadline_s=self._deadline_s,
+                on_progress=line.report,
+            )
+        return automata_exploration_of(found, model)
+
+    def verify(
+        self, model: "LoadedAutomata", options: SynthesisOptions, *, maximum_states: int, is_strict: bool
+    ) -> "Verification":
+        """Synthesize the supervisor, and verify it."""
+        from robosc_client.outcomes import require_automata_report
+
+        if maximum_states < 1:
+            raise UsageError("--limit must be at least 1 for a server")
+        with ProgressLine() as line:
+            found = self._client.verify(
+                model,
+                options=_sendable(options),
+                maximum_states=maximum_states,
+                is_strict=is_strict,
+                deadline_s=self._deadline_s,
+                on_progress=line.report,
+            )
+        return require_automata_report(found)
+
+    def generate(
+        self,
+        model: "LoadedAutomata",
+        target: str,
+        generation: "GenerateOptions",
+        options: SynthesisOptions,
+        *,
+        initial: str | None,
+    ) -> "Generation":
+        """Generate the files of a target."""
+        with ProgressLine() as line:
+            return self._client.generate(
+                model,
+                target,
+                generation,
+                _sendable(options),
+                initial=initial,
+                deadline_s=self._deadline_s,
+                on_progress=line.report,
+            )
+
+
+def task_of(arguments: argparse.Namespace, package: str | None) -> Task:
+    """Return the task that the arguments of `submit` ask for.
+
+    Args:
+        arguments: Arguments of the command.
+        package: Name of what is generated; None: one made from the model's name.
+
+    Raises:
+        UsageError: An argument means nothing for automata, or the model cannot be read.
+    """
+    from robosc.targets import GenerateOptions
+
+    if arguments.task == "check":
+        return Check(automata.loaded(arguments))
+    options = _sendable(automata.synthesis_options(arguments))
+    match arguments.task:
+        case "synth":
+            return Synthesize(automata.loaded_for_synthesis(arguments), options, arguments.modular)
+        case "generate":
+            model = automata.loaded_for_generation(arguments)
+            return Generate(model, arguments.target, GenerateOptions(package=package), options, arguments.initial)
+        case "explore":
+            return Explore(automata.loaded(arguments), options, arguments.limit)
+        case _:
+            automata.refuse(arguments.supervisor is not None, automata.NO_FILE)
+            return Verify(
+                bundle=automata.loaded_for_verification(arguments),
+                engine=options.engine,
+                allow_reordering=options.allow_reordering,
+                maximum_nodes=options.maximum_nodes,
+                maximum_states=arguments.limit,
+                is_strict=arguments.strict,
+            )
+
+
+def _sendable(options: SynthesisOptions) -> SynthesisOptions:
+    return replace(options, maximum_nodes=checked_number(options.maximum_nodes, "--max-nodes"))

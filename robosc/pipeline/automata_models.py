@@ -1,0 +1,122 @@
+"""Automata as models: loaded from a file (CIF, libFAUDES, Supremica), checked, synthesized and verified."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from robosc.automata import CheckedSystem, System
+from robosc.errors import InvalidSupervisorError
+from robosc.expressions import conjunction
+from robosc.json_documents import diagnostics_json
+from robosc.pipeline.automata_files import check_automata_file
+from robosc.pipeline.findings import Findings
+from robosc.pipeline.loading import LoadedAutomata
+from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
+from robosc.pipeline.results import NoSupervisor, SynthesisStatus, Verification, VerificationStatus
+from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis, synthesize_system, verify_system
+
+if TYPE_CHECKING:
+    from robosc.pipeline.synthesis import OnProgress, ShouldStop
+    from robosc.verification import Limits
+
+_OF_ROBOTS = ("deployment", "allow_livelock", "verified_states")
+
+
+def checked_automata(model: LoadedAutomata, options: SynthesisOptions = DEFAULT_OPTIONS) -> CheckedSystem:
+    """Return what checking automata finds, before they are synthesized with these options.
+
+    Raises:
+        ValueError: An option is for models of robots alone.
+    """
+    for name in _OF_ROBOTS:
+        if getattr(options, name) != getattr(DEFAULT_OPTIONS, name):
+            raise ValueError(f"{name} is for models of robots, and {model.name} holds automata: leave it out")
+    return check_automata_file(model)
+
+
+def begun(system: System, initial: str) -> System:
+    """Return automata that begin only where a description of their states holds, such as `tank.level = 1`.
+
+    Raises:
+        RequestError: It names what is not there.
+    """
+    from robosc.explanation.requests import SystemRequests
+
+    return replace(system, initial=conjunction(system.initial, SystemRequests(system).state(initial)))
+
+
+def automata_synthesis(
+    model: LoadedAutomata | System,
+    options: SynthesisOptions,
+    on_progress: "OnProgress",
+    should_stop: "ShouldStop",
+    *,
+    is_modular: bool = False,
+    initial: str | None = None,
+) -> SystemSynthesis:
+    """Synthesize the supervisor of automata; parameters and errors as of `robosc.synthesize`.
+
+    Raises:
+        ValueError: An option is for models of robots alone.
+        RequestError: `initial` names what is not there.
+    """
+    found = CheckedSystem(model, ()) if isinstance(model, System) else checked_automata(model, options)
+    diagnostics = Findings(found.diagnostics, None if isinstance(model, System) else model)
+    system = found.system
+    if system is None:
+        explanation = NoSupervisor("", diagnostics)
+        return SystemSynthesis(SynthesisStatus.MODEL_ERRORS, "", None, None, diagnostics, explanation)
+    if initial is not None:
+        system = begun(system, initial)
+    made = synthesize_system(system, options, on_progress, should_stop, found.places, is_modular=is_modular)
+    return replace(made, diagnostics=diagnostics)
+
+
+def automata_verification(
+    model: LoadedAutomata,
+    options: SynthesisOptions,
+    limits: "Limits",
+    on_progress: "OnProgress",
+    should_stop: "ShouldStop",
+    *,
+    is_strict: bool,
+) -> Verification:
+    """Synthesize the supervisor of automata, and verify it by other means than it was made."""
+    from robosc.explanation import EmptyExplanation, document
+
+    made = automata_synthesis(model, options, on_progress, should_stop)
+    if made.status is SynthesisStatus.UNSUPPORTED_MODEL:
+        return Verification(VerificationStatus.UNSUPPORTED_MODEL, made.diagnostics, made.reason, {})
+    findings = diagnostics_json(made.diagnostics)
+    if made.supervisor is None:
+        explanation = document(made.explanation) if isinstance(made.explanation, EmptyExplanation) else None
+        report = {"status": str(made.status), "reason": made.reason, "explanation": explanation, **findings}
+        return Verification(VerificationStatus.NO_SUPERVISOR, made.diagnostics, made.reason, report)
+    found = verify_system(made.supervisor, options, limits, on_progress, should_stop, is_strict=is_strict)
+    return replace(found, diagnostics=made.diagnostics, report={**found.report, **findings})
+
+
+def file_verification(
+    model: LoadedAutomata,
+    supervisor: SystemSupervisor,
+    options: SynthesisOptions,
+    limits: "Limits",
+    on_progress: "OnProgress",
+    should_stop: "ShouldStop",
+    *,
+    is_strict: bool,
+) -> Verification:
+    """Verify a supervisor that was read from a file, which has to be of the automata of a model.
+
+    Raises:
+        InvalidSupervisorError: It is one of other automata.
+    """
+    checked = checked_automata(model, options)
+    diagnostics = Findings(checked.diagnostics, model)
+    findings = diagnostics_json(diagnostics)
+    if checked.system is None:
+        report = {"status": str(SynthesisStatus.MODEL_ERRORS), "reason": "", "explanation": None, **findings}
+        return Verification(VerificationStatus.NO_SUPERVISOR, diagnostics, "", report)
+    if supervisor.system != checked.system:
+        raise InvalidSupervisorError(f"the supervisor is one of other automata than those of {model.name}")
+    found = verify_system(supervisor, options, limits, on_progress, should_stop, is_strict=is_strict)
+    return replace(found, diagnostics=diagnostics, report={**found.report, **findings})

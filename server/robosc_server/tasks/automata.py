@@ -1,0 +1,127 @@
+"""Work on automata (CIF, libFAUDES, Supremica), in a worker: by the functions of the Python API."""
+
+import hashlib
+from typing import Any
+
+from robosc.certification import OutcomeStatus, Progress
+from robosc.errors import UnsupportedModelError
+from robosc.explanation import EmptyExplanation, to_text
+from robosc.exploration import Graph
+from robosc.json_documents import json_text
+from robosc.pipeline.exploring import Exploration, explore
+from robosc.pipeline.generating import generate
+from robosc.pipeline.loading import LoadedAutomata
+from robosc.pipeline.results import Generation, SynthesisStatus, VerificationStatus
+from robosc.pipeline.synthesis import synthesize
+from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis, system_summary_text
+from robosc.pipeline.verifying import verify
+from robosc.targets import GeneratedFiles, GenerateOptions
+from robosc_api.v1 import synthesis_pb2 as pb
+from robosc_server.tasks.convert import from_proto, to_proto
+from robosc_server.tasks.synthesis_attempt import OnReport
+from robosc_server.tasks.task import Report
+
+_VERDICTS = {
+    VerificationStatus.PASSED: pb.VERIFICATION_STATUS_PASSED,
+    VerificationStatus.FAILED: pb.VERIFICATION_STATUS_FAILED,
+    VerificationStatus.NOT_CHECKED: pb.VERIFICATION_STATUS_NOT_CHECKED,
+    VerificationStatus.NO_SUPERVISOR: pb.VERIFICATION_STATUS_NO_SUPERVISOR,
+    VerificationStatus.UNSUPPORTED_MODEL: pb.VERIFICATION_STATUS_UNSUPPORTED_MODEL,
+}
+
+
+class Automata:
+    """Automata of a request, and how they are synthesized.
+
+    Args:
+        model: The automata.
+        options: Options for making the supervisor.
+        maximum_nodes: Nodes of decision diagrams that are allowed, whatever the options say.
+        on_report: Callback that receives reports of the progress.
+    """
+
+    def __init__(
+        self, model: LoadedAutomata, options: pb.SynthesisOptions, maximum_nodes: int, on_report: OnReport
+    ) -> None:
+        self._model = model
+        self._options = from_proto.automata_options(options, maximum_nodes)
+        self._on_report = on_report
+
+    def synthesis(self, *, is_modular: bool) -> pb.SynthesisResult:
+        """The supervisor, with all that is told of it."""
+        made = synthesize(self._model, self._options, is_modular=is_modular, on_progress=self._report)
+        result = pb.SynthesisResult(**_result_fields(made))
+        if made.statistics is not None:
+            result.statistics.CopyFrom(to_proto.statistics(made.statistics))
+        if made.supervisor is not None:
+            try:
+                content = made.supervisor.encode()
+            except UnsupportedModelError as error:
+                # It is more than a supervisor's file can hold.
+                result.status, result.reason = pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL, str(error)
+                return result
+            result.supervisor, result.supervisor_digest = content, hashlib.sha256(content).digest()
+            result.summary.CopyFrom(_summary(made.supervisor))
+        return result
+
+    def generation(
+        self, target: str, choices: GenerateOptions, initial: str | None
+    ) -> tuple[GeneratedFiles | None, dict[str, Any]]:
+        """The files of a target, or None, and the fields of the result.
+
+        Raises:
+            RequestError: `initial` names what is not there.
+            UnknownTargetError: There is no such target.
+        """
+        made = generate(self._model, target, choices, self._options, initial=initial, on_progress=self._report)
+        return made.files, _result_fields(made)
+
+    def exploration(self, maximum_states: int) -> tuple[Graph | None, dict[str, Any]]:
+        """The graph of the controlled system, or None, and the fields of the result."""
+        made = explore(self._model, self._options, maximum_states=maximum_states, on_progress=self._report)
+        return made.graph, _result_fields(made)
+
+    def verification(self, maximum_states: int, *, is_strict: bool) -> pb.VerificationResult:
+        """The report about a supervisor that is made."""
+        found = verify(
+            self._model,
+            options=self._options,
+            maximum_states=maximum_states,
+            is_strict=is_strict,
+            on_progress=self._report,
+        )
+        return pb.VerificationResult(
+            status=_VERDICTS[found.status],
+            diagnostics=to_proto.findings(found.diagnostics),
+            reason=found.reason,
+            report=json_text(found.report) if found.report else "",
+        )
+
+    def _report(self, progress: Progress) -> None:
+        self._on_report(Report(progress.stage, progress.message))
+
+
+def _result_fields(made: SystemSynthesis | Generation | Exploration) -> dict[str, Any]:
+    is_supported = made.status is not SynthesisStatus.UNSUPPORTED_MODEL
+    return {
+        "status": to_proto.STATUSES[OutcomeStatus(str(made.status))]
+        if is_supported
+        else pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL,
+        "diagnostics": to_proto.findings(made.diagnostics),
+        "reason": made.reason,
+        "explanation": to_text(made.explanation) if isinstance(made.explanation, EmptyExplanation) else "",
+    }
+
+
+def _summary(supervisor: SystemSupervisor) -> pb.Summary:
+    controllable = sum(event.is_controllable for event in supervisor.system.events)
+    return pb.Summary(
+        controllable_events=controllable,
+        uncontrollable_events=len(supervisor.system.events) - controllable,
+        states=str(supervisor.states),
+        added=[
+            pb.AddedCondition(event=event, condition=str(condition))
+            for event, condition in supervisor.conditions.items()
+        ],
+        text=system_summary_text(supervisor),
+    )

@@ -78,7 +78,7 @@ class OpenCrBase:
             LineError: The line cannot be used.
             DeviceSilentError: Nothing answers.
             WrongDeviceError: It is another device, firmware or robot.
-            DeviceFaultError: The board has found no motors, or a motor does not let go.
+            DeviceFaultError: The board has found no motors, keeps a profile acceleration, or a motor does not let go.
         """
         self.close()
         line = self._host.open_port(self._path, BAUD)
@@ -91,6 +91,7 @@ class OpenCrBase:
             self._following.forget()
             self._check_identity(self._bus)
             self._check_motors(self._bus)
+            self._clear_profile(self._bus)
             self._comes_to_rest()
             self._switch_torque(False)
             if self._calibrates_gyro:
@@ -217,6 +218,13 @@ class OpenCrBase:
         bus.begin(self._exchange_limit_s)
         # The first one must be another than the board knows.
         self._heartbeat = bus.read(opencr.DEVICE, opencr.HEARTBEAT, 1).data[0]
+
+    def _clear_profile(self, bus: DynamixelBus) -> None:
+        # With one that other software has left, a goal of zero is a long way to a standstill.
+        bus.begin(self._exchange_limit_s)
+        bus.write(opencr.DEVICE, opencr.PROFILE_ACCELERATIONS, opencr.NO_PROFILE)
+        if bus.read(opencr.DEVICE, opencr.PROFILE_ACCELERATIONS, len(opencr.NO_PROFILE)).data != opencr.NO_PROFILE:
+            raise DeviceFaultError(f"{self._path}: OpenCR keeps a profile acceleration; switch the robot off and on")
 
     def _calibrate(self, bus: DynamixelBus) -> None:
         # The board does nothing else until it is done, and answers then.

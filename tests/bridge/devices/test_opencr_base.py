@@ -55,6 +55,17 @@ def test_it_begins_with_a_ping_and_reads_the_status_before_anything_moves(bench:
     assert TORQUE_ON not in packets
 
 
+def test_accelerations_that_other_software_has_left_are_cleared(bench: Rig) -> None:
+    for servo in (bench.robot.left, bench.robot.right):
+        servo.table["profile acceleration"] = 5
+    bench.start()
+    assert [servo.table["profile acceleration"] for servo in (bench.robot.left, bench.robot.right)] == [0, 0]
+    bench.drive(Velocity(0.2), 0.3)
+    begin_s = bench.host.monotonic()
+    bench.drive_until(lambda reading: reading.wheels_m_s == (0.0, 0.0))
+    assert bench.host.monotonic() - begin_s < 0.1
+
+
 def test_torque_is_switched_on_as_worked_after_a_command_of_zero(bench: Rig) -> None:
     bench.base.open()
     bench.tap.packets.clear()
@@ -213,6 +224,14 @@ def test_what_is_no_sound_turtlebot_is_refused(
         with pytest.raises(DeviceError, match=problem):
             base.open()
         assert all(request[7] in (1, 2) for request in peer.requests)
+
+
+def test_an_acceleration_that_the_board_keeps_is_told() -> None:
+    registers = {2: b"\1", 18: b"\0", 148: b"\1", 174: b"\5"}
+    with VirtualPeer(_answers(0x5000, 5, registers)) as peer:  # type: ignore[arg-type]
+        base = OpenCrBase(peer.path, BURGER, answer_limit_s=PATIENT_S, host=peer.time)
+        with pytest.raises(DeviceFaultError, match="OpenCR keeps a profile acceleration; switch the robot off and on"):
+            base.open()
 
 
 def test_answers_to_an_earlier_session_are_not_taken_for_what_the_board_is() -> None:

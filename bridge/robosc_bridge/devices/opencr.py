@@ -195,9 +195,13 @@ class OpenCrBase:
         if model != opencr.MODEL_NUMBER:
             raise WrongDeviceError(f"{self._path}: this is device model {model}, not an OpenCR ({opencr.MODEL_NUMBER})")
         if firmware != opencr.FIRMWARE:
+            advice = (
+                "it is from before October 2022; update it to TurtleBot3's present ROS 2 firmware"
+                if firmware < opencr.FIRMWARE
+                else f"it is newer than is known here; update the bridge, or load version {opencr.FIRMWARE}"
+            )
             raise WrongDeviceError(
-                f"{self._path}: OpenCR has firmware version {firmware} instead of {opencr.FIRMWARE}; "
-                "load TurtleBot3's ROS 2 firmware onto it"
+                f"{self._path}: OpenCR has firmware version {firmware} instead of {opencr.FIRMWARE}: {advice}"
             )
         information = int.from_bytes(bus.read(opencr.DEVICE, opencr.MODEL_INFORMATION, 4).data, "little")
         if information not in self._robot.opencr_information:

@@ -211,7 +211,9 @@ def _answers(model: int, firmware: int, registers: dict[int, bytes]) -> object:
     ("model", "firmware", "registers", "problem"),
     [
         (1060, 45, {}, "this is device model 1060, not an OpenCR"),
-        (0x5000, 4, {}, "firmware version 4 instead of 5; load"),
+        (0x5000, 1, {}, "firmware version 1 instead of 5: it is from before October 2022; update it"),
+        (0x5000, 4, {}, "firmware version 4 instead of 5: it is from before October 2022; update it"),
+        (0x5000, 6, {}, "firmware version 6 instead of 5: it is newer than is known here; update the bridge, or load"),
         (0x5000, 5, {2: b"\1", 18: b"\xff", 148: b"\1"}, "found no wheel motors"),
         (0x5000, 5, {2: b"\1", 18: b"\0", 148: b"\0"}, "found no wheel motors"),
     ],

@@ -110,6 +110,8 @@ def test_drive_modes_other_than_the_factorys_are_respected(modes: tuple[int, int
     [
         ("drive mode", 4, r"motor 1 \(left\) has drive mode 4: a time-based profile.* set address 10 to 0"),
         ("drive mode", 9, r"motor 1 \(left\) has drive mode 9: .*torque that a goal switches on; set address 10 to 1"),
+        ("startup configuration", 1, r"motor 1 \(left\) would switch torque on by itself, .* set address 60 to 0"),
+        ("startup configuration", 2, r"motor 1 \(left\) would .* restore an old goal, .* set address 60 to 0"),
         ("shutdown", 0, r"motor 1 \(left\) would not protect itself .* set address 63 to 52"),
         ("model number", 1200, r"motor 1 \(left\) is of model 1200; what can be driven is XM430-W210 \(1030\), XL430"),
         ("model number", 1030, r"motor 1 \(left\) is of model 1030, .*motor 2 \(right\) of 1060; they must be alike"),
@@ -121,6 +123,14 @@ def test_what_cannot_be_driven_is_refused_with_what_to_do(bench: Rig, item: str,
     with pytest.raises(WrongDeviceError, match=problem):
         bench.base.open()
     assert not [packet for packet in bench.tap.packets if packet.split()[7] in ("03", "83")]
+
+
+def test_a_motor_without_a_startup_configuration_can_be_driven(bench: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    left = bench.robot.left
+    read = left.read
+    monkeypatch.setattr(left, "read", lambda address, length: (7, b"") if address == 60 else read(address, length))
+    bench.start()
+    assert bench.drive(FORWARD, 0.2).velocity.linear_m_s == pytest.approx(0.15, abs=0.001)
 
 
 def test_a_smaller_velocity_limit_is_kept(bench: Rig) -> None:

@@ -1,6 +1,7 @@
 """A stock TurtleBot3 through its OpenCR: what it is told byte for byte, and what can be wrong with it."""
 
 import itertools
+import math
 import struct
 from collections.abc import Iterator
 
@@ -147,13 +148,13 @@ def test_the_gyroscope_sees_the_turn(bench: Rig) -> None:
 
 
 def test_the_gyroscope_is_calibrated_at_rest_if_asked_to() -> None:
-    with rig("opencr", calibration_s=0.8) as bench:
+    with rig("opencr", calibration_s=1.5) as bench:
         bench.base = OpenCrBase(
             bench.robot.base_path, BURGER, calibrates_gyro=True, answer_limit_s=PATIENT_S, host=bench.host
         )
         begin_s = bench.host.monotonic()
         bench.base.open()
-        assert bench.host.monotonic() - begin_s >= 0.8
+        assert bench.host.monotonic() - begin_s >= 1.5
         packets = bench.tap.packets
         assert packets.count(CALIBRATE) == 1
         assert ZERO in packets[: packets.index(CALIBRATE)]
@@ -302,6 +303,48 @@ def test_a_board_that_has_started_anew_must_be_opened_again(bench: Rig) -> None:
             bench.base.exchange(Velocity(0.1))
     bench.base.open()
     assert not bench.drive().is_torque_on
+
+
+@pytest.mark.parametrize(
+    ("uptime_s", "problem"),
+    [
+        (9.0, "OpenCR has started anew; it must be opened again"),
+        (11.0, "the computer stood still or OpenCR has started anew; it must be opened again"),
+    ],
+)
+def test_a_board_whose_time_is_another_than_the_computers_has_restarted(
+    bench: Rig, uptime_s: float, problem: str
+) -> None:
+    bench.start()
+    bench.drive(Velocity(0.1), 0.2)
+    _board(bench)._began_s += 10.0 - uptime_s + math.copysign(0.1, 10.0 - uptime_s)
+    bench.host.sleep(10.0)
+    for _ in range(2):
+        with pytest.raises(DeviceError, match=problem):
+            bench.base.exchange(Velocity(0.1))
+        # It was commanded before it was known, which must not last.
+        bench.host.sleep(0.05)
+        assert bench.goals_rad_s() == (0.0, 0.0)
+    bench.base.open()
+    assert not bench.drive().is_torque_on
+
+
+@pytest.mark.parametrize("lead_s", [-0.9, 0.0, 0.6])
+def test_a_board_whose_time_is_nearly_the_computers_goes_on(bench: Rig, lead_s: float) -> None:
+    bench.start()
+    bench.drive(Velocity(0.1), 0.2)
+    _board(bench)._began_s -= lead_s
+    bench.host.sleep(10.0)
+    assert bench.drive(Velocity(0.1), 0.2).velocity.linear_m_s == pytest.approx(0.1, abs=0.002)
+
+
+def test_answers_that_are_late_are_no_restart() -> None:
+    with rig("opencr", answer_limit_s=2.0) as bench:
+        bench.start()
+        bench.robot.base_faults.delay_s = 1.5
+        bench.base.exchange(Velocity())
+        bench.robot.base_faults.delay_s = 0.0
+        assert bench.drive(Velocity(0.1), 0.2).velocity.linear_m_s == pytest.approx(0.1, abs=0.002)
 
 
 def test_torque_is_not_switched_on_while_the_wheels_turn(bench: Rig) -> None:

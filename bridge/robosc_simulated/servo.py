@@ -4,6 +4,7 @@ After the ROBOTIS e-Manual, pages XL430-W250 and XM430-W210. Where it is silent,
 careful with is taken:
 
 - a goal velocity that is written while torque is off is kept, and drives the wheel when torque comes on;
+- a bus watchdog that trips stops the wheel and leaves the goals, which drive it again once the watchdog is cleared;
 - only packets for this servo (its ID, or broadcast) feed its bus watchdog;
 - torque cannot be switched on with a hardware error that has shut it off (error 1), nor is that error forgotten.
 
@@ -174,8 +175,7 @@ class Servo:
         periods = self.table["bus watchdog"]
         if is_driven and 0 < periods < 0xFF and now_s - self._heard_s > periods * _WATCHDOG_S:
             self.table["bus watchdog"] = 0xFF
-            for name in ("goal velocity", "goal pwm", "profile acceleration", "profile velocity"):
-                self.table[name] = 0
+            self.table["profile acceleration"] = self.table["profile velocity"] = 0
             self._drive()
         if not (is_driven and self._wheel.is_blocked and self._wheel.goal_rad_s):
             self._blocked_s = None
@@ -299,6 +299,8 @@ class Servo:
         wheel.is_driven = self._has_power and bool(table["torque enable"])
         fastest_rad_s = table.model.no_load_rpm * 2 * math.pi / 60 * self.voltage_v / 12.0
         match table["operating mode"]:
+            case _ if table["bus watchdog"] == 0xFF:
+                wanted_rad_s = 0.0
             case 1:
                 wanted_rad_s = table["goal velocity"] * RAW_RAD_S
             case 16:

@@ -9,6 +9,7 @@ here (it reads the device status before it has one, and takes old readings for n
 
 import contextlib
 from collections.abc import Callable
+from typing import NoReturn
 
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, DynamixelBus, exchange_limit_s
 from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFault, Velocity
@@ -31,6 +32,9 @@ _TORQUE_LIMIT_S = 1.0
 _REFRESHED_MS = 45  # Two refreshes, every 20 ms, of what the board knows of its motors.
 _POLL_S = 0.01
 _UPTIME_MODULUS = 2**32
+# Differences between the board's time and the computer's, from one reading to the next, that a restart is told from.
+_LEAD_S = 0.7
+_LAG_S = 1.0
 
 
 class OpenCrBase:
@@ -67,7 +71,8 @@ class OpenCrBase:
         self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m)
         self._following = FollowingMonitor()
         self._heartbeat = 0
-        self._uptime_ms: int | None = None
+        # The uptime in the last block, and when that was asked for and received.
+        self._uptime: tuple[int, float, float] | None = None
         self._is_torque_wanted = False
         self._is_torque_lost = False
 
@@ -78,19 +83,21 @@ class OpenCrBase:
             LineError: The line cannot be used.
             DeviceSilentError: Nothing answers.
             WrongDeviceError: It is another device, firmware or robot.
-            DeviceFaultError: The board has found no motors, or a motor does not let go.
+            DeviceFaultError: The board has found no motors, keeps a profile acceleration, or a motor does not let go.
         """
         self.close()
         line = self._host.open_port(self._path, BAUD)
         try:
             self._line = line
             self._bus = DynamixelBus(line, lambda device: f"{self._path}: OpenCR", self._answer_limit_s, self._host)
-            self._uptime_ms = None
+            self._uptime = None
             self._is_torque_wanted = self._is_torque_lost = False
             self._odometry = self._odometry.rebased()
             self._following.forget()
             self._check_identity(self._bus)
             self._check_motors(self._bus)
+            self._clear_profile(self._bus)
+            self._await_refresh()
             self._comes_to_rest()
             self._switch_torque(False)
             if self._calibrates_gyro:
@@ -127,7 +134,7 @@ class OpenCrBase:
         Raises:
             LineError: The line is gone.
             DeviceSilentError: The board did not answer, also when asked again; it has been told to stop.
-            DeviceError: The board has started anew.
+            DeviceError: The board has started anew, or the computer stood still; the board has been told to stop.
         """
         try:
             return self._exchange(velocity)
@@ -194,9 +201,13 @@ class OpenCrBase:
         if model != opencr.MODEL_NUMBER:
             raise WrongDeviceError(f"{self._path}: this is device model {model}, not an OpenCR ({opencr.MODEL_NUMBER})")
         if firmware != opencr.FIRMWARE:
+            advice = (
+                "it is from before October 2022; update it to TurtleBot3's present ROS 2 firmware"
+                if firmware < opencr.FIRMWARE
+                else f"it is newer than is known here; update the bridge, or load version {opencr.FIRMWARE}"
+            )
             raise WrongDeviceError(
-                f"{self._path}: OpenCR has firmware version {firmware} instead of {opencr.FIRMWARE}; "
-                "load TurtleBot3's ROS 2 firmware onto it"
+                f"{self._path}: OpenCR has firmware version {firmware} instead of {opencr.FIRMWARE}: {advice}"
             )
         information = int.from_bytes(bus.read(opencr.DEVICE, opencr.MODEL_INFORMATION, 4).data, "little")
         if information not in self._robot.opencr_information:
@@ -218,10 +229,22 @@ class OpenCrBase:
         # The first one must be another than the board knows.
         self._heartbeat = bus.read(opencr.DEVICE, opencr.HEARTBEAT, 1).data[0]
 
+    def _clear_profile(self, bus: DynamixelBus) -> None:
+        # With one that other software has left, a goal of zero is a long way to a standstill.
+        bus.begin(self._exchange_limit_s)
+        bus.write(opencr.DEVICE, opencr.PROFILE_ACCELERATIONS, opencr.NO_PROFILE)
+        if bus.read(opencr.DEVICE, opencr.PROFILE_ACCELERATIONS, len(opencr.NO_PROFILE)).data != opencr.NO_PROFILE:
+            raise DeviceFaultError(f"{self._path}: OpenCR keeps a profile acceleration; switch the robot off and on")
+
     def _calibrate(self, bus: DynamixelBus) -> None:
         # The board does nothing else until it is done, and answers then.
         bus.begin(_CALIBRATION_LIMIT_S)
         bus.write(opencr.DEVICE, opencr.CALIBRATE_GYRO, b"\1", _CALIBRATION_LIMIT_S)
+        self._await_refresh()
+
+    def _await_refresh(self) -> None:
+        # After a calibration, which another program may have begun, the board first tells an uptime from before it.
+        self._host.sleep(_REFRESHED_MS / 1000)
 
     def _comes_to_rest(self) -> bool:
         """Command zero and wait for the wheels; whether they came to rest in time."""
@@ -260,20 +283,31 @@ class OpenCrBase:
             self._command(words)
         self._heartbeat = (self._heartbeat + 1) % 256
         bus.write(opencr.DEVICE, opencr.HEARTBEAT, bytes((self._heartbeat,)))
+        asked_s = self._host.monotonic()
         block = decode_block(bus.read(opencr.DEVICE, opencr.BLOCK_ADDRESS, opencr.BLOCK_LENGTH).data)
-        self._check_uptime(block.uptime_ms)
+        self._check_uptime(block.uptime_ms, asked_s)
         return block
 
     def _command(self, words: tuple[int, int]) -> None:
         self._used_bus.write(opencr.DEVICE, opencr.COMMAND, encode_command(*words))
 
-    def _check_uptime(self, uptime_ms: int) -> None:
-        before_ms = self._uptime_ms
-        if before_ms is not None and (uptime_ms - before_ms) % _UPTIME_MODULUS > _UPTIME_MODULUS // 2:
-            # It switches torque on by itself when it starts, and its motors count anew.
-            self._is_torque_wanted = False
-            raise DeviceError(f"{self._path}: OpenCR has started anew; it must be opened again")
-        self._uptime_ms = uptime_ms
+    def _check_uptime(self, uptime_ms: int, asked_s: float) -> None:
+        received_s = self._used_bus.received_s
+        if self._uptime is not None:
+            before_ms, before_asked_s, before_received_s = self._uptime
+            half = _UPTIME_MODULUS // 2
+            passed_s = ((uptime_ms - before_ms + half) % _UPTIME_MODULUS - half) / 1000
+            if passed_s < max(0.0, asked_s - before_received_s - _LAG_S):
+                self._give_up("OpenCR has started anew")
+            if passed_s > received_s - before_asked_s + _LEAD_S:
+                self._give_up("the computer stood still or OpenCR has started anew")
+        self._uptime = uptime_ms, asked_s, received_s
+
+    def _give_up(self, problem: str) -> NoReturn:
+        # The board switches torque on by itself when it starts, and its motors count anew.
+        self._is_torque_wanted = False
+        self._used_bus.tell(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
+        raise DeviceError(f"{self._path}: {problem}; it must be opened again")
 
     def _wheels_raw(self, words: tuple[int, int]) -> tuple[int, int]:
         velocity = Velocity(words[0] / 100, words[1] / 100)

@@ -98,9 +98,11 @@ class ServoPair:
         self.halt()
         if not self.stops_in_time():
             raise DeviceError(f"{self._names[self.motors[0]]} or {self._names[self.motors[1]]} still rotates")
+        # A servo keeps its goal when its watchdog trips, and goes on once it is cleared: torque must be off then.
+        self._write_both(servo.TORQUE, 0, "does not let go")
         for motor in self.motors:
             self._bus.begin(self._limit_s)
-            # First the watchdog: a tripped one lets nothing else be written.
+            # First the watchdog: a tripped one lets no goal be written.
             self._bus.write(motor, servo.BUS_WATCHDOG, b"\0")
             self._bus.write(motor, servo.PROFILE_ACCELERATION, acceleration_raw.to_bytes(4, "little"))
             self._bus.write(motor, servo.GOAL_VELOCITY, encode_velocity(0))
@@ -109,7 +111,7 @@ class ServoPair:
         self._write_both(servo.BUS_WATCHDOG, watchdog, "does not arm its bus watchdog")
 
     def release_torque(self) -> None:
-        """Goal zero, wait for the wheels, watchdogs and torque off.
+        """Goal zero, wait for the wheels, torque off, then watchdogs off.
 
         Raises:
             LineError: The line is gone.
@@ -118,9 +120,11 @@ class ServoPair:
         self.halt()
         try:
             self.stops_in_time()
-            self._write_both(servo.BUS_WATCHDOG, 0, "does not disarm its bus watchdog")
             self._write_both(servo.TORQUE, 0, "does not let go")
+            # Not before: one that has tripped keeps its goal, and goes on once it is cleared.
+            self._write_both(servo.BUS_WATCHDOG, 0, "does not disarm its bus watchdog")
         except DeviceError:
+            # Watchdogs stay: they alone may stop a motor that did not let go.
             self._bus.sync_write(servo.TORQUE, dict.fromkeys(self.motors, b"\0"))
             raise
 

@@ -1,12 +1,14 @@
 """Settings of a wheel servo, and the check that it can be driven with them."""
 
+import contextlib
 from dataclasses import dataclass
 
-from robosc_bridge.devices.dynamixel_bus import DynamixelBus
+from robosc_bridge.devices.dynamixel_bus import DynamixelBus, RefusedError
 from robosc_bridge.devices.robots import MOTORS
 from robosc_bridge.errors import WrongDeviceError
 from robosc_bridge.protocol import servo
 
+_STARTUP = servo.STARTUP_TORQUE | servo.STARTUP_RESTORE
 _SHUTDOWN = servo.OVERHEATING | servo.SHOCK | servo.OVERLOAD
 
 
@@ -64,6 +66,15 @@ def read_settings(bus: DynamixelBus, device: int, name: str, is_mirrored: bool, 
         raise WrongDeviceError(
             f"{name} has drive mode {drive_mode}: a time-based profile, or torque that a goal switches on; "
             f"set address {servo.DRIVE_MODE} to {drive_mode & servo.REVERSE}"
+        )
+    startup = 0
+    # Older firmware may not have it.
+    with contextlib.suppress(RefusedError):
+        startup = number(servo.STARTUP, 1)
+    if startup & _STARTUP:
+        raise WrongDeviceError(
+            f"{name} would switch torque on by itself, or restore an old goal, whenever it starts "
+            f"(startup configuration {startup}); set address {servo.STARTUP} to {startup & ~_STARTUP}"
         )
     bus.begin(limit_s)
     shutdown = number(servo.SHUTDOWN, 1)

@@ -10,6 +10,7 @@ DRIVE_MODE = 10
 OPERATING_MODE = 11
 TEMPERATURE_LIMIT = 31
 VELOCITY_LIMIT = 44
+STARTUP = 60
 SHUTDOWN = 63
 TORQUE = 64
 LED = 65
@@ -24,6 +25,9 @@ MEASUREMENT_LENGTH = 21
 
 REVERSE = 0x01
 """Bit of the drive mode."""
+
+STARTUP_TORQUE, STARTUP_RESTORE = 0x01, 0x02
+"""Bits of the startup configuration: torque on, and the RAM as it was, when it starts."""
 
 VELOCITY_MODE = 1
 

@@ -1,7 +1,7 @@
 """Two servos as wheels: what they are told byte for byte, and what can be wrong with them."""
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import pytest
 
@@ -9,9 +9,12 @@ from robosc_bridge.devices.dynamixel import DynamixelBase
 from robosc_bridge.devices.interface import MotorFault, Velocity
 from robosc_bridge.devices.robots import BURGER
 from robosc_bridge.errors import DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
+from robosc_simulated.line import Sending
 from support.drive import PATIENT_S, Rig, rig
 
 PINGS = ("ff ff fd 00 01 03 00 01 19 4e",)
+
+DISARM = "ff ff fd 00 fe 0b 00 83 62 00 01 00 01 00 02 00 "
 
 TORQUE_ON = "ff ff fd 00 fe 0b 00 83 40 00 01 00 01 01 02 01 c7 64"
 
@@ -107,6 +110,8 @@ def test_drive_modes_other_than_the_factorys_are_respected(modes: tuple[int, int
     [
         ("drive mode", 4, r"motor 1 \(left\) has drive mode 4: a time-based profile.* set address 10 to 0"),
         ("drive mode", 9, r"motor 1 \(left\) has drive mode 9: .*torque that a goal switches on; set address 10 to 1"),
+        ("startup configuration", 1, r"motor 1 \(left\) would switch torque on by itself, .* set address 60 to 0"),
+        ("startup configuration", 2, r"motor 1 \(left\) would .* restore an old goal, .* set address 60 to 0"),
         ("shutdown", 0, r"motor 1 \(left\) would not protect itself .* set address 63 to 52"),
         ("model number", 1200, r"motor 1 \(left\) is of model 1200; what can be driven is XM430-W210 \(1030\), XL430"),
         ("model number", 1030, r"motor 1 \(left\) is of model 1030, .*motor 2 \(right\) of 1060; they must be alike"),
@@ -118,6 +123,14 @@ def test_what_cannot_be_driven_is_refused_with_what_to_do(bench: Rig, item: str,
     with pytest.raises(WrongDeviceError, match=problem):
         bench.base.open()
     assert not [packet for packet in bench.tap.packets if packet.split()[7] in ("03", "83")]
+
+
+def test_a_motor_without_a_startup_configuration_can_be_driven(bench: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    left = bench.robot.left
+    read = left.read
+    monkeypatch.setattr(left, "read", lambda address, length: (7, b"") if address == 60 else read(address, length))
+    bench.start()
+    assert bench.drive(FORWARD, 0.2).velocity.linear_m_s == pytest.approx(0.15, abs=0.001)
 
 
 def test_a_smaller_velocity_limit_is_kept(bench: Rig) -> None:
@@ -238,6 +251,29 @@ def test_a_pause_that_trips_the_watchdogs_is_told_and_nothing_goes_on_by_itself(
     assert bench.goals_rad_s() != (0.0, 0.0)
 
 
+@pytest.mark.parametrize("is_on", [True, False])
+def test_motors_whose_watchdogs_tripped_do_not_go_on_when_torque_is_switched(
+    bench: Rig, monkeypatch: pytest.MonkeyPatch, is_on: bool
+) -> None:
+    bench.start()
+    bench.drive(FORWARD, 0.2)
+    bench.host.sleep(0.7)
+    goals = []
+
+    def received(data: bytes, baud: int, receive: Callable[..., Iterable[Sending]] = bench.tap.receive) -> object:
+        answers = receive(data, baud)
+        goals.append(bench.goals_rad_s())
+        return answers
+
+    monkeypatch.setattr(bench.tap, "receive", received)
+    bench.tap.packets.clear()
+    bench.base.set_torque(is_on)
+    assert set(goals) == {(0.0, 0.0)}
+    writes = [packet.split()[7:9] for packet in bench.tap.packets if packet.split()[7] in ("03", "83")]
+    cleared = ["03", "62"] if is_on else ["83", "62"]
+    assert writes.index(["83", "40"]) < writes.index(cleared)
+
+
 def test_a_motor_that_was_away_has_not_jumped(bench: Rig) -> None:
     bench.robot.left.set_position(4096 + 1000)
     bench.start()
@@ -286,9 +322,11 @@ def test_a_silent_motor_does_not_keep_the_other_one_from_being_let_go(bench: Rig
     bench.start()
     bench.drive(FORWARD, 0.1)
     bench.robot.left.brown_out(0.0)
+    bench.tap.packets.clear()
     bench.base.close()
     bench.until(lambda: not bench.robot.right.table["torque enable"])
     assert bench.goals_rad_s() == (0.0, 0.0)
+    assert not [packet for packet in bench.tap.packets if packet.startswith(DISARM)]
 
 
 HARDWARE = "ff ff fd 00 01 07 00 02 46 00 01 00 3c a3"

@@ -1,6 +1,7 @@
 """A stock TurtleBot3 through its OpenCR: what it is told byte for byte, and what can be wrong with it."""
 
 import itertools
+import math
 import struct
 from collections.abc import Iterator
 
@@ -53,6 +54,17 @@ def test_it_begins_with_a_ping_and_reads_the_status_before_anything_moves(bench:
     assert all(packet.split()[7] in ("01", "02") for packet in packets[: begin + 2])
     assert ZERO in packets[begin:]
     assert TORQUE_ON not in packets
+
+
+def test_accelerations_that_other_software_has_left_are_cleared(bench: Rig) -> None:
+    for servo in (bench.robot.left, bench.robot.right):
+        servo.table["profile acceleration"] = 5
+    bench.start()
+    assert [servo.table["profile acceleration"] for servo in (bench.robot.left, bench.robot.right)] == [0, 0]
+    bench.drive(Velocity(0.2), 0.3)
+    begin_s = bench.host.monotonic()
+    bench.drive_until(lambda reading: reading.wheels_m_s == (0.0, 0.0))
+    assert bench.host.monotonic() - begin_s < 0.1
 
 
 def test_torque_is_switched_on_as_worked_after_a_command_of_zero(bench: Rig) -> None:
@@ -136,13 +148,13 @@ def test_the_gyroscope_sees_the_turn(bench: Rig) -> None:
 
 
 def test_the_gyroscope_is_calibrated_at_rest_if_asked_to() -> None:
-    with rig("opencr", calibration_s=0.8) as bench:
+    with rig("opencr", calibration_s=1.5) as bench:
         bench.base = OpenCrBase(
             bench.robot.base_path, BURGER, calibrates_gyro=True, answer_limit_s=PATIENT_S, host=bench.host
         )
         begin_s = bench.host.monotonic()
         bench.base.open()
-        assert bench.host.monotonic() - begin_s >= 0.8
+        assert bench.host.monotonic() - begin_s >= 1.5
         packets = bench.tap.packets
         assert packets.count(CALIBRATE) == 1
         assert ZERO in packets[: packets.index(CALIBRATE)]
@@ -200,7 +212,9 @@ def _answers(model: int, firmware: int, registers: dict[int, bytes]) -> object:
     ("model", "firmware", "registers", "problem"),
     [
         (1060, 45, {}, "this is device model 1060, not an OpenCR"),
-        (0x5000, 4, {}, "firmware version 4 instead of 5; load"),
+        (0x5000, 1, {}, "firmware version 1 instead of 5: it is from before October 2022; update it"),
+        (0x5000, 4, {}, "firmware version 4 instead of 5: it is from before October 2022; update it"),
+        (0x5000, 6, {}, "firmware version 6 instead of 5: it is newer than is known here; update the bridge, or load"),
         (0x5000, 5, {2: b"\1", 18: b"\xff", 148: b"\1"}, "found no wheel motors"),
         (0x5000, 5, {2: b"\1", 18: b"\0", 148: b"\0"}, "found no wheel motors"),
     ],
@@ -213,6 +227,14 @@ def test_what_is_no_sound_turtlebot_is_refused(
         with pytest.raises(DeviceError, match=problem):
             base.open()
         assert all(request[7] in (1, 2) for request in peer.requests)
+
+
+def test_an_acceleration_that_the_board_keeps_is_told() -> None:
+    registers = {2: b"\1", 18: b"\0", 148: b"\1", 174: b"\5"}
+    with VirtualPeer(_answers(0x5000, 5, registers)) as peer:  # type: ignore[arg-type]
+        base = OpenCrBase(peer.path, BURGER, answer_limit_s=PATIENT_S, host=peer.time)
+        with pytest.raises(DeviceFaultError, match="OpenCR keeps a profile acceleration; switch the robot off and on"):
+            base.open()
 
 
 def test_answers_to_an_earlier_session_are_not_taken_for_what_the_board_is() -> None:
@@ -281,6 +303,48 @@ def test_a_board_that_has_started_anew_must_be_opened_again(bench: Rig) -> None:
             bench.base.exchange(Velocity(0.1))
     bench.base.open()
     assert not bench.drive().is_torque_on
+
+
+@pytest.mark.parametrize(
+    ("uptime_s", "problem"),
+    [
+        (9.0, "OpenCR has started anew; it must be opened again"),
+        (11.0, "the computer stood still or OpenCR has started anew; it must be opened again"),
+    ],
+)
+def test_a_board_whose_time_is_another_than_the_computers_has_restarted(
+    bench: Rig, uptime_s: float, problem: str
+) -> None:
+    bench.start()
+    bench.drive(Velocity(0.1), 0.2)
+    _board(bench)._began_s += 10.0 - uptime_s + math.copysign(0.1, 10.0 - uptime_s)
+    bench.host.sleep(10.0)
+    for _ in range(2):
+        with pytest.raises(DeviceError, match=problem):
+            bench.base.exchange(Velocity(0.1))
+        # It was commanded before it was known, which must not last.
+        bench.host.sleep(0.05)
+        assert bench.goals_rad_s() == (0.0, 0.0)
+    bench.base.open()
+    assert not bench.drive().is_torque_on
+
+
+@pytest.mark.parametrize("lead_s", [-0.9, 0.0, 0.6])
+def test_a_board_whose_time_is_nearly_the_computers_goes_on(bench: Rig, lead_s: float) -> None:
+    bench.start()
+    bench.drive(Velocity(0.1), 0.2)
+    _board(bench)._began_s -= lead_s
+    bench.host.sleep(10.0)
+    assert bench.drive(Velocity(0.1), 0.2).velocity.linear_m_s == pytest.approx(0.1, abs=0.002)
+
+
+def test_answers_that_are_late_are_no_restart() -> None:
+    with rig("opencr", answer_limit_s=2.0) as bench:
+        bench.start()
+        bench.robot.base_faults.delay_s = 1.5
+        bench.base.exchange(Velocity())
+        bench.robot.base_faults.delay_s = 0.0
+        assert bench.drive(Velocity(0.1), 0.2).velocity.linear_m_s == pytest.approx(0.1, abs=0.002)
 
 
 def test_torque_is_not_switched_on_while_the_wheels_turn(bench: Rig) -> None:

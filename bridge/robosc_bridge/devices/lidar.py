@@ -127,8 +127,8 @@ class Lidar[Frame]:
         """The next full revolution; when one read brings several, the newest.
 
         To be called again and again: it also sends what a restart still owes, and tries another speed while no
-        well-formed frame has come. What waited in the line while nobody asked for so long that it is stale is
-        discarded.
+        well-formed frame has come. What waited in the line while nobody asked, or while the process was paused, for so
+        long that it is stale is discarded.
 
         Args:
             limit_s: Longest wait.
@@ -142,14 +142,14 @@ class Lidar[Frame]:
         line = self._opened()
         now_s = self._clock()
         end_s = now_s + limit_s
-        if now_s - self._listened_s > self._model.stale_after_s:
-            line.discard_input()
-            self._forget(now_s)
+        self._discard_stale(line, now_s)
         while True:
             due_s = self._keep_on(line, now_s)
             data = line.read(min(end_s, due_s) - now_s)
-            now_s = self._listened_s = self._clock()
-            revolution = self._decode(data, now_s) if data else None
+            now_s = self._clock()
+            # A process that was paused while it read has got the oldest bytes of those that waited.
+            is_stale = self._discard_stale(line, now_s)
+            revolution = self._decode(data, now_s) if data and not is_stale else None
             is_woken = self._woken.is_set()
             if revolution or is_woken or now_s >= end_s:
                 self._woken.clear()
@@ -201,6 +201,15 @@ class Lidar[Frame]:
         self._count()
         self._revolutions.forget()
         self._listened_s = self._heard_s = now_s
+
+    def _discard_stale(self, line: Port, now_s: float) -> bool:
+        """Discard what waited in the line if nothing was read for so long that it is stale; return whether it was."""
+        is_stale = now_s - self._listened_s > self._model.stale_after_s
+        if is_stale:
+            line.discard_input()
+            self._forget(now_s)
+        self._listened_s = now_s
+        return is_stale
 
     def _start(self, line: Port) -> None:
         line.write(self._model.start)

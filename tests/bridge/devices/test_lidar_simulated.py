@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from typing import Any
 
@@ -19,6 +19,33 @@ MAKERS: dict[str, Callable[..., Lidar[Any]]] = {"lds01": make_lds01, "lds02": ma
 FULL = {"lds01": BINS, "lds02": BINS - 6, "lds03": BINS}
 POSE = (0.3, 0.2, 0.7)
 each_lidar = pytest.mark.parametrize("name", MAKERS)
+
+
+class PausingHost(VirtualHost):
+    """A host whose threads of one name can be paused, as a process that gets no processor.
+
+    Attributes:
+        paused: Name of the threads that are paused; empty: none are.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.paused = ""
+        self._by_name: dict[str, Any] = {}
+
+    def thread(self, run: Callable[[], None], name: str) -> Any:
+        """Return a new thread that can be paused."""
+        self._by_name[name] = super().thread(run, name)
+        return self._by_name[name]
+
+    def _next(self) -> Any:
+        held = [slot for slot in self._waiting if self.paused and slot is self._by_name[self.paused]._turn]
+        for slot in held:
+            self._waiting.remove(slot)
+        try:
+            return super()._next()
+        finally:
+            self._waiting.extendleft(held)
 
 
 class Scene:
@@ -64,10 +91,12 @@ class Scene:
 
 
 @contextmanager
-def scene(name: str, walls: Walls | None = None, **arguments: Any) -> Iterator[Scene]:
+def scene(
+    name: str, walls: Walls | None = None, *, host: VirtualHost | None = None, **arguments: Any
+) -> Iterator[Scene]:
     walls = walls or room(3.0, 2.0)
     with (
-        VirtualHost() as time,
+        host or VirtualHost() as time,
         SimulatedTurtleBot3(lidar=name, walls=walls, pose=POSE, clock=time, **arguments) as robot,
     ):
         made = Scene(name, robot, time)
@@ -178,6 +207,36 @@ def test_a_stalled_one_tells_nothing_and_goes_on_without_a_mixture(name: str) ->
         scans = seen.scans(0.8)
         assert scans
         assert all(seen.check(scan) >= FULL[name] for scan in scans)
+
+
+@each_lidar
+@pytest.mark.parametrize("pause_s", [1.0, 20.0])
+def test_nothing_of_before_a_pause_of_the_process_counts_as_new(name: str, pause_s: float) -> None:
+    host = PausingHost()
+    with scene(name, host=host) as seen:
+        seen.lidar.open()
+        scans: list[Scan] = []
+
+        def listen() -> None:
+            with suppress(LineLostError):  # At the end.
+                while True:
+                    if scan := seen.lidar.receive(0.2):
+                        scans.append(scan)
+
+        host.thread(listen, "listener").start()
+        host.sleep(1.0)
+        assert scans
+        host.paused = "listener"
+        host.sleep(pause_s - 0.5)
+        # Ranges of before would be beside the walls.
+        seen.robot.world.heading_rad += 1.0
+        host.sleep(0.5)
+        host.paused = ""
+        resumed_s = host.monotonic()
+        host.sleep(0.8)
+        found = [scan for scan in scans if scan.time_s >= resumed_s]
+        assert found
+        assert all(seen.check(scan) >= FULL[name] for scan in found)
 
 
 @each_lidar

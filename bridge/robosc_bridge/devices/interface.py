@@ -1,7 +1,8 @@
 """Interface of a drive base and a range scanner to the rest of the bridge, whatever device is behind them.
 
 Both are used from one thread each, that of their line; none of their methods waits longer than its line's limit.
-Times are those of `time.monotonic`, in seconds. Axes are those of REP 103: x forward, angles counter-clockwise.
+Times are those of `robosc_bridge.host.monotonic`, in seconds. Axes are those of REP 103: x forward, angles
+counter-clockwise.
 """
 
 from collections.abc import Mapping

@@ -32,6 +32,8 @@ class Model[Frame]:
         stop: Command that stops its motor; empty: it cannot be stopped.
         restart_pause_s: Pause between stop and start, in seconds; None: a restart is the start alone.
         stale_after_s: Three revolutions: after so long a silence, what came before says nothing about now.
+        min_m: Shortest distance that it measures.
+        max_m: Longest.
         is_dtr_off: True if its official driver drops this modem line, which opening a port raises.
     """
 
@@ -43,14 +45,26 @@ class Model[Frame]:
     stop: bytes
     restart_pause_s: float | None
     stale_after_s: float
+    min_m: float
+    max_m: float
     is_dtr_off: bool = False
 
 
-LDS01 = Model("lds01", (230_400,), lds01.Decoder, lds01.points, lds01.START, lds01.STOP, None, 0.6)
-LDS02 = Model("lds02", (115_200,), lds02.Decoder, lds02.points, b"", b"", None, 0.5)
+LDS01 = Model("lds01", (230_400,), lds01.Decoder, lds01.points, lds01.START, lds01.STOP, None, 0.6, 0.12, 3.5)
+LDS02 = Model("lds02", (115_200,), lds02.Decoder, lds02.points, b"", b"", None, 0.5, 0.16, 8.0)
 # Its driver says the first speed, its manual the second.
 LDS03 = Model(
-    "lds03", (230_400, 115_200), lds03.Decoder, lds03.points, lds03.START, lds03.STOP, 1.0, 0.3, is_dtr_off=True
+    "lds03",
+    (230_400, 115_200),
+    lds03.Decoder,
+    lds03.points,
+    lds03.START,
+    lds03.STOP,
+    1.0,
+    0.3,
+    0.05,
+    12.0,
+    is_dtr_off=True,
 )
 
 
@@ -254,7 +268,7 @@ class Lidar[Frame]:
         raw = RawScan(
             tuple([math.radians(angle_deg) for angle_deg in angles_deg]), revolution.ranges_m, revolution.intensities
         )
-        return Scan(now_s, ranges_m, raw, revolution.revolutions_per_s)
+        return Scan(now_s, ranges_m, raw, revolution.revolutions_per_s, self._model.min_m, self._model.max_m)
 
     def _seen_by_the_robot(self, angles_deg: tuple[float, ...]) -> tuple[float, ...]:
         if self._is_upside_down:

@@ -115,6 +115,7 @@ def test_every_degree_shows_the_wall_where_it_is(name: str) -> None:
         assert revolutions <= len(scans) <= revolutions + 2
         for scan in scans:
             assert seen.check(scan) >= FULL[name]
+            assert (scan.min_m, scan.max_m) == (seen.robot.scanner.nearest_m, seen.robot.scanner.farthest_m)
             assert scan.revolutions_per_s == pytest.approx(seen.robot.scanner.revolutions_per_s, rel=0.01)
         assert seen.lidar.counters.scans == len(scans)
         assert seen.lidar.counters.bad_frames == 0

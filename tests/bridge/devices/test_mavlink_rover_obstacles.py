@@ -43,6 +43,7 @@ def test_obstacles_are_where_they_are(bench: Bench, obstacles: str) -> None:
         scan = _next(scanner)
         _check(bench, scan, 45.0 if obstacles == "sensors" else 6.0)
         assert scan.time_s == bench.host.monotonic()
+        assert (scan.min_m, scan.max_m) == (0.05, 8.0)
         assert scanner.counters.scans >= 1
         # Alone on the line, it is who is there.
         before, end_s = len(bench.rover.heartbeats), bench.host.monotonic() + 20.0

@@ -13,39 +13,13 @@ from robosc_bridge.devices.interface import BINS, Scan
 from robosc_bridge.devices.lidar import BAUD_TRIAL_S, Lidar, make_lds01, make_lds02, make_lds03
 from robosc_bridge.errors import LineLostError
 from robosc_simulated import SimulatedTurtleBot3, VirtualHost, Walls, room
+from support.pausing_host import PausingHost
 
 MAKERS: dict[str, Callable[..., Lidar[Any]]] = {"lds01": make_lds01, "lds02": make_lds02, "lds03": make_lds03}
 # Of an LDS-02, the correction moves neighbouring points apart where a wall comes nearer: a bin may lie between.
 FULL = {"lds01": BINS, "lds02": BINS - 6, "lds03": BINS}
 POSE = (0.3, 0.2, 0.7)
 each_lidar = pytest.mark.parametrize("name", MAKERS)
-
-
-class PausingHost(VirtualHost):
-    """A host whose threads of one name can be paused, as a process that gets no processor.
-
-    Attributes:
-        paused: Name of the threads that are paused; empty: none are.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.paused = ""
-        self._by_name: dict[str, Any] = {}
-
-    def thread(self, run: Callable[[], None], name: str) -> Any:
-        """Return a new thread that can be paused."""
-        self._by_name[name] = super().thread(run, name)
-        return self._by_name[name]
-
-    def _next(self) -> Any:
-        held = [slot for slot in self._waiting if self.paused and slot is self._by_name[self.paused]._turn]
-        for slot in held:
-            self._waiting.remove(slot)
-        try:
-            return super()._next()
-        finally:
-            self._waiting.extendleft(held)
 
 
 class Scene:

@@ -4,12 +4,21 @@ Whatever waits or measures time does so through a `Host`, so that a test can put
 `robosc_simulated.virtual_host`. The real one is `robosc_bridge.transport.system_host`. Readings are in seconds.
 """
 
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Protocol
 
 from robosc.execution.runtime.clock import Clock
+
+
+def monotonic() -> float:
+    """Return this computer's time in seconds; it goes on while the computer is suspended, where its system tells that.
+
+    Else scans and commands of before would be as fresh as ever when it wakes up.
+    """
+    return time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else time.monotonic()
 
 
 class Condition(Protocol):

@@ -27,6 +27,7 @@ from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import OperatorCommand, Order, State
 from robosc_bridge.daemon.view_settings import ViewSettings
 from robosc_bridge.devices.interface import BINS, DriveReading, Pose, RawScan, Scan, Velocity
+from robosc_bridge.host import monotonic
 from robosc_bridge.safety import Caution, Reason
 from robosc_view import ViewEndpoint
 from support.models import model_of
@@ -112,7 +113,7 @@ class LiveRobot:
         self._model = supervisor.model
         self._dice = Random(seed)
         self._number = 0
-        self._begin_s = time.monotonic()
+        self._begin_s = monotonic()
         self._lock = threading.Lock()
         mapping = ChannelMapping(
             {item.name: GrpcChannel() for item in self._model.communications}, self._model.communications
@@ -154,7 +155,7 @@ class LiveRobot:
     def snapshot(self) -> Snapshot:
         """Return a snapshot like that of a bridge's loop."""
         system, is_running = self.system, self.state is State.RUNNING
-        now_s = time.monotonic()
+        now_s = monotonic()
         angle = 0.2 * (now_s - self._begin_s)
         pose = Pose(2.0 * math.cos(angle), 2.0 * math.sin(angle), math.remainder(angle + math.pi / 2, math.tau))
         ranges = tuple(math.nan if k % 60 < 5 else 2.0 + math.sin(math.radians(3 * k) + angle) for k in range(BINS))

@@ -23,6 +23,7 @@ from robosc_bridge.daemon.programs import FromProgram, Program
 from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import OperatorCommand, Order, State
 from robosc_bridge.devices.interface import BINS, DriveReading, MotorFault, Pose, RawScan, Scan, Velocity
+from robosc_bridge.host import monotonic
 from robosc_bridge.remote import RemoteEndpoint, RemoteSettings, serve
 from robosc_bridge.safety import Caution, Reason
 from support.models import bundle_of
@@ -110,7 +111,7 @@ AHEAD_S = 3600.0
 
 
 def scan(first_m: float) -> Scan:
-    now_s = time.monotonic()
+    now_s = monotonic()
     raw = RawScan((0.0,), (first_m,), (1.0,))
     return Scan(now_s, (first_m, *[float("nan")] * (BINS - 1)), raw, 5.0)
 

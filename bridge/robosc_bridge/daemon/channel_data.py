@@ -14,15 +14,14 @@ _PRESENT_V = 7.0
 
 def scan_data(scan: Scan) -> dict[str, Any]:
     """Return the data of a sensor_msgs/LaserScan: 360 ranges, counter-clockwise from the front."""
-    known = [value for value in scan.raw.ranges_m if not math.isnan(value)]
     return {
         "ranges": list(scan.ranges_m),
         "angle_min": 0.0,
         "angle_max": math.tau - _STEP_RAD,
         "angle_increment": _STEP_RAD,
         "scan_time": 1.0 / scan.revolutions_per_s if scan.revolutions_per_s > 0.0 else math.nan,
-        "range_min": min(known, default=0.0),
-        "range_max": max(known, default=0.0),
+        "range_min": scan.min_m,
+        "range_max": scan.max_m,
     }
 
 

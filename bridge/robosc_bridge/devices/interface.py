@@ -1,9 +1,11 @@
 """Interface of a drive base and a range scanner to the rest of the bridge, whatever device is behind them.
 
 Both are used from one thread each, that of their line; none of their methods waits longer than its line's limit.
-Times are those of `time.monotonic`, in seconds. Axes are those of REP 103: x forward, angles counter-clockwise.
+Times are those of `robosc_bridge.host.monotonic`, in seconds. Axes are those of REP 103: x forward, angles
+counter-clockwise.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -173,12 +175,16 @@ class Scan:
             sides of it; the smallest valid range of each, NaN if none.
         raw: The scan as it was measured.
         revolutions_per_s: Speed of the motor as the device reports it.
+        min_m: Shortest distance that the device measures; 0: unknown.
+        max_m: Longest; infinite: unknown.
     """
 
     time_s: float
     ranges_m: tuple[float, ...]
     raw: RawScan
     revolutions_per_s: float
+    min_m: float = 0.0
+    max_m: float = math.inf
 
 
 @dataclass

@@ -32,6 +32,8 @@ class Model[Frame]:
         stop: Command that stops its motor; empty: it cannot be stopped.
         restart_pause_s: Pause between stop and start, in seconds; None: a restart is the start alone.
         stale_after_s: Three revolutions: after so long a silence, what came before says nothing about now.
+        min_m: Shortest distance that it measures.
+        max_m: Longest.
         is_dtr_off: True if its official driver drops this modem line, which opening a port raises.
     """
 
@@ -43,14 +45,26 @@ class Model[Frame]:
     stop: bytes
     restart_pause_s: float | None
     stale_after_s: float
+    min_m: float
+    max_m: float
     is_dtr_off: bool = False
 
 
-LDS01 = Model("lds01", (230_400,), lds01.Decoder, lds01.points, lds01.START, lds01.STOP, None, 0.6)
-LDS02 = Model("lds02", (115_200,), lds02.Decoder, lds02.points, b"", b"", None, 0.5)
+LDS01 = Model("lds01", (230_400,), lds01.Decoder, lds01.points, lds01.START, lds01.STOP, None, 0.6, 0.12, 3.5)
+LDS02 = Model("lds02", (115_200,), lds02.Decoder, lds02.points, b"", b"", None, 0.5, 0.16, 8.0)
 # Its driver says the first speed, its manual the second.
 LDS03 = Model(
-    "lds03", (230_400, 115_200), lds03.Decoder, lds03.points, lds03.START, lds03.STOP, 1.0, 0.3, is_dtr_off=True
+    "lds03",
+    (230_400, 115_200),
+    lds03.Decoder,
+    lds03.points,
+    lds03.START,
+    lds03.STOP,
+    1.0,
+    0.3,
+    0.05,
+    12.0,
+    is_dtr_off=True,
 )
 
 
@@ -127,8 +141,8 @@ class Lidar[Frame]:
         """The next full revolution; when one read brings several, the newest.
 
         To be called again and again: it also sends what a restart still owes, and tries another speed while no
-        well-formed frame has come. What waited in the line while nobody asked for so long that it is stale is
-        discarded.
+        well-formed frame has come. What waited in the line while nobody asked, or while the process was paused, for so
+        long that it is stale is discarded.
 
         Args:
             limit_s: Longest wait.
@@ -142,14 +156,14 @@ class Lidar[Frame]:
         line = self._opened()
         now_s = self._clock()
         end_s = now_s + limit_s
-        if now_s - self._listened_s > self._model.stale_after_s:
-            line.discard_input()
-            self._forget(now_s)
+        self._discard_stale(line, now_s)
         while True:
             due_s = self._keep_on(line, now_s)
             data = line.read(min(end_s, due_s) - now_s)
-            now_s = self._listened_s = self._clock()
-            revolution = self._decode(data, now_s) if data else None
+            now_s = self._clock()
+            # A process that was paused while it read has got the oldest bytes of those that waited.
+            is_stale = self._discard_stale(line, now_s)
+            revolution = self._decode(data, now_s) if data and not is_stale else None
             is_woken = self._woken.is_set()
             if revolution or is_woken or now_s >= end_s:
                 self._woken.clear()
@@ -202,6 +216,15 @@ class Lidar[Frame]:
         self._revolutions.forget()
         self._listened_s = self._heard_s = now_s
 
+    def _discard_stale(self, line: Port, now_s: float) -> bool:
+        """Discard what waited in the line if nothing was read for so long that it is stale; return whether it was."""
+        is_stale = now_s - self._listened_s > self._model.stale_after_s
+        if is_stale:
+            line.discard_input()
+            self._forget(now_s)
+        self._listened_s = now_s
+        return is_stale
+
     def _start(self, line: Port) -> None:
         line.write(self._model.start)
         self._start_at_s = None
@@ -245,7 +268,7 @@ class Lidar[Frame]:
         raw = RawScan(
             tuple([math.radians(angle_deg) for angle_deg in angles_deg]), revolution.ranges_m, revolution.intensities
         )
-        return Scan(now_s, ranges_m, raw, revolution.revolutions_per_s)
+        return Scan(now_s, ranges_m, raw, revolution.revolutions_per_s, self._model.min_m, self._model.max_m)
 
     def _seen_by_the_robot(self, angles_deg: tuple[float, ...]) -> tuple[float, ...]:
         if self._is_upside_down:

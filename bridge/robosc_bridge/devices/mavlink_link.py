@@ -32,7 +32,9 @@ from robosc_bridge.transport.system_host import SYSTEM_HOST, open_line
 BAUD = 57_600
 HEARTBEAT_S = 1.0
 _KEPT_OBSTACLES = 32
-_READ_S = 1.0
+_READ_S = 0.2
+# A read that takes so long was paused, with the process.
+_PAUSE_S = 0.5
 
 type Obstacle = ObstacleRing | SectorDistance
 
@@ -203,10 +205,14 @@ class VehicleLink:
 
     def _read(self) -> None:
         try:
+            now_s, is_old = self._host.monotonic(), False
             while not self._is_closing:
-                data = self._line.read(_READ_S)
+                data = self._line.read(0.0 if is_old else _READ_S)
+                before_s, now_s = now_s, self._host.monotonic()
+                # All that waits in the line is of the time of the pause.
+                is_old = now_s - before_s > _PAUSE_S or (is_old and bool(data))
                 if data:
-                    self._take(data, self._host.monotonic())
+                    self._take(data, now_s, is_old=is_old)
         except LineError as error:
             with self._changed:
                 self._lost = error
@@ -214,11 +220,14 @@ class VehicleLink:
             # Whoever plugs it in again must not find it busy.
             self._line.close()
 
-    def _take(self, data: bytes, time_s: float) -> None:
+    def _take(self, data: bytes, time_s: float, *, is_old: bool) -> None:
         with self._changed:
             messages = self._decoder.feed(data)
             for message in messages:
                 self._sort(message, time_s)
+            if is_old:
+                # Whoever drives by them would drive by what was there.
+                self._obstacles.clear()
             if isinstance(self._line, NetworkPort) and self._line.is_datagram:
                 # A packet does not go on in the next datagram.
                 self._decoder.forget()

@@ -169,4 +169,6 @@ class MavlinkObstacles:
             (math.nan,) * len(sectors),
         )
         # Nothing rotates that it could tell the speed of.
-        return Scan(time_s, nearest_in_sectors(sectors), raw, math.nan)
+        min_m = min(sector.min_m for sector in sectors)
+        max_m = max(sector.max_m for sector in sectors)
+        return Scan(time_s, nearest_in_sectors(sectors), raw, math.nan, min_m, max_m)

@@ -29,7 +29,7 @@ class Timestamped[Content]:
     """A report with the time at which it came.
 
     Attributes:
-        time_s: Time when it came, by `time.monotonic`, in seconds.
+        time_s: Time when it came, by the host's clock, in seconds.
         content: Content of the report.
     """
 

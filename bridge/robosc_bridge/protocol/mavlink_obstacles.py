@@ -26,11 +26,15 @@ class Sector:
         middle_deg: Counter-clockwise from the front, within [0, 360).
         width_deg: Of all of it.
         range_m: NaN: nothing is there, or it is unknown.
+        min_m: Shortest distance that its sensor measures.
+        max_m: Longest.
     """
 
     middle_deg: float
     width_deg: float
     range_m: float
+    min_m: float = 0.0
+    max_m: float = math.inf
 
 
 def _range_m(distance_cm: int, least_cm: int, most_cm: int) -> float:
@@ -61,6 +65,8 @@ def ring_sectors(ring: ObstacleRing, heading_rad: float | None) -> tuple[Sector,
             wrapped_deg(-(ring.offset_deg + index * ring.increment_deg) - turned_deg),
             width_deg,
             _range_m(distance_cm, ring.least_cm, ring.most_cm),
+            ring.least_cm / 100,
+            ring.most_cm / 100,
         )
         for index, distance_cm in enumerate(ring.distances_cm[:count])
     )
@@ -71,7 +77,9 @@ def sensor_sector(told: SectorDistance) -> Sector | None:
     if told.orientation >= _EIGHTHS:
         return None
     range_m = _range_m(told.distance_cm, told.least_cm, told.most_cm)
-    return Sector(wrapped_deg(-told.orientation * _EIGHTH_DEG), told.width_deg or _EIGHTH_DEG, range_m)
+    middle_deg = wrapped_deg(-told.orientation * _EIGHTH_DEG)
+    width_deg = told.width_deg or _EIGHTH_DEG
+    return Sector(middle_deg, width_deg, range_m, told.least_cm / 100, told.most_cm / 100)
 
 
 def nearest_in_sectors(sectors: Iterable[Sector]) -> tuple[float, ...]:

@@ -25,6 +25,7 @@ from robosc_bridge.daemon.feed import Snapshot
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.devices.interface import DriveReading, Scan
+from robosc_bridge.host import monotonic
 from robosc_bridge.remote.data import DataError, plain_of, struct_of, text_of, value_of
 from robosc_bridge.safety import LATCHING, Caution, Reason
 
@@ -157,7 +158,7 @@ class SnapshotEncoder:
         target.CopyFrom(self._made)
         target.age_s = max(time.time() - snapshot.time_s, 0.0)
         if snapshot.reading is not None:
-            target.drive.age_s = max(time.monotonic() - snapshot.reading.time_s, 0.0)
+            target.drive.age_s = max(monotonic() - snapshot.reading.time_s, 0.0)
 
 
 def _snapshot(snapshot: Snapshot) -> pb.Snapshot:
@@ -208,7 +209,7 @@ def _drive(reading: DriveReading) -> pb.DriveState:
 
 def put_scan(target: pb.Scan, scan: Scan) -> None:
     """Fill a message with a revolution of the LiDAR."""
-    target.age_s = max(time.monotonic() - scan.time_s, 0.0)
+    target.age_s = max(monotonic() - scan.time_s, 0.0)
     target.turns_per_s = scan.revolutions_per_s
     target.ranges_m.extend(scan.ranges_m)
 

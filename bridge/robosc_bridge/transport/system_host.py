@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from robosc.execution.runtime.clock import SystemClock
-from robosc_bridge.host import Host, NetworkPort, Port
+from robosc_bridge.host import Host, NetworkPort, Port, monotonic
 from robosc_bridge.transport.network_line import NetworkLine, is_network_address
 from robosc_bridge.transport.serial_line import SerialLine
 
@@ -17,6 +17,7 @@ type Line = Port | NetworkPort
 class SystemHost(SystemClock):
     """This computer."""
 
+    monotonic = staticmethod(monotonic)
     sleep = staticmethod(time.sleep)
 
     def condition(self) -> threading.Condition:

@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from typing import Any
 
@@ -13,6 +13,7 @@ from robosc_bridge.devices.interface import BINS, Scan
 from robosc_bridge.devices.lidar import BAUD_TRIAL_S, Lidar, make_lds01, make_lds02, make_lds03
 from robosc_bridge.errors import LineLostError
 from robosc_simulated import SimulatedTurtleBot3, VirtualHost, Walls, room
+from support.pausing_host import PausingHost
 
 MAKERS: dict[str, Callable[..., Lidar[Any]]] = {"lds01": make_lds01, "lds02": make_lds02, "lds03": make_lds03}
 # Of an LDS-02, the correction moves neighbouring points apart where a wall comes nearer: a bin may lie between.
@@ -64,10 +65,12 @@ class Scene:
 
 
 @contextmanager
-def scene(name: str, walls: Walls | None = None, **arguments: Any) -> Iterator[Scene]:
+def scene(
+    name: str, walls: Walls | None = None, *, host: VirtualHost | None = None, **arguments: Any
+) -> Iterator[Scene]:
     walls = walls or room(3.0, 2.0)
     with (
-        VirtualHost() as time,
+        host or VirtualHost() as time,
         SimulatedTurtleBot3(lidar=name, walls=walls, pose=POSE, clock=time, **arguments) as robot,
     ):
         made = Scene(name, robot, time)
@@ -86,6 +89,7 @@ def test_every_degree_shows_the_wall_where_it_is(name: str) -> None:
         assert revolutions <= len(scans) <= revolutions + 2
         for scan in scans:
             assert seen.check(scan) >= FULL[name]
+            assert (scan.min_m, scan.max_m) == (seen.robot.scanner.nearest_m, seen.robot.scanner.farthest_m)
             assert scan.revolutions_per_s == pytest.approx(seen.robot.scanner.revolutions_per_s, rel=0.01)
         assert seen.lidar.counters.scans == len(scans)
         assert seen.lidar.counters.bad_frames == 0
@@ -178,6 +182,36 @@ def test_a_stalled_one_tells_nothing_and_goes_on_without_a_mixture(name: str) ->
         scans = seen.scans(0.8)
         assert scans
         assert all(seen.check(scan) >= FULL[name] for scan in scans)
+
+
+@each_lidar
+@pytest.mark.parametrize("pause_s", [1.0, 20.0])
+def test_nothing_of_before_a_pause_of_the_process_counts_as_new(name: str, pause_s: float) -> None:
+    host = PausingHost()
+    with scene(name, host=host) as seen:
+        seen.lidar.open()
+        scans: list[Scan] = []
+
+        def listen() -> None:
+            with suppress(LineLostError):  # At the end.
+                while True:
+                    if scan := seen.lidar.receive(0.2):
+                        scans.append(scan)
+
+        host.thread(listen, "listener").start()
+        host.sleep(1.0)
+        assert scans
+        host.paused = "listener"
+        host.sleep(pause_s - 0.5)
+        # Ranges of before would be beside the walls.
+        seen.robot.world.heading_rad += 1.0
+        host.sleep(0.5)
+        host.paused = ""
+        resumed_s = host.monotonic()
+        host.sleep(0.8)
+        found = [scan for scan in scans if scan.time_s >= resumed_s]
+        assert found
+        assert all(seen.check(scan) >= FULL[name] for scan in found)
 
 
 @each_lidar

@@ -86,7 +86,7 @@ def test_a_ring_from_north_is_turned_with_the_vehicle() -> None:
 
 
 def test_single_sensors_look_in_eighths_clockwise() -> None:
-    assert sensor_sector(SectorDistance(2, 100, 5, 800, 0.0)) == Sector(270.0, 45.0, 1.0)
-    assert sensor_sector(SectorDistance(0, 100, 5, 800, 10.0)) == Sector(0.0, 10.0, 1.0)
+    assert sensor_sector(SectorDistance(2, 100, 5, 800, 0.0)) == Sector(270.0, 45.0, 1.0, 0.05, 8.0)
+    assert sensor_sector(SectorDistance(0, 100, 5, 800, 10.0)) == Sector(0.0, 10.0, 1.0, 0.05, 8.0)
     # Down.
     assert sensor_sector(SectorDistance(25, 100, 5, 800, 0.0)) is None

@@ -6,6 +6,7 @@ import socket
 import threading
 import time
 from collections import Counter
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -17,10 +18,21 @@ from robosc.targets.ros.state_topic import state_topic
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.configuration import parse
 from robosc_bridge.daemon.states import OperatorCommand, State
-from robosc_bridge.remote import RemoteEndpoint, RemoteError, RemoteSettings, serve, service, settings_of, shutdown
+from robosc_bridge.host import monotonic
+from robosc_bridge.remote import (
+    RemoteEndpoint,
+    RemoteError,
+    RemoteSettings,
+    convert,
+    serve,
+    service,
+    settings_of,
+    shutdown,
+)
 from robosc_bridge.remote import endpoint as endpoint_module
 from robosc_bridge.remote.endpoint import MAXIMUM_CONNECTIONS, MAXIMUM_REQUEST_BYTES
 from robosc_bridge.remote.watchers import MAXIMUM_EVENTS
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 from support.remote import READING, FakeDaemon, connected, model, scan, served
 from support.waiting import PATIENCE_S, wait_until
 
@@ -124,7 +136,18 @@ class TestStatus:
         assert drive.battery_v == 11.8
         assert not drive.HasField("battery_share")
         assert dict(drive.buttons) == {"button_1": True}
-        assert drive.age_s == pytest.approx(time.monotonic(), abs=PATIENCE_S)
+        assert drive.age_s == pytest.approx(monotonic(), abs=PATIENCE_S)
+
+    def test_ages_are_by_the_clock_of_the_devices(
+        self, daemon: FakeDaemon, stub: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        # As after the computer was suspended for a day.
+        monkeypatch.setattr(time, "clock_gettime", lambda clock: time.monotonic() + 86_400.0)
+        daemon.show(reading=replace(READING, time_s=SYSTEM_HOST.monotonic() - 100.0))
+        assert status(stub).snapshot.drive.age_s == pytest.approx(100.0, abs=PATIENCE_S)
+        told = pb.Scan()
+        convert.put_scan(told, replace(scan(1.0), time_s=SYSTEM_HOST.monotonic() - 100.0))
+        assert told.age_s == pytest.approx(100.0, abs=PATIENCE_S)
 
     def test_a_loop_that_hangs_is_seen_by_the_age(self, daemon: FakeDaemon, stub: Any) -> None:
         daemon.show(time_s=time.time() - 100.0)

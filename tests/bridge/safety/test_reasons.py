@@ -527,10 +527,9 @@ def test_after_a_pause_nothing_from_before_counts(is_loop_first: bool) -> None:
 def test_wheels_are_judged_anew_after_a_pause() -> None:
     bench = Bench()
     bench.drive()
-    bench.wheels_m_s = (0.0, 0.0)
+    bench.wheels_m_s = (0.0, 0.1)
     bench.cycles(0.6)
     pause(bench)
-    bench.wheels_m_s = (0.1, 0.1)
     assert bench.cycles(0.7).reasons == (Reason.PAUSED,)
     assert bench.cycles(0.2).reasons == (Reason.PAUSED, Reason.WHEEL_ASTRAY)
 

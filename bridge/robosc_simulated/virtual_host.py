@@ -38,9 +38,14 @@ class _Ended(BaseException):
 
 
 class _Slot:
-    """A thread's place among those that run one at a time."""
+    """A thread's place among those that run one at a time.
 
-    def __init__(self) -> None:
+    Args:
+        name: Name of the thread.
+    """
+
+    def __init__(self, name: str = "") -> None:
+        self.name = name
         # Taken by whoever waits for its slot, released by whoever gives it: of all waits, the fastest.
         self.given = threading.Lock()
         self.given.acquire()
@@ -80,6 +85,16 @@ class VirtualHost:
     def sleep(self, seconds: float) -> None:
         """Let time pass."""
         self.wait(lambda: False, seconds)
+
+    def suspend(self, seconds: float, *names: str) -> None:
+        """Let time pass in which the threads of these names stand still, as those of a process that is halted."""
+        held = [slot for slot in self._waiting if slot.name in names]
+        for slot in held:
+            self._waiting.remove(slot)
+        try:
+            self.sleep(seconds)
+        finally:
+            self._waiting.extendleft(reversed(held))
 
     def wait(self, is_ready: Callable[[], bool], limit_s: float) -> bool:
         """Let others run until something holds, or for a time; whether it holds.
@@ -301,7 +316,7 @@ class _Thread:
         self._host = host
         self._run = run
         self._name = name
-        self._turn = _Slot()
+        self._turn = _Slot(name)
 
     def start(self) -> None:
         """Begin when the others wait."""

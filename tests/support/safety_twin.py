@@ -41,6 +41,19 @@ class SafetyTwin:
         """Note an event for the layer."""
         self.past.append(Past(name, value, time_s))
 
+    def loop_cycled(self, time_s: float) -> None:
+        """The loop was at work then."""
+        self._note_pause(time_s)
+        self.happens("loop", None, time_s)
+
+    def _note_pause(self, time_s: float) -> None:
+        """Note a pause if neither an output nor the loop was there for too long before this time."""
+        at_work_s = [each.time_s for each in self._since_last("output") if each.name == "loop"]
+        last_s = max([self.past_now_s(), *filter(math.isfinite, at_work_s)])
+        is_long = math.isfinite(time_s) and time_s - last_s > self.limits.pause_s
+        if is_long and self._is_wanted() and self._torque_story()[0]:
+            self.past.append(Past("pause", latched=frozenset({Reason.PAUSED})))
+
     def _since_last(self, *names: str) -> list[Past]:
         """Return everything that has happened from the last of these on, that one included; all if there was none."""
         for index in reversed(range(len(self.past))):
@@ -55,6 +68,8 @@ class SafetyTwin:
         if timeout_s is None:
             return False
         for index in reversed(range(len(self.past))):
+            if self.past[index].name == "pause" and name != "operator":
+                return True
             if self.past[index].name == name and math.isfinite(self.past[index].time_s):
                 looked_s = [each.now_s for each in self.past[index:] if each.name == "output"]
                 return now_s - min([self.past[index].time_s, *looked_s, now_s]) > timeout_s
@@ -83,7 +98,7 @@ class SafetyTwin:
 
     def _torque_story(self) -> tuple[bool, bool, float | None]:
         """Tell whether the motors reported that they hold, whether they let go since, and how long a wheel is off."""
-        began = [each for each in self.past if each.name in ("output", "drive")]
+        began = [each for each in self.past if each.name in ("output", "drive", "pause")]
         for index in reversed(range(len(began))):
             if began[index].name == "output" and began[index].torque_since_s is None:
                 began = began[index + 1 :]
@@ -96,6 +111,8 @@ class SafetyTwin:
         for each in began:
             if each.name == "output":
                 since_s, velocity = each.torque_since_s, each.velocity
+            elif each.name == "pause":
+                off = []
             elif since_s is not None and each.value.time_s > since_s:
                 is_seen, is_lost = (
                     is_seen or each.value.is_torque_on,
@@ -189,7 +206,8 @@ class SafetyTwin:
         since = self._since_last("output")
         if not since or since[0].name != "output" or since[0].reasons - {Reason.COMMAND_SILENT}:
             return True
-        return any(each.name in ("enable", "disable") or (each.name == "reset" and each.value) for each in since)
+        changes = ("enable", "disable", "pause")
+        return any(each.name in changes or (each.name == "reset" and each.value) for each in since)
 
     def _limited(self, linear_m_s: float, angular_rad_s: float) -> Velocity:
         linear_m_s = sorted((-self.limits.linear_m_s, linear_m_s, self.limits.linear_m_s))[1]
@@ -211,6 +229,7 @@ class SafetyTwin:
 
     def output(self, now_s: float) -> Output:
         """Return the output that the layer should give; its warnings are left out."""
+        self._note_pause(now_s)
         limits = self.limits
         last = self._last("output") or Past("output")
         is_clock_wrong = not (math.isfinite(now_s) and now_s >= last.now_s)

@@ -18,7 +18,7 @@ MANUAL_INPUT, GUIDED, AUTO = 64, 8, 4
 ORDINARY = frozenset({Reason.STANDBY, Reason.TORQUE_AWAITED, Reason.COMMAND_SILENT})
 """Reasons that belong to every start and stop."""
 
-_HARDWARE = frozenset(LATCHING) - {Reason.OPERATOR_STOP, Reason.SUPERVISOR_FAULT}
+_HARDWARE = frozenset(LATCHING) - {Reason.OPERATOR_STOP, Reason.SUPERVISOR_FAULT, Reason.PAUSED}
 
 
 class SystemStatus(IntEnum):

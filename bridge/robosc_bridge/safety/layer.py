@@ -53,6 +53,8 @@ class SafetyLayer:
         # A signal handler may call while its own thread is inside.
         self._lock = threading.RLock()
         self._now_s = 0.0
+        # When the drive base's thread or the loop was at work last.
+        self._alive_s = 0.0
         self._is_enabled = False
         self._latched: set[Reason] = set()
         # What is commanded, within the limits, and what was put out last.
@@ -165,6 +167,7 @@ class SafetyLayer:
     def loop_cycled(self, now_s: float) -> None:
         """The supervisor's loop was at work then."""
         with self._lock:
+            self._find_pause(now_s)
             self._loop.update(now_s)
 
     def supervisor_fault(self) -> None:
@@ -217,11 +220,14 @@ class SafetyLayer:
                 call gives standstill.
         """
         with self._lock:
+            self._find_pause(now_s)
             is_clock_wrong = not self._now_s <= now_s < math.inf
             # For a time in which nothing was read there is no acceleration.
             step_s = min(now_s - self._now_s, self._limits.motor_timeout_s)
             if math.isfinite(now_s):
                 self._now_s = now_s
+            # A time ahead of the clock counts from now.
+            self._alive_s = self._now_s
             self._switch_torque()
             if self._is_held:
                 self._wanted = STANDSTILL
@@ -232,6 +238,23 @@ class SafetyLayer:
             else:
                 self._velocity = ramped(self._velocity, self._wanted, self._limits, step_s)
             return Output(self._velocity, self._torque_since_s is not None, self._reasons, self._find_warnings())
+
+    def _find_pause(self, now_s: float) -> None:
+        """Find out whether nothing of the bridge was at work for too long; what was known before is no longer so.
+
+        One of the two threads may wait for long, for a device or for a supervisor, but not both. A scan tells nothing
+        here: its time is not that of who reports it, and one that came first after a pause would hide it.
+        """
+        if not math.isfinite(now_s):
+            return
+        has_torque = self._torque_since_s is not None and self._is_torque_seen
+        if has_torque and now_s - self._alive_s > self._limits.pause_s:
+            self._latched.add(Reason.PAUSED)
+            self._is_held = True
+            for known in (self._scans, self._readings, self._loop):
+                known.forget()
+            self._wheels.forget()
+        self._alive_s = max(self._alive_s, now_s)
 
     def _switch_torque(self) -> None:
         """Let torque be wanted or not; where the clock went back, times begin anew."""

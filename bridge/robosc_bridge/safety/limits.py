@@ -14,6 +14,7 @@ _LONGEST_S = {
     "scan_timeout_s": 2.0,
     "motor_timeout_s": 1.0,
     "loop_timeout_s": 2.0,
+    "pause_s": 2.0,
     "operator_timeout_s": 10.0,
     "battery_mean_s": 10.0,
     "astray_s": 5.0,
@@ -46,6 +47,7 @@ class SafetyLimits:
         motor_timeout_s: Longest time without a reading of the drive base.
         motor_failures: Number of failed exchanges in a row that count as silence, too.
         loop_timeout_s: Longest time between two cycles of the supervisor's loop.
+        pause_s: Longest time in which neither the drive base's thread nor the loop turns while the motors hold.
         operator_timeout_s: Longest time without a sign of the operator; None: none is needed.
         battery_warn_v: Mean voltage at and below which the safety layer warns.
         battery_stop_v: Mean voltage at and below which it stops the robot.
@@ -78,6 +80,7 @@ class SafetyLimits:
     motor_timeout_s: float = 0.2
     motor_failures: int = 3
     loop_timeout_s: float = 0.2
+    pause_s: float = 0.5
     operator_timeout_s: float | None = None
     battery_warn_v: float = 11.5
     battery_stop_v: float = 11.1

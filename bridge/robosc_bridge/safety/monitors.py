@@ -30,6 +30,10 @@ class Freshness:
         if math.isfinite(time_s):
             self._heard_s = time_s
 
+    def forget(self) -> None:
+        """Forget what was heard."""
+        self._heard_s = None
+
     def is_stale(self, now_s: float) -> bool:
         """Return True if the last report is too long ago, or there never was one."""
         if self._timeout_s is None:

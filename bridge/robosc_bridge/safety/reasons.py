@@ -13,6 +13,7 @@ class Reason(StrEnum):
     CLOCK = "The clock went backwards."
     OPERATOR_STOP = "An operator has stopped the robot."
     SUPERVISOR_FAULT = "The supervisor has failed."
+    PAUSED = "The bridge's computer stood still for too long."
     MOTOR_FAULT = "A motor tells of a fault."
     TORQUE_LOST = "A motor does not hold, or has let go by itself."
     WHEEL_ASTRAY = "A wheel does not rotate as it is told: it is blocked, or does not stop."
@@ -29,6 +30,7 @@ class Reason(StrEnum):
 LATCHING = (
     Reason.OPERATOR_STOP,
     Reason.SUPERVISOR_FAULT,
+    Reason.PAUSED,
     Reason.MOTOR_FAULT,
     Reason.TORQUE_LOST,
     Reason.WHEEL_ASTRAY,

@@ -18,6 +18,7 @@ from robosc_bridge.daemon.motion import MotionTarget
 from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.errors import LineDeniedError
 from robosc_bridge.host import Port
+from robosc_bridge.safety import Reason
 from robosc_simulated import SimulatedTurtleBot3
 from robosc_simulated.virtual_host import VirtualHost
 from support.driven import LIMIT_S, PATIENT, Driven, driven
@@ -276,6 +277,38 @@ def test_a_base_that_is_plugged_in_again_moves_when_somebody_says_so(base: str) 
         bridge.stays(2 * WHILE_S)
         assert _ordered(bridge, OperatorCommand.START) == ""
         bridge.moves()
+
+
+def _suspend(bridge: Driven, seconds: float) -> None:
+    """Let the whole bridge stand still, as a computer that sleeps; its devices go on."""
+    host_of(bridge.robot).suspend(seconds, "drive", "scanner", "loop", f"MAVLink {bridge.robot.base_path}")
+
+
+# A rover alone goes on meanwhile, until its own time limit of some seconds.
+@pytest.mark.parametrize("base", [*BASES, "mavlink-rover"])
+@pytest.mark.parametrize("gap_s", [0.6, 30.0])
+def test_a_bridge_that_stood_still_moves_nothing_before_somebody_says_so(base: str, gap_s: float) -> None:
+    limit_s = STATED_S["the bridge stands still"] if base in BASES else gap_s + 0.06
+    with driven(base, remote=REACHABLE) as bridge:
+        bridge.stopped_after(lambda: _suspend(bridge, gap_s), limit_s)
+        bridge.until(lambda: bridge.state is State.FAULT, "the fault")
+        assert Reason.PAUSED in bridge.machine.daemon.problem
+        bridge.stays(2 * WHILE_S)
+        assert _ordered(bridge, OperatorCommand.START) != ""
+        assert _ordered(bridge, OperatorCommand.RESET) == ""
+        bridge.stays(WHILE_S)
+        assert _ordered(bridge, OperatorCommand.START) == ""
+        bridge.moves()
+
+
+@pytest.mark.parametrize("base", [*BASES, "mavlink-rover"])
+def test_a_bridge_that_stood_still_for_a_moment_goes_on(base: str) -> None:
+    with driven(base, remote=REACHABLE) as bridge:
+        bridge.steady()
+        _suspend(bridge, 0.3)
+        bridge.host.sleep(1.0)
+        assert bridge.state is State.RUNNING
+        assert bridge.wheels_m_s != (0.0, 0.0)
 
 
 @pytest.mark.parametrize("fault", [fault for fault in GRAVE if fault.is_line], ids=lambda fault: fault.row)

@@ -37,9 +37,10 @@ class Scene:
         )
 
     def live(self, seconds: float) -> None:
-        """Let the worker do what its thread does for so long."""
+        """Let the worker do what its thread does for so long, while the loop turns."""
         end_s = self.time.monotonic() + seconds
         while (now_s := self.time.monotonic()) < end_s:
+            self.safety.loop_cycled(now_s)
             if now_s >= self._due_s:
                 self._due_s = self.worker.step(now_s)
             self.time.sleep(max(min(self._due_s, end_s) - self.time.monotonic(), 0.0))

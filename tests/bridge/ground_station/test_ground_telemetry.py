@@ -70,6 +70,7 @@ def test_the_worked_packets() -> None:
         ({"state": State.FAULT, "problem": "x", "reasons": (Reason.MOTOR_FAULT,)}, False, (False, Mode.AUTO, 5, 6)),
         ({"state": State.FAULT, "problem": "x", "devices": {Device.DRIVE: False}}, False, (False, Mode.AUTO, 5, 6)),
         ({"state": State.FAULT, "problem": "x", "reasons": (Reason.SUPERVISOR_FAULT,)}, False, (False, 10, 5, 5)),
+        ({"state": State.FAULT, "problem": "x", "reasons": (Reason.PAUSED,)}, False, (False, 10, 5, 5)),
         ({"state": State.OVER}, False, (False, Mode.AUTO, 5, 7)),
     ],
 )

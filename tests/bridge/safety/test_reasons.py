@@ -29,9 +29,15 @@ def lose_torque(bench: Bench) -> None:
     bench.holds = None
 
 
+def pause(bench: Bench) -> None:
+    bench.now_s += 0.6
+    bench.layer.loop_cycled(bench.now_s)
+
+
 LATCHED: dict[Reason, Callable[[Bench], object]] = {
     Reason.OPERATOR_STOP: lambda bench: bench.layer.operator_stop(),
     Reason.SUPERVISOR_FAULT: lambda bench: bench.layer.supervisor_fault(),
+    Reason.PAUSED: pause,
     Reason.MOTOR_FAULT: fault,
     Reason.TORQUE_LOST: lose_torque,
 }
@@ -454,3 +460,97 @@ def test_limits_decide_the_times() -> None:
     assert replace(bench.limits, motor_failures=1) == bench.limits
     bench.layer.drive_failed()
     assert Reason.MOTOR_SILENT in bench.layer.output(bench.now_s).reasons
+
+
+@pytest.mark.parametrize("is_loop_first", [True, False])
+def test_a_pause_is_longer_than_its_time(is_loop_first: bool) -> None:
+    bench = Bench()
+    bench.drive()
+    layer = bench.layer
+    assert Reason.PAUSED not in layer.output(64.0).reasons
+    assert Reason.PAUSED not in layer.output(64.5).reasons
+    layer.loop_cycled(64.75)
+    late_s = 65.25 if is_loop_first else math.nextafter(65.25, 66)
+    layer.loop_cycled(64.0)  # what comes late does not take the time back
+    if is_loop_first:
+        layer.loop_cycled(late_s)
+        assert Reason.PAUSED not in layer.output(late_s).reasons
+        late_s = math.nextafter(65.75, 66)
+        layer.loop_cycled(late_s)
+    assert Reason.PAUSED in layer.output(late_s).reasons
+
+
+@pytest.mark.parametrize("odd_s", [math.nan, math.inf, -math.inf, 0.0])
+def test_a_time_that_is_none_is_no_sign_of_work_and_no_pause(odd_s: float) -> None:
+    bench = Bench()
+    bench.drive()
+    bench.layer.loop_cycled(odd_s)
+    assert bench.cycle().reasons == ()
+    bench.now_s += 0.6
+    bench.layer.loop_cycled(odd_s)
+    assert Reason.PAUSED in bench.cycle().reasons
+
+
+def test_a_time_ahead_hides_no_pause() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.layer.loop_cycled(bench.now_s + 0.4)
+    assert bench.layer.output(bench.now_s).reasons == ()
+    assert Reason.PAUSED in bench.layer.output(bench.now_s + 0.6).reasons
+
+
+def test_what_comes_first_after_a_pause_does_not_hide_it() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.now_s += 0.6
+    bench.layer.on_scan(bench.now_s)
+    bench.layer.on_drive_reading(reading(bench.now_s))
+    bench.layer.command(Velocity(0.1), bench.now_s)
+    assert bench.layer.output(bench.now_s).velocity == STANDSTILL
+    assert bench.cycle().reasons == (Reason.PAUSED,)
+
+
+@pytest.mark.parametrize("is_loop_first", [True, False])
+def test_after_a_pause_nothing_from_before_counts(is_loop_first: bool) -> None:
+    bench = Bench(scan_timeout_s=2.0, motor_timeout_s=1.0, loop_timeout_s=2.0, command_timeout_s=1.0)
+    bench.drive()
+    bench.now_s += 0.6
+    stale = [Reason.SCAN_STALE, Reason.MOTOR_SILENT, Reason.LOOP_OVERRUN]
+    if is_loop_first:
+        bench.layer.loop_cycled(bench.now_s)
+        stale.remove(Reason.LOOP_OVERRUN)
+    assert bench.layer.output(bench.now_s).reasons == (Reason.PAUSED, *stale)
+    assert bench.last.is_torque_wanted
+    restart(bench)
+
+
+def test_wheels_are_judged_anew_after_a_pause() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.wheels_m_s = (0.0, 0.1)
+    bench.cycles(0.6)
+    pause(bench)
+    assert bench.cycles(0.7).reasons == (Reason.PAUSED,)
+    assert bench.cycles(0.2).reasons == (Reason.PAUSED, Reason.WHEEL_ASTRAY)
+
+
+def test_a_drive_base_that_takes_its_time_is_no_pause() -> None:
+    bench = Bench()
+    bench.drive()
+    for step in range(1, 100):
+        bench.layer.loop_cycled(bench.now_s + step * 0.1)
+    assert Reason.PAUSED not in bench.layer.output(bench.now_s + 10.0).reasons
+
+
+@pytest.mark.parametrize("is_enabled", [True, False])
+def test_without_torque_there_is_no_pause(is_enabled: bool) -> None:
+    bench = Bench()
+    bench.drive()
+    bench.layer.disable()
+    assert not bench.cycles(0.1).is_torque_wanted
+    if is_enabled:
+        bench.holds = False
+        bench.layer.enable()
+        assert Reason.TORQUE_AWAITED in bench.cycle().reasons
+    pause(bench)
+    assert Reason.PAUSED not in bench.cycle().reasons

@@ -36,6 +36,7 @@ def test_its_numbers_are_the_defaults() -> None:
         Reason.MOTOR_SILENT: LIMITS.motor_timeout_s,
         Reason.LOOP_OVERRUN: LIMITS.loop_timeout_s,
         Reason.WHEEL_ASTRAY: LIMITS.astray_s,
+        Reason.PAUSED: LIMITS.pause_s,
     }
     for reason, time_s in told.items():
         assert f"more than {time_s} s" in ROWS[reason.name][0]

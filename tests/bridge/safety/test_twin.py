@@ -81,7 +81,10 @@ class Sequence(RuleBasedStateMachine):
     def _tell(self, name: str, time_s: float) -> None:
         tell = {"scan": self.layer.on_scan, "loop": self.layer.loop_cycled, "operator": self.layer.operator_seen}
         tell[name](time_s)
-        self.twin.happens(name, None, time_s)
+        if name == "loop":
+            self.twin.loop_cycled(time_s)
+        else:
+            self.twin.happens(name, None, time_s)
 
     @rule(
         shift_s=SHIFTS,
@@ -146,6 +149,13 @@ class Sequence(RuleBasedStateMachine):
         assert remaining == self.twin.reset()
         if not remaining:
             self.stopped, self.is_enabled = set(), False
+
+    @rule(cycles=st.integers(1, 8))
+    def wait(self, cycles: int) -> None:
+        """The loop turns alone, while the drive base takes its time."""
+        for _ in range(cycles):
+            self.now_s += 0.4
+            self._tell("loop", self.now_s)
 
     @rule(step_s=STEPS)
     def output(self, step_s: float) -> None:

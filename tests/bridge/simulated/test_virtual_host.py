@@ -149,6 +149,26 @@ def test_whoever_has_waited_its_time_goes_before_those_who_wait_anew() -> None:
     assert turns[3:] == [("one", 1), ("other", 1), ("one", 2), ("other", 2)]
 
 
+def test_threads_that_are_suspended_stand_still_and_go_on_late() -> None:
+    with VirtualHost(0.0) as host:
+        woken: list[tuple[str, float]] = []
+
+        def works(name: str) -> None:
+            for _ in range(4):
+                host.sleep(1.0)
+                woken.append((name, host.monotonic()))
+
+        for name in ("first", "second", "other"):
+            host.thread(partial(works, name), name).start()
+        host.sleep(1.5)
+        host.suspend(2.0, "first", "second")
+        host.sleep(1.25)
+        assert woken[3:] == [
+            ("other", 2.0), ("other", 3.0), ("first", 3.5), ("second", 3.5), ("other", 4.0), ("first", 4.5),
+            ("second", 4.5),
+        ]  # fmt: skip
+
+
 def test_threads_that_still_wait_end_with_the_host() -> None:
     ended: list[str] = []
     with VirtualHost() as host:

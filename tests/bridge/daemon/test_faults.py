@@ -297,7 +297,8 @@ def test_a_bridge_that_stood_still_moves_nothing_before_somebody_says_so(base: s
         assert _ordered(bridge, OperatorCommand.START) != ""
         assert _ordered(bridge, OperatorCommand.RESET) == ""
         bridge.stays(WHILE_S)
-        assert _ordered(bridge, OperatorCommand.START) == ""
+        # After so long a time the scanner is started anew.
+        bridge.until(lambda: _ordered(bridge, OperatorCommand.START) == "", "a start that is accepted")
         bridge.moves()
 
 

@@ -40,7 +40,7 @@ def made_of(model: LoadedAutomata, found: SystemSynthesis) -> MadeModel | str:
     why_not = too_large(system)
     if why_not:
         return why_not
-    # Of a copy: what a supervisor works out for itself cannot be pickled.
+    # A copy, since the values that a supervisor keeps for itself cannot be pickled.
     begin = distinct_beginnings(system, beginnings(replace(found.supervisor)))
     return MadeModel(found.supervisor, told, whole, language, begin)
 

@@ -421,7 +421,7 @@ class Playground:
     def _entries_of(self, before: StateInWords, step: Step, number: int) -> list[dict[str, Any]]:
         found = list(entries_of(step, number))
         if self._edges is not None:
-            # Of automata the edges are told, and a state of hundreds of them not once more.
+            # Edges are enough for automata: the state of hundreds of them is not sent once more.
             (entry,) = found
             entry["transitions"] = self._edges.of(before, step)
             del entry["state"]

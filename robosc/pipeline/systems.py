@@ -355,7 +355,7 @@ def verify_system(
     found = verified.verification
     outcomes = {name: getattr(found, name) for name in _CHECKS}
     is_complete = verified.is_complete and not (is_strict and CheckOutcome.NOT_CHECKED in outcomes.values())
-    # What a file says of itself is not believed either; of a wrong supervisor the figure says nothing more.
+    # The figure in a file is not believed either; that of a wrong supervisor says nothing more.
     told, counted = supervisor.states, found.states
     is_miscounted = told > 0 and counted not in (None, told) and not found.failures
     miscount = f"it tells of {told}, and there are {counted}" if is_miscounted else ""

@@ -93,7 +93,7 @@ class BoundedMonitor(ProgressMonitor):
             EffortSpentError: It has taken more steps than it may.
         """
         self.steps += steps
-        # What asks less often goes a little beyond the limit; that is nothing to count.
+        # The kernel asks less often and goes a little beyond the limit: those steps are not counted.
         beyond = 0 if self.limit is None else max(0, self.steps - self.limit - 1)
         self.steps -= beyond
         self._monitor.check_stop(steps - beyond)

@@ -14,6 +14,33 @@ TWO_TANKS = TANK + TANK.replace("tank", "tub")
 EMPTY = TANK.replace("when level > 1", "")
 WRONG = TANK.replace("= 1;", "= n;")
 
+TANK_AND_BELT = """\
+input bool sensor;
+plant tank:
+  controllable c_fill;
+  uncontrollable u_drain;
+  disc int[0..4] level in any;
+  location:
+    initial; marked;
+    edge c_fill do level := level + 1;
+    edge u_drain when level > 1 do level := level - 1;
+end
+group line:
+  plant belt:
+    uncontrollable u_go;
+    controllable c_turn;
+    location run: initial; marked; edge u_go goto jam; edge u_go goto run;
+    location jam: edge c_turn goto run;
+  end
+end
+requirement order:
+  location a: initial; marked; edge tank.c_fill goto b;
+  location b: marked; edge tank.c_fill when sensor goto a;
+end
+requirement tank.u_drain needs tank.level != 4;
+"""
+"""A tank with an input variable and several beginnings, and a belt whose event has two outcomes."""
+
 BUFFER = """<Generator name="Machine" ftype="System">
 <Alphabet> start +C+ stop </Alphabet>
 <States> idle busy </States>

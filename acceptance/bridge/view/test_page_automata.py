@@ -4,34 +4,10 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, expect
 
+from support.automata_models import TANK_AND_BELT
 from support.browser import visit
 from support.view_servers import view_process
 
-TANK = """\
-input bool sensor;
-plant tank:
-  controllable c_fill;
-  uncontrollable u_drain;
-  disc int[0..4] level in any;
-  location:
-    initial; marked;
-    edge c_fill do level := level + 1;
-    edge u_drain when level > 1 do level := level - 1;
-end
-group line:
-  plant belt:
-    uncontrollable u_go;
-    controllable c_turn;
-    location run: initial; marked; edge u_go goto jam; edge u_go goto run;
-    location jam: edge c_turn goto run;
-  end
-end
-requirement order:
-  location a: initial; marked; edge tank.c_fill goto b;
-  location b: marked; edge tank.c_fill when sensor goto a;
-end
-requirement tank.u_drain needs tank.level != 4;
-"""
 SYNTHESIS_MS = 60_000.0
 """Maximum time for a process that synthesizes what was saved, in milliseconds."""
 
@@ -58,7 +34,7 @@ def form_of(name: str) -> str:
 
 def test_automata_are_played_with(browser: Browser, tmp_path: Path) -> None:
     file = tmp_path / "tank.cif"
-    file.write_text(TANK, encoding="utf-8")
+    file.write_text(TANK_AND_BELT, encoding="utf-8")
     with view_process(file) as (_, url), visit(browser, url) as seen:
         page = seen.page
         told, count = page.locator("#play-told"), page.locator("#play-count")
@@ -80,7 +56,7 @@ def test_automata_are_played_with(browser: Browser, tmp_path: Path) -> None:
         draining = page.locator(form_of("tank.u_drain"))
         expect(draining.locator("button")).to_have_attribute("aria-disabled", "true")
         expect(draining.locator(".play-why")).to_have_text("tank: tank.level > 1 does not hold (tank.level is 1)")
-        # Of several outcomes one is chosen, and the edge that was taken is marked.
+        # The person chooses one of several outcomes, and the page marks the edge that was taken.
         happen("line.belt.u_go")
         expect(told).to_contain_text("line.belt.u_go can lead to 2 states: choose one beside its button")
         ways = page.locator(form_of("line.belt.u_go")).locator(".play-ways button")
@@ -105,8 +81,8 @@ def test_automata_are_played_with(browser: Browser, tmp_path: Path) -> None:
         page.reload()
         expect(told).to_have_text("what this page did before is here again")
         expect(page.locator("#play-beginning")).to_have_value("tank.level = 1")
-        # What the file says, also where it is wrong.
-        file.write_text(TANK.replace("!= 4", "< 3"), encoding="utf-8")
+        # The page shows the findings of a wrong file, too.
+        file.write_text(TANK_AND_BELT.replace("!= 4", "< 3"), encoding="utf-8")
         expect(told).to_contain_text("the supervisor adds to tank.c_fill: tank.level <= 1", timeout=SYNTHESIS_MS)
         expect(page.locator("#play-beginning")).to_have_value("tank.level = 1")
         seen.picture("automata")
@@ -116,10 +92,10 @@ def test_automata_are_played_with(browser: Browser, tmp_path: Path) -> None:
         expect(told).to_contain_text("the link to this model is")
         link = page.evaluate("location.hash")
         assert link.startswith("#model.cif=")
-        file.write_text(TANK.replace("when level > 1 do", "do"), encoding="utf-8")
+        file.write_text(TANK_AND_BELT.replace("when level > 1 do", "do"), encoding="utf-8")
         expect(page.locator("#causes")).to_contain_text("no supervisor exists", timeout=SYNTHESIS_MS)
         expect(page.locator("#causes")).to_contain_text("to blame")
-        file.write_text(TANK.replace("c_fill do", "c_fil do"), encoding="utf-8")
+        file.write_text(TANK_AND_BELT.replace("c_fill do", "c_fil do"), encoding="utf-8")
         expect(page.locator("#causes")).to_contain_text("[cif-unknown-name]", timeout=SYNTHESIS_MS)
         seen.picture("automata-findings")
         assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")

@@ -226,7 +226,7 @@ class VehicleLink:
             for message in messages:
                 self._sort(message, time_s)
             if is_old:
-                # Whoever drives by them would drive by what was there.
+                # A robot that drives by them would drive by things that are gone.
                 self._obstacles.clear()
             if isinstance(self._line, NetworkPort) and self._line.is_datagram:
                 # A packet does not go on in the next datagram.

@@ -203,7 +203,7 @@ def test_the_watchdog_stops_a_servo_that_hears_nothing(station: Station) -> None
     assert station.write(RAM_GOAL, 4, 50) == (0, 4)
     assert station.write(WATCHDOG, 1, 5) == (0, 4)
     assert station.write(WATCHDOG, 1, 0) == (0, 0)
-    # What it was told before drives it again.
+    # The goal from before drives it again.
     station.robot.advance(0.1)
     assert station.read(128, 4, signed=True) == 100
     assert station.write(RAM_GOAL, 4, 50) == (0, 0)

@@ -20,34 +20,9 @@ from robosc_view.playground import MAXIMUM_WAYS, packed, unpacked
 from robosc_view.requests import parse_request
 from robosc_view.sources import RefusedError
 from robosc_view.watched_model import NoSupervisorError, synthesized_automata
+from support.automata_models import TANK_AND_BELT
 from support.pages_open import opened, token_of
 from support.view_servers import served
-
-TANK = """\
-input bool sensor;
-plant tank:
-  controllable c_fill;
-  uncontrollable u_drain;
-  disc int[0..4] level in any;
-  location:
-    initial; marked;
-    edge c_fill do level := level + 1;
-    edge u_drain when level > 1 do level := level - 1;
-end
-group line:
-  plant belt:
-    uncontrollable u_go;
-    controllable c_turn;
-    location run: initial; marked; edge u_go goto jam; edge u_go goto run;
-    location jam: edge c_turn goto run;
-  end
-end
-requirement order:
-  location a: initial; marked; edge tank.c_fill goto b;
-  location b: marked; edge tank.c_fill when sensor goto a;
-end
-requirement tank.u_drain needs tank.level != 4;
-"""
 
 ODD = """\
 <Module xmlns="http://waters.sourceforge.net/xsd/module" name="odd">
@@ -105,7 +80,7 @@ async def changed(page: Any) -> list[str]:
     return lines
 
 
-def played(file: Path, text: str = TANK) -> str:
+def played(file: Path, text: str = TANK_AND_BELT) -> str:
     file.write_text(text, encoding="utf-8")
     return str(file)
 
@@ -145,7 +120,7 @@ def test_what_is_shown(tmp_path: Path) -> None:
             ]
             # The supervisor does not let it begin at 4. Input variables change at any time.
             assert play["beginnings"] == [f"tank.level = {level}" for level in range(4)]
-            assert (play["forms"], play["language"], unpacked(play["link"])) == ([], "cif", TANK)
+            assert (play["forms"], play["language"], unpacked(play["link"])) == ([], "cif", TANK_AND_BELT)
             first = await page.told("run")
             assert first["lines"] == [
                 "there are 4 states to begin in, and this begins where tank.level = 0: choose another one, and restart"
@@ -277,7 +252,7 @@ def test_chance_and_trouble(tmp_path: Path) -> None:
 
 def test_the_page_follows_the_file_and_what_it_imports(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watched_model, "LOOK_S", 0.01)
-    head, _, last = TANK.strip().rpartition("\n")
+    head, _, last = TANK_AND_BELT.strip().rpartition("\n")
     rule = tmp_path / "rule.cif"
     played(rule, last)
     file = tmp_path / "tank.cif"
@@ -285,7 +260,7 @@ def test_the_page_follows_the_file_and_what_it_imports(tmp_path: Path, monkeypat
 
     async def run() -> None:
         async with serving(played(file, imported)) as url, opened(url) as page:
-            # Who has a link has not what the model imports.
+            # A link does not hold the files that the model imports.
             assert (await page.told("definition"))["play"]["link"] is None
             await page.told("run")
             await done(page, "restart", beginning=1)
@@ -303,7 +278,7 @@ def test_the_page_follows_the_file_and_what_it_imports(tmp_path: Path, monkeypat
             update = await page.until(lambda told: told["type"] == "update" and told["warnings"])
             (warning,) = update["warnings"]
             assert "this is not what it says" in warning["text"] and "rule.cif:1:" in warning["text"]
-            # Of a model without a supervisor it is told what is to blame.
+            # Without a supervisor the page says what is to blame.
             played(rule, "requirement invariant tank.level > 4;")
             update = await page.until(
                 lambda told: told["type"] == "update" and "to blame" in "".join(w["text"] for w in told["warnings"])
@@ -327,18 +302,18 @@ def test_a_link_tells_the_language_and_reads_no_file(tmp_path: Path) -> None:
         async with serving(played(tmp_path / "gate.gen", GEN)) as url, opened(url) as page:
             token = token_of(url)
             assert (await page.told("definition"))["play"]["language"] == "gen"
-            await page.send(type="model", packed=packed(TANK), language="cif", token=token)
+            await page.send(type="model", packed=packed(TANK_AND_BELT), language="cif", token=token)
             assert await changed(page) == ["this is the model of the link"]
-            importing = f'import "{secret}";\n{TANK}'
+            importing = f'import "{secret}";\n{TANK_AND_BELT}'
             await page.send(type="model", packed=packed(importing), language="cif", token=token)
             told = await page.until(lambda message: message["type"] == "run" and message["kind"] == "wrong")
             assert f"there is no file '{secret}' that can be read" in told["lines"][0]
 
     asyncio.run(run())
-    link = f"http://127.0.0.1:8066/#model.cif={packed(TANK)}"
+    link = f"http://127.0.0.1:8066/#model.cif={packed(TANK_AND_BELT)}"
     given = arguments(link)
-    assert (given.model, given.text) == (Path("model.cif"), TANK)
-    assert arguments(f"http://127.0.0.1:8066/#model={packed(TANK)}").model == Path("model.rscd")
+    assert (given.model, given.text) == (Path("model.cif"), TANK_AND_BELT)
+    assert arguments(f"http://127.0.0.1:8066/#model={packed(TANK_AND_BELT)}").model == Path("model.rscd")
     _, is_shared, robot = command._source(given)
     assert (is_shared, robot is not None and robot.shape.name) == (False, "model")
     with pytest.raises(RefusedError, match="one of rscd, cif, gen, wmod"):
@@ -398,8 +373,8 @@ def automata_run(made: watched_model.MadeModel) -> Any:
 
 
 def test_changes_of_the_supervisor_are_told() -> None:
-    before = model(TANK)
-    after = model(TANK.replace("c_turn", "c_back").replace("!= 4", "< 3"))
+    before = model(TANK_AND_BELT)
+    after = model(TANK_AND_BELT.replace("c_turn", "c_back").replace("!= 4", "< 3"))
     told = model_changes(before, after)
     assert "new: line.belt.c_back" in told and "gone: line.belt.c_turn" in told
     assert "the supervisor adds to tank.c_fill: tank.level <= 1 (before: tank.level != 3)" in told
@@ -425,8 +400,8 @@ def test_a_model_that_is_too_large_is_told(tmp_path: Path, monkeypatch: pytest.M
 def test_a_model_without_a_supervisor_and_one_with_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "tank.cif"
     for text, told in (
-        (TANK.replace("when level > 1 do", "do"), "to blame"),
-        (TANK.replace("c_fill do", "c_fil do"), "cif-unknown-name"),
+        (TANK_AND_BELT.replace("when level > 1 do", "do"), "to blame"),
+        (TANK_AND_BELT.replace("c_fill do", "c_fil do"), "cif-unknown-name"),
     ):
         with pytest.raises(CommandError, match="there is no supervisor of") as error:
             command._source(arguments(played(file, text)))

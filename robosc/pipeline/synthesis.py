@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import overload
+from typing import Literal, overload
 
 from robosc.automata import System
 from robosc.certification import Progress, SynthesisOutcome, make_supervisor
@@ -69,6 +69,18 @@ def synthesize(  # type: ignore[overload-overlap]
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     is_modular: bool = False,
+    on_progress: OnProgress = ignored,
+    should_stop: ShouldStop = never,
+) -> SystemSynthesis: ...
+
+
+# The name of a file alone tells no type checker what is in it; modules are of automata.
+@overload
+def synthesize(
+    model: ModelLike,
+    options: SynthesisOptions = DEFAULT_OPTIONS,
+    *,
+    is_modular: Literal[True],
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> SystemSynthesis: ...

@@ -184,7 +184,8 @@ class TestWork:
         assert (finding.code, finding.message) == ("cif-import", f"there is no file '{name}' that can be read")
 
     def test_a_supervisor_is_that_of_the_library(self) -> None:
-        local = robosc.synthesize(robosc.load(text=TWO_TANKS, name="tank.cif"), is_modular=True)  # type: ignore[call-overload]
+        local = robosc.synthesize(robosc.load(text=TWO_TANKS, name="tank.cif"), is_modular=True)
+        assert local.supervisor is not None
         message = request(TaskKind.SYNTHESIZE, cif(TWO_TANKS), modular=True)
         (answer,) = answers(TaskKind.SYNTHESIZE, message)
         assert answer.result.status == pb.SYNTHESIS_STATUS_SUPERVISOR

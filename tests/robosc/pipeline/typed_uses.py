@@ -32,6 +32,8 @@ def right(system: System) -> None:
             robosc.simulate(robosc.Supervisor.read(saved))
             print(step.data, enabled, files, checked.report)
     of_system: robosc.SystemSynthesis = robosc.synthesize(system)
+    in_modules: robosc.SystemSynthesis = robosc.synthesize("plant.cif", is_modular=True)
+    print(in_modules.reason)
     if of_system.supervisor is not None:
         print(robosc.verify(of_system.supervisor, is_strict=True).passed, of_system.supervisor.conditions["a"])
         by_hand: robosc.SystemRun = robosc.simulate(of_system.supervisor, initial={"A": "idle"})

@@ -19,14 +19,16 @@ from robosc import kernel
 from robosc.dd_modules import load_dd
 from robosc.errors import NodeLimitError, SynthesisCancelled
 from robosc.kernel import kernel_module, kernel_problem
-from robosc.synthesis import SynthesisProgress, compiled, nodes
+from robosc.synthesis import EngineOptions, SynthesisProgress, compiled, nodes, synthesize
 from robosc.synthesis.compiled import kernel_of
 from robosc.synthesis.engines import Manager, limited, make_manager
 from robosc.synthesis.image import Image
 from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
+from robosc.synthesis.result import Closure
 from robosc.synthesis.saturation import CompiledSaturation, Saturation, saturation
 from robosc.synthesis.step import Step
 from support.effort import examples
+from support.families import FAMILIES
 
 TOP = Path(__file__).parents[3]
 PLACES = ("a", "b", "c", "d", "e", "f")
@@ -189,6 +191,13 @@ def test_it_counts(manager: Manager) -> None:
     assert closed(manager, ProgressMonitor(lambda: False, told.append)) == 256
     assert {progress.phase for progress in told} == {"test"}
     assert [progress.iteration for progress in told] == list(range(1, len(told) + 1))
+
+
+def test_the_figures_tell_of_it() -> None:
+    system = FAMILIES["token ring"](2)
+    engines = (EngineOptions("cudd"), EngineOptions("autoref"), EngineOptions("cudd", is_reordering=True))
+    found = [synthesize(system, engine=engine).statistics.closure for engine in engines]
+    assert found == [Closure.COMPILED_SATURATION, Closure.SATURATION, Closure.CHAINING]
 
 
 def test_it_stops_when_told(manager: Manager) -> None:

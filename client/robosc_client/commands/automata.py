@@ -139,7 +139,7 @@ def task_of(arguments: argparse.Namespace, package: str | None) -> Task:
         case _:
             automata.refuse(arguments.supervisor is not None, automata.NO_FILE)
             return Verify(
-                bundle=automata.loaded_for_verification(arguments),
+                model=automata.loaded_for_verification(arguments),
                 engine=options.engine,
                 allow_reordering=options.allow_reordering,
                 maximum_nodes=options.maximum_nodes,

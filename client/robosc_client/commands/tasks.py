@@ -142,7 +142,7 @@ def verify_task(arguments: argparse.Namespace, bundle: Bundle, supervisor: bytes
     """Return the task that the arguments of `verify` ask for."""
     texts, listings = property_texts(arguments)
     return Verify(
-        bundle=bundle,
+        model=bundle,
         supervisor=supervisor,
         deployment=None if arguments.deployment is None else Deployment(arguments.deployment),
         properties=tuple(file.text for file in texts),

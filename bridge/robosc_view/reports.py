@@ -117,7 +117,7 @@ class Status:
 
 @dataclass(frozen=True, slots=True)
 class RunReport:
-    """Report of what was just done with a run that is led by hand.
+    """Report of what was just done with a run that is stepped by hand.
 
     Attributes:
         kind: `step`, `unknown`, `trouble`, `changed` (the model), `wrong` or `choose`; empty: nothing was done.

@@ -192,7 +192,7 @@ class Scope:
 type Item = Entity | Definition | Scope
 
 
-class Scopes:
+class RobotScopes:
     """All scopes of a specification.
 
     Attributes:

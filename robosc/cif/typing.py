@@ -7,7 +7,7 @@ from typing import Any
 
 from robosc.cif import syntax
 from robosc.cif.functions import call
-from robosc.cif.scopes import Entity, Scope, Scopes
+from robosc.cif.scopes import Entity, RobotScopes, Scope
 from robosc.cif.terms import (
     ERROR,
     MAXIMUM_DEPTH,
@@ -57,7 +57,7 @@ NAMELESS = "*"
 class Typing:
     """Meaning of expressions and types in the scopes of a specification."""
 
-    def __init__(self, scopes: Scopes) -> None:
+    def __init__(self, scopes: RobotScopes) -> None:
         self.scopes = scopes
         self.findings = scopes.findings
         self._terms: dict[Entity, Term | None] = {}

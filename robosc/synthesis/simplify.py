@@ -233,7 +233,7 @@ class Simplifier:
         for wanted, forbidden in pairs:
             try:
                 with space.within(self._formulas.effort.part(STEPS)):
-                    for description in relations.around(wanted, forbidden, places):
+                    for description in relations.descriptions(wanted, forbidden, places):
                         states = relations.states(description)
                         yield space.diagram(states if wanted == sets[0] else space.without(1, states))
             except EffortExceededError:

@@ -21,7 +21,7 @@ from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.commands.bench import varied
 from robosc_client.jobs import MAXIMUM_IDEMPOTENCY_KEY, MAXIMUM_LABEL
-from robosc_client.load import Measured
+from robosc_client.load_measurement import Measured
 from robosc_client.main import main
 from robosc_server.jobs import convert
 from support.answers import (

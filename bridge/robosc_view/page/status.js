@@ -25,7 +25,7 @@ let lastCauses = null;
 /** The update is new. */
 export function paintStatus() {
   const { update } = received;
-  const state = update?.state || (isReplay() ? "recorded" : isModel() ? "led by hand" : "not known");
+  const state = update?.state || (isReplay() ? "recorded" : isModel() ? "stepped by hand" : "not known");
   say(byId("state-word"), state);
   mark(byId("state"), "data-state", update?.state || "unknown");
   if (update === null) {

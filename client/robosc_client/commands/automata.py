@@ -11,7 +11,7 @@ from robosc.pipeline.options import SynthesisOptions
 from robosc_client import Check, Client, Explore, Generate, Synthesize, Task, Verify
 from robosc_client.commands.numbers import checked_number
 from robosc_client.commands.progress_line import ProgressLine
-from robosc_client.commands.signed import require_signature
+from robosc_client.commands.signature_checks import require_signature
 
 if TYPE_CHECKING:
     from robosc.pipeline.exploring import Exploration

@@ -61,7 +61,7 @@ from robosc_client.commands.connection import (
     seconds,
 )
 from robosc_client.commands.progress_line import ProgressLine
-from robosc_client.commands.signed import require_signature, trusted_keys
+from robosc_client.commands.signature_checks import require_signature, trusted_keys
 from robosc_client.commands.supervisor_file import write_supervisor
 from robosc_client.commands.tasks import (
     add_signed_by_argument,

@@ -85,7 +85,7 @@ def played(file: Path, text: str = TANK_AND_BELT) -> str:
     return str(file)
 
 
-def model(text: str, name: str = "tank.cif") -> watched_model.MadeModel:
+def model(text: str, name: str = "tank.cif") -> watched_model.SynthesizedModel:
     return asyncio.run(synthesized_automata(arguments(name), text))
 
 
@@ -365,7 +365,7 @@ def test_edges_that_cannot_be_told_apart_are_not_told() -> None:
     assert numbers == [[0], [1], []]
 
 
-def automata_run(made: watched_model.MadeModel) -> Any:
+def automata_run(made: watched_model.SynthesizedModel) -> Any:
     from robosc.pipeline.system_runs import SystemRun
 
     assert isinstance(made.supervisor, SystemSupervisor)

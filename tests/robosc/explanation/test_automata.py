@@ -21,7 +21,7 @@ from robosc.automata import (
 from robosc.automata.state import Subject, subjects
 from robosc.explanation import Explanation, RequestError, SystemWords, explain_synthesis, explanation_text
 from robosc.explanation.explanations import StateReport, StateValues
-from robosc.explanation.requests import SystemRequests
+from robosc.explanation.requests import SystemQuestionReader
 from robosc.explanation.requirement_automata import as_conditions
 from robosc.expressions import Binary, Constant, IntegerType, StateTest, Unary, VariableRead
 from robosc.source import Location
@@ -242,7 +242,7 @@ def test_no_initial_state_is_told() -> None:
 
 
 ODD = Automaton("odd = 1", ("< 2",), ("< 2",), frozenset(), frozenset(), ())
-ASKED = SystemRequests(System("s", (GO, STOP), (PLANT, ODD)))
+ASKED = SystemQuestionReader(System("s", (GO, STOP), (PLANT, ODD)))
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Runs that are led by hand: against the reference interpreter's own interface, and what is refused."""
+"""Runs that are stepped by hand: against the reference interpreter's own interface, and what is refused."""
 
 from random import Random
 from typing import Any

@@ -138,7 +138,7 @@ def _text(path: Path) -> str:
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
-        raise ValueError(f"{path}: is no text in UTF-8") from None
+        raise ValueError(f"{path}: is not text in UTF-8") from None
 
 
 def _track(name: str | None) -> Track | None:

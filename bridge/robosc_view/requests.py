@@ -229,4 +229,4 @@ def _number(document: dict[str, Any], name: str, low: float, high: float) -> flo
 
 
 def _refuse(text: str) -> float:
-    raise ValueError(f"{text} is no JSON number")
+    raise ValueError(f"{text} is not a JSON number")

@@ -621,11 +621,11 @@ class Typing:
         if base.type.kind == "unknown" or any(item is not None and item.type.kind == "unknown" for item in bounds):
             return ERROR
         if base.type.kind not in ("list", "string"):
-            return self.mismatch(f"{base.type} cannot be cut", node.at)
+            return self.mismatch(f"{base.type} cannot be sliced", node.at)
         type_ = STRING if base.type.kind == "string" else CifType("list", parts=base.type.parts)
         known = [item for item in bounds if item is not None]
         if not base.is_static or not all(item.is_static for item in known):
-            return broken(type_, base, *known, problem=Problem("this cuts a value of a state", node.at))
+            return broken(type_, base, *known, problem=Problem("this slices a value of a state", node.at))
         low, high = (None if item is None else item.value for item in bounds)
         return static(type_, base.value[low:high])
 
@@ -662,7 +662,7 @@ class Typing:
         try:
             return _cast_value(term, type_)
         except ValueError:
-            return self.mismatch(f"{term.value!r} is no {type_}", node.at)
+            return self.mismatch(f"{term.value!r} is not {type_}", node.at)
 
     def _special(self, node: syntax.Special, scope: Scope) -> Term:
         match node.word:
@@ -670,7 +670,7 @@ class Typing:
                 return broken(REAL, problem=Problem("'time' is a real number", node.at))
             case "self":
                 if not scope.is_automaton:
-                    return self.mismatch("'self' is the automaton around it, and there is none", node.at)
+                    return self.mismatch("'self' is the enclosing automaton, and there is none", node.at)
                 return Term(AUTOMATON, value=scope)
             case "?":
                 return broken(UNKNOWN, problem=Problem("a value is received from a channel", node.at))

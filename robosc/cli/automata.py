@@ -459,7 +459,7 @@ def loaded(arguments: argparse.Namespace, text: str | None = None) -> "LoadedAut
     refuse(bool(arguments.library_path), "-L: automata import no libraries, and CIF models files by their places")
     refuse(bool(arguments.interface_path), "-I: automata have no types of ROS")
     deployment = getattr(arguments, "deployment", None)
-    refuse(deployment == str(Deployment.LAYER), "--deployment: automata are no node of a robot")
+    refuse(deployment == str(Deployment.LAYER), "--deployment: automata are not a node of a robot")
     if text is not None:
         return LoadedAutomata(SourceFile(str(arguments.model), text))
     try:

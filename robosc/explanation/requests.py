@@ -112,7 +112,9 @@ class Requests(ABC):
             values = {value_text(value): value for value in subject_domain(self._system, subject)}
             if text in values:
                 return EnumValue(type_.name, text) if isinstance(type_, EnumType) else Constant(values[text])
-        raise RequestError(f"{_quoted(text)} is no value of {subject}{_hint(text, list(values) or ['a whole number'])}")
+        raise RequestError(
+            f"{_quoted(text)} is not a value of {subject}{_hint(text, list(values) or ['a whole number'])}"
+        )
 
 
 class ModelQuestionReader(Requests):
@@ -149,7 +151,7 @@ class ModelQuestionReader(Requests):
         """
         found = _ATOM.fullmatch(text.replace("^", ""))
         if found is None:
-            raise RequestError(f"{_quoted(text)} is no condition such as Door.closed, Lift.n = 2 or !Lamp.on")
+            raise RequestError(f"{_quoted(text)} is not a condition such as Door.closed, Lift.n = 2 or !Lamp.on")
         owner, name = found["owner"], found["name"]
         plants = {item.name: communication_plant_name(item) for item in self._model.communications}
         if found["kind"]:

@@ -120,7 +120,7 @@ class SystemSupervisor:
 
         Raises:
             FileAccessError: The file cannot be read.
-            InvalidSupervisorError: It is no supervisor of automata.
+            InvalidSupervisorError: It is not a supervisor of automata.
         """
         return decode_system(read_bounded(given_path(file), MAXIMUM_BYTES))
 
@@ -195,7 +195,9 @@ def decode_system(data: bytes) -> SystemSupervisor:
         raise InvalidSupervisorError(f"the supervisor file is inconsistent: {one_line(error)}") from None
     names = {automaton.name for automaton in supervisor.system.automata}
     if any(min(item.states, item.group) < 1 or not names.issuperset(item.automata) for item in supervisor.modules):
-        raise InvalidSupervisorError("the supervisor file is inconsistent: a module is none of its automata")
+        raise InvalidSupervisorError(
+            "the supervisor file is inconsistent: a module names an automaton that it does not have"
+        )
     figures = supervisor.statistics
     if min(figures.state_bits, figures.iterations, figures.peak_nodes) < 0 or figures.states < (not supervisor.modules):
         raise InvalidSupervisorError("the supervisor file is inconsistent: a figure of the synthesis is too small")

@@ -233,7 +233,7 @@ class TestJobs:
         status, _, err = remote("get", job, "-o", "job.txt")
         assert (status, "ends in .cif" in err) == (2, True)
         status, _, err = remote("get", job, "--result", "--deployment", "controller")
-        assert (status, "automata are no node" in err) == (2, True)
+        assert (status, "automata are not a node" in err) == (2, True)
         assert json.loads(remote("get", job, "--result")[1])["summary"].startswith("tank: a supervisor exists")
 
     def test_the_other_tasks(self, folder: Path, remote: Run) -> None:

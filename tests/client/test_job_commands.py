@@ -417,8 +417,8 @@ class TestListAndCancel:
         [
             (["--most", "0"], "must be a number from 1 to 1,000,000"),
             (["--most", "x"], "must be a number from 1 to 1,000,000"),
-            (["--kind", "fly"], "'fly' is none of check, synthesize, generate, explore, verify, format, synth"),
-            (["--state", "idle"], "'idle' is none of queued, running, succeeded, failed, cancelled"),
+            (["--kind", "fly"], "'fly' is not one of check, synthesize, generate, explore, verify, format, synth"),
+            (["--state", "idle"], "'idle' is not one of queued, running, succeeded, failed, cancelled"),
             (["--deadline", "inf"], "above 0 and below 1,000,000,000"),
             (["--deadline", "soon"], "above 0 and below 1,000,000,000"),
         ],

@@ -27,7 +27,7 @@ def load(path: FilePath) -> Loaded:
     """Read a configuration file.
 
     Raises:
-        ConfigurationError: It cannot be read, is no YAML, or is no valid configuration; lists all that is wrong.
+        ConfigurationError: It cannot be read, is not YAML, or is no valid configuration; lists all that is wrong.
     """
     return parse(read_file(path), str(path))
 
@@ -40,7 +40,7 @@ def parse(data: bytes, name: str) -> Loaded:
         name: Of its file, for messages.
 
     Raises:
-        ConfigurationError: It is no YAML or no valid configuration; lists all that is wrong.
+        ConfigurationError: It is not YAML or no valid configuration; lists all that is wrong.
     """
     document = parse_document(data, name)
     configuration = decode(document, Configuration)

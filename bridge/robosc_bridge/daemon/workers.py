@@ -187,7 +187,7 @@ class DriveWorker:
         reading = self._base.exchange(command.velocity)
         self._silent = 0
         if news := reading.faults - self._told:
-            _log.warning("the motors tell: %s", ", ".join(sorted(news)))
+            _log.warning("the motors report: %s", ", ".join(sorted(news)))
             self._told |= news
         self._gate.on_drive_reading(reading)
         self._report(reading)

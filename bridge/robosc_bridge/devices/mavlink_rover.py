@@ -143,8 +143,8 @@ class MavlinkRover:
                 self._link.request((telemetry,), _TELEMETRY_S.get(telemetry, self._telemetry_s))
             if not self._waits(lambda state: self._fresh(state) is not None, _SHOWN_LIMIT_S):
                 raise DeviceFaultError(
-                    f"{self._path}: the rover does not tell where it is; its estimator has no origin (GPS, or another "
-                    "source of its position)"
+                    f"{self._path}: the rover does not report where it is; its estimator has no origin (GPS, or "
+                    "another source of its position)"
                 )
         except BaseException:
             self._release()
@@ -209,7 +209,9 @@ class MavlinkRover:
             if self._is_due(target):
                 self._send_target(target)
         if told is None:
-            raise DeviceSilentError(f"{self._path}: the rover has not told its motion for {self._motion_limit_s:g} s")
+            raise DeviceSilentError(
+                f"{self._path}: the rover has not reported its motion for {self._motion_limit_s:g} s"
+            )
         return self._reading(state, told, is_obeying)
 
     def reset(self) -> None:

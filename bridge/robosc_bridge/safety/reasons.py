@@ -16,7 +16,7 @@ class Reason(StrEnum):
     PAUSED = "The bridge's computer stood still for too long."
     MOTOR_FAULT = "A motor tells of a fault."
     TORQUE_LOST = "A motor does not hold, or has let go by itself."
-    WHEEL_ASTRAY = "A wheel does not rotate as it is told: it is blocked, or does not stop."
+    WHEEL_ASTRAY = "A wheel does not rotate as commanded: it is blocked, or does not stop."
     BATTERY_LOW = "The battery is empty."
     TORQUE_AWAITED = "The motors do not hold yet."
     COMMAND_SILENT = "No command came for too long."
@@ -49,7 +49,7 @@ class Caution(StrEnum):
     """Caution that does not stop the robot, as a sentence for a person."""
 
     BATTERY = "The battery will soon be empty."
-    MOTOR_VOLTAGE = "A motor tells that its supply is out of range."
-    COMMAND_REFUSED = "A command was no number and counts as a stop."
+    MOTOR_VOLTAGE = "A motor reports that its supply is out of range."
+    COMMAND_REFUSED = "A command was not a number and counts as a stop."
     SCAN_BLIND = "The scanner measures nothing where the robot goes: it is covered, or nothing is in its range."
     SCAN_NOISY = "Many frames of the scanner are damaged."

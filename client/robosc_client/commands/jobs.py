@@ -169,7 +169,7 @@ def _one_of[Choice: StrEnum](choices: type[Choice], shorter: Mapping[str, Choice
 
     def read(text: str) -> Choice:
         if text not in names:
-            raise argparse.ArgumentTypeError(f"{text!r} is none of {', '.join(names)}")
+            raise argparse.ArgumentTypeError(f"{text!r} is not one of {', '.join(names)}")
         return names[text]
 
     return read
@@ -443,7 +443,7 @@ def _sound_automata(
     """
     from robosc_client.outcomes import automata_supervisor_of
 
-    automata.refuse(bool(arguments.deployment), "--deployment: automata are no node of a robot")
+    automata.refuse(bool(arguments.deployment), "--deployment: automata are not a node of a robot")
     automata.refuse_output(arguments.output)
     supervisor = automata_supervisor_of(found.supervisor)
     if keys:

@@ -92,14 +92,14 @@ def test_which_fault_a_motor_tells_is_told() -> None:
         bridge.steady()
         bridge.robot.left.overload()
         bridge.ended()
-        bridge.was_told("the motors tell: overload")
+        bridge.was_told("the motors report: overload")
 
 
 def test_a_voltage_that_is_out_of_range_is_told_and_stops_nothing() -> None:
     with driven("dynamixel") as bridge:
         bridge.steady()
         bridge.robot.left.brown_out(14.5)
-        bridge.was_told("the motors tell: input voltage")
+        bridge.was_told("the motors report: input voltage")
         before = len(bridge.trace.told)
         bridge.until(lambda: len(bridge.trace.heard_s) > 100, "a hundred exchanges")
         assert (bridge.state, bridge.trace.told[before:]) == (State.RUNNING, [])

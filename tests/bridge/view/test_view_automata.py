@@ -417,7 +417,7 @@ def test_a_model_without_a_supervisor_and_one_with_errors(tmp_path: Path, capsys
         (["--bridge", "127.0.0.1:1", "--model", "tank.cif"], "a bridge tells its model itself"),
         (["tank.wmod", "--scene", "room"], "--scene: automata are nowhere"),
         (["tank.cif", "-L", "."], "-L: automata import no libraries"),
-        (["tank.cif", "--deployment", "layer"], "--deployment: automata are no node"),
+        (["tank.cif", "--deployment", "layer"], "--deployment: automata are not a node"),
         (["tank.cif"], "there is no file tank.cif"),
     ],
 )

@@ -268,7 +268,7 @@ def test_states_are_asked_for_by_the_names_of_automata(text: str, condition: obj
         ("p.q = c", "unknown location of p.q 'c'; there is a, b"),
         ("p.q < a", "unknown location or variable 'p.q'; did you mean 'p.q.n'?"),
         ("p.q.n", "p.q.n needs a value: p.q.n = 0"),
-        ("p.q.n = x", "'x' is no value of p.q.n; there is a whole number"),
+        ("p.q.n = x", "'x' is not a value of p.q.n; there is a whole number"),
         ("", 'no state is asked for: write for instance "Door.closed, Lift.n = 2"'),
     ],
 )

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Server:
-    """Machine of `robosc.cli.automata` that is a server, whose answers are not believed.
+    """Machine of `robosc.cli.machine` that is a server, whose answers are not believed.
 
     Args:
         client: Connection to the server.

@@ -61,32 +61,26 @@ def synthesized(arguments: argparse.Namespace, text: str | None = None) -> "tupl
     return model, THIS_MACHINE.synthesize(model, synthesis_options(arguments), is_modular=False)
 
 
-def file_of(supervisor: "SystemSupervisor", suffix: str) -> bytes:
-    """Return the content of a file whose name ends so.
-
-    It is the supervisor's own file, or the controlled system: a CIF model, or one automaton of libFAUDES or Supremica.
+def controlled_system(supervisor: "SystemSupervisor", suffix: str) -> bytes:
+    """Return the content of a file whose name ends so: a CIF model, or one automaton of libFAUDES or Supremica.
 
     Raises:
         CommandError: It has too many states for one automaton.
         UnsupportedModelError: A name in it is none of that format, or it is too large.
     """
-    return supervisor.encode() if suffix == SUPERVISOR else _controlled_system(supervisor, suffix).encode()
-
-
-def _controlled_system(supervisor: "SystemSupervisor", suffix: str) -> str:
     from robosc.exploration import DEFAULT_LIMIT, graph_automaton
     from robosc.pipeline.exploring import graph_of
     from robosc.plain_automata import WRITERS
     from robosc.targets.cif import automata
 
     if suffix not in WRITERS:
-        return automata.controlled_system(supervisor)
+        return automata.controlled_system(supervisor).encode()
     try:
         graph = graph_of(supervisor, limit=DEFAULT_LIMIT)
     except UnsupportedModelError as error:
         problem = f"-o: the controlled system has more than {DEFAULT_LIMIT:,} states, or very many transitions"
         raise CommandError(f"{problem}: write it to a file that ends in .cif", ExitCode.FAILED) from error
-    return WRITERS[suffix](graph_automaton(graph, supervisor.system))
+    return WRITERS[suffix](graph_automaton(graph, supervisor.system)).encode()
 
 
 def check(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> ExitCode:
@@ -138,7 +132,10 @@ def synth(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Exi
     if output is not None:
         for file in model.files:
             require_other_file(output, arguments.model.parent / file.name)
-        write_bytes(output, file_of(made.supervisor, output.suffix))
+        if output.suffix == SUPERVISOR:
+            machine.write_supervisor(output, made.supervisor)
+        else:
+            write_bytes(output, controlled_system(made.supervisor, output.suffix))
     initial = made.supervisor.initial_condition
     if arguments.json:
         print_json(

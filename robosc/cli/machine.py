@@ -2,10 +2,11 @@
 
 from typing import TYPE_CHECKING, Protocol
 
-from robosc.cli.output import ProgressLine
+from robosc.cli.output import ProgressLine, write_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     from robosc.pipeline.exploring import Exploration
     from robosc.pipeline.findings import Findings
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from robosc.pipeline.options import SynthesisOptions
     from robosc.pipeline.results import Generation, Verification
     from robosc.pipeline.synthesis import OnProgress
-    from robosc.pipeline.systems import SystemSynthesis
+    from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
     from robosc.targets import GenerateOptions
 
 
@@ -27,6 +28,14 @@ class Machine(Protocol):
         self, model: "LoadedAutomata", options: "SynthesisOptions", *, is_modular: bool
     ) -> "SystemSynthesis":
         """Synthesize the supervisor."""
+
+    def write_supervisor(self, output: "Path", made: "SystemSupervisor") -> None:
+        """Write the file of a supervisor that this machine has synthesized, and what belongs beside it.
+
+        Raises:
+            UsageError: A file cannot be written.
+            UnsupportedModelError: The supervisor is more than a file can hold.
+        """
 
     def explore(self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int) -> "Exploration":
         """Return the graph of the controlled system."""
@@ -65,6 +74,10 @@ class ThisMachine:
         from robosc.pipeline.automata_models import automata_synthesis
 
         return watched(lambda told: automata_synthesis(model, options, told, lambda: False, is_modular=is_modular))
+
+    def write_supervisor(self, output: "Path", made: "SystemSupervisor") -> None:
+        """Write a supervisor's file."""
+        write_bytes(output, made.encode())
 
     def explore(self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int) -> "Exploration":
         """Return the graph of the controlled system."""

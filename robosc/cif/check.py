@@ -10,7 +10,7 @@ from robosc.automata import CheckedSystem, SystemPlaces
 from robosc.cif import syntax
 from robosc.cif.lowering import Lowering
 from robosc.cif.parser import parse
-from robosc.cif.scopes import RobotScopes
+from robosc.cif.scopes import Scopes
 from robosc.cif.typing import Typing
 from robosc.errors import Diagnostic, LanguageError, Severity, sorted_diagnostics
 from robosc.language.reading import read_source
@@ -61,7 +61,7 @@ def check_cif(bundle: Bundle) -> CheckedSystem:
     if has_all and not findings.has_errors:
         allow_depth(_LEVELS, _FRAMES)
         try:
-            scopes = RobotScopes(trees, findings)
+            scopes = Scopes(trees, findings)
             system, places = Lowering(scopes, Typing(scopes)).lowered(Path(bundle.main.name).stem)
         except RecursionError:
             message = "expressions, or definitions in definitions, are nested too deeply"

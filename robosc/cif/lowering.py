@@ -20,7 +20,7 @@ from robosc.automata import (
 from robosc.automata.environment import environment_variable
 from robosc.automata.structure import InputVariable
 from robosc.cif import syntax
-from robosc.cif.scopes import Entity, RobotScopes, Scope
+from robosc.cif.scopes import Entity, Scope, Scopes
 from robosc.cif.terms import ERROR, Term, conditional, logic, negation, tuple_parts
 from robosc.cif.types import CifType, fits, overlaps
 from robosc.cif.typing import NAMELESS, Typing
@@ -74,7 +74,7 @@ class Lowering:
         depends: Variables that the initial value of a variable reads, with the places where it does.
     """
 
-    scopes: RobotScopes
+    scopes: Scopes
     typing: Typing
     events: list[Event] = field(default_factory=list)
     automata: list[Automaton] = field(default_factory=list)

@@ -192,7 +192,7 @@ class Scope:
 type Item = Entity | Definition | Scope
 
 
-class RobotScopes:
+class Scopes:
     """All scopes of a specification.
 
     Attributes:

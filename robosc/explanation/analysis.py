@@ -154,7 +154,7 @@ class Analysis:
             safe = safe & ~steps.bad
         self.safe = safe
         """The states that are not bad."""
-        self._troubled = ~self._fixed_point.nonblocking_states(self._problem, safe)
+        self._troubled = ~self._fixed_point.nonblocking_ahead(self._problem, safe)
         self.good = good
         """The states that a supervisor may be in."""
         free = (*dropped, *(item for item in constraints if item.kind is not ConstraintKind.MARKING))

@@ -69,7 +69,7 @@ def explain_synthesis(
         problems = Problems(encoding, monitor)
         fixed_point, problem = problems.without(())
         with place.reordering():
-            good = fixed_point.good_states(problem, encoding.manager.false)
+            good = fixed_point.solution(problem, encoding.manager.false)
             reachable = None if good.reason else fixed_point.reachable_states(problem, good.states)
         if good.reason:
             empty = explain_problem(place, monitor, problems, words)

@@ -587,7 +587,7 @@ def _write(arguments: argparse.Namespace, found: TaskResult, supervisor: "System
         case tuple():
             raise UsageError("a check has no result file: use --result to print its findings")
         case Synthesis() if supervisor is not None and arguments.output.suffix != automata.SUPERVISOR:
-            write_bytes(arguments.output, automata.file_of(supervisor, arguments.output.suffix))
+            write_bytes(arguments.output, automata.controlled_system(supervisor, arguments.output.suffix))
         case Synthesis() if found.supervisor:
             write_supervisor(arguments.output, found.supervisor, found.signature)
         case Generation() if found.files is not None:

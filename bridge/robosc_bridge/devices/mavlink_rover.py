@@ -12,7 +12,15 @@ from collections.abc import Callable
 
 from robosc_bridge.devices.interface import STANDSTILL, DriveLimits, DriveReading, MotorFault, Velocity
 from robosc_bridge.devices.kinematics import wheel_speeds, within_limits
-from robosc_bridge.devices.mavlink_link import BAUD, LinkSettings, VehicleLink, acquire, release
+from robosc_bridge.devices.mavlink_link import (
+    BAUD,
+    OWN_COMPONENT,
+    OWN_SYSTEM,
+    LinkSettings,
+    VehicleLink,
+    acquire,
+    release,
+)
 from robosc_bridge.devices.mavlink_odometry import VehicleOdometry, estimate
 from robosc_bridge.devices.mavlink_state import Timestamped, VehicleState
 from robosc_bridge.devices.robots import Body
@@ -94,8 +102,8 @@ class MavlinkRover:
         baud: int = BAUD,
         *,
         system: int | None = None,
-        own_system: int = 255,
-        own_component: int = 190,
+        own_system: int = OWN_SYSTEM,
+        own_component: int = OWN_COMPONENT,
         signing: Signing | None = None,
         host: Host = SYSTEM_HOST,
         motion_limit_s: float = 1.0,
@@ -249,6 +257,11 @@ class MavlinkRover:
     def _find(self, link: VehicleLink) -> None:
         if self._waits(lambda state: state.heartbeat is not None, _FIRST_HEARTBEAT_LIMIT_S):
             self._heartbeat(link.state)
+            if self._settings.is_own(link.state.system, link.state.component):
+                raise WrongDeviceError(
+                    f"{self._path}: the rover has the numbers {link.state.system} (system) and {link.state.component} "
+                    "(component), as the bridge; set own_system or own_component to others"
+                )
             return
         stranger = link.state.stranger
         if stranger is not None:

@@ -57,11 +57,12 @@ def configured(folder: Path, robot: SimulatedTurtleBot3, base: str, address: str
 
 @contextmanager
 def running(
-    folder: Path, robot: SimulatedTurtleBot3, base: str, address: str = "null"
+    folder: Path, robot: SimulatedTurtleBot3, base: str, address: str = "null", *arguments: str
 ) -> Iterator[subprocess.Popen[str]]:
-    """The bridge, once the robot has moved; arguments are those of `configured`."""
+    """The bridge, once the robot has moved; arguments are those of `configured`, and further ones of `run`."""
     configuration = configured(folder, robot, base, address)
     command = [sys.executable, "-m", "robosc_bridge.main", "run", "--model", str(MODEL), "--config", str(configuration)]
+    command += arguments
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         start = robot.world.pose

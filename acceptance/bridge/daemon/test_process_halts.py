@@ -68,7 +68,7 @@ class Wheels:
         """They stand still within the time, and go on doing so for a while."""
         while self.lived_s() < halted_s + promised_s + LATER_S:
             time.sleep(0.02)
-        assert self.moved_s - halted_s <= promised_s
+        assert 0.0 <= self.moved_s - halted_s <= promised_s
 
     def lived_s(self) -> float:
         """The world's time."""

@@ -1,6 +1,7 @@
 """From a configuration to a daemon with its devices' threads."""
 
 import contextlib
+import inspect
 import math
 import sys
 from collections.abc import Sequence
@@ -32,6 +33,7 @@ from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
 from robosc_bridge.devices.options import checked_options
 from robosc_bridge.devices.robots import ROBOTS, Body, Robot
 from robosc_bridge.driver_registry import (
+    Driver,
     DriverFeatures,
     Kind,
     features_of,
@@ -178,23 +180,24 @@ def drive_base(configuration: Configuration, host: Host = SYSTEM_HOST) -> DriveB
     drive = configuration.drive
     driver = find_driver(Kind.DRIVE_BASE, drive.driver)
     try:
-        options = checked_options(driver, drive.options)
-        return make_drive_base(drive.driver, path=drive.port, robot=_robot(configuration), **_on(host), **options)
+        options = checked_options(driver, drive.options) | _on(host, driver)
+        return make_drive_base(drive.driver, path=drive.port, robot=_robot(configuration), **options)
     except (SigningError, TypeError, ValueError) as error:
         raise AssemblyError(f"driver '{drive.driver}': {error}") from error
 
 
-def _on(host: Host) -> dict[str, Host]:
+def _on(host: Host, driver: Driver) -> dict[str, Host]:
     """Arguments of a driver; that of a plug-in need not know any host but this computer."""
-    return {} if host is SYSTEM_HOST else {"host": host}
+    takes_host = "host" in inspect.signature(driver.make).parameters
+    return {"host": host} if takes_host and host is not SYSTEM_HOST else {}
 
 
 def range_scanner(scanner: Scanner, host: Host = SYSTEM_HOST) -> RangeScanner:
     """The LiDAR, not opened yet; raises as `drive_base`."""
     driver = find_driver(Kind.RANGE_SCANNER, scanner.driver)
     try:
-        options = checked_options(driver, scanner.options)
-        return make_range_scanner(scanner.driver, path=scanner.port, **_on(host), **options)
+        options = checked_options(driver, scanner.options) | _on(host, driver)
+        return make_range_scanner(scanner.driver, path=scanner.port, **options)
     except (SigningError, TypeError, ValueError) as error:
         raise AssemblyError(f"driver '{scanner.driver}': {error}") from error
 

@@ -33,6 +33,7 @@ from robosc_bridge.errors import (
     WrongDeviceError,
 )
 from robosc_bridge.host import Host
+from robosc_bridge.protocol.framing import FrameCounts
 from robosc_bridge.protocol.mavlink_messages import (
     Heartbeat,
     MavCommand,
@@ -125,6 +126,12 @@ class MavlinkRover:
         self._is_torque_lost = False
         self._target = STANDSTILL
         self._target_s = -math.inf
+
+    @property
+    def counters(self) -> FrameCounts:
+        """Health of the line since it was opened."""
+        link = self._link
+        return FrameCounts() if link is None else link.counts
 
     def open(self) -> None:
         """Find the vehicle and check that it is a rover that tells where it is and that nobody else drives.

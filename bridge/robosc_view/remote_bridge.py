@@ -299,6 +299,11 @@ def status_of(snapshot: Snapshot) -> Status:
         enabled=list(snapshot.enabled),
         drive=_drive(snapshot.drive) if snapshot.HasField("drive") else None,
         age_s=snapshot.age_s,
+        latencies=[
+            (item.name, item.p50_s * 1e3, item.p99_s * 1e3, item.max_s * 1e3)
+            for item in snapshot.latencies
+            if item.count
+        ],
     )
 
 

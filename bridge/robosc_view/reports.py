@@ -98,6 +98,7 @@ class Status:
         age_s: Age of this when it came, in seconds.
         last: Number of the transition that each component took last; of one that is not named none is known. None:
             the entries show it.
+        latencies: Times that the bridge measures of itself: name, 50th and 99th percentile and maximum in milliseconds.
     """
 
     time_s: float
@@ -113,6 +114,7 @@ class Status:
     drive: Drive | None = None
     age_s: float = 0.0
     last: Mapping[str, int] | None = None
+    latencies: Sequence[tuple[str, float, float, float]] = ()
 
 
 @dataclass(frozen=True, slots=True)

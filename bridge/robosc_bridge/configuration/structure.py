@@ -213,6 +213,10 @@ class Remote(_Section, frozen=True):
     mavlink_interval_s: Annotated[
         float, Meta(ge=0.05, le=10, description="Seconds between two messages of pose, and of obstacles.")
     ] = 0.1
+    metrics_address: Annotated[
+        _Text | None,
+        Meta(description="HOST:PORT at which Prometheus reads metrics, over HTTP at /metrics; null: none."),
+    ] = None
 
 
 class View(_Section, frozen=True):

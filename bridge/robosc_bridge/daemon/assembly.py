@@ -1,10 +1,14 @@
 """From a configuration to a daemon with its devices' threads."""
 
 import contextlib
+import dataclasses
+import inspect
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import msgspec
 
@@ -25,13 +29,17 @@ from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.files import file_problems
 from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.reports import Device
+from robosc_bridge.daemon.service_manager import ServiceManager
 from robosc_bridge.daemon.states import OperatorCommand
+from robosc_bridge.daemon.timing import Timing
 from robosc_bridge.daemon.view_settings import settings_of as view_settings
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
 from robosc_bridge.devices.options import checked_options
 from robosc_bridge.devices.robots import ROBOTS, Body, Robot
 from robosc_bridge.driver_registry import (
+    Driver,
     DriverFeatures,
     Kind,
     features_of,
@@ -178,23 +186,24 @@ def drive_base(configuration: Configuration, host: Host = SYSTEM_HOST) -> DriveB
     drive = configuration.drive
     driver = find_driver(Kind.DRIVE_BASE, drive.driver)
     try:
-        options = checked_options(driver, drive.options)
-        return make_drive_base(drive.driver, path=drive.port, robot=_robot(configuration), **_on(host), **options)
+        options = checked_options(driver, drive.options) | _on(host, driver)
+        return make_drive_base(drive.driver, path=drive.port, robot=_robot(configuration), **options)
     except (SigningError, TypeError, ValueError) as error:
         raise AssemblyError(f"driver '{drive.driver}': {error}") from error
 
 
-def _on(host: Host) -> dict[str, Host]:
+def _on(host: Host, driver: Driver) -> dict[str, Host]:
     """Arguments of a driver; that of a plug-in need not know any host but this computer."""
-    return {} if host is SYSTEM_HOST else {"host": host}
+    takes_host = "host" in inspect.signature(driver.make).parameters
+    return {"host": host} if takes_host and host is not SYSTEM_HOST else {}
 
 
 def range_scanner(scanner: Scanner, host: Host = SYSTEM_HOST) -> RangeScanner:
     """The LiDAR, not opened yet; raises as `drive_base`."""
     driver = find_driver(Kind.RANGE_SCANNER, scanner.driver)
     try:
-        options = checked_options(driver, scanner.options)
-        return make_range_scanner(scanner.driver, path=scanner.port, **_on(host), **options)
+        options = checked_options(driver, scanner.options) | _on(host, driver)
+        return make_range_scanner(scanner.driver, path=scanner.port, **options)
     except (SigningError, TypeError, ValueError) as error:
         raise AssemblyError(f"driver '{scanner.driver}': {error}") from error
 
@@ -210,6 +219,7 @@ class Machine:
         camera: The camera's thread; None: nothing is mapped to what it shows.
         operations: The daemon as remote endpoints see it.
         liveness: Threads and endpoints that must not end by themselves.
+        manager: Service manager that is told that the bridge lives.
     """
 
     daemon: Daemon
@@ -218,6 +228,7 @@ class Machine:
     camera: DeviceThread | None
     operations: Operations
     liveness: LivenessMonitor
+    manager: ServiceManager
 
     def run(self, endpoints: Sequence[Endpoint] = ()) -> bool:
         """Start the remote endpoints and the threads, run the loop to its end, and stop them.
@@ -238,9 +249,12 @@ class Machine:
                 self.liveness.watch(endpoint)
             for thread in threads:
                 thread.start()
+            self.manager.ready()
+            stack.callback(self.manager.close)
             try:
                 self.daemon.run()
             finally:
+                self.manager.stopping()
                 # The drive base first: whatever else hangs, the wheels stop.
                 ended = [thread.stop(_THREAD_LIMIT_S) for thread in threads]
         return all(ended)
@@ -329,16 +343,19 @@ def assemble(
     rotate = msgspec.structs.replace(rotate, speed_rad_s=speed_rad_s, slowest_rad_s=slowest_rad_s)
     stop = EmergencyStop(configuration.skills.emergency_stop)
     feed = Feed()
+    base = drive_base(configuration, host)
+    lidar = None if configuration.scanner is None else range_scanner(configuration.scanner, host)
+    timing = Timing(host.monotonic, _line_counts(base, lidar))
     try:
-        daemon = Daemon(job, safety, Rotate(rotate), stop, host, log, feed, host.queue())
+        daemon = Daemon(job, safety, Rotate(rotate), stop, host, log, feed, host.queue(), timing)
     except (DeploymentError, SettingsError) as error:
         raise AssemblyError(str(error)) from error
-    worker = DriveWorker(drive_base(configuration, host), safety, daemon.post, EXCHANGE_S, host.monotonic)
+    worker = DriveWorker(base, safety, daemon.post, EXCHANGE_S, host.monotonic, timing=timing)
     drive = DeviceThread(worker, host)
     scanner = None
-    if configuration.scanner is not None:
+    if lidar is not None:
         listener = ScannerWorker(
-            range_scanner(configuration.scanner, host),
+            lidar,
             safety,
             daemon.post,
             configuration.safety.scan_timeout_s,
@@ -356,4 +373,19 @@ def assemble(
     operations = Operations(
         supervisor, mapping, feed, daemon.post, lambda: safety.operator_seen(host.monotonic()), is_layer=is_layer
     )
-    return Machine(daemon, drive, scanner, camera, operations, liveness)
+    manager = ServiceManager(lambda now_s: drive.is_alive and worker.is_cycling(now_s))
+    daemon.beat = lambda now_s: manager.beat(now_s, daemon.state)
+    return Machine(daemon, drive, scanner, camera, operations, liveness, manager)
+
+
+def _line_counts(base: DriveBase, lidar: RangeScanner | None) -> dict[str, Callable[[], dict[str, int]]]:
+    """Counts of the devices' lines, by device; those of drivers that keep none are left out."""
+    found: dict[str, Callable[[], dict[str, int]]] = {}
+    for device, driver in ((Device.DRIVE, base), (Device.SCANNER, lidar)):
+        if dataclasses.is_dataclass(getattr(driver, "counters", None)):
+            found[device] = partial(_counted, driver)
+    return found
+
+
+def _counted(driver: Any) -> dict[str, int]:
+    return dataclasses.asdict(driver.counters)

@@ -11,7 +11,7 @@ import contextlib
 import logging
 from collections.abc import Sequence
 
-from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, DynamixelBus, exchange_limit_s
+from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, BusCounters, DynamixelBus, exchange_limit_s
 from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFault, Velocity
 from robosc_bridge.devices.kinematics import body_velocity, wheel_goals
 from robosc_bridge.devices.odometry import Odometry
@@ -99,6 +99,12 @@ class DynamixelBase:
     def limits(self) -> DriveLimits:
         """Limits of the wheels; known after `open`."""
         return self._limits
+
+    @property
+    def counters(self) -> BusCounters:
+        """Health of the line since it was opened."""
+        bus = self._bus
+        return BusCounters() if bus is None else bus.counters
 
     def open(self) -> None:
         """Find both motors, check that they can be driven, and set them up; wheels at rest, torque off.

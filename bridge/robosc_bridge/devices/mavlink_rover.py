@@ -12,7 +12,15 @@ from collections.abc import Callable
 
 from robosc_bridge.devices.interface import STANDSTILL, DriveLimits, DriveReading, MotorFault, Velocity
 from robosc_bridge.devices.kinematics import wheel_speeds, within_limits
-from robosc_bridge.devices.mavlink_link import BAUD, LinkSettings, VehicleLink, acquire, release
+from robosc_bridge.devices.mavlink_link import (
+    BAUD,
+    OWN_COMPONENT,
+    OWN_SYSTEM,
+    LinkSettings,
+    VehicleLink,
+    acquire,
+    release,
+)
 from robosc_bridge.devices.mavlink_odometry import VehicleOdometry, estimate
 from robosc_bridge.devices.mavlink_state import Timestamped, VehicleState
 from robosc_bridge.devices.robots import Body
@@ -25,6 +33,7 @@ from robosc_bridge.errors import (
     WrongDeviceError,
 )
 from robosc_bridge.host import Host
+from robosc_bridge.protocol.framing import FrameCounts
 from robosc_bridge.protocol.mavlink_messages import (
     Heartbeat,
     MavCommand,
@@ -94,8 +103,8 @@ class MavlinkRover:
         baud: int = BAUD,
         *,
         system: int | None = None,
-        own_system: int = 255,
-        own_component: int = 190,
+        own_system: int = OWN_SYSTEM,
+        own_component: int = OWN_COMPONENT,
         signing: Signing | None = None,
         host: Host = SYSTEM_HOST,
         motion_limit_s: float = 1.0,
@@ -117,6 +126,12 @@ class MavlinkRover:
         self._is_torque_lost = False
         self._target = STANDSTILL
         self._target_s = -math.inf
+
+    @property
+    def counters(self) -> FrameCounts:
+        """Health of the line since it was opened."""
+        link = self._link
+        return FrameCounts() if link is None else link.counts
 
     def open(self) -> None:
         """Find the vehicle and check that it is a rover that tells where it is and that nobody else drives.
@@ -251,6 +266,11 @@ class MavlinkRover:
     def _find(self, link: VehicleLink) -> None:
         if self._waits(lambda state: state.heartbeat is not None, _FIRST_HEARTBEAT_LIMIT_S):
             self._heartbeat(link.state)
+            if self._settings.is_own(link.state.system, link.state.component):
+                raise WrongDeviceError(
+                    f"{self._path}: the rover has the numbers {link.state.system} (system) and {link.state.component} "
+                    "(component), as the bridge; set own_system or own_component to others"
+                )
             return
         stranger = link.state.stranger
         if stranger is not None:

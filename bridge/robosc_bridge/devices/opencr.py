@@ -11,7 +11,7 @@ import contextlib
 from collections.abc import Callable
 from typing import NoReturn
 
-from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, DynamixelBus, exchange_limit_s
+from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, BusCounters, DynamixelBus, exchange_limit_s
 from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFault, Velocity
 from robosc_bridge.devices.kinematics import body_velocity, opencr_words, wheel_speeds
 from robosc_bridge.devices.odometry import Odometry
@@ -75,6 +75,12 @@ class OpenCrBase:
         self._uptime: tuple[int, float, float] | None = None
         self._is_torque_wanted = False
         self._is_torque_lost = False
+
+    @property
+    def counters(self) -> BusCounters:
+        """Health of the line since it was opened."""
+        bus = self._bus
+        return BusCounters() if bus is None else bus.counters
 
     def open(self) -> None:
         """Find the board and check that it is the one that is meant; wheels at rest, torque off.

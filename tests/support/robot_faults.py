@@ -15,7 +15,6 @@ PAGE = (Path(__file__).parents[2] / "docs" / "bridge-safety.md").read_text(encod
 TABLE = PAGE.partition("## Every fault, measured at the motors")[2]
 STATED_S = {name: float(time_s) for name, time_s in re.findall(r"^\| ([^|]+?) \| ([0-9.]+) s \|", TABLE, re.MULTILINE)}
 BASES = ("opencr", "dynamixel")
-SCAN_TIMEOUTS_S = {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
 
 
 @dataclass(frozen=True)

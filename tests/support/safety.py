@@ -16,6 +16,8 @@ LIMITS = SafetyLimits(
     separation_m=0.16,
     scan_timeout_s=0.6,
     operator_timeout_s=5.0,
+    loop_timeout_s=0.2,
+    angular_acceleration_rad_s2=4.0,
 )
 STEP_S = 0.02
 

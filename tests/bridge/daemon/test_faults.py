@@ -18,11 +18,11 @@ from robosc_bridge.daemon.motion import MotionTarget
 from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.errors import LineDeniedError
 from robosc_bridge.host import Port
-from robosc_bridge.safety import Reason
+from robosc_bridge.safety import SCAN_TIMEOUTS_S, Reason
 from robosc_simulated import SimulatedTurtleBot3
 from robosc_simulated.virtual_host import VirtualHost
 from support.driven import LIMIT_S, PATIENT, Driven, driven
-from support.robot_faults import BASES, GRAVE, SCAN_TIMEOUTS_S, STATED_S, TABLE, Fault, answer_as, cases, speak, wires
+from support.robot_faults import BASES, GRAVE, STATED_S, TABLE, Fault, answer_as, cases, speak, wires
 
 # A section `remote`; nothing listens there, the test itself is who can be told.
 REACHABLE = "{grpc_address: '127.0.0.1:1'}"
@@ -153,7 +153,7 @@ def test_no_wheel_is_told_more_than_its_limit_nor_at_once(base: str, velocity: t
     ("row", "safety", "message"),
     [
         ("the loop hangs", "{}", "The supervisor's loop has not turned for too long."),
-        ("no command comes", "{command_timeout_s: 0.2, overrun_s: 1.0}", ""),
+        ("no command comes", "{overrun_s: 1.0}", ""),
     ],
 )
 def test_a_loop_that_hangs_stops_the_wheels_until_it_turns_again(
@@ -345,16 +345,12 @@ def test_a_motor_that_is_overloaded_is_restarted_by_a_reset_and_moves_after_a_st
 # The LiDAR.
 
 
-def _scan_timeout(lidar: str) -> str:
-    return f"{{scan_timeout_s: {SCAN_TIMEOUTS_S[lidar]}}}"
-
-
 @pytest.mark.parametrize(
     ("base", "lidar"), [("opencr", "lds01"), ("dynamixel", "lds02"), ("opencr", "lds03"), ("dynamixel", "lds03")]
 )
 @pytest.mark.parametrize("how", ["is_stalled", "is_covered"])
 def test_a_lidar_that_shows_nothing_stops_the_wheels_until_it_does(base: str, lidar: str, how: str) -> None:
-    with driven(base, lidar, safety=_scan_timeout(lidar)) as bridge:
+    with driven(base, lidar) as bridge:
         row = f"{lidar} is silent" if how == "is_stalled" else f"{lidar} is covered"
         bridge.stopped_after(lambda: setattr(bridge.robot.scanner, how, True), STATED_S[row])
         bridge.was_told(f"scanner: no full revolution with valid ranges for {SCAN_TIMEOUTS_S[lidar]:g} s")
@@ -368,7 +364,7 @@ def test_a_lidar_that_shows_nothing_stops_the_wheels_until_it_does(base: str, li
 
 @pytest.mark.parametrize("base", BASES)
 def test_a_lidar_that_is_unplugged_stops_the_wheels_until_it_is_back(base: str) -> None:
-    with driven(base, safety=_scan_timeout("lds03")) as bridge:
+    with driven(base) as bridge:
         line = bridge.robot.scanner_line
         bridge.stopped_after(line.disconnect, STATED_S["lds03 is silent"])
         bridge.was_told(f"scanner: {line.path}: the ")
@@ -384,7 +380,7 @@ def test_a_lidar_that_is_unplugged_stops_the_wheels_until_it_is_back(base: str) 
 
 @pytest.mark.parametrize("base", BASES)
 def test_noise_from_a_lidar_is_no_scan(base: str) -> None:
-    with driven(base, safety=_scan_timeout("lds03")) as bridge:
+    with driven(base) as bridge:
         faults = bridge.robot.scanner_faults
         bridge.stopped_after(lambda: setattr(faults, "corrupt_share", 1.0), STATED_S["lds03 is covered"])
         bridge.stays(WHILE_S)

@@ -125,11 +125,11 @@ def test_a_command_of_long_ago_does_not_count() -> None:
 
 
 def test_a_time_without_readings_gives_no_acceleration() -> None:
-    bench = Bench(command_timeout_s=1.0, loop_timeout_s=2.0, motor_timeout_s=0.05)
+    bench = Bench(command_timeout_s=1.0, loop_timeout_s=2.0, motor_timeout_s=0.06)
     bench.drive(0.01)
     bench.layer.command(Velocity(0.2), bench.now_s + 0.5)
     bench.layer.on_drive_reading(reading(bench.now_s + 0.5, wheels_m_s=(0.01, 0.01)))
-    assert bench.layer.output(bench.now_s + 0.5).velocity == near(0.06)
+    assert bench.layer.output(bench.now_s + 0.5).velocity == near(0.07)
 
 
 def again(bench: Bench) -> None:

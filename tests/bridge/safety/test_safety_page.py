@@ -5,8 +5,9 @@ from pathlib import Path
 
 from robosc_bridge.driver_registry import features_of
 from robosc_bridge.safety import LATCHING, SCAN_TIMEOUTS_S, TORQUE_OFF, Caution, Reason
-from support.safety import LIMITS
+from support.safety_numbers import shipped
 
+LIMITS = shipped()
 PAGE = (Path(__file__).parents[3] / "docs" / "bridge-safety.md").read_text(encoding="utf-8")
 ROWS = {
     cells[0].strip("`"): cells[1:]
@@ -30,7 +31,7 @@ def test_how_each_ends_and_whether_torque_goes() -> None:
         assert zero.startswith(("at once", "timeout and one call"))
 
 
-def test_its_numbers_are_the_defaults() -> None:
+def test_its_numbers_are_those_that_ship() -> None:
     told = {
         Reason.COMMAND_SILENT: LIMITS.command_timeout_s,
         Reason.MOTOR_SILENT: LIMITS.motor_timeout_s,

@@ -7,6 +7,7 @@ Sources: ArduPilot Rover (`GCS_MAVLink_Rover.cpp`, `mode_guided.cpp`, `AP_Arming
 """
 
 import contextlib
+import logging
 import math
 from collections.abc import Callable
 
@@ -66,6 +67,12 @@ _NEW_TARGET_S = 0.02
 _WARNING = 4
 _FOLLOWING_LIMIT_S = 2.0
 _MM = 1000
+_LONG_TARGETS = (
+    "the rover is armed; where the bridge or its line fails, it drives on for up to 3 s, until its target expires "
+    "(docs/bridge-safety.md says what shortens that)"
+)
+
+_log = logging.getLogger(__name__)
 
 
 class MavlinkRover:
@@ -117,6 +124,7 @@ class MavlinkRover:
         self._is_torque_lost = False
         self._target = STANDSTILL
         self._target_s = -math.inf
+        self._is_warned = False
 
     def open(self) -> None:
         """Find the vehicle and check that it is a rover that tells where it is and that nobody else drives.
@@ -181,6 +189,9 @@ class MavlinkRover:
         self._is_torque_wanted = True
         self._is_torque_lost = False
         self._following.forget()
+        if not self._is_warned:
+            self._is_warned = True
+            _log.warning("%s: %s", self._path, _LONG_TARGETS)
 
     def exchange(self, velocity: Velocity) -> DriveReading:
         """Send the velocity and our heartbeat where they are due, and tell what came; waits for nothing.

@@ -284,11 +284,12 @@ def _suspend(bridge: Driven, seconds: float) -> None:
     host_of(bridge.robot).suspend(seconds, "drive", "scanner", "loop", f"MAVLink {bridge.robot.base_path}")
 
 
-# A rover alone goes on meanwhile, until its own time limit of some seconds.
+# A rover alone goes on meanwhile, until its own time limit.
 @pytest.mark.parametrize("base", [*BASES, "mavlink-rover"])
 @pytest.mark.parametrize("gap_s", [0.6, 30.0])
 def test_a_bridge_that_stood_still_moves_nothing_before_somebody_says_so(base: str, gap_s: float) -> None:
-    limit_s = STATED_S["the bridge stands still"] if base in BASES else gap_s + 0.06
+    row = "the bridge stands still" if base in BASES else "a rover's bridge is killed or halted"
+    limit_s = min(STATED_S[row], gap_s + 0.06)
     with driven(base, remote=REACHABLE) as bridge:
         bridge.stopped_after(lambda: _suspend(bridge, gap_s), limit_s)
         bridge.until(lambda: bridge.state is State.FAULT, "the fault")
@@ -300,6 +301,45 @@ def test_a_bridge_that_stood_still_moves_nothing_before_somebody_says_so(base: s
         # After so long a time the scanner is started anew.
         bridge.until(lambda: _ordered(bridge, OperatorCommand.START) == "", "a start that is accepted")
         bridge.moves()
+
+
+# A process that is killed never goes on; what it has sent is the last that its devices hear.
+@pytest.mark.parametrize(
+    ("base", "row"),
+    [
+        ("opencr", "the bridge is killed"),
+        ("dynamixel", "the bridge is killed"),
+        ("mavlink-rover", "a rover's bridge is killed or halted"),
+    ],
+)
+def test_a_bridge_that_is_killed_leaves_wheels_that_stop_by_themselves(base: str, row: str) -> None:
+    with driven(base) as bridge:
+        bridge.stopped_after(lambda: _suspend(bridge, 10.0), STATED_S[row])
+
+
+@pytest.mark.parametrize(
+    ("row", "happens", "problem"),
+    [
+        ("a rover is unplugged", lambda bridge: bridge.robot.base_line.disconnect(), "the drive base is lost"),
+        # It still tells that it moves.
+        ("a rover hears nothing", lambda bridge: wires(bridge, is_deaf=True), Reason.WHEEL_ASTRAY),
+    ],
+)
+def test_a_rover_that_is_not_reached_stops_by_itself(
+    row: str, happens: Callable[[Driven], object], problem: str
+) -> None:
+    with driven("mavlink-rover") as bridge:
+        bridge.stopped_after(lambda: happens(bridge), STATED_S[row])
+        assert problem in bridge.ended()
+
+
+def test_whoever_arms_a_rover_is_told_how_long_it_goes_on_alone() -> None:
+    with driven("mavlink-rover", remote=REACHABLE) as bridge:
+        bridge.steady()
+        for command in (OperatorCommand.STANDBY, OperatorCommand.START):
+            assert _ordered(bridge, command) == ""
+        bridge.moves()
+        bridge.was_told("it drives on for up to 3 s, until its target expires")
 
 
 @pytest.mark.parametrize("base", [*BASES, "mavlink-rover"])

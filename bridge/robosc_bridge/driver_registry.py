@@ -45,6 +45,10 @@ class DriverFeatures:
         revolution_s: Time that a revolution of a range scanner takes, in seconds; None: that is not known.
         torque_on_s: Time within which motors that are told to hold do so and report it, in seconds; None: as the
             safety layer has it.
+        astray_s: Longest time that a wheel may be off its goal, in seconds; None: as the safety layer has it.
+        astray_m_s: Difference from its goal up to which a wheel is not off it, in m/s; None: as above.
+        has_own_controls: True if the device has controls of its own that move the wheels while torque is on, such as
+            buttons of a board; an operator's stop switches torque off then, unless it is told not to.
     """
 
     buttons: tuple[str, ...] = ()
@@ -52,6 +56,9 @@ class DriverFeatures:
     needs_turtlebot3: bool = False
     revolution_s: float | None = None
     torque_on_s: float | None = None
+    astray_s: float | None = None
+    astray_m_s: float | None = None
+    has_own_controls: bool = False
 
     @property
     def has_bumpers(self) -> bool:
@@ -104,12 +111,14 @@ _BUILT_IN: dict[Kind, dict[str, tuple[str, str, DriverFeatures | None]]] = {
             "a MAVLink rover: ArduPilot Rover, driven in its mode GUIDED over a serial line, UDP or TCP",
             "robosc_bridge.devices.mavlink_drivers:make_rover",
             # Its mode and its arming show in a heartbeat each; there is one a second, of which two may be lost.
-            DriverFeatures(has_imu=True, torque_on_s=8.0),
+            # Its own control is as slow as its mass asks for, and its estimate of a standstill is not zero.
+            DriverFeatures(has_imu=True, torque_on_s=8.0, astray_s=2.0, astray_m_s=0.1),
         ),
         "opencr": (
             "a stock TurtleBot3: its OpenCR board with the ROS 2 firmware",
             "robosc_bridge.devices.opencr:OpenCrBase",
-            DriverFeatures(PANEL, has_imu=True, needs_turtlebot3=True),
+            # Its firmware adds its two buttons and an RC-100 to what it is commanded.
+            DriverFeatures(PANEL, has_imu=True, needs_turtlebot3=True, has_own_controls=True),
         ),
     },
     Kind.RANGE_SCANNER: {

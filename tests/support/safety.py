@@ -45,6 +45,7 @@ class Bench:
         wheels_m_s: Speeds of the wheels, in m/s; None: as ordered.
         holds: True if the motors hold; None: as ordered.
         ranges_m: Ranges of a full scan, in metres.
+        acceleration_m_s2: Acceleration that the motors report; None: as fast as they can.
     """
 
     def __init__(self, **changes: Any) -> None:
@@ -57,6 +58,7 @@ class Bench:
         self.holds: bool | None = None
         self.battery_v: float | None = 12.0
         self.ranges_m: tuple[float, ...] = ()
+        self.acceleration_m_s2: float | None = None
         self.last = Output(STANDSTILL, False, (), ())
 
     def report(self) -> None:
@@ -82,6 +84,7 @@ class Bench:
                     wheels_m_s=self.wheels_m_s or (v - turn, v + turn),
                     is_torque_on=self.last.is_torque_wanted if self.holds is None else self.holds,
                     battery_v=self.battery_v,
+                    acceleration_m_s2=self.acceleration_m_s2,
                 )
             )
         self.now_s += step_s

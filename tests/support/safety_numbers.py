@@ -17,6 +17,8 @@ BY_ROBOT = {
     "wheel_m_s": "",
     "separation_m": "",
     "scan_timeout_s": "scan_timeout_s",
+    "has_own_controls": "",
+    "is_torque_off_on_operator_stop": "torque_off_on_operator_stop",
 }
 
 

@@ -186,8 +186,12 @@ class Safety(_Section, frozen=True):
         Meta(description="Seconds without the operator after which the robot stops; null: it needs none."),
     ] = SafetyLimits.operator_timeout_s
     torque_off_on_operator_stop: Annotated[
-        bool, Meta(description="True: the motors let go, too, once the wheels stand still after an operator's stop.")
-    ] = SafetyLimits.is_torque_off_on_operator_stop
+        bool | None,
+        Meta(
+            description="True: the motors let go, too, once the wheels stand still after an operator's stop; null: "
+            "they do where the drive has controls of its own (`opencr`)."
+        ),
+    ] = None
 
 
 class Skills(_Section, frozen=True):

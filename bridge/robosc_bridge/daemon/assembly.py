@@ -66,7 +66,6 @@ KEYS: Mapping[str, str] = MappingProxyType(
         "battery_warn_v": "battery_warning_v",
         "battery_stop_v": "battery_stop_v",
         "min_valid_share": "min_valid_share",
-        "is_torque_off_on_operator_stop": "torque_off_on_operator_stop",
         "is_stopped_when_blind": "stops_when_blind",
     }
 )
@@ -107,6 +106,14 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
             separation_m=robot.wheel_separation_m,
             scan_timeout_s=None if configuration.scanner is None else scan_timeout_s(configuration.scanner, chosen),
             torque_on_s=features.torque_on_s or SafetyLimits.torque_on_s,
+            astray_s=features.astray_s or SafetyLimits.astray_s,
+            astray_m_s=features.astray_m_s or SafetyLimits.astray_m_s,
+            has_own_controls=features.has_own_controls,
+            is_torque_off_on_operator_stop=(
+                features.has_own_controls
+                if chosen.torque_off_on_operator_stop is None
+                else chosen.torque_off_on_operator_stop
+            ),
         )
     except ValueError as error:
         raise AssemblyError(f"safety: {error}") from error

@@ -67,6 +67,7 @@ class DriveReading:
         wheels_m_s: Speed of the left and the right wheel.
         is_torque_on: True if the motors hold and obey.
         faults: Faults of any motor.
+        acceleration_m_s2: Acceleration with which the motors bring a wheel to a new goal; None: as fast as they can.
         battery_v: Voltage of the battery, in volts; None: it is not reported.
         battery_share: Charge of the battery, 0 to 1; None: it is not reported.
         temperature_c: Temperature of the hottest motor, in degrees Celsius; None: it is not reported.
@@ -80,6 +81,7 @@ class DriveReading:
     wheels_m_s: tuple[float, float]
     is_torque_on: bool
     faults: frozenset[MotorFault] = frozenset()
+    acceleration_m_s2: float | None = None
     battery_v: float | None = None
     battery_share: float | None = None
     temperature_c: float | None = None

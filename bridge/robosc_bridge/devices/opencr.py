@@ -28,6 +28,8 @@ BAUD = 1_000_000  # A USB device: any is right.
 _CALIBRATION_LIMIT_S = 6.0
 _REST_RAW = 2
 _REST_LIMIT_S = 1.0
+# What rotates against a goal of zero, by a button of the board or its remote control, rests without torque alone.
+_RELEASE_LIMIT_S = 0.3
 _TORQUE_LIMIT_S = 1.0
 _REFRESHED_MS = 45  # Two refreshes, every 20 ms, of what the board knows of its motors.
 _POLL_S = 0.01
@@ -116,7 +118,7 @@ class OpenCrBase:
             DeviceError: The wheels do not come to rest.
         """
         self._is_torque_wanted = False
-        if not self._comes_to_rest() and is_on:
+        if not self._comes_to_rest(_REST_LIMIT_S if is_on else _RELEASE_LIMIT_S) and is_on:
             raise DeviceError(f"{self._path}: the wheels still rotate")
         try:
             self._switch_torque(is_on)
@@ -246,9 +248,9 @@ class OpenCrBase:
         # After a calibration, which another program may have begun, the board first tells an uptime from before it.
         self._host.sleep(_REFRESHED_MS / 1000)
 
-    def _comes_to_rest(self) -> bool:
+    def _comes_to_rest(self, limit_s: float = _REST_LIMIT_S) -> bool:
         """Command zero and wait for the wheels; whether they came to rest in time."""
-        return self._cycles_until(lambda block: max(map(abs, block.velocities_raw)) <= _REST_RAW, _REST_LIMIT_S)
+        return self._cycles_until(lambda block: max(map(abs, block.velocities_raw)) <= _REST_RAW, limit_s)
 
     def _switch_torque(self, is_on: bool) -> None:
         self._write_torque(is_on)

@@ -156,8 +156,11 @@ class SafetyLayer:
                 self._latched.add(Reason.TORQUE_LOST)
             return
         self._is_torque_seen = True
-        if self._wheels.is_astray(wheels(self._velocity, self._limits), reading.wheels_m_s, reading.time_s):
+        self._wheels.update(wheels(self._velocity, self._limits), reading)
+        if self._wheels.is_astray:
             self._latched.add(Reason.WHEEL_ASTRAY)
+        if self._wheels.is_unbidden:
+            self._latched.add(Reason.UNBIDDEN_MOTION)
 
     def drive_failed(self) -> None:
         """An exchange with the drive base has failed."""
@@ -271,7 +274,9 @@ class SafetyLayer:
         elif self._torque_since_s is not None:
             self._letting_go_s = self._now_s if self._letting_go_s is None else min(self._letting_go_s, self._now_s)
             self._still_s = min(self._still_s, self._now_s)
-            if self._still_s > self._letting_go_s or self._now_s - self._letting_go_s >= self._limits.torque_off_s:
+            # Motors that rotate against a goal of zero obey something else: they come to rest without torque alone.
+            is_over = self._now_s - self._letting_go_s >= self._limits.torque_off_s
+            if self._still_s > self._letting_go_s or is_over or Reason.UNBIDDEN_MOTION in self._latched:
                 self._torque_since_s = self._letting_go_s = None
 
     def _find_reasons(self, is_clock_wrong: bool) -> tuple[Reason, ...]:
@@ -295,5 +300,8 @@ class SafetyLayer:
             Caution.COMMAND_REFUSED: self._is_refused,
             Caution.SCAN_BLIND: self._sight.is_blind(self._asked_m_s),
             Caution.SCAN_NOISY: self._is_noisy,
+            Caution.TORQUE_HELD: self._limits.has_own_controls
+            and self._torque_since_s is not None
+            and Reason.OPERATOR_STOP in self._latched,
         }
         return tuple(caution for caution, is_so in holds.items() if is_so)

@@ -58,6 +58,7 @@ BOUNDS: Mapping[str, Bounds] = MappingProxyType(
         "battery_stop_v": Bounds(most=100),
         "battery_mean_s": Bounds(most=10),
         "astray_s": Bounds(most=5),
+        "unbidden_s": Bounds(most=5),
         "torque_on_s": Bounds(most=10),
         "torque_off_s": Bounds(most=5),
         "min_valid_share": Bounds(most=1),
@@ -99,11 +100,14 @@ class SafetyLimits:
         battery_mean_s: Time that a mean is made of, so that a dip stops nothing.
         astray_m_s: Difference from its goal above which a wheel is astray, if it is also more than half of the goal.
         astray_s: Longest time that a wheel may be astray.
+        unbidden_s: Longest time that a wheel may rotate faster than `astray_m_s`, after all have stood still and with
+            nothing commanded since.
         torque_on_s: Longest time that the motors take to hold.
         torque_off_s: Longest wait for the wheels to stand still before torque goes off.
         standstill_m_s: Fastest speed of a wheel that counts as standstill.
         min_valid_share: Smallest share of the scanner's ranges where the robot goes that must be valid in a full
             scan; with a smaller one, the scanner sees nothing there; at most 1.
+        has_own_controls: True if the drive base has controls of its own that move the wheels while torque is on.
         is_torque_off_on_operator_stop: True if an operator's stop wants torque off, too.
         is_stopped_when_blind: True if the robot may not go where the scanner sees nothing; else a person is informed.
 
@@ -132,16 +136,18 @@ class SafetyLimits:
     battery_mean_s: float = 2.0
     astray_m_s: float = 0.02
     astray_s: float = 0.8
+    unbidden_s: float = 0.5
     torque_on_s: float = 2.0
     torque_off_s: float = 1.0
     standstill_m_s: float = 0.01
     min_valid_share: float = 0.05
+    has_own_controls: bool = False
     is_torque_off_on_operator_stop: bool = False
     is_stopped_when_blind: bool = False
 
     def __post_init__(self) -> None:
         values: dict[str, float] = {
-            each.name: getattr(self, each.name) for each in fields(self) if not each.name.startswith("is_")
+            each.name: getattr(self, each.name) for each in fields(self) if not each.name.startswith(("is_", "has_"))
         }
         for name in _MAY_BE_NONE:
             if values[name] is None:

@@ -205,7 +205,7 @@ def test_wheels_that_stood_still_before_do_not_count() -> None:
 
 
 def test_enabling_again_keeps_torque_that_is_still_on() -> None:
-    bench = Bench(astray_s=5.0)
+    bench = Bench(astray_s=5.0, unbidden_s=5.0)
     bench.drive()
     bench.wheels_m_s = (0.1, 0.1)
     bench.layer.disable()

@@ -9,7 +9,7 @@ import pytest
 from robosc_bridge.safety import SCAN_TIMEOUTS_S, SafetyLimits
 from support.safety import LIMITS
 
-NUMBERS = [each.name for each in fields(SafetyLimits) if not each.name.startswith("is_")]
+NUMBERS = [each.name for each in fields(SafetyLimits) if not each.name.startswith(("is_", "has_"))]
 LONGEST = {
     "command_timeout_s": 1.0,
     "scan_timeout_s": 2.0,
@@ -60,10 +60,12 @@ def test_the_defaults_are_these() -> None:
         battery_mean_s=2.0,
         astray_m_s=0.02,
         astray_s=0.8,
+        unbidden_s=0.5,
         torque_on_s=2.0,
         torque_off_s=1.0,
         standstill_m_s=0.01,
         min_valid_share=0.05,
+        has_own_controls=False,
         is_torque_off_on_operator_stop=False,
         is_stopped_when_blind=False,
     )

@@ -45,7 +45,7 @@ def test_every_key_is_a_number_of_the_layer() -> None:
 
 @pytest.mark.parametrize("name", [each.name for each in fields(SafetyLimits) if each.name not in BY_ROBOT])
 def test_what_ships_is_the_layers_default(name: str) -> None:
-    assert getattr(shipped(), name) == getattr(SafetyLimits, name)
+    assert getattr(shipped("dynamixel"), name) == getattr(SafetyLimits, name)
 
 
 @pytest.mark.parametrize(("name", "key"), [*KEYS.items(), ("scan_timeout_s", "scan_timeout_s")])
@@ -83,6 +83,24 @@ def test_what_the_schema_takes_the_layer_takes_and_what_not_not(name: str, key: 
         with pytest.raises(ValueError, match=rf"\b{name} must be "):
             changes: dict[str, Any] = {name: value}
             replace(shipped(), **changes)
+
+
+# What a drive decides.
+
+
+@pytest.mark.parametrize(("base", "is_off"), [("opencr", True), ("dynamixel", False), ("mavlink-rover", False)])
+def test_after_an_operators_stop_a_board_with_own_controls_lets_go(base: str, is_off: bool) -> None:
+    assert shipped(base).is_torque_off_on_operator_stop is is_off
+    assert shipped(base).has_own_controls is is_off
+    for value in (True, False):
+        chosen = shipped(base, safety=f"{{torque_off_on_operator_stop: {str(value).lower()}}}")
+        assert chosen.is_torque_off_on_operator_stop is value
+
+
+def test_a_rover_is_given_more_time_to_follow() -> None:
+    found = shipped("mavlink-rover")
+    assert (found.astray_m_s, found.astray_s, found.torque_on_s) == (0.1, 2.0, 8.0)
+    assert shipped("dynamixel").astray_s == SafetyLimits.astray_s
 
 
 # The LiDAR.

@@ -27,7 +27,9 @@ def test_how_each_ends_and_whether_torque_goes() -> None:
     for reason in Reason:
         _, zero, torque, end = ROWS[reason.name]
         assert end.startswith("reset") is (reason in LATCHING), reason
-        assert torque.startswith("once") is (reason in TORQUE_OFF or reason is Reason.STANDBY), reason
+        is_off = reason in TORQUE_OFF or reason is Reason.STANDBY
+        at_once = reason is Reason.UNBIDDEN_MOTION
+        assert torque.startswith("once" if not at_once else "at once") is is_off, reason
         assert zero.startswith(("at once", "timeout and one call"))
 
 
@@ -38,6 +40,7 @@ def test_its_numbers_are_those_that_ship() -> None:
         Reason.LOOP_OVERRUN: LIMITS.loop_timeout_s,
         Reason.WHEEL_ASTRAY: LIMITS.astray_s,
         Reason.PAUSED: LIMITS.pause_s,
+        Reason.UNBIDDEN_MOTION: LIMITS.unbidden_s,
     }
     for reason, time_s in told.items():
         assert f"more than {time_s} s" in ROWS[reason.name][0]
@@ -52,4 +55,8 @@ def test_its_numbers_are_those_that_ship() -> None:
     assert f"mean of at most {LIMITS.battery_warn_v} V" in PAGE
     assert f"faster than {LIMITS.standstill_m_s} m/s; {LIMITS.torque_off_s:g} s" in PAGE
     assert f"more than {LIMITS.astray_m_s} m/s" in ROWS["WHEEL_ASTRAY"][0]
+    astray = f"for more than {LIMITS.astray_s} s ({rover.astray_m_s} m/s and {rover.astray_s:g} s of a MAVLink rover)"
+    assert astray in ROWS["WHEEL_ASTRAY"][0]
+    assert f"faster than {LIMITS.astray_m_s} m/s" in ROWS["UNBIDDEN_MOTION"][0]
+    assert f"lose their torque {LIMITS.unbidden_s} s later" in PAGE
     assert LIMITS.motor_failures == 3

@@ -33,6 +33,12 @@ PANEL = ("button_1", "button_2", "bumper_1", "bumper_2")
 """Buttons of an OpenCR board: the bumpers are the one in front and the one behind."""
 
 
+PACK_3S_V = (11.5, 11.1)
+"""Warning and end of a lithium pack of three cells in series, the battery of a TurtleBot3: 3.83 V and 3.7 V a cell.
+
+Its board beeps at 11.1 V, too."""
+
+
 @dataclass(frozen=True, slots=True)
 class DriverFeatures:
     """Features of a device, beside those that all of its kind have.
@@ -47,6 +53,8 @@ class DriverFeatures:
             safety layer has it.
         astray_s: Longest time that a wheel may be off its goal, in seconds; None: as the safety layer has it.
         astray_m_s: Difference from its goal up to which a wheel is not off it, in m/s; None: as above.
+        battery_v: Voltages at and below which a person is warned and the robot stops, as of the pack that it is made
+            for; None: they go by its motors, or by what it tells itself.
         has_own_controls: True if the device has controls of its own that move the wheels while torque is on, such as
             buttons of a board; an operator's stop switches torque off then, unless it is told not to.
     """
@@ -58,6 +66,7 @@ class DriverFeatures:
     torque_on_s: float | None = None
     astray_s: float | None = None
     astray_m_s: float | None = None
+    battery_v: tuple[float, float] | None = None
     has_own_controls: bool = False
 
     @property
@@ -118,7 +127,7 @@ _BUILT_IN: dict[Kind, dict[str, tuple[str, str, DriverFeatures | None]]] = {
             "a stock TurtleBot3: its OpenCR board with the ROS 2 firmware",
             "robosc_bridge.devices.opencr:OpenCrBase",
             # Its firmware adds its two buttons and an RC-100 to what it is commanded.
-            DriverFeatures(PANEL, has_imu=True, needs_turtlebot3=True, has_own_controls=True),
+            DriverFeatures(PANEL, has_imu=True, needs_turtlebot3=True, battery_v=PACK_3S_V, has_own_controls=True),
         ),
     },
     Kind.RANGE_SCANNER: {

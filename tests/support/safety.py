@@ -18,6 +18,8 @@ LIMITS = SafetyLimits(
     operator_timeout_s=5.0,
     loop_timeout_s=0.2,
     angular_acceleration_rad_s2=4.0,
+    battery_warn_v=11.5,
+    battery_stop_v=11.1,
 )
 STEP_S = 0.02
 

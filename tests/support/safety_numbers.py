@@ -17,21 +17,24 @@ BY_ROBOT = {
     "wheel_m_s": "",
     "separation_m": "",
     "scan_timeout_s": "scan_timeout_s",
+    "battery_warn_v": "battery_warning_v",
+    "battery_stop_v": "battery_stop_v",
     "has_own_controls": "",
     "is_torque_off_on_operator_stop": "torque_off_on_operator_stop",
 }
 
 
-def shipped(base: str = "opencr", lidar: str = "lds02", **sections: str) -> SafetyLimits:
+def shipped(base: str = "opencr", lidar: str = "lds02", robot: str = "burger", **sections: str) -> SafetyLimits:
     """Return the numbers of a bridge whose configuration says no more than it must.
 
     Args:
         base: Driver of its drive base.
         lidar: Driver of its LiDAR.
+        robot: Robot, a TurtleBot3.
         sections: Further sections in YAML.
     """
     rest = "".join(f"{key}: {text}\n" for key, text in sections.items())
-    text = f"robot: burger\ndrive: {{driver: {base}, port: /a}}\nscanner: {{driver: {lidar}, port: /b}}\n{rest}"
+    text = f"robot: {robot}\ndrive: {{driver: {base}, port: /a}}\nscanner: {{driver: {lidar}, port: /b}}\n{rest}"
     return safety_limits(parse(text.encode(), "test.yaml").configuration)
 
 
@@ -41,7 +44,7 @@ def table() -> str:
     limits, keys = shipped(), {**KEYS, **BY_ROBOT}
     for each in fields(SafetyLimits):
         key, value = keys.get(each.name, ""), getattr(limits, each.name)
-        ships = "the robot's" if each.name in BY_ROBOT else "none" if value is None else f"{value:g}"
+        ships = "the robot's or its devices'" if each.name in BY_ROBOT else "none" if value is None else f"{value:g}"
         may_be = _range(BOUNDS.get(each.name, Bounds()))
         if isinstance(value, bool):
             ships, may_be = str(value).lower(), "true or false"

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from robosc_bridge.devices.interface import STANDSTILL, DriveReading, MotorFault, Velocity
+from robosc_bridge.devices.interface import STANDSTILL, BatteryLevel, DriveReading, MotorFault, Velocity
 from robosc_bridge.safety import LATCHING, Output, Reason, SafetyLimits
 
 _FACTS = {"scan": Reason.SCAN_STALE, "loop": Reason.LOOP_OVERRUN, "operator": Reason.OPERATOR_LOST}
@@ -82,6 +82,12 @@ class SafetyTwin:
 
     def _readings(self) -> list[DriveReading]:
         return [each.value for each in self.past if each.name == "drive"]
+
+    def is_empty(self) -> bool:
+        """Return True if the battery is empty, by its voltage or by the last word of the drive base on it."""
+        levels = [each.battery_level for each in self._readings() if each.battery_level is not None]
+        is_low = self.limits.battery_stop_v is not None and self.mean_v() <= self.limits.battery_stop_v
+        return is_low or levels[-1:] == [BatteryLevel.EMPTY]
 
     def mean_v(self) -> float:
         """Return the mean voltage of the last time that was long enough, in volts."""
@@ -181,7 +187,7 @@ class SafetyTwin:
         _, is_lost, read = self._torque_story()
         is_judged = bool(read) and read[-1][1] is reading and self._is_wanted()
         latched = {
-            Reason.BATTERY_LOW: self.mean_v() <= self.limits.battery_stop_v,
+            Reason.BATTERY_LOW: self.is_empty(),
             Reason.TORQUE_LOST: is_lost and self._is_wanted(),
             Reason.WHEEL_ASTRAY: is_judged and self._is_astray(read),
             Reason.UNBIDDEN_MOTION: is_judged and self._is_unbidden(read),
@@ -205,7 +211,7 @@ class SafetyTwin:
                 remaining.add(reason)
             if reason is Reason.MOTOR_FAULT and readings[-1].faults - {MotorFault.VOLTAGE}:
                 remaining.add(reason)
-            if reason is Reason.BATTERY_LOW and self.mean_v() <= self.limits.battery_stop_v:
+            if reason is Reason.BATTERY_LOW and self.is_empty():
                 remaining.add(reason)
             if reason in self._torque_off() and self._is_wanted():
                 remaining.add(reason)

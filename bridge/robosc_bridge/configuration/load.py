@@ -61,6 +61,8 @@ def _contradictions(configuration: Configuration) -> Iterator[tuple[Path, str]]:
     )
     for section, path, low, high, may_be_equal in pairs:
         first, second = getattr(section, low), getattr(section, high)
+        if first is None or second is None:
+            continue
         if first > second or (first == second and not may_be_equal):
             words = "at most" if may_be_equal else "below"
             yield (*path, low), f"is {first:g}; it must be {words} '{high}', which is {second:g}"

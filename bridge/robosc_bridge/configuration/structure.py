@@ -175,12 +175,17 @@ class Safety(_Section, frozen=True):
             "`execution.period_s`.",
         ),
     ] = SafetyLimits.loop_timeout_s
-    battery_warning_v: Annotated[float, _within("battery_warn_v", "Voltage at and below which somebody is warned.")] = (
-        SafetyLimits.battery_warn_v
-    )
-    battery_stop_v: Annotated[float, _within("battery_stop_v", "Voltage at and below which the robot stops.")] = (
-        SafetyLimits.battery_stop_v
-    )
+    battery_warning_v: Annotated[
+        Annotated[float, _within("battery_warn_v")] | None,
+        Meta(description="Voltage at and below which somebody is warned; null: the drive decides it."),
+    ] = None
+    battery_stop_v: Annotated[
+        Annotated[float, _within("battery_stop_v")] | None,
+        Meta(
+            description="Voltage at and below which the robot stops; null: 11.1 of `opencr`, the lowest supply of its "
+            "servos of `dynamixel`, none of others; a rover tells by itself that its battery is empty."
+        ),
+    ] = None
     operator_link_timeout_s: Annotated[
         Annotated[float, _within("operator_timeout_s")] | None,
         Meta(description="Seconds without the operator after which the robot stops; null: it needs none."),

@@ -52,6 +52,9 @@ from robosc_bridge.transport.system_host import SYSTEM_HOST
 EXCHANGE_S = 0.02
 """Time between exchanges with the drive base: what OpenCR refreshes its registers at."""
 
+MOTOR_MARGIN_V = 0.5
+"""Voltage above the lowest supply of its motors at which somebody is warned, where the battery is not known."""
+
 RESTART_S = 3.0
 """After so long without a full revolution a LiDAR's motor is restarted, as its official driver does."""
 
@@ -63,8 +66,6 @@ KEYS: Mapping[str, str] = MappingProxyType(
         "motor_timeout_s": "motor_timeout_s",
         "loop_timeout_s": "overrun_s",
         "operator_timeout_s": "operator_link_timeout_s",
-        "battery_warn_v": "battery_warning_v",
-        "battery_stop_v": "battery_stop_v",
         "min_valid_share": "min_valid_share",
         "is_stopped_when_blind": "stops_when_blind",
     }
@@ -97,6 +98,7 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
         unit = "m" if part == "linear" else "rad"
         slower = f"{part}_deceleration_{unit}_s2"
         numbers[slower] = max(numbers[f"{part}_acceleration_{unit}_s2"], getattr(SafetyLimits, slower))
+    warn_v, stop_v = _battery(chosen, features, robot)
     try:
         return SafetyLimits(
             **numbers,
@@ -108,6 +110,8 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
             torque_on_s=features.torque_on_s or SafetyLimits.torque_on_s,
             astray_s=features.astray_s or SafetyLimits.astray_s,
             astray_m_s=features.astray_m_s or SafetyLimits.astray_m_s,
+            battery_warn_v=warn_v,
+            battery_stop_v=stop_v,
             has_own_controls=features.has_own_controls,
             is_torque_off_on_operator_stop=(
                 features.has_own_controls
@@ -117,6 +121,20 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
         )
     except ValueError as error:
         raise AssemblyError(f"safety: {error}") from error
+
+
+def _battery(chosen: Safety, features: DriverFeatures, robot: Robot | Body) -> tuple[float | None, float | None]:
+    """Return the voltages of a warning and of the end: those that are chosen, else of the pack or the motors."""
+    warn_v, stop_v = features.battery_v or (None, None)
+    if features.battery_v is None and isinstance(robot, Robot):
+        stop_v = robot.motor.lowest_v
+        warn_v = stop_v + MOTOR_MARGIN_V
+    stop_v = stop_v if chosen.battery_stop_v is None else chosen.battery_stop_v
+    if chosen.battery_warning_v is not None:
+        warn_v = chosen.battery_warning_v
+    elif stop_v is not None:
+        warn_v = stop_v if warn_v is None else max(warn_v, stop_v)
+    return warn_v, stop_v
 
 
 def scan_timeout_s(scanner: Scanner, chosen: Safety) -> float:

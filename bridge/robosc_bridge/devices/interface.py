@@ -56,6 +56,14 @@ class MotorFault(StrEnum):
     BLOCKED = "does not rotate as told"
 
 
+class BatteryLevel(StrEnum):
+    """Judgement of a drive base on its battery, by what it knows of it."""
+
+    SOUND = "sound"
+    LOW = "low"
+    EMPTY = "empty"
+
+
 @dataclass(frozen=True)
 class DriveReading:
     """Reading of a drive base in one exchange.
@@ -70,6 +78,7 @@ class DriveReading:
         acceleration_m_s2: Acceleration with which the motors bring a wheel to a new goal; None: as fast as they can.
         battery_v: Voltage of the battery, in volts; None: it is not reported.
         battery_share: Charge of the battery, 0 to 1; None: it is not reported.
+        battery_level: Judgement of the drive base itself on the battery; None: it makes none.
         temperature_c: Temperature of the hottest motor, in degrees Celsius; None: it is not reported.
         buttons: True for each button that is pressed, by name: `button_1`, `bumper_1` and so on.
         imu: Further measurements by name, such as `angular_velocity_z`; empty: there are none.
@@ -84,6 +93,7 @@ class DriveReading:
     acceleration_m_s2: float | None = None
     battery_v: float | None = None
     battery_share: float | None = None
+    battery_level: BatteryLevel | None = None
     temperature_c: float | None = None
     buttons: Mapping[str, bool] = field(default_factory=dict)
     imu: Mapping[str, float] = field(default_factory=dict)

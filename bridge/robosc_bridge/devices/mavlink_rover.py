@@ -9,9 +9,9 @@ Sources: ArduPilot Rover (`GCS_MAVLink_Rover.cpp`, `mode_guided.cpp`, `AP_Arming
 import contextlib
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
-from robosc_bridge.devices.interface import STANDSTILL, DriveLimits, DriveReading, MotorFault, Velocity
+from robosc_bridge.devices.interface import STANDSTILL, BatteryLevel, DriveLimits, DriveReading, MotorFault, Velocity
 from robosc_bridge.devices.kinematics import wheel_speeds, within_limits
 from robosc_bridge.devices.mavlink_link import BAUD, LinkSettings, VehicleLink, acquire, release
 from robosc_bridge.devices.mavlink_odometry import VehicleOdometry, estimate
@@ -27,6 +27,7 @@ from robosc_bridge.errors import (
 )
 from robosc_bridge.host import Host
 from robosc_bridge.protocol.mavlink_messages import (
+    ChargeState,
     Heartbeat,
     MavCommand,
     Mode,
@@ -67,6 +68,15 @@ _NEW_TARGET_S = 0.02
 _WARNING = 4
 _FOLLOWING_LIMIT_S = 2.0
 _MM = 1000
+_LEVELS: Mapping[int, BatteryLevel] = {
+    ChargeState.OK: BatteryLevel.SOUND,
+    ChargeState.CHARGING: BatteryLevel.SOUND,
+    ChargeState.LOW: BatteryLevel.LOW,
+    ChargeState.UNHEALTHY: BatteryLevel.LOW,
+    ChargeState.CRITICAL: BatteryLevel.EMPTY,
+    ChargeState.EMERGENCY: BatteryLevel.EMPTY,
+    ChargeState.FAILED: BatteryLevel.EMPTY,
+}
 _LONG_TARGETS = (
     "the rover is armed; where the bridge or its line fails, it drives on for up to 3 s, until its target expires "
     "(docs/bridge-safety.md says what shortens that)"
@@ -427,5 +437,6 @@ class MavlinkRover:
             faults=frozenset(faults),
             battery_v=next((found.voltage_v for found in (main, pack) if found and found.voltage_v is not None), None),
             battery_share=next((found.share for found in (main, pack) if found and found.share is not None), None),
+            battery_level=None if pack is None else _LEVELS.get(pack.state),
             imu={"angular_velocity_z": velocity.angular_rad_s},
         )

@@ -142,7 +142,7 @@ class SafetyLayer:
             self._faults = reading.faults
             if reading.faults - _HARMLESS:
                 self._latched.add(Reason.MOTOR_FAULT)
-            self._battery.update(reading.battery_v, reading.time_s)
+            self._battery.update(reading.battery_v, reading.time_s, reading.battery_level)
             if self._battery.is_empty:
                 self._latched.add(Reason.BATTERY_LOW)
             is_still = all(abs(speed) <= self._limits.standstill_m_s for speed in reading.wheels_m_s)

@@ -71,7 +71,7 @@ _NOT_BELOW = (
     ("angular_deceleration_rad_s2", "angular_acceleration_rad_s2"),
     ("battery_warn_v", "battery_stop_v"),
 )
-_MAY_BE_NONE = ("scan_timeout_s", "operator_timeout_s")
+_MAY_BE_NONE = ("scan_timeout_s", "operator_timeout_s", "battery_warn_v", "battery_stop_v")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,8 +95,9 @@ class SafetyLimits:
         loop_timeout_s: Longest time between two cycles of the supervisor's loop.
         pause_s: Longest time in which neither the drive base's thread nor the loop turns while the motors hold.
         operator_timeout_s: Longest time without a sign of the operator; None: none is needed.
-        battery_warn_v: Mean voltage at and below which the safety layer warns.
-        battery_stop_v: Mean voltage at and below which it stops the robot.
+        battery_warn_v: Mean voltage at and below which the safety layer warns; None: only what the drive base itself
+            tells of its battery counts.
+        battery_stop_v: Mean voltage at and below which it stops the robot; None: the same.
         battery_mean_s: Time that a mean is made of, so that a dip stops nothing.
         astray_m_s: Difference from its goal above which a wheel is astray, if it is also more than half of the goal.
         astray_s: Longest time that a wheel may be astray.
@@ -131,8 +132,8 @@ class SafetyLimits:
     loop_timeout_s: float = 0.1
     pause_s: float = 0.5
     operator_timeout_s: float | None = None
-    battery_warn_v: float = 11.5
-    battery_stop_v: float = 11.1
+    battery_warn_v: float | None = None
+    battery_stop_v: float | None = None
     battery_mean_s: float = 2.0
     astray_m_s: float = 0.02
     astray_s: float = 0.8

@@ -8,7 +8,7 @@ first looked at, and one that is no time is ignored.
 import math
 from collections.abc import Sequence
 
-from robosc_bridge.devices.interface import DriveReading
+from robosc_bridge.devices.interface import BatteryLevel, DriveReading
 from robosc_bridge.devices.wheel_following import FollowingMonitor
 from robosc_bridge.safety.limits import SafetyLimits
 
@@ -78,7 +78,9 @@ class ScanCoverageMonitor:
 
 
 class BatteryMonitor:
-    """Mean voltages of times that follow each other, so that two of them at the latest tell of an empty battery.
+    """Battery as mean voltages and the drive base's own word tell it.
+
+    The times of the means follow each other, so that two of them at the latest tell of an empty battery.
 
     Args:
         limits: The voltages, and the time of a mean.
@@ -86,13 +88,15 @@ class BatteryMonitor:
 
     def __init__(self, limits: SafetyLimits) -> None:
         self._limits = limits
+        self._level: BatteryLevel | None = None
         self._mean_v = math.inf
         self._sum_v = 0.0
         self._count = 0
         self._begin_s = 0.0
 
-    def update(self, voltage_v: float | None, time_s: float) -> None:
-        """A voltage was measured; None and what is not finite tell nothing."""
+    def update(self, voltage_v: float | None, time_s: float, level: BatteryLevel | None = None) -> None:
+        """A voltage was measured, and the drive base judged; None and what is not finite tell nothing."""
+        self._level = level or self._level
         if voltage_v is None or not math.isfinite(voltage_v) or not math.isfinite(time_s):
             return
         if not self._count or time_s < self._begin_s:
@@ -106,12 +110,14 @@ class BatteryMonitor:
     @property
     def is_near_empty(self) -> bool:
         """True if a person should be warned."""
-        return self._mean_v <= self._limits.battery_warn_v
+        warn_v = self._limits.battery_warn_v
+        return self._level in (BatteryLevel.LOW, BatteryLevel.EMPTY) or (warn_v is not None and self._mean_v <= warn_v)
 
     @property
     def is_empty(self) -> bool:
         """True if the robot must stop."""
-        return self._mean_v <= self._limits.battery_stop_v
+        stop_v = self._limits.battery_stop_v
+        return self._level is BatteryLevel.EMPTY or (stop_v is not None and self._mean_v <= stop_v)
 
 
 class WheelMonitor:

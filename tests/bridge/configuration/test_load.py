@@ -201,7 +201,7 @@ def test_the_server_is_a_host_with_or_without_a_port(address: str) -> None:
             "skills.line.smallest: is 0.7; it must be below 'largest', which is 0.6",
         ),
         (
-            "safety: {battery_stop_v: 12}",
+            "safety: {battery_stop_v: 12, battery_warning_v: 11.5}",
             "safety.battery_stop_v: is 12; it must be at most 'battery_warning_v', which is 11.5",
         ),
         (

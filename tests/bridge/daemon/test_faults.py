@@ -47,7 +47,7 @@ HARMLESS = (
 
 @pytest.mark.parametrize(("base", "fault"), cases(GRAVE))
 def test_a_grave_fault_stops_the_wheels_in_time_and_ends_the_run(base: str, fault: Fault) -> None:
-    with driven(base, options="{}" if fault.is_line else PATIENT) as bridge:
+    with driven(base, options="{}" if fault.is_line or base not in BASES else PATIENT) as bridge:
         bridge.stopped_after(lambda: fault.cause(bridge), STATED_S[fault.row])
         problem = bridge.ended()
         assert fault.problem in problem
@@ -157,6 +157,39 @@ def test_motors_that_go_to_their_goals_slowly_are_no_fault_and_a_wheel_that_is_h
         assert (bridge.state, bridge.machine.daemon.problem) == (State.RUNNING, "")
         bridge.stopped_after(bridge.robot.left.block_wheel, STATED_S["a wheel is held"])
         assert bridge.ended() in (Reason.MOTOR_FAULT, Reason.WHEEL_ASTRAY)
+
+
+@pytest.mark.parametrize(
+    ("base", "voltage_v"), [("opencr", 11.4), ("opencr", 11.5), ("dynamixel", 6.9), ("mavlink-rover", 0.0)]
+)
+def test_a_battery_that_is_low_is_told_and_stops_nothing(base: str, voltage_v: float) -> None:
+    with driven(base) as bridge:
+        bridge.steady()
+        for servo in (bridge.robot.left, bridge.robot.right):
+            if base == "dynamixel":
+                servo.brown_out(voltage_v)
+        if bridge.robot.opencr is not None:
+            bridge.robot.opencr.set_battery(voltage_v)
+        if bridge.robot.rover is not None:
+            bridge.robot.rover.charge_state = 2
+        bridge.was_told("The battery will soon be empty.")
+        bridge.host.sleep(5.0)
+        assert bridge.state is State.RUNNING
+        assert bridge.wheels_m_s != (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("base", "voltage_v"), [("dynamixel", 11.1), ("mavlink-rover", 7.4)])
+def test_a_supply_that_is_not_a_turtlebot3s_is_no_empty_battery(base: str, voltage_v: float) -> None:
+    """A bench supply of 11.1 V, and a rover with a pack of two cells."""
+    with driven(base) as bridge:
+        for servo in (bridge.robot.left, bridge.robot.right):
+            servo.brown_out(voltage_v)
+        if bridge.robot.rover is not None:
+            bridge.robot.rover.battery_v = voltage_v
+        bridge.steady()
+        bridge.host.sleep(5.0)
+        assert bridge.state is State.RUNNING
+        assert not any("battery" in message for message in bridge.messages)
 
 
 # The loop and the supervisor.

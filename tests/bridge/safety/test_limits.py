@@ -55,8 +55,8 @@ def test_the_defaults_are_these() -> None:
         loop_timeout_s=0.1,
         pause_s=0.5,
         operator_timeout_s=None,
-        battery_warn_v=11.5,
-        battery_stop_v=11.1,
+        battery_warn_v=None,
+        battery_stop_v=None,
         battery_mean_s=2.0,
         astray_m_s=0.02,
         astray_s=0.8,
@@ -120,8 +120,11 @@ def test_what_belongs_together_is_consistent(name: str, other: str) -> None:
         changed(name, below)
 
 
-def test_only_scanner_and_operator_may_be_missing() -> None:
+def test_only_scanner_operator_and_battery_may_be_missing() -> None:
     assert replace(LIMITS, scan_timeout_s=None, operator_timeout_s=None).scan_timeout_s is None
+    # Each of the two is free of the other.
+    assert replace(LIMITS, battery_warn_v=None).battery_stop_v == 11.1
+    assert replace(LIMITS, battery_stop_v=None, battery_warn_v=3.0).battery_warn_v == 3.0
     with pytest.raises(TypeError, match="scan_timeout_s"):
         SafetyLimits(linear_m_s=1, angular_rad_s=1, wheel_m_s=1, separation_m=1)  # type: ignore[call-arg]
 

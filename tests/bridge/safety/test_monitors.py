@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from robosc_bridge.devices.interface import BatteryLevel
 from robosc_bridge.safety.monitors import BatteryMonitor, Freshness, ScanCoverageMonitor, WheelMonitor
 from support.safety import LIMITS, reading
 
@@ -128,6 +129,23 @@ def test_a_mean_takes_its_time() -> None:
     assert battery((1.0, 10.0)) == (False, False)
     assert battery((1.0, 10.0), (1.0, math.nextafter(12.0, 0))) == (False, False)
     assert battery((1.0, 10.0), (1.0, 12.0)) == (True, True)
+
+
+@pytest.mark.parametrize(
+    ("level", "is_near_empty", "is_empty"),
+    [(BatteryLevel.SOUND, False, False), (BatteryLevel.LOW, True, False), (BatteryLevel.EMPTY, True, True)],
+)
+def test_what_a_drive_base_says_of_its_battery_counts_at_once(
+    level: BatteryLevel, is_near_empty: bool, is_empty: bool
+) -> None:
+    watch = BatteryMonitor(replace(EXACT, battery_warn_v=None, battery_stop_v=None))
+    watch.update(None, 10.0, level)
+    assert (watch.is_near_empty, watch.is_empty) == (is_near_empty, is_empty)
+    watch.update(1.0, 11.0)  # says nothing
+    watch.update(1.0, 13.0)
+    assert (watch.is_near_empty, watch.is_empty) == (is_near_empty, is_empty)
+    watch.update(None, 14.0, BatteryLevel.SOUND)
+    assert (watch.is_near_empty, watch.is_empty) == (False, False)
 
 
 def test_a_dip_is_no_empty_battery() -> None:

@@ -48,7 +48,9 @@ def test_what_ships_is_the_layers_default(name: str) -> None:
     assert getattr(shipped("dynamixel"), name) == getattr(SafetyLimits, name)
 
 
-@pytest.mark.parametrize(("name", "key"), [*KEYS.items(), ("scan_timeout_s", "scan_timeout_s")])
+@pytest.mark.parametrize(
+    ("name", "key"), [*KEYS.items(), ("scan_timeout_s", "scan_timeout_s"), ("battery_stop_v", "battery_stop_v")]
+)
 def test_a_key_changes_its_number_alone(name: str, key: str) -> None:
     value: Any = not getattr(shipped(), name) if name.startswith("is_") else bounds_of(key)["maximum"]
     if name == "battery_stop_v":
@@ -95,6 +97,30 @@ def test_after_an_operators_stop_a_board_with_own_controls_lets_go(base: str, is
     for value in (True, False):
         chosen = shipped(base, safety=f"{{torque_off_on_operator_stop: {str(value).lower()}}}")
         assert chosen.is_torque_off_on_operator_stop is value
+
+
+@pytest.mark.parametrize(
+    ("robot", "base", "chosen", "voltages_v"),
+    [
+        ("burger", "opencr", "", (11.5, 11.1)),
+        ("waffle", "opencr", "", (11.5, 11.1)),
+        ("burger", "dynamixel", "", (7.0, 6.5)),
+        ("waffle", "dynamixel", "", (10.5, 10.0)),
+        ("burger", "mavlink-rover", "", (None, None)),
+        # What is chosen counts, and a warning never comes after the end.
+        ("burger", "dynamixel", "battery_stop_v: 9.9", (9.9, 9.9)),
+        ("burger", "dynamixel", "battery_warning_v: 10.5, battery_stop_v: 9.9", (10.5, 9.9)),
+        ("burger", "opencr", "battery_stop_v: 10.5", (11.5, 10.5)),
+        ("burger", "mavlink-rover", "battery_warning_v: 7.4", (7.4, None)),
+        ("burger", "mavlink-rover", "battery_stop_v: 7.0", (7.0, 7.0)),
+    ],
+)
+def test_a_battery_is_that_of_the_drive(
+    robot: str, base: str, chosen: str, voltages_v: tuple[float | None, float | None]
+) -> None:
+    text = BARE.replace("burger", robot).replace("opencr", base) + f"safety: {{{chosen}}}\n"
+    found = safety_limits(parse(text.encode(), "test.yaml").configuration)
+    assert (found.battery_warn_v, found.battery_stop_v) == voltages_v
 
 
 def test_a_rover_is_given_more_time_to_follow() -> None:

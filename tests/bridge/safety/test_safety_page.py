@@ -50,9 +50,17 @@ def test_its_numbers_are_those_that_ship() -> None:
     assert rover is not None
     told_s = f"within {LIMITS.torque_on_s:g} s ({rover.torque_on_s:g} s of a MAVLink rover)"
     assert told_s in ROWS["TORQUE_LOST"][0]
-    assert f"the mean of {LIMITS.battery_mean_s:g} s is at most {LIMITS.battery_stop_v} V" in ROWS["BATTERY_LOW"][0]
+    assert f"the mean of {LIMITS.battery_mean_s:g} s is at most the voltage" in ROWS["BATTERY_LOW"][0]
     assert f"{2 * LIMITS.battery_mean_s:g} s and two readings" in ROWS["BATTERY_LOW"][1]
-    assert f"mean of at most {LIMITS.battery_warn_v} V" in PAGE
+    for driver, robot, name in (
+        ("opencr", "burger", "`opencr`"),
+        ("dynamixel", "burger", "`dynamixel`, Burger (XL430-W250)"),
+        ("dynamixel", "waffle", "`dynamixel`, Waffle (XM430-W210)"),
+    ):
+        found = shipped(driver, robot=robot)
+        assert f"\n| {name} | {found.battery_warn_v:g} V | {found.battery_stop_v:g} V |" in PAGE
+    rover_limits = shipped("mavlink-rover")
+    assert (rover_limits.battery_warn_v, rover_limits.battery_stop_v) == (None, None)
     assert f"faster than {LIMITS.standstill_m_s} m/s; {LIMITS.torque_off_s:g} s" in PAGE
     assert f"more than {LIMITS.astray_m_s} m/s" in ROWS["WHEEL_ASTRAY"][0]
     astray = f"for more than {LIMITS.astray_s} s ({rover.astray_m_s} m/s and {rover.astray_s:g} s of a MAVLink rover)"

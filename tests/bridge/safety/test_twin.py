@@ -8,7 +8,7 @@ import pytest
 from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
-from robosc_bridge.devices.interface import STANDSTILL, MotorFault, Velocity
+from robosc_bridge.devices.interface import STANDSTILL, BatteryLevel, MotorFault, Velocity
 from robosc_bridge.safety import LATCHING, Output, Reason, SafetyLayer
 from support.effort import examples
 from support.safety import LIMITS, STEP_S, reading
@@ -93,6 +93,7 @@ class Sequence(RuleBasedStateMachine):
         faults=FAULTS,
         battery_v=st.sampled_from([None, 12.0, 12.0, 11.6, 11.0, math.nan]),
         acceleration_m_s2=st.sampled_from([None, None, None, 0.05, 0.5]),
+        level=st.sampled_from([None, None, None, *BatteryLevel]),
     )
     def drive(
         self,
@@ -102,9 +103,10 @@ class Sequence(RuleBasedStateMachine):
         faults: frozenset[MotorFault],
         battery_v: float | None,
         acceleration_m_s2: float | None,
+        level: BatteryLevel | None,
     ) -> None:
         is_torque_on = self.last.is_torque_wanted is is_obeying
-        self._read(self.now_s + shift_s, wheels, is_torque_on, faults, battery_v, acceleration_m_s2)
+        self._read(self.now_s + shift_s, wheels, is_torque_on, faults, battery_v, acceleration_m_s2, level)
 
     def _read(
         self,
@@ -114,6 +116,7 @@ class Sequence(RuleBasedStateMachine):
         faults: frozenset[MotorFault] = frozenset(),
         battery_v: float | None = 12.0,
         acceleration_m_s2: float | None = None,
+        level: BatteryLevel | None = None,
     ) -> None:
         turn = self.last.velocity.angular_rad_s * self.limits.separation_m / 2
         told = (self.last.velocity.linear_m_s - turn, self.last.velocity.linear_m_s + turn)
@@ -124,6 +127,7 @@ class Sequence(RuleBasedStateMachine):
             faults=faults,
             battery_v=battery_v,
             acceleration_m_s2=acceleration_m_s2,
+            battery_level=level,
         )
         self.layer.on_drive_reading(found)
         self.twin.tells(found)

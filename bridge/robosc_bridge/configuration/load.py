@@ -105,5 +105,3 @@ def _idle(configuration: Configuration) -> Iterator[tuple[Path, str]]:
     if (view.tls_certificate is None) != (view.tls_key is None):
         missing = "tls_key" if view.tls_key is None else "tls_certificate"
         yield ("view",), f"a certificate and its key belong together: '{missing}' is missing"
-    if configuration.safety.stops_when_blind and configuration.scanner is None:
-        yield ("safety", "stops_when_blind"), "means nothing without the section 'scanner'"

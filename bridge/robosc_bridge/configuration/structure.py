@@ -158,7 +158,10 @@ class Safety(_Section, frozen=True):
         ),
     ] = SafetyLimits.min_valid_share
     stops_when_blind: Annotated[
-        bool, Meta(description="True: it may not go where the LiDAR measures nothing; else somebody is warned.")
+        bool,
+        Meta(
+            description="True: it may not go where the LiDAR measures nothing; false: somebody is warned, and it goes."
+        ),
     ] = SafetyLimits.is_stopped_when_blind
     bad_frames_share: Annotated[
         float,

@@ -110,7 +110,8 @@ class SafetyLimits:
             scan; with a smaller one, the scanner sees nothing there; at most 1.
         has_own_controls: True if the drive base has controls of its own that move the wheels while torque is on.
         is_torque_off_on_operator_stop: True if an operator's stop wants torque off, too.
-        is_stopped_when_blind: True if the robot may not go where the scanner sees nothing; else a person is informed.
+        is_stopped_when_blind: True if the robot may not go where the scanner sees nothing: what is unknown counts as an
+            obstacle. Else a person is informed.
 
     Raises:
         ValueError: A number is not finite, not within its bounds or inconsistent with another; all of them are
@@ -144,7 +145,7 @@ class SafetyLimits:
     min_valid_share: float = 0.05
     has_own_controls: bool = False
     is_torque_off_on_operator_stop: bool = False
-    is_stopped_when_blind: bool = False
+    is_stopped_when_blind: bool = True
 
     def __post_init__(self) -> None:
         values: dict[str, float] = {

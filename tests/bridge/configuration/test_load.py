@@ -225,7 +225,6 @@ def test_the_server_is_a_host_with_or_without_a_port(address: str) -> None:
             "safety: {command_timeout_s: 0.03}",
             "safety.command_timeout_s: is 0.03; it must be at least twice 'execution.period_s', which is 0.02",
         ),
-        ("safety: {stops_when_blind: true}", "safety.stops_when_blind: means nothing without the section 'scanner'"),
         ("remote: {mavlink_key: k}", "remote.mavlink_key: means nothing without 'mavlink_url'"),
         (
             "remote: {mavlink_unsigned_commands: true}",

@@ -67,7 +67,7 @@ def test_the_defaults_are_these() -> None:
         min_valid_share=0.05,
         has_own_controls=False,
         is_torque_off_on_operator_stop=False,
-        is_stopped_when_blind=False,
+        is_stopped_when_blind=True,
     )
     assert SCAN_TIMEOUTS_S == {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
 

@@ -428,7 +428,7 @@ AHEAD, BEHIND, NOWHERE = (
 
 @pytest.mark.parametrize(("blind", "speed_m_s"), [(BEHIND, 0.1), (AHEAD, -0.1), (NOWHERE, 0.1), (NOWHERE, -0.1)])
 def test_where_the_scanner_sees_nothing_a_person_is_told(blind: tuple[float, ...], speed_m_s: float) -> None:
-    bench = Bench()
+    bench = Bench(is_stopped_when_blind=False)
     bench.ranges_m = blind
     bench.drive(speed_m_s)
     assert bench.last.warnings == (Caution.SCAN_BLIND,)
@@ -448,8 +448,8 @@ def test_where_the_scanner_sees_nothing_a_person_is_told(blind: tuple[float, ...
     assert bench.cycle().warnings == ()
 
 
-def test_where_the_scanner_sees_nothing_the_robot_may_not_go_if_it_is_configured() -> None:
-    bench = Bench(is_stopped_when_blind=True)
+def test_where_the_scanner_sees_nothing_the_robot_may_not_go() -> None:
+    bench = Bench()
     bench.ranges_m = AHEAD
     bench.drive(0.1)
     bench.ranges_m = BEHIND
@@ -473,7 +473,7 @@ def test_where_the_scanner_sees_nothing_the_robot_may_not_go_if_it_is_configured
 
 
 def test_a_reset_forgets_where_it_was_to_go() -> None:
-    bench = Bench(is_stopped_when_blind=True)
+    bench = Bench()
     bench.ranges_m = AHEAD
     bench.drive(0.1)
     bench.layer.operator_stop()

@@ -273,7 +273,9 @@ class SafetyTwin:
         limits = self.limits
         last = self._last("output") or Past("output")
         is_clock_wrong = not (math.isfinite(now_s) and now_s >= last.now_s)
-        step_s = min(now_s - last.now_s, limits.motor_timeout_s)
+        present, step_s = last.velocity, now_s - last.now_s
+        if step_s > limits.motor_timeout_s:
+            present, step_s = STANDSTILL, 0.0
         now_s = now_s if math.isfinite(now_s) else last.now_s
         is_seen, _, _ = self._torque_story()
         noted = set[Reason]()
@@ -313,13 +315,13 @@ class SafetyTwin:
         if not reasons and wanted != STANDSTILL:
             velocity = self._limited(
                 self._moved(
-                    last.velocity.linear_m_s,
+                    present.linear_m_s,
                     wanted.linear_m_s,
                     limits.linear_acceleration_m_s2 * step_s,
                     limits.linear_deceleration_m_s2 * step_s,
                 ),
                 self._moved(
-                    last.velocity.angular_rad_s,
+                    present.angular_rad_s,
                     wanted.angular_rad_s,
                     limits.angular_acceleration_rad_s2 * step_s,
                     limits.angular_deceleration_rad_s2 * step_s,

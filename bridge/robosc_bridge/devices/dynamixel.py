@@ -233,6 +233,8 @@ class DynamixelBase:
         if self._is_torque_wanted:
             if not self._stops:
                 goals = wheel_goals(velocity, self._limits, self._robot.wheel_separation_m, self._robot.raw_m_s)
+            if self._host.monotonic() > velocity.until_s:
+                goals = (0, 0)
             pair.command(goals)
             self._commanded_s = self._host.monotonic()
         answers = pair.measure()

@@ -19,10 +19,12 @@ class Velocity:
     Attributes:
         linear_m_s: Forward.
         angular_rad_s: Counter-clockwise.
+        until_s: Time after which it may be commanded no more, in seconds; two velocities may differ in it and be equal.
     """
 
     linear_m_s: float = 0.0
     angular_rad_s: float = 0.0
+    until_s: float = field(default=math.inf, compare=False)
 
 
 STANDSTILL = Velocity()
@@ -139,6 +141,9 @@ class DriveBase(Protocol):
 
     def exchange(self, velocity: Velocity) -> DriveReading:
         """One cycle: command a velocity within the limits, keep every watchdog fed, read everything.
+
+        A velocity whose `until_s` is over is not commanded, but zero: a thread that was halted between the decision and
+        the writing of it must not set the wheels in motion when it goes on. It is looked at right before the writing.
 
         With torque off the velocity is not sent, and zero is what the device has as its goal.
 

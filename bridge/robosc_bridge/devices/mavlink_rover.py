@@ -227,6 +227,8 @@ class MavlinkRover:
             # Nor is one driven that no longer tells what it does.
             target = STANDSTILL if self._is_torque_lost or told is None else velocity
             target = within_limits(target, self.limits, self._robot.wheel_separation_m)
+            if self._host.monotonic() > velocity.until_s:
+                target = STANDSTILL
             if self._is_due(target):
                 self._send_target(target)
         if told is None:

@@ -8,6 +8,7 @@ here (it reads the device status before it has one, and takes old readings for n
 """
 
 import contextlib
+import math
 from collections.abc import Callable
 from typing import NoReturn
 
@@ -149,7 +150,7 @@ class OpenCrBase:
     def _exchange(self, velocity: Velocity) -> DriveReading:
         is_obeying = self._is_torque_wanted and not self._is_torque_lost
         words = opencr_words(velocity, self.limits, self._robot.wheel_separation_m) if is_obeying else (0, 0)
-        block = self._cycle(words if self._is_torque_wanted else None)
+        block = self._cycle(words if self._is_torque_wanted else None, velocity.until_s)
         if self._is_torque_wanted and not block.is_torque_on and not self._is_torque_lost:
             self._is_torque_lost = True
             # A motor that has lost its power counts within one revolution afterwards.
@@ -277,12 +278,12 @@ class OpenCrBase:
             if self._host.monotonic() > end_s:
                 return False
 
-    def _cycle(self, words: tuple[int, int] | None) -> Block:
-        """Command, if there is anything to, change the heartbeat, and read."""
+    def _cycle(self, words: tuple[int, int] | None, until_s: float = math.inf) -> Block:
+        """Command, if there is anything to and it is not too late for it, change the heartbeat, and read."""
         bus = self._used_bus
         bus.begin(self._exchange_limit_s)
         if words is not None:
-            self._command(words)
+            self._command(words if self._host.monotonic() <= until_s else (0, 0))
         self._heartbeat = (self._heartbeat + 1) % 256
         bus.write(opencr.DEVICE, opencr.HEARTBEAT, bytes((self._heartbeat,)))
         asked_s = self._host.monotonic()

@@ -3,7 +3,7 @@
 import math
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from robosc_bridge.devices.interface import STANDSTILL, DriveReading, MotorFault, Velocity
 from robosc_bridge.safety.limits import SafetyLimits
@@ -20,7 +20,7 @@ class Output:
     """Command for the drive base in its next exchange.
 
     Attributes:
-        velocity: Standstill whenever there is a reason.
+        velocity: Standstill whenever there is a reason; it holds for `SafetyLimits.motor_timeout_s`.
         is_torque_wanted: True if the motors are to hold.
         reasons: Reasons why it may not move, in the order of `Reason`.
         warnings: Warnings that a person should know, in the order of `Caution`.
@@ -225,8 +225,10 @@ class SafetyLayer:
         with self._lock:
             self._find_pause(now_s)
             is_clock_wrong = not self._now_s <= now_s < math.inf
-            # For a time in which nothing was read there is no acceleration.
-            step_s = min(now_s - self._now_s, self._limits.motor_timeout_s)
+            step_s = now_s - self._now_s
+            if step_s > self._limits.motor_timeout_s:
+                # What was put out before holds no longer: motion begins anew.
+                self._velocity, step_s = STANDSTILL, 0.0
             if math.isfinite(now_s):
                 self._now_s = now_s
             # A time ahead of the clock counts from now.
@@ -240,7 +242,9 @@ class SafetyLayer:
                 self._velocity = STANDSTILL
             else:
                 self._velocity = ramped(self._velocity, self._wanted, self._limits, step_s)
-            return Output(self._velocity, self._torque_since_s is not None, self._reasons, self._find_warnings())
+            # What is written later than this was decided from what is no longer so.
+            velocity = replace(self._velocity, until_s=self._now_s + self._limits.motor_timeout_s)
+            return Output(velocity, self._torque_since_s is not None, self._reasons, self._find_warnings())
 
     def _find_pause(self, now_s: float) -> None:
         """Find out whether nothing of the bridge was at work for too long; what was known before is no longer so.

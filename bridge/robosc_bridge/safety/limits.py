@@ -90,7 +90,7 @@ class SafetyLimits:
         angular_acceleration_rad_s2: Acceleration away from standstill.
         angular_deceleration_rad_s2: Deceleration towards standstill.
         command_timeout_s: Time for which a command to move holds.
-        motor_timeout_s: Longest time without a reading of the drive base.
+        motor_timeout_s: Longest time without a reading of the drive base, and for which an output holds.
         motor_failures: Number of failed exchanges in a row that count as silence, too.
         loop_timeout_s: Longest time between two cycles of the supervisor's loop.
         pause_s: Longest time in which neither the drive base's thread nor the loop turns while the motors hold.

@@ -16,9 +16,10 @@ from robosc.execution.runtime.requests import Decisions
 from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.motion import MotionTarget
 from robosc_bridge.daemon.states import OperatorCommand, State
+from robosc_bridge.devices.interface import STANDSTILL
 from robosc_bridge.errors import LineDeniedError
 from robosc_bridge.host import Port
-from robosc_bridge.safety import SCAN_TIMEOUTS_S, Reason
+from robosc_bridge.safety import SCAN_TIMEOUTS_S, Output, Reason, SafetyLayer
 from robosc_simulated import SimulatedTurtleBot3
 from robosc_simulated.virtual_host import VirtualHost
 from support.driven import LIMIT_S, PATIENT, Driven, driven
@@ -190,6 +191,54 @@ def test_a_supply_that_is_not_a_turtlebot3s_is_no_empty_battery(base: str, volta
         bridge.host.sleep(5.0)
         assert bridge.state is State.RUNNING
         assert not any("battery" in message for message in bridge.messages)
+
+
+# A write of 24 bytes at address 150 of OpenCR, and one of the goals (104) of both servos; what follows is the order.
+ORDERS = {
+    "opencr": (bytes.fromhex("ff ff fd 00 c8 1d 00 03 96 00"), bytes(24)),
+    "dynamixel": (
+        bytes.fromhex("ff ff fd 00 fe 11 00 83 68 00 04 00"),
+        bytes.fromhex("01 00 00 00 00 02 00 00 00 00"),
+    ),
+}
+
+
+def _orders(bridge: Driven, base: str, since: int) -> list[bool]:
+    """Tell of each order that the base has heard since then whether it was to stand still."""
+    if base in ORDERS:
+        order, zero = ORDERS[base]
+        found = [data for data in bridge.trace.heard[since:] if data.startswith(order)]
+        return [data.startswith(order + zero) for data in found]
+    assert bridge.robot.rover is not None
+    return [target["vx"] == 0.0 for target in bridge.robot.rover.targets[since:]]
+
+
+# Longer than an output holds; shorter and longer than the time limits of the devices.
+@pytest.mark.parametrize("base", [*BASES, "mavlink-rover"])
+@pytest.mark.parametrize("gap_s", [0.22, 0.45, 0.7, 5.0])
+def test_a_thread_that_is_halted_between_decision_and_writing_sends_no_old_velocity(
+    base: str, gap_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with driven(base, velocity=(0.15, 0.0)) as bridge:
+        bridge.steady()
+        decided = SafetyLayer.output
+        gaps, ends = [gap_s], list[int]()
+
+        def output(layer: SafetyLayer, now_s: float) -> Output:
+            found = decided(layer, now_s)
+            if gaps and found.velocity != STANDSTILL:
+                bridge.host.sleep(gaps.pop())
+                rover = bridge.robot.rover
+                ends.append(len(bridge.trace.heard) if rover is None else len(rover.targets))
+            return found
+
+        monkeypatch.setattr(SafetyLayer, "output", output)
+        bridge.until(lambda: ends and _orders(bridge, base, ends[0]), "the first order after the gap")
+        assert _orders(bridge, base, ends[0])[0]
+        # What follows is decided anew, and begins at standstill.
+        told = len(bridge.trace.told)
+        bridge.host.sleep(1.0)
+        assert all(max(map(abs, wheels)) < 0.05 for _, *wheels in bridge.trace.told[told : told + 1])
 
 
 # The loop and the supervisor.

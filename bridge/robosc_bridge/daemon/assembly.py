@@ -5,9 +5,10 @@ import dataclasses
 import inspect
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import msgspec
@@ -20,7 +21,7 @@ from robosc.supervisor import Supervisor
 from robosc_api.security import SecurityError, check_listening
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import GrpcChannel
-from robosc_bridge.configuration.structure import Configuration, Scanner
+from robosc_bridge.configuration.structure import Configuration, Safety, Scanner
 from robosc_bridge.daemon.camera_setup import camera_problems, camera_worker, needs_camera
 from robosc_bridge.daemon.device_thread import DeviceThread
 from robosc_bridge.daemon.endpoints import Endpoint, LivenessMonitor, is_remote, is_startable
@@ -52,17 +53,32 @@ from robosc_bridge.host import Host
 from robosc_bridge.protocol.mavlink_signing import SigningError
 from robosc_bridge.remote import settings_of
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
+from robosc_bridge.safety.limits import REVOLUTIONS, SCAN_TIMEOUT_S, SCAN_TIMEOUTS_S
 from robosc_bridge.skills import EmergencyStop, Rotate
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 EXCHANGE_S = 0.02
 """Time between exchanges with the drive base: what OpenCR refreshes its registers at."""
 
+MOTOR_MARGIN_V = 0.5
+"""Voltage above the lowest supply of its motors at which somebody is warned, where the battery is not known."""
+
 RESTART_S = 3.0
 """After so long without a full revolution a LiDAR's motor is restarted, as its official driver does."""
 
-LONGEST_PERIOD_S = 0.9
-"""The safety layer waits for the loop for two seconds at most, and for two periods at least (`safety.overrun_s`)."""
+KEYS: Mapping[str, str] = MappingProxyType(
+    {
+        "linear_acceleration_m_s2": "linear_acceleration_m_s2",
+        "angular_acceleration_rad_s2": "angular_acceleration_rad_s2",
+        "command_timeout_s": "command_timeout_s",
+        "motor_timeout_s": "motor_timeout_s",
+        "loop_timeout_s": "overrun_s",
+        "operator_timeout_s": "operator_link_timeout_s",
+        "min_valid_share": "min_valid_share",
+        "is_stopped_when_blind": "stops_when_blind",
+    }
+)
+"""Numbers of the safety layer that are those of a key below `safety`, and the key."""
 
 SWITCH_S = 0.0005
 """After how long a thread that computes lets others run. With Python's own 5 ms, a remote endpoint that is busy
@@ -84,35 +100,61 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
     """
     robot, chosen = _robot(configuration), configuration.safety
     features = features_of(configuration.drive.driver) or DriverFeatures()
-    if configuration.execution.period_s > LONGEST_PERIOD_S:
-        raise AssemblyError(f"execution.period_s may be {LONGEST_PERIOD_S:g} at most")
     can = robot.limits if isinstance(robot, Body) else robot.limits(robot.motor.velocity_limit_raw)
-    linear = chosen.linear_acceleration_m_s2
-    angular = chosen.angular_acceleration_rad_s2
+    numbers = {name: getattr(chosen, key) for name, key in KEYS.items()}
+    for part in ("linear", "angular"):
+        unit = "m" if part == "linear" else "rad"
+        slower = f"{part}_deceleration_{unit}_s2"
+        numbers[slower] = max(numbers[f"{part}_acceleration_{unit}_s2"], getattr(SafetyLimits, slower))
+    warn_v, stop_v = _battery(chosen, features, robot)
     try:
         return SafetyLimits(
+            **numbers,
             linear_m_s=min(chosen.linear_m_s or math.inf, can.linear_m_s),
             angular_rad_s=min(chosen.angular_rad_s or math.inf, can.angular_rad_s),
             wheel_m_s=can.wheel_m_s,
             separation_m=robot.wheel_separation_m,
-            scan_timeout_s=None if configuration.scanner is None else chosen.scan_timeout_s,
-            linear_acceleration_m_s2=linear,
-            linear_deceleration_m_s2=max(linear, SafetyLimits.linear_deceleration_m_s2),
-            angular_acceleration_rad_s2=angular,
-            angular_deceleration_rad_s2=max(angular, SafetyLimits.angular_deceleration_rad_s2),
-            command_timeout_s=chosen.command_timeout_s,
-            motor_timeout_s=chosen.motor_timeout_s,
-            loop_timeout_s=chosen.overrun_s,
-            operator_timeout_s=chosen.operator_link_timeout_s,
-            battery_warn_v=chosen.battery_warning_v,
-            battery_stop_v=chosen.battery_stop_v,
+            scan_timeout_s=None if configuration.scanner is None else scan_timeout_s(configuration.scanner, chosen),
             torque_on_s=features.torque_on_s or SafetyLimits.torque_on_s,
-            min_valid_share=chosen.min_valid_share,
-            is_torque_off_on_operator_stop=chosen.torque_off_on_operator_stop,
-            is_stopped_when_blind=chosen.stops_when_blind,
+            astray_s=features.astray_s or SafetyLimits.astray_s,
+            astray_m_s=features.astray_m_s or SafetyLimits.astray_m_s,
+            battery_warn_v=warn_v,
+            battery_stop_v=stop_v,
+            has_own_controls=features.has_own_controls,
+            is_torque_off_on_operator_stop=(
+                features.has_own_controls
+                if chosen.torque_off_on_operator_stop is None
+                else chosen.torque_off_on_operator_stop
+            ),
         )
     except ValueError as error:
         raise AssemblyError(f"safety: {error}") from error
+
+
+def _battery(chosen: Safety, features: DriverFeatures, robot: Robot | Body) -> tuple[float | None, float | None]:
+    """Return the voltages of a warning and of the end: those that are chosen, else of the pack or the motors."""
+    warn_v, stop_v = features.battery_v or (None, None)
+    if features.battery_v is None and isinstance(robot, Robot):
+        stop_v = robot.motor.lowest_v
+        warn_v = stop_v + MOTOR_MARGIN_V
+    stop_v = stop_v if chosen.battery_stop_v is None else chosen.battery_stop_v
+    if chosen.battery_warning_v is not None:
+        warn_v = chosen.battery_warning_v
+    elif stop_v is not None:
+        warn_v = stop_v if warn_v is None else max(warn_v, stop_v)
+    return warn_v, stop_v
+
+
+def scan_timeout_s(scanner: Scanner, chosen: Safety) -> float:
+    """Return the time without a full scan after which a LiDAR counts as silent, in seconds."""
+    if chosen.scan_timeout_s is not None:
+        return chosen.scan_timeout_s
+    if scanner.driver in SCAN_TIMEOUTS_S:
+        return SCAN_TIMEOUTS_S[scanner.driver]
+    features = features_of(scanner.driver, Kind.RANGE_SCANNER)
+    if features is None or features.revolution_s is None:
+        return SCAN_TIMEOUT_S
+    return REVOLUTIONS * features.revolution_s
 
 
 def check_settings(configuration: Configuration, mapping: ChannelMapping, deployment: Deployment) -> Settings:
@@ -158,9 +200,11 @@ def check_settings(configuration: Configuration, mapping: ChannelMapping, deploy
 
 def _scan_problems(configuration: Configuration) -> list[str]:
     """A time within which no revolution can be complete would stop the robot for ever."""
-    scanner, timeout_s = configuration.scanner, configuration.safety.scan_timeout_s
+    scanner = configuration.scanner
     features = None if scanner is None else features_of(scanner.driver, Kind.RANGE_SCANNER)
-    if features is None or features.revolution_s is None or timeout_s > features.revolution_s:
+    if scanner is None or features is None or features.revolution_s is None:
+        return []
+    if scan_timeout_s(scanner, configuration.safety) > features.revolution_s:
         return []
     return [
         f"safety.scan_timeout_s: a revolution of the LiDAR takes {features.revolution_s:g} s; the time must be longer"
@@ -353,12 +397,12 @@ def assemble(
     worker = DriveWorker(base, safety, daemon.post, EXCHANGE_S, host.monotonic, timing=timing)
     drive = DeviceThread(worker, host)
     scanner = None
-    if lidar is not None:
+    if lidar is not None and configuration.scanner is not None:
         listener = ScannerWorker(
             lidar,
             safety,
             daemon.post,
-            configuration.safety.scan_timeout_s,
+            scan_timeout_s(configuration.scanner, configuration.safety),
             RESTART_S,
             host.monotonic,
             bad_frames_share=configuration.safety.bad_frames_share,

@@ -7,10 +7,11 @@ Sources: ArduPilot Rover (`GCS_MAVLink_Rover.cpp`, `mode_guided.cpp`, `AP_Arming
 """
 
 import contextlib
+import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
-from robosc_bridge.devices.interface import STANDSTILL, DriveLimits, DriveReading, MotorFault, Velocity
+from robosc_bridge.devices.interface import STANDSTILL, BatteryLevel, DriveLimits, DriveReading, MotorFault, Velocity
 from robosc_bridge.devices.kinematics import wheel_speeds, within_limits
 from robosc_bridge.devices.mavlink_link import (
     BAUD,
@@ -35,6 +36,7 @@ from robosc_bridge.errors import (
 from robosc_bridge.host import Host
 from robosc_bridge.protocol.framing import FrameCounts
 from robosc_bridge.protocol.mavlink_messages import (
+    ChargeState,
     Heartbeat,
     MavCommand,
     Mode,
@@ -75,6 +77,21 @@ _NEW_TARGET_S = 0.02
 _WARNING = 4
 _FOLLOWING_LIMIT_S = 2.0
 _MM = 1000
+_LEVELS: Mapping[int, BatteryLevel] = {
+    ChargeState.OK: BatteryLevel.SOUND,
+    ChargeState.CHARGING: BatteryLevel.SOUND,
+    ChargeState.LOW: BatteryLevel.LOW,
+    ChargeState.UNHEALTHY: BatteryLevel.LOW,
+    ChargeState.CRITICAL: BatteryLevel.EMPTY,
+    ChargeState.EMERGENCY: BatteryLevel.EMPTY,
+    ChargeState.FAILED: BatteryLevel.EMPTY,
+}
+_LONG_TARGETS = (
+    "the rover is armed; where the bridge or its line fails, it drives on for up to 3 s, until its target expires "
+    "(docs/bridge-safety.md says what shortens that)"
+)
+
+_log = logging.getLogger(__name__)
 
 
 class MavlinkRover:
@@ -126,6 +143,7 @@ class MavlinkRover:
         self._is_torque_lost = False
         self._target = STANDSTILL
         self._target_s = -math.inf
+        self._is_warned = False
 
     @property
     def counters(self) -> FrameCounts:
@@ -196,6 +214,9 @@ class MavlinkRover:
         self._is_torque_wanted = True
         self._is_torque_lost = False
         self._following.forget()
+        if not self._is_warned:
+            self._is_warned = True
+            _log.warning("%s: %s", self._path, _LONG_TARGETS)
 
     def exchange(self, velocity: Velocity) -> DriveReading:
         """Send the velocity and our heartbeat where they are due, and tell what came; waits for nothing.
@@ -221,6 +242,8 @@ class MavlinkRover:
             # Nor is one driven that no longer tells what it does.
             target = STANDSTILL if self._is_torque_lost or told is None else velocity
             target = within_limits(target, self.limits, self._robot.wheel_separation_m)
+            if self._host.monotonic() > velocity.until_s:
+                target = STANDSTILL
             if self._is_due(target):
                 self._send_target(target)
         if told is None:
@@ -438,5 +461,6 @@ class MavlinkRover:
             faults=frozenset(faults),
             battery_v=next((found.voltage_v for found in (main, pack) if found and found.voltage_v is not None), None),
             battery_share=next((found.share for found in (main, pack) if found and found.share is not None), None),
+            battery_level=None if pack is None else _LEVELS.get(pack.state),
             imu={"angular_velocity_z": velocity.angular_rad_s},
         )

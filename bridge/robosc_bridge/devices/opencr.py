@@ -8,6 +8,7 @@ here (it reads the device status before it has one, and takes old readings for n
 """
 
 import contextlib
+import math
 from collections.abc import Callable
 from typing import NoReturn
 
@@ -28,6 +29,8 @@ BAUD = 1_000_000  # A USB device: any is right.
 _CALIBRATION_LIMIT_S = 6.0
 _REST_RAW = 2
 _REST_LIMIT_S = 1.0
+# What rotates against a goal of zero, by a button of the board or its remote control, rests without torque alone.
+_RELEASE_LIMIT_S = 0.3
 _TORQUE_LIMIT_S = 1.0
 _REFRESHED_MS = 45  # Two refreshes, every 20 ms, of what the board knows of its motors.
 _POLL_S = 0.01
@@ -122,7 +125,7 @@ class OpenCrBase:
             DeviceError: The wheels do not come to rest.
         """
         self._is_torque_wanted = False
-        if not self._comes_to_rest() and is_on:
+        if not self._comes_to_rest(_REST_LIMIT_S if is_on else _RELEASE_LIMIT_S) and is_on:
             raise DeviceError(f"{self._path}: the wheels still rotate")
         try:
             self._switch_torque(is_on)
@@ -153,7 +156,7 @@ class OpenCrBase:
     def _exchange(self, velocity: Velocity) -> DriveReading:
         is_obeying = self._is_torque_wanted and not self._is_torque_lost
         words = opencr_words(velocity, self.limits, self._robot.wheel_separation_m) if is_obeying else (0, 0)
-        block = self._cycle(words if self._is_torque_wanted else None)
+        block = self._cycle(words if self._is_torque_wanted else None, velocity.until_s)
         if self._is_torque_wanted and not block.is_torque_on and not self._is_torque_lost:
             self._is_torque_lost = True
             # A motor that has lost its power counts within one revolution afterwards.
@@ -252,9 +255,9 @@ class OpenCrBase:
         # After a calibration, which another program may have begun, the board first tells an uptime from before it.
         self._host.sleep(_REFRESHED_MS / 1000)
 
-    def _comes_to_rest(self) -> bool:
+    def _comes_to_rest(self, limit_s: float = _REST_LIMIT_S) -> bool:
         """Command zero and wait for the wheels; whether they came to rest in time."""
-        return self._cycles_until(lambda block: max(map(abs, block.velocities_raw)) <= _REST_RAW, _REST_LIMIT_S)
+        return self._cycles_until(lambda block: max(map(abs, block.velocities_raw)) <= _REST_RAW, limit_s)
 
     def _switch_torque(self, is_on: bool) -> None:
         self._write_torque(is_on)
@@ -281,12 +284,12 @@ class OpenCrBase:
             if self._host.monotonic() > end_s:
                 return False
 
-    def _cycle(self, words: tuple[int, int] | None) -> Block:
-        """Command, if there is anything to, change the heartbeat, and read."""
+    def _cycle(self, words: tuple[int, int] | None, until_s: float = math.inf) -> Block:
+        """Command, if there is anything to and it is not too late for it, change the heartbeat, and read."""
         bus = self._used_bus
         bus.begin(self._exchange_limit_s)
         if words is not None:
-            self._command(words)
+            self._command(words if self._host.monotonic() <= until_s else (0, 0))
         self._heartbeat = (self._heartbeat + 1) % 256
         bus.write(opencr.DEVICE, opencr.HEARTBEAT, bytes((self._heartbeat,)))
         asked_s = self._host.monotonic()

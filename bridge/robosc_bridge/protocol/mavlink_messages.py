@@ -174,6 +174,19 @@ class MotionEstimate:
     resets: int = 0
 
 
+class ChargeState(IntEnum):
+    """Judgement of an autopilot on its battery (MAV_BATTERY_CHARGE_STATE), by its own failsafe parameters."""
+
+    UNDEFINED = 0
+    OK = 1
+    LOW = 2
+    CRITICAL = 3
+    EMERGENCY = 4
+    FAILED = 5
+    UNHEALTHY = 6
+    CHARGING = 7
+
+
 @dataclass(frozen=True, slots=True)
 class BatteryState:
     """State of the first battery; None: not reported.
@@ -182,11 +195,13 @@ class BatteryState:
         is_main: True if it is the summary that every vehicle sends.
         voltage_v: Voltage of the whole pack.
         share: Charge, 0 to 1.
+        state: Judgement of the vehicle on it, one of `ChargeState` if it is known.
     """
 
     is_main: bool
     voltage_v: float | None
     share: float | None
+    state: int = ChargeState.UNDEFINED
 
 
 @dataclass(frozen=True, slots=True)
@@ -331,7 +346,8 @@ def _battery_status(told: Any) -> BatteryState | None:
     if told.id != 0:
         return None
     cells_mv = [cell_mv for cell_mv in told.voltages if cell_mv != UNKNOWN]
-    return BatteryState(False, sum(cells_mv) / 1000 if any(cells_mv) else None, _share(told.battery_remaining))
+    voltage_v = sum(cells_mv) / 1000 if any(cells_mv) else None
+    return BatteryState(False, voltage_v, _share(told.battery_remaining), told.charge_state)
 
 
 def _text(told: Any) -> Text:

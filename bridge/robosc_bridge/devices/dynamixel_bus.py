@@ -71,6 +71,7 @@ class BusCounters:
         unanswered: Those of the requests without a sound answer in time.
         damaged: Answers with a wrong checksum or cut short.
         foreign: Sound packets that were no answer to the request.
+        late: Those of them from the device that was asked: answers to what it was asked before.
         repeated: Requests that were made again.
     """
 
@@ -78,6 +79,7 @@ class BusCounters:
     unanswered: int = 0
     damaged: int = 0
     foreign: int = 0
+    late: int = 0
     repeated: int = 0
 
 
@@ -151,14 +153,18 @@ class DynamixelBus:
         status = self._answered(device, lambda: self._read(device, address, length), fits, length)
         return status.data
 
-    def ping(self, device: int) -> tuple[int, int]:
+    def ping(self, device: int, limit_s: float | None = None) -> tuple[int, int]:
         """Model number and version of the firmware.
+
+        Args:
+            device: Id of the device.
+            limit_s: Longest wait for the answer, where it is not the usual one.
 
         Raises:
             LineError: The line is gone.
             DeviceSilentError: There is no answer in time.
         """
-        status = self._asked(device, lambda: self._plain(device, INST_PING), PING_DATA)
+        status = self._asked(device, lambda: self._plain(device, INST_PING), PING_DATA, limit_s)
         return int.from_bytes(status.data[:2], "little"), status.data[2]
 
     def read(self, device: int, address: int, length: int) -> StatusPacket:
@@ -195,6 +201,27 @@ class DynamixelBus:
         return self._accepted(
             self._asked(device, transmit, 0, limit_s), f"does not let {len(data)} bytes at {address} be written"
         )
+
+    def is_late(self, device: int, limit_s: float) -> bool:
+        """Return True if a device that has not answered in time does so after all.
+
+        Args:
+            device: Id of the device.
+            limit_s: Longest wait for it, in seconds.
+
+        Raises:
+            LineError: The line is gone.
+        """
+        end_s = self._host.monotonic() + limit_s
+        self._port.end_s = end_s
+        while self._host.monotonic() < end_s:
+            self._port.wait_for(0, end_s - self._host.monotonic())
+            status = self._received()
+            if status is not None and status.device == device:
+                self.counters.foreign += 1
+                self.counters.late += 1
+                return True
+        return False
 
     def tell(self, device: int, address: int, data: bytes) -> None:
         """Write to an address of a device that may hear though it is not heard: no answer is waited for.
@@ -315,9 +342,11 @@ class DynamixelBus:
         raise self.silence_of(self._name_of(device), "does")
 
     def _is_foreign(self, status: StatusPacket, devices: Collection[int]) -> None:
-        """Count an answer that comes from another device than these."""
+        """Count an answer that is to another request, or comes from another device than these."""
         self.counters.foreign += 1
-        if status.device not in devices:
+        if status.device in devices:
+            self.counters.late += 1
+        else:
             self.stranger = status.device
 
     def _begin_request(self) -> None:

@@ -54,6 +54,7 @@ class MotorFault(StrEnum):
     TORQUE_LOST = "torque off by itself"
     WATCHDOG = "bus watchdog"
     BLOCKED = "does not rotate as told"
+    UNCOMMANDED = "rotates without a command"
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,8 @@ class DriveReading:
         pose: Odometry.
         velocity: Velocity as the wheels measure it.
         wheels_m_s: Speed of the left and the right wheel.
+        goals_m_s: Speeds that the left and the right wheel were told in this exchange, as the device rounds them;
+            None: they were told none, or the driver does not say.
         is_torque_on: True if the motors hold and obey.
         faults: Faults of any motor.
         battery_v: Voltage of the battery, in volts; None: it is not reported.
@@ -85,6 +88,7 @@ class DriveReading:
     temperature_c: float | None = None
     buttons: Mapping[str, bool] = field(default_factory=dict)
     imu: Mapping[str, float] = field(default_factory=dict)
+    goals_m_s: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

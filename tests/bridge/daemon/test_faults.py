@@ -71,7 +71,7 @@ def test_a_base_that_is_silent_counts_as_lost_after_three_answers_that_do_not_co
 @pytest.mark.parametrize(
     ("base", "limit_s"),
     [
-        ("opencr", 0.36),  # Three exchanges of 120 ms.
+        ("opencr", 0.78),  # Those and a wait for a board that is slow, 0.65 s in all, and a last word.
         ("dynamixel", 0.48),  # The same, and a last word to both motors.
         ("mavlink-rover", 2.0),  # Its last estimate holds for a second, and for another one it is told to disarm.
     ],

@@ -14,7 +14,7 @@ from robosc_bridge.devices.interface import DriveBase, DriveReading, Velocity
 from robosc_bridge.devices.kinematics import wheel_speeds
 from robosc_bridge.devices.robots import ROBOTS
 from robosc_bridge.driver_registry import make_drive_base
-from robosc_bridge.errors import DeviceError, DeviceSilentError, LineLostError, LineMissingError
+from robosc_bridge.errors import DeviceError, DeviceFaultError, DeviceSilentError, LineLostError, LineMissingError
 from support.drive import PERIOD_S, Rig, rig
 
 KINDS = ("opencr", "dynamixel")
@@ -242,11 +242,15 @@ def test_only_bad_answers_are_no_reading(bench: Rig, fault: dict[str, float]) ->
     bench.drive(FORWARD, 0.1)
     bench.hurry()
     vars(bench.robot.base_faults).update(fault)
+    # The third time, OpenCR is waited for: it may be slow and not silent.
+    longest_s = 0.66 if bench.kind == "opencr" else 0.3
+    begin_s = bench.host.monotonic()
     for _ in range(5):
-        begin_s = bench.host.monotonic()
-        with pytest.raises(DeviceSilentError):
+        exchange_s = bench.host.monotonic()
+        with pytest.raises((DeviceSilentError, DeviceFaultError)):
             bench.base.exchange(FORWARD)
-        assert bench.host.monotonic() - begin_s < 0.3
+        assert bench.host.monotonic() - exchange_s < longest_s
+    assert bench.host.monotonic() - begin_s < longest_s + 4 * 0.3
 
 
 @pytest.mark.parametrize(

@@ -263,6 +263,15 @@ _READERS: dict[str, Callable[[str], object]] = {
     "split_s": _seconds_or_none,
     "echo": _boolean,
     "is_deaf": _boolean,
+    "duplicate_share": _share,
+    "cut_share": _share,
+    "flip_share": _share,
+    "device_drop_share": _share,
+    "device_duplicate_share": _share,
+    "device_cut_share": _share,
+    "device_flip_share": _share,
+    "batch_s": _seconds,
+    "has_wire_time": _boolean,
 }
 
 

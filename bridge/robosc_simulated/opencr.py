@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from robosc_simulated.battery import Battery
 from robosc_simulated.line import Sending
 from robosc_simulated.packets import Error, Instruction, Request, RequestParser, status
 from robosc_simulated.servo import TICKS, Servo
@@ -129,6 +130,7 @@ class OpenCr:
         calibration_s: Time for which a recalibration of the gyroscope keeps it busy; 5 s at most.
         pass_s: Time of a pass of its loop in which it has nothing to refresh, in seconds; it handles a packet in each.
         refresh_s: Time of a pass in which it has, in seconds.
+        battery: Battery that it measures, until `set_battery` says otherwise; None: 12 V.
 
     Attributes:
         panel: Buttons, bumpers, battery.
@@ -147,6 +149,7 @@ class OpenCr:
         calibration_s: float = 5.0,
         pass_s: float = 0.0,
         refresh_s: float = 0.0,
+        battery: Battery | None = None,
     ) -> None:
         self.panel = Panel()
         self.answers_as: int | None = None
@@ -176,6 +179,9 @@ class OpenCr:
         )
         self._has_motor_power = True
         self._percent = 0.0
+        self._battery = battery
+        if battery is not None:
+            self.panel.battery_v = battery.voltage_v()
         self._is_connected = False
         self._skips_comparison = False
         self._seen_heartbeat = 0
@@ -221,6 +227,7 @@ class OpenCr:
         """Let the battery have this voltage from now on."""
         with self._time.lock:
             self.update()
+            self._battery = None
             self.panel.battery_v = voltage_v
             self._supply()
 
@@ -440,6 +447,8 @@ class OpenCr:
         self._skips_comparison = was_connected != self._is_connected
 
     def _watch_battery(self, now_s: float) -> None:
+        if self._battery is not None:
+            self.panel.battery_v = self._battery.voltage_v()
         voltage_v = self.panel.battery_v
         # After a long pass, the mean is of what there was meanwhile.
         samples = max(round((now_s - self._sampled_s) / self._period_s), 1)

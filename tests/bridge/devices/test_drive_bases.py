@@ -253,6 +253,37 @@ def test_only_bad_answers_are_no_reading(bench: Rig, fault: dict[str, float]) ->
     assert bench.host.monotonic() - begin_s < longest_s + 4 * 0.3
 
 
+@pytest.mark.parametrize("length", [0x01, 0x04, 0x07])
+def test_a_request_whose_length_was_damaged_costs_no_more_than_two_exchanges(
+    bench: Rig, length: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A device waits for the rest of it, and takes the requests that follow for that."""
+    bench.start()
+    bench.drive(FORWARD, 0.1)
+    bench.hurry()
+    receive, is_damaged = bench.tap.device.receive, False
+
+    def damaged(data: bytes, baud: int) -> object:
+        nonlocal is_damaged
+        if not is_damaged:
+            is_damaged = True
+            data = data[:6] + bytes((length,)) + data[7:]
+        return receive(data, baud)
+
+    monkeypatch.setattr(bench.tap.device, "receive", damaged)
+    failed = 0
+    while True:
+        try:
+            reading = bench.base.exchange(FORWARD)
+        except DeviceSilentError:
+            failed += 1
+            assert failed <= 2
+            continue
+        break
+    assert reading.is_torque_on
+    assert bench.drive(FORWARD, 0.3).velocity.linear_m_s == pytest.approx(0.15, abs=0.001)
+
+
 @pytest.mark.parametrize(
     "fault",
     [{"echo": True}, {"split_s": 0.0}, {"garbage": b"\xff\xff\xfd\x00\x01\xff"}, {"garbage": bytes(range(200))}],

@@ -108,6 +108,15 @@ def test_every_fault_of_a_wire_can_be_told(robot: SimulatedTurtleBot3) -> None:
         "split_s": ("0.001", 0.001),
         "echo": ("true", True),
         "is_deaf": ("true", True),
+        "duplicate_share": ("0.1", 0.1),
+        "cut_share": ("0.2", 0.2),
+        "flip_share": ("0.3", 0.3),
+        "device_drop_share": ("0.4", 0.4),
+        "device_duplicate_share": ("0.5", 0.5),
+        "device_cut_share": ("0.6", 0.6),
+        "device_flip_share": ("0.7", 0.7),
+        "batch_s": ("0.016", 0.016),
+        "has_wire_time": ("true", True),
     }
     assert set(values) == set(vars(Faults()))
     for name, (text, _) in values.items():

@@ -65,14 +65,14 @@ def test_a_base_that_is_silent_counts_as_lost_after_three_answers_that_do_not_co
         begin_s = bridge.host.monotonic()
         wires(bridge, is_deaf=True)
         bridge.until(lambda: "lost.response" in bridge.log.events(), "the loss")
-        # Beside the rest of a cycle.
-        assert bridge.host.monotonic() - begin_s == pytest.approx(trials * 0.3, abs=0.05)
+        # Beside the rest of a cycle, and what is sent to a device that may wait for more of a packet.
+        assert bridge.host.monotonic() - begin_s == pytest.approx(trials * 0.3, abs=0.1)
 
 
 @pytest.mark.parametrize(
     ("base", "limit_s"),
     [
-        ("opencr", 0.36),  # Three exchanges of 120 ms.
+        ("opencr", 0.84),  # Those and a wait for a board that is slow, 0.65 s in all, and a last word.
         ("dynamixel", 0.48),  # The same, and a last word to both motors.
         ("mavlink-rover", 2.0),  # Its last estimate holds for a second, and for another one it is told to disarm.
     ],

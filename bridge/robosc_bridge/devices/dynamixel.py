@@ -309,6 +309,8 @@ class DynamixelBase:
             faults=faults,
             battery_v=min(one.voltage_v for one in measured),
             temperature_c=max(one.temperature_c for one in measured),
+            wheels_m=self._odometry.wheels_m,
+            wheel_radius_m=self._robot.wheel_radius_m,
         )
 
 

@@ -354,6 +354,12 @@ def assemble(
     liveness = LivenessMonitor(threads)
     daemon.connect(drive.hurry, worker.reset, liveness.are_alive)
     operations = Operations(
-        supervisor, mapping, feed, daemon.post, lambda: safety.operator_seen(host.monotonic()), is_layer=is_layer
+        supervisor,
+        mapping,
+        feed,
+        daemon.post,
+        lambda: safety.operator_seen(host.monotonic()),
+        is_layer=is_layer,
+        turtlebot=configuration.robot if isinstance(configuration.robot, str) else "",
     )
     return Machine(daemon, drive, scanner, camera, operations, liveness)

@@ -43,6 +43,7 @@ from robosc_bridge.daemon.view_settings import ADDRESS as VIEW_ADDRESS
 from robosc_bridge.driver_registry import Kind, available_drivers
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.health_check import add_command as add_health_command
+from robosc_bridge.ros2.command import add_command as add_ros2_command
 from robosc_bridge.terminal.commands import add_commands
 
 OK, FAULT, WRONG_USE = 0, 1, 2
@@ -142,6 +143,7 @@ def make_parser() -> Parser:
     drivers.set_defaults(run=_drivers)
     add_health_command(commands)
     add_commands(commands)
+    add_ros2_command(commands)
     return parser
 
 

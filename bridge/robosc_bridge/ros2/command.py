@@ -17,7 +17,7 @@ NAME = "ros2"
 """Name of the command."""
 
 RATE_HZ, LEAST_RATE_HZ, MOST_RATE_HZ = 30.0, 1.0, 100.0
-"""Looks a second, by default and within bounds; the bridge has 20 new readings a second, and every scan."""
+"""Looks a second, by default and within bounds; the bridge shows up to 20 readings a second, and every scan."""
 
 REPORT_S = 1.0
 """Time between two messages of diagnostics; a change is told at once."""

@@ -45,6 +45,7 @@ docs: $(CHECKERS)/.ready ## build the site of the documentation, out/site; every
 	NO_MKDOCS_2_WARNING=1 $(CHECKERS)/bin/mkdocs build --strict
 
 pictures: $(READY) ## make the pictures of the README and of docs/ anew; needs Chromium
+	$(BIN)/python deploy/draw_scan_to_wheel.py
 	PYTHONPATH=tests $(BIN)/python deploy/make_pictures.py
 
 images: $(WHEELS)/.ready ## fetch what the images are made of, and build them without an engine, for their tests

@@ -17,6 +17,10 @@ def _load() -> Callable[[], int]:
 
     if sys.argv[1:2] and sys.argv[1] in commands.NAMES:
         return commands.main
+    if sys.argv[1:2] == ["ros2"]:
+        from robosc_bridge.ros2 import command
+
+        return command.main
     if sys.argv[1:2] == ["health"]:
         # Asked again and again beside a robot that is driving.
         from robosc_bridge import health_check

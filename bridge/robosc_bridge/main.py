@@ -46,6 +46,7 @@ from robosc_bridge.daemon.view_settings import ADDRESS as VIEW_ADDRESS
 from robosc_bridge.driver_registry import Kind, available_drivers
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.health_check import add_command as add_health_command
+from robosc_bridge.ros2.command import add_command as add_ros2_command
 from robosc_bridge.terminal.commands import add_commands
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 
@@ -148,6 +149,7 @@ def make_parser() -> Parser:
     add_capture_commands(commands)
     add_health_command(commands)
     add_commands(commands)
+    add_ros2_command(commands)
     return parser
 
 

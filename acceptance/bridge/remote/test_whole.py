@@ -1,11 +1,9 @@
 """`robosc-bridge run` with a remote endpoint on a simulated TurtleBot3, commanded from a terminal: all as programs."""
 
 import json
-import re
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,6 +13,7 @@ import pytest
 
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_simulated import SimulatedTurtleBot3
+from support.bridge_runs import LIMIT_S, RUNNER, START_LIMIT_S, Running, configured
 from support.real_time import preferred
 from support.remote import Attachment, connected
 from support.terminals import Terminal
@@ -22,25 +21,12 @@ from support.waiting import wait_until
 
 pytestmark = pytest.mark.real_time
 
-START_LIMIT_S, LIMIT_S = 90.0, 30.0
-
 
 def command(*arguments: str) -> subprocess.CompletedProcess[str]:
     line = [sys.executable, "-m", "robosc_bridge.command", *arguments]
     return subprocess.run(line, capture_output=True, text=True, check=False, timeout=LIMIT_S)
 
 
-RUNNER = """robot Runner {
-    interface twist use Twist from geometry_msgs
-    datatype object Vector { x: double z: double }
-    datatype object Twist { linear: Vector angular: Vector }
-    component Wheels {
-        incoming message drive with identifier: "/cmd_vel", type: Twist links twist
-        behaviour { initial marked state ready { on request to drive } }
-    }
-    provide drive with { linear: { x: 0.1 } }
-}
-"""
 CART = """robot Cart {
     interface twist use Twist from geometry_msgs
     datatype object Vector { x: double z: double }
@@ -59,53 +45,6 @@ CART = """robot Cart {
     requirement drive needs Gate.opened
 }
 """
-
-
-def configured(folder: Path, robot: SimulatedTurtleBot3, model: str, *grpc: str, operator: str = "null") -> Path:
-    """A configuration with its model beside it; the wheels are on `/cmd_vel`."""
-    (folder / "robot.rscd").write_text(model)
-    file = folder / "robot.yaml"
-    file.write_text(
-        f"robot: burger\ndrive: {{driver: opencr, port: {robot.base_path}}}\n"
-        # A machine on which tests run is not one for robots.
-        f"safety: {{overrun_s: 1.0, motor_timeout_s: 1.0, operator_link_timeout_s: {operator}}}\n"
-        "remote: {grpc_address: '127.0.0.1:0'}\n"
-        "channels:\n  /cmd_vel: {channel: drive}\n" + "".join(f"  {name}: {{channel: grpc}}\n" for name in grpc)
-    )
-    return file
-
-
-class Running:
-    """The program, and what it has written."""
-
-    def __init__(self, configuration: Path, *options: str) -> None:
-        line = [sys.executable, "-m", "robosc_bridge.main", "run", "--standby", *options]
-        line += ["--model", str(configuration.with_suffix(".rscd")), "--config", str(configuration)]
-        self.process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
-        self.written = ""
-        self._thread = threading.Thread(target=self._read)
-        self._thread.start()
-
-    def _read(self) -> None:
-        assert self.process.stderr is not None
-        for line in self.process.stderr:
-            self.written += line
-
-    def address(self) -> str:
-        """Return the address that its endpoint listens on."""
-
-        def look() -> re.Match[str] | None:
-            assert self.process.poll() is None, self.written
-            return re.search(r"the remote endpoint listens on (\S+)\n", self.written)
-
-        return wait_until(look, limit_s=START_LIMIT_S)[1]
-
-    def end(self) -> None:
-        self.process.kill()
-        self.process.wait()
-        self._thread.join(LIMIT_S)
-        assert self.process.stderr is not None
-        self.process.stderr.close()
 
 
 @contextmanager

@@ -415,7 +415,13 @@ def assemble(
     liveness = LivenessMonitor(threads)
     daemon.connect(drive.hurry, worker.reset, liveness.are_alive)
     operations = Operations(
-        supervisor, mapping, feed, daemon.post, lambda: safety.operator_seen(host.monotonic()), is_layer=is_layer
+        supervisor,
+        mapping,
+        feed,
+        daemon.post,
+        lambda: safety.operator_seen(host.monotonic()),
+        is_layer=is_layer,
+        turtlebot=configuration.robot if isinstance(configuration.robot, str) else "",
     )
     manager = ServiceManager(lambda now_s: drive.is_alive and worker.is_cycling(now_s))
     daemon.beat = lambda now_s: manager.beat(now_s, daemon.state)

@@ -37,6 +37,7 @@ class Operations:
         feed: Feed that the daemon shows.
         post: Function that tells the loop something.
         operator_seen: Function that tells the safety layer that the operator is there.
+        turtlebot: TurtleBot3 that is driven, as a configuration names it; empty: another robot.
 
     Attributes:
         supervisor: Supervisor that is executed.
@@ -44,6 +45,7 @@ class Operations:
         mapping: Channels that its communications are mapped to.
         is_layer: True if the supervisor is a supervision layer.
         feed: Feed that the daemon shows.
+        turtlebot: TurtleBot3 that is driven, as a configuration names it; empty: another robot.
     """
 
     def __init__(
@@ -55,12 +57,14 @@ class Operations:
         operator_seen: Callable[[], None],
         *,
         is_layer: bool,
+        turtlebot: str = "",
     ) -> None:
         self.supervisor = supervisor
         self.model = supervisor.model
         self.mapping = mapping
         self.is_layer = is_layer
         self.feed = feed
+        self.turtlebot = turtlebot
         self._post = post
         self._operator_seen = operator_seen
 

@@ -317,6 +317,8 @@ class DynamixelBase:
             battery_v=min(one.voltage_v for one in measured),
             temperature_c=max(one.temperature_c for one in measured),
             goals_m_s=self._goals_m_s(goals) if self._is_torque_wanted else None,
+            wheels_m=self._odometry.wheels_m,
+            wheel_radius_m=self._robot.wheel_radius_m,
         )
 
     def _goals_m_s(self, goals: tuple[int, int]) -> tuple[float, float]:

@@ -87,6 +87,8 @@ class DriveReading:
         temperature_c: Temperature of the hottest motor, in degrees Celsius; None: it is not reported.
         buttons: True for each button that is pressed, by name: `button_1`, `bumper_1` and so on.
         imu: Further measurements by name, such as `angular_velocity_z`; empty: there are none.
+        wheels_m: Way of the left and the right wheel since the odometry began; None: encoders are not read.
+        wheel_radius_m: Radius of both wheels; None: not known.
     """
 
     time_s: float
@@ -103,6 +105,8 @@ class DriveReading:
     buttons: Mapping[str, bool] = field(default_factory=dict)
     imu: Mapping[str, float] = field(default_factory=dict)
     goals_m_s: tuple[float, float] | None = None
+    wheels_m: tuple[float, float] | None = None
+    wheel_radius_m: float | None = None
 
 
 @dataclass(frozen=True)

@@ -26,12 +26,14 @@ class Odometry:
         separation_m: Distance between the wheels, in metres.
         pose: Pose of the body.
         ticks: Ticks of the left and the right wheel in the last reading; None: the next one begins anew.
+        wheels_m: Way of the left and the right wheel, backward ways subtracted.
     """
 
     tick_m: float
     separation_m: float
     pose: Pose = field(default_factory=Pose)
     ticks: tuple[int | None, int | None] = (None, None)
+    wheels_m: tuple[float, float] = (0.0, 0.0)
 
     def advanced(self, left: int, right: int) -> "Odometry":
         """The odometry after another reading.
@@ -41,7 +43,9 @@ class Odometry:
             right: Of the right wheel.
         """
         left_m, right_m = (step * self.tick_m for step in self._steps(left, right))
-        return replace(self, pose=_moved(self.pose, left_m, right_m, self.separation_m), ticks=(left, right))
+        pose = _moved(self.pose, left_m, right_m, self.separation_m)
+        wheels_m = self.wheels_m[0] + left_m, self.wheels_m[1] + right_m
+        return replace(self, pose=pose, ticks=(left, right), wheels_m=wheels_m)
 
     def jumps(self, left: int, right: int) -> tuple[bool, bool]:
         """Return, for each wheel, True if it has gone so far that its motor may have restarted instead.

@@ -477,4 +477,6 @@ class OpenCrBase:
             battery_share=0.0 if is_empty else block.battery_share,
             buttons=block.buttons,
             imu=block.motion,
+            wheels_m=self._odometry.wheels_m,
+            wheel_radius_m=self._robot.wheel_radius_m,
         )

@@ -102,6 +102,7 @@ def definition(operations: Operations) -> pb.GetDefinitionResponse:
             for state, number in numbers.items()
         ],
         supervisor=_supervisor(operations.supervisor),
+        turtlebot=operations.turtlebot,
     )
 
 
@@ -204,6 +205,7 @@ def _notice(item: Reason | Caution) -> pb.Notice:
 
 def _drive(reading: DriveReading) -> pb.DriveState:
     pose, velocity = reading.pose, reading.velocity
+    left_m, right_m = reading.wheels_m or (None, None)
     return pb.DriveState(
         pose=pb.Pose(x_m=pose.x_m, y_m=pose.y_m, heading_rad=pose.heading_rad),
         velocity=pb.Twist(linear_m_s=velocity.linear_m_s, angular_rad_s=velocity.angular_rad_s),
@@ -215,6 +217,11 @@ def _drive(reading: DriveReading) -> pb.DriveState:
         battery_share=reading.battery_share,
         temperature_c=reading.temperature_c,
         buttons=dict(reading.buttons),
+        time_s=reading.time_s,
+        imu=dict(reading.imu),
+        left_wheel_m=left_m,
+        right_wheel_m=right_m,
+        wheel_radius_m=reading.wheel_radius_m,
     )
 
 
@@ -223,6 +230,12 @@ def put_scan(target: pb.Scan, scan: Scan) -> None:
     target.age_s = max(monotonic() - scan.time_s, 0.0)
     target.turns_per_s = scan.revolutions_per_s
     target.ranges_m.extend(scan.ranges_m)
+    target.time_s, target.min_m, target.max_m = scan.time_s, scan.min_m, scan.max_m
+
+
+def put_sent(target: pb.WatchResponse) -> None:
+    """Fill a message with the time of its sending."""
+    target.sent_s = monotonic()
 
 
 def event_of(entry: Entry) -> Struct:

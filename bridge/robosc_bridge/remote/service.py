@@ -178,6 +178,7 @@ class BridgeService(convert.BridgeServiceServicer):
                         if request.with_scans and snapshot.scan is not None and snapshot.scan.time_s != scan_s:
                             scan_s = snapshot.scan.time_s
                             convert.put_scan(response.scan, snapshot.scan)
+                    convert.put_sent(response)
                     await context.write(response)
                     if is_last:
                         raise _ClosingError

@@ -42,6 +42,8 @@ _PATIENCE_S = 2.0
 
 Snapshot = pb.Snapshot
 DriveState = pb.DriveState
+Scan = pb.Scan
+Definition = pb.GetDefinitionResponse
 WatchResponse = pb.WatchResponse
 
 
@@ -148,9 +150,9 @@ class BridgeClient:
                 return DriveTopic(item.identifier, "twist" in item.fields)
         raise RefusedError(f"no communication of {definition.robot} is mapped to 'drive'")
 
-    def watch(self, *, with_scans: bool, rate_hz: float) -> Iterator[pb.WatchResponse]:
+    def watch(self, *, with_scans: bool, rate_hz: float, with_events: bool = True) -> Iterator[pb.WatchResponse]:
         """Yield what the bridge is doing and what happens, until the bridge or the caller ends it."""
-        request = pb.WatchRequest(maximum_rate_hz=rate_hz, with_scans=with_scans)
+        request = pb.WatchRequest(maximum_rate_hz=rate_hz, with_scans=with_scans, without_events=not with_events)
         with self._translated():
             call = self._stub.Watch(request)
             try:

@@ -70,7 +70,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     return status
 
 
-def _finish(parser: argparse.ArgumentParser, work: Callable[[Any, argparse.Namespace], int]) -> None:
+def add_connection_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options for reaching a bridge."""
     parser.add_argument(
         "--address",
         type=_address,
@@ -79,6 +80,10 @@ def _finish(parser: argparse.ArgumentParser, work: Callable[[Any, argparse.Names
         help=f"address of the bridge (default: ${ADDRESS_VARIABLE}, or {ADDRESS}; default port: {BRIDGE_PORT})",
     )
     add_client_arguments(parser)
+
+
+def _finish(parser: argparse.ArgumentParser, work: Callable[[Any, argparse.Namespace], int]) -> None:
+    add_connection_arguments(parser)
     parser.set_defaults(run=lambda arguments: _connected(arguments, work))
 
 

@@ -72,7 +72,7 @@ class GetDefinitionRequest(_message.Message):
     def __init__(self) -> None: ...
 
 class GetDefinitionResponse(_message.Message):
-    __slots__ = ("robot", "version", "is_layer", "communications", "definition", "transitions", "supervisor")
+    __slots__ = ("robot", "version", "is_layer", "communications", "definition", "transitions", "supervisor", "turtlebot")
     ROBOT_FIELD_NUMBER: _ClassVar[int]
     VERSION_FIELD_NUMBER: _ClassVar[int]
     IS_LAYER_FIELD_NUMBER: _ClassVar[int]
@@ -80,6 +80,7 @@ class GetDefinitionResponse(_message.Message):
     DEFINITION_FIELD_NUMBER: _ClassVar[int]
     TRANSITIONS_FIELD_NUMBER: _ClassVar[int]
     SUPERVISOR_FIELD_NUMBER: _ClassVar[int]
+    TURTLEBOT_FIELD_NUMBER: _ClassVar[int]
     robot: str
     version: str
     is_layer: bool
@@ -87,7 +88,8 @@ class GetDefinitionResponse(_message.Message):
     definition: str
     transitions: _containers.RepeatedCompositeFieldContainer[EventTransition]
     supervisor: bytes
-    def __init__(self, robot: _Optional[str] = ..., version: _Optional[str] = ..., is_layer: _Optional[bool] = ..., communications: _Optional[_Iterable[_Union[Communication, _Mapping]]] = ..., definition: _Optional[str] = ..., transitions: _Optional[_Iterable[_Union[EventTransition, _Mapping]]] = ..., supervisor: _Optional[bytes] = ...) -> None: ...
+    turtlebot: str
+    def __init__(self, robot: _Optional[str] = ..., version: _Optional[str] = ..., is_layer: _Optional[bool] = ..., communications: _Optional[_Iterable[_Union[Communication, _Mapping]]] = ..., definition: _Optional[str] = ..., transitions: _Optional[_Iterable[_Union[EventTransition, _Mapping]]] = ..., supervisor: _Optional[bytes] = ..., turtlebot: _Optional[str] = ...) -> None: ...
 
 class Communication(_message.Message):
     __slots__ = ("name", "component", "kind", "identifier", "channel", "fields")
@@ -233,7 +235,7 @@ class ComponentState(_message.Message):
     def __init__(self, name: _Optional[str] = ..., state: _Optional[str] = ..., variables: _Optional[_Union[_struct_pb2.Struct, _Mapping]] = ...) -> None: ...
 
 class DriveState(_message.Message):
-    __slots__ = ("age_s", "pose", "velocity", "left_wheel_m_s", "right_wheel_m_s", "is_torque_on", "faults", "battery_v", "battery_share", "temperature_c", "buttons")
+    __slots__ = ("age_s", "pose", "velocity", "left_wheel_m_s", "right_wheel_m_s", "is_torque_on", "faults", "battery_v", "battery_share", "temperature_c", "buttons", "time_s", "imu", "left_wheel_m", "right_wheel_m", "wheel_radius_m")
     class ButtonsEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -241,6 +243,13 @@ class DriveState(_message.Message):
         key: str
         value: bool
         def __init__(self, key: _Optional[str] = ..., value: _Optional[bool] = ...) -> None: ...
+    class ImuEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: float
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[float] = ...) -> None: ...
     AGE_S_FIELD_NUMBER: _ClassVar[int]
     POSE_FIELD_NUMBER: _ClassVar[int]
     VELOCITY_FIELD_NUMBER: _ClassVar[int]
@@ -252,6 +261,11 @@ class DriveState(_message.Message):
     BATTERY_SHARE_FIELD_NUMBER: _ClassVar[int]
     TEMPERATURE_C_FIELD_NUMBER: _ClassVar[int]
     BUTTONS_FIELD_NUMBER: _ClassVar[int]
+    TIME_S_FIELD_NUMBER: _ClassVar[int]
+    IMU_FIELD_NUMBER: _ClassVar[int]
+    LEFT_WHEEL_M_FIELD_NUMBER: _ClassVar[int]
+    RIGHT_WHEEL_M_FIELD_NUMBER: _ClassVar[int]
+    WHEEL_RADIUS_M_FIELD_NUMBER: _ClassVar[int]
     age_s: float
     pose: Pose
     velocity: Twist
@@ -263,7 +277,12 @@ class DriveState(_message.Message):
     battery_share: float
     temperature_c: float
     buttons: _containers.ScalarMap[str, bool]
-    def __init__(self, age_s: _Optional[float] = ..., pose: _Optional[_Union[Pose, _Mapping]] = ..., velocity: _Optional[_Union[Twist, _Mapping]] = ..., left_wheel_m_s: _Optional[float] = ..., right_wheel_m_s: _Optional[float] = ..., is_torque_on: _Optional[bool] = ..., faults: _Optional[_Iterable[str]] = ..., battery_v: _Optional[float] = ..., battery_share: _Optional[float] = ..., temperature_c: _Optional[float] = ..., buttons: _Optional[_Mapping[str, bool]] = ...) -> None: ...
+    time_s: float
+    imu: _containers.ScalarMap[str, float]
+    left_wheel_m: float
+    right_wheel_m: float
+    wheel_radius_m: float
+    def __init__(self, age_s: _Optional[float] = ..., pose: _Optional[_Union[Pose, _Mapping]] = ..., velocity: _Optional[_Union[Twist, _Mapping]] = ..., left_wheel_m_s: _Optional[float] = ..., right_wheel_m_s: _Optional[float] = ..., is_torque_on: _Optional[bool] = ..., faults: _Optional[_Iterable[str]] = ..., battery_v: _Optional[float] = ..., battery_share: _Optional[float] = ..., temperature_c: _Optional[float] = ..., buttons: _Optional[_Mapping[str, bool]] = ..., time_s: _Optional[float] = ..., imu: _Optional[_Mapping[str, float]] = ..., left_wheel_m: _Optional[float] = ..., right_wheel_m: _Optional[float] = ..., wheel_radius_m: _Optional[float] = ...) -> None: ...
 
 class Pose(_message.Message):
     __slots__ = ("x_m", "y_m", "heading_rad")
@@ -284,14 +303,20 @@ class Twist(_message.Message):
     def __init__(self, linear_m_s: _Optional[float] = ..., angular_rad_s: _Optional[float] = ...) -> None: ...
 
 class Scan(_message.Message):
-    __slots__ = ("age_s", "ranges_m", "turns_per_s")
+    __slots__ = ("age_s", "ranges_m", "turns_per_s", "time_s", "min_m", "max_m")
     AGE_S_FIELD_NUMBER: _ClassVar[int]
     RANGES_M_FIELD_NUMBER: _ClassVar[int]
     TURNS_PER_S_FIELD_NUMBER: _ClassVar[int]
+    TIME_S_FIELD_NUMBER: _ClassVar[int]
+    MIN_M_FIELD_NUMBER: _ClassVar[int]
+    MAX_M_FIELD_NUMBER: _ClassVar[int]
     age_s: float
     ranges_m: _containers.RepeatedScalarFieldContainer[float]
     turns_per_s: float
-    def __init__(self, age_s: _Optional[float] = ..., ranges_m: _Optional[_Iterable[float]] = ..., turns_per_s: _Optional[float] = ...) -> None: ...
+    time_s: float
+    min_m: float
+    max_m: float
+    def __init__(self, age_s: _Optional[float] = ..., ranges_m: _Optional[_Iterable[float]] = ..., turns_per_s: _Optional[float] = ..., time_s: _Optional[float] = ..., min_m: _Optional[float] = ..., max_m: _Optional[float] = ...) -> None: ...
 
 class StopRequest(_message.Message):
     __slots__ = ()
@@ -324,16 +349,18 @@ class WatchRequest(_message.Message):
     def __init__(self, maximum_rate_hz: _Optional[float] = ..., with_scans: _Optional[bool] = ..., without_events: _Optional[bool] = ...) -> None: ...
 
 class WatchResponse(_message.Message):
-    __slots__ = ("snapshot", "events", "lost_events", "scan")
+    __slots__ = ("snapshot", "events", "lost_events", "scan", "sent_s")
     SNAPSHOT_FIELD_NUMBER: _ClassVar[int]
     EVENTS_FIELD_NUMBER: _ClassVar[int]
     LOST_EVENTS_FIELD_NUMBER: _ClassVar[int]
     SCAN_FIELD_NUMBER: _ClassVar[int]
+    SENT_S_FIELD_NUMBER: _ClassVar[int]
     snapshot: Snapshot
     events: _containers.RepeatedCompositeFieldContainer[_struct_pb2.Struct]
     lost_events: int
     scan: Scan
-    def __init__(self, snapshot: _Optional[_Union[Snapshot, _Mapping]] = ..., events: _Optional[_Iterable[_Union[_struct_pb2.Struct, _Mapping]]] = ..., lost_events: _Optional[int] = ..., scan: _Optional[_Union[Scan, _Mapping]] = ...) -> None: ...
+    sent_s: float
+    def __init__(self, snapshot: _Optional[_Union[Snapshot, _Mapping]] = ..., events: _Optional[_Iterable[_Union[_struct_pb2.Struct, _Mapping]]] = ..., lost_events: _Optional[int] = ..., scan: _Optional[_Union[Scan, _Mapping]] = ..., sent_s: _Optional[float] = ...) -> None: ...
 
 class AttachRequest(_message.Message):
     __slots__ = ("hello", "keep_alive", "give", "reply", "call_failure", "goal_acceptance", "feedback", "goal_end", "request", "call", "goal", "cancel")

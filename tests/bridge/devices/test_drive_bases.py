@@ -75,6 +75,11 @@ def test_the_wheels_turn_as_told_and_the_odometry_follows_the_world(kind: str, r
         assert (reading.pose.x_m, reading.pose.y_m) == pytest.approx((x_m, y_m), abs=0.001)
         assert reading.pose.heading_rad == pytest.approx(heading_rad, abs=0.005)
         assert abs(heading_rad) > 0.01
+        assert reading.wheels_m is not None
+        left_m, right_m = reading.wheels_m
+        assert right_m - left_m == pytest.approx(heading_rad * separation_m, abs=0.001)
+        assert abs(right_m + left_m) / 2 == pytest.approx(abs(0.15 * 0.6 - 0.1 * 0.6), abs=0.02)
+        assert reading.wheel_radius_m == ROBOTS[robot].wheel_radius_m
 
 
 @pytest.mark.parametrize("robot", sorted(ROBOTS))

@@ -91,3 +91,15 @@ def test_a_wheel_can_be_made_to_begin_anew() -> None:
     found = _odometry().advanced(0, 0).rebased(is_left=True, is_right=False).advanced(1000, 0)
     assert found.pose == _odometry().pose
     assert found.ticks == (1000, 0)
+
+
+@given(STEPS)
+def test_the_ways_of_the_wheels_are_what_they_have_rolled(steps: list[tuple[int, int]]) -> None:
+    found = _odometry().advanced(0, 0)
+    at = [0, 0]
+    for left, right in steps:
+        at = [at[0] + left, at[1] + right]
+        found = found.advanced(at[0], at[1])
+    assert found.wheels_m == pytest.approx((at[0] * BURGER.tick_m, at[1] * BURGER.tick_m), abs=1e-9)
+    # A motor that has restarted counts anew, and has not rolled.
+    assert found.rebased().advanced(7, 7).wheels_m == found.wheels_m

@@ -100,6 +100,12 @@ class TestDefinition:
         with FakeDaemon(is_layer=is_layer) as daemon, served(daemon) as endpoint, connected(endpoint.address) as stub:
             assert stub.GetDefinition(pb.GetDefinitionRequest(), timeout=PATIENCE_S).is_layer is is_layer
 
+    @pytest.mark.parametrize("name", ["", "waffle_pi"])
+    def test_the_turtlebot_is_told(self, name: str, daemon: FakeDaemon) -> None:
+        daemon.operations.turtlebot = name
+        with served(daemon) as endpoint, connected(endpoint.address) as stub:
+            assert stub.GetDefinition(pb.GetDefinitionRequest(), timeout=PATIENCE_S).turtlebot == name
+
 
 class TestStatus:
     def test_everything_is_told(self, daemon: FakeDaemon, stub: Any) -> None:
@@ -137,6 +143,27 @@ class TestStatus:
         assert not drive.HasField("battery_share")
         assert dict(drive.buttons) == {"button_1": True}
         assert drive.age_s == pytest.approx(monotonic(), abs=PATIENCE_S)
+
+    def test_what_the_drive_measures_of_its_wheels_and_its_motion_is_told(self, daemon: FakeDaemon, stub: Any) -> None:
+        daemon.show(reading=READING)
+        drive = status(stub).snapshot.drive
+        assert not any(drive.HasField(name) for name in ("left_wheel_m", "right_wheel_m", "wheel_radius_m"))
+        assert dict(drive.imu) == {}
+        imu = {"angular_velocity_z": -0.2}
+        daemon.show(reading=replace(READING, time_s=12.5, imu=imu, wheels_m=(0.0, 0.75), wheel_radius_m=0.033))
+        drive = status(stub).snapshot.drive
+        assert (drive.time_s, dict(drive.imu)) == (12.5, imu)
+        assert (drive.left_wheel_m, drive.right_wheel_m, drive.wheel_radius_m) == (0.0, 0.75, 0.033)
+        assert drive.HasField("left_wheel_m")
+
+    def test_times_are_by_one_clock(self, daemon: FakeDaemon, stub: Any) -> None:
+        before_s = monotonic()
+        shown = replace(scan(1.5), min_m=0.12, max_m=3.5)
+        daemon.show(reading=replace(READING, time_s=before_s), scan=shown)
+        response = next(stub.Watch(pb.WatchRequest(with_scans=True), timeout=PATIENCE_S))
+        assert before_s == response.snapshot.drive.time_s < response.scan.time_s == shown.time_s
+        assert shown.time_s < response.sent_s < monotonic()
+        assert (response.scan.min_m, response.scan.max_m) == (0.12, 3.5)
 
     def test_ages_are_by_the_clock_of_the_devices(
         self, daemon: FakeDaemon, stub: Any, monkeypatch: pytest.MonkeyPatch

@@ -1,0 +1,153 @@
+"""The node of ROS 2: publishers, and nothing that anybody could command."""
+
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Any, Self
+
+from robosc_bridge.ros2.diagnostics import Entry
+from robosc_bridge.ros2.frames import Frames, Place, mountings, places_of
+from robosc_bridge.terminal.client import DriveState, Scan
+
+ROS_ARGUMENTS = "--ros-args"
+
+
+class MissingRosError(Exception):
+    """ROS 2, or a package of it, is not installed; one sentence that says what to do."""
+
+
+class NodeError(Exception):
+    """The node cannot be made as it is asked for; one sentence for a person."""
+
+
+class BridgeNode:
+    """The node, an `Outlet`; use it with `with`.
+
+    Nothing spins it: publishers need no executor, and parameters cannot be set from elsewhere.
+
+    Args:
+        frames: Names of frames.
+        scan: Place of the LiDAR in `base_link`; None: as the TurtleBot3 has it.
+        namespace: Namespace of its topics.
+        sends_odom_tf: True if it sends the transform of the odometry.
+        sends_static_tf: True if it sends those of the robot's parts.
+        arguments: Arguments after `--ros-args`.
+
+    Raises:
+        MissingRosError: rclpy or a package of messages is not installed.
+        NodeError: ROS does not take a name or an argument.
+    """
+
+    def __init__(
+        self,
+        frames: Frames,
+        scan: Place | None,
+        namespace: str,
+        *,
+        sends_odom_tf: bool,
+        sends_static_tf: bool,
+        arguments: Sequence[str] = (),
+    ) -> None:
+        try:
+            import rclpy
+            from diagnostic_msgs.msg import DiagnosticArray
+            from nav_msgs.msg import Odometry
+            from rclpy.node import Node
+            from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+            from rclpy.signals import SignalHandlerOptions
+            from rclpy.validate_namespace import validate_namespace
+            from sensor_msgs.msg import BatteryState, Imu, JointState, LaserScan
+
+            from robosc_bridge.ros2 import messages
+        except ImportError as error:
+            raise MissingRosError(
+                f"ROS 2 is not there ({error}): source its setup file, or install RoboSC with its extra `ros2`"
+            ) from error
+        self._tf_message: Any = None
+        if sends_odom_tf or sends_static_tf:
+            try:
+                from tf2_msgs.msg import TFMessage
+            except ImportError as error:
+                raise MissingRosError(
+                    f"transforms cannot be sent ({error}): install the package tf2_msgs of ROS 2, or use --no-tf"
+                ) from error
+            self._tf_message = TFMessage
+        self._rclpy = rclpy
+        self._messages = messages
+        self._frames = frames
+        self._scan = scan
+        self._context = rclpy.context.Context()
+        given = [messages.NODE, ROS_ARGUMENTS, *arguments] if arguments else [messages.NODE]
+        try:
+            # A node that is refused is told by several lines of ROS, too.
+            validate_namespace(namespace if namespace.startswith("/") else f"/{namespace}")
+            rclpy.init(args=given, context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+            self._node = node = Node(
+                messages.NODE, context=self._context, namespace=namespace or None, start_parameter_services=False
+            )
+        except Exception as error:
+            rclpy.try_shutdown(context=self._context)
+            raise NodeError(f"ROS 2 refuses the node: {' '.join(str(error).split())}") from error
+        self._to_odometry = node.create_publisher(Odometry, "odom", 10)
+        self._to_joints = node.create_publisher(JointState, "joint_states", 10)
+        self._to_imu = node.create_publisher(Imu, "imu", qos_profile_sensor_data)
+        self._to_battery = node.create_publisher(BatteryState, "battery_state", 10)
+        self._to_scan = node.create_publisher(LaserScan, "scan", qos_profile_sensor_data)
+        self._to_diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        # Quality as tf2_ros has it.
+        self._to_tf = node.create_publisher(self._tf_message, "/tf", 100) if sends_odom_tf else None
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._to_static_tf = node.create_publisher(self._tf_message, "/tf_static", latched) if sends_static_tf else None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._node.destroy_node()
+        self._rclpy.try_shutdown(context=self._context)
+
+    def know(self, turtlebot: str) -> None:
+        """Tell where the parts of the robot are.
+
+        Raises:
+            NodeError: Nobody knows it.
+        """
+        if self._to_static_tf is None:
+            return
+        places = places_of(turtlebot, self._scan)
+        if places is None:
+            raise NodeError(
+                f"the bridge drives {repr(turtlebot) if turtlebot else 'no TurtleBot3'}, and it is not known where the "
+                "LiDAR is on it: give --scan-at X Y Z, or use --no-static-tf"
+            )
+        now_ns = self._node.get_clock().now().nanoseconds
+        transforms = [self._messages.mounted(item, now_ns) for item in mountings(self._frames, places)]
+        self._to_static_tf.publish(self._tf_message(transforms=transforms))
+
+    def put_drive(self, drive: DriveState, stamp_ns: int, pose_covariance: tuple[float, ...]) -> None:
+        """Publish a reading of the drive base."""
+        made = self._messages
+        self._to_odometry.publish(made.odometry(drive, stamp_ns, self._frames, pose_covariance))
+        if self._to_tf is not None:
+            self._to_tf.publish(self._tf_message(transforms=[made.moved(drive, stamp_ns, self._frames)]))
+        joints = made.joint_states(drive, stamp_ns)
+        if joints is not None:
+            self._to_joints.publish(joints)
+        imu = made.imu(drive, stamp_ns, self._frames)
+        if imu is not None:
+            self._to_imu.publish(imu)
+
+    def put_battery(self, drive: DriveState, stamp_ns: int) -> None:
+        """Publish the state of the battery, if anything is known of it."""
+        message = self._messages.battery_state(drive, stamp_ns)
+        if message is not None:
+            self._to_battery.publish(message)
+
+    def put_scan(self, scan: Scan, stamp_ns: int) -> None:
+        """Publish a revolution of the LiDAR."""
+        self._to_scan.publish(self._messages.laser_scan(scan, stamp_ns, self._frames))
+
+    def put_diagnostics(self, told: tuple[Entry, ...], stamp_ns: int, robot: str) -> None:
+        """Publish the present state."""
+        self._to_diagnostics.publish(self._messages.diagnostics(told, stamp_ns, robot))

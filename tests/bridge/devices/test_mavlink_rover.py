@@ -61,7 +61,7 @@ def test_a_vehicle_that_does_not_tell_its_motion_is_stopped_and_told_after_1_s(b
     bench.start()
     last_s = bench.drive(FORWARD, 0.2).time_s
     bench.rover.is_silent = True
-    with pytest.raises(DeviceSilentError, match="has not told its motion for 1 s"):
+    with pytest.raises(DeviceSilentError, match="has not reported its motion for 1 s"):
         bench.drive(FORWARD, 30.0)
     # It is looked at every 10 ms.
     assert 1.0 < bench.host.monotonic() - last_s < 1.015
@@ -134,7 +134,7 @@ def test_silence_stops_it_and_is_told_when_its_last_estimate_has_grown_old(bench
     told = bench.base._link and estimate(bench.base._link.state)
     assert told
     bench.rover.is_silent = True
-    with pytest.raises(DeviceSilentError, match="has not told its motion for 1 s"):
+    with pytest.raises(DeviceSilentError, match="has not reported its motion for 1 s"):
         bench.drive(FORWARD, 3.0)
     # It is looked at every 10 ms.
     assert bench.host.monotonic() - told.time_s == pytest.approx(1.01, abs=1e-6)

@@ -134,7 +134,7 @@ def test_another_system_than_was_asked_for_is_told() -> None:
 @pytest.mark.usefixtures("hasty")
 def test_a_vehicle_that_does_not_know_where_it_is_cannot_be_driven(bench: Bench) -> None:
     bench.rover.has_origin = False
-    with pytest.raises(DeviceFaultError, match="does not tell where it is"):
+    with pytest.raises(DeviceFaultError, match="does not report where it is"):
         bench.base.open()
 
 

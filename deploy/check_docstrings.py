@@ -44,7 +44,7 @@ def main(folders: list[str]) -> int:
     """Check all modules below folders; return the exit status."""
     missing = [folder for folder in folders if not Path(folder).is_dir()]
     if missing or not folders:
-        print(f"{missing[0]} is no folder" if missing else "name the folders to check", file=sys.stderr)
+        print(f"{missing[0]} is not a folder" if missing else "name the folders to check", file=sys.stderr)
         return 2
     count = 0
     for folder in folders:

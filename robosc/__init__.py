@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from robosc.pipeline.files import FileAccessError
     from robosc.pipeline.findings import Findings
     from robosc.pipeline.generating import generate
-    from robosc.pipeline.led_run import EventNotPossibleError, Step, UnknownEventError
     from robosc.pipeline.loading import LoadedAutomata, LoadedModel, load
+    from robosc.pipeline.manual_run import EventNotPossibleError, Step, UnknownEventError
     from robosc.pipeline.options import SynthesisOptions
     from robosc.pipeline.received_data import DataError
     from robosc.pipeline.results import (
@@ -76,7 +76,7 @@ _HOMES = {
     "Deployment": "model.structure",
     "Diagnostic": "errors",
     "DrawingUnavailableError": "graphviz",
-    "EventNotPossibleError": "pipeline.led_run",
+    "EventNotPossibleError": "pipeline.manual_run",
     "Explained": "pipeline.explaining",
     "Exploration": "pipeline.exploring",
     "FileAccessError": "pipeline.files",
@@ -98,7 +98,7 @@ _HOMES = {
     "RoboscError": "errors",
     "Run": "pipeline.simulation",
     "Severity": "errors",
-    "Step": "pipeline.led_run",
+    "Step": "pipeline.manual_run",
     "Summary": "pipeline.results",
     "Supervisor": "pipeline.supervisors",
     "Synthesis": "pipeline.synthesis",
@@ -112,7 +112,7 @@ _HOMES = {
     "TroubleKind": "pipeline.walking",
     "UnknownCodeError": "diagnostics",
     "UnknownEngineError": "synthesis",
-    "UnknownEventError": "pipeline.led_run",
+    "UnknownEventError": "pipeline.manual_run",
     "UnknownNameError": "errors",
     "UnknownTargetError": "targets",
     "UnsupportedModelError": "errors",

@@ -168,7 +168,7 @@ def graph_automaton(graph: Graph, system: System) -> System:
 
 def _states(semantics: Semantics, model: Model | None, graph: ControlledGraph) -> tuple[GraphState, ...]:
     places = {subject: place for place, subject in enumerate(subjects(semantics.system))}
-    components = _automata_shown(semantics.system, model)
+    components = _named_automata(semantics.system, model)
     variables = [subject for subject in places if subject.variable is not None]
     communications = [(item.name, places[Subject(communication_plant_name(item))]) for item in _called(model)]
 
@@ -191,7 +191,7 @@ def graph_columns(system: System, model: Model | None) -> tuple[str, ...]:
     """Return the names of the parts of a state in a table; without a model, those of automata and variables."""
     components = () if model is None else tuple(item.name for item in model.components)
     return (
-        *_automata_shown(system, model),
+        *_named_automata(system, model),
         *(str(subject) for subject in subjects(system) if subject.variable is not None),
         *(automaton_text(communication_plant_name(item), components) for item in _called(model)),
     )
@@ -199,7 +199,7 @@ def graph_columns(system: System, model: Model | None) -> tuple[str, ...]:
 
 def marks(system: System, model: Model) -> Callable[[Mapping[str, str], Mapping[str, str]], bool]:
     """Return a function that tells from the states of components and the locations of communications what is marked."""
-    components = {name: system.automaton(name).marked for name in _automata_shown(system, model)}
+    components = {name: system.automaton(name).marked for name in _named_automata(system, model)}
     called = {item.name: system.automaton(communication_plant_name(item)).marked for item in _called(model)}
     return lambda at, location: (
         all(at.get(name) in marked for name, marked in components.items())
@@ -207,7 +207,7 @@ def marks(system: System, model: Model) -> Callable[[Mapping[str, str], Mapping[
     )
 
 
-def _automata_shown(system: System, model: Model | None) -> list[str]:
+def _named_automata(system: System, model: Model | None) -> list[str]:
     """The automata that are told by their own names: components, or all where there is no model."""
     if model is None:
         return [automaton.name for automaton in system.automata]

@@ -103,7 +103,9 @@ def read_motion(path: Path) -> Motion:
     sample, event = msgspec.json.Decoder(Sample), msgspec.json.Decoder(Event)
     try:
         if not path.is_file():
-            raise MotionError(f"{path}: there is no such file" if not path.exists() else f"{path}: is no regular file")
+            raise MotionError(
+                f"{path}: there is no such file" if not path.exists() else f"{path}: is not a regular file"
+            )
         if path.stat().st_size > MOST_BYTES:
             raise MotionError(f"{path}: is larger than {MOST_BYTES} bytes")
         with path.open("rb") as file:
@@ -121,7 +123,7 @@ def read_motion(path: Path) -> Motion:
                     # The last line of a simulator that was killed may be half a line.
                     if not line.endswith(b"\n") and samples:
                         break
-                    raise MotionError(f"{path}:{number}: is no entry of a motion record: {error}") from error
+                    raise MotionError(f"{path}:{number}: is not an entry of a motion record: {error}") from error
                 _check_order(path, number, samples, happenings)
     except OSError as error:
         raise MotionError(f"{path}: cannot be read: {error.strerror}") from error

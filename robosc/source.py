@@ -1,10 +1,15 @@
 """Source texts and places in them: what every diagnostic points at."""
 
-import hashlib
 from dataclasses import dataclass
 from functools import lru_cache
 
 import msgspec
+
+
+def _sha256(text: str) -> str:
+    import hashlib  # loads OpenSSL, which is not needed to read a text
+
+    return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +27,7 @@ class SourceFile:
     @property
     def sha256(self) -> str:
         """Hexadecimal SHA-256 of the text's UTF-8 bytes."""
-        return hashlib.sha256(self.text.encode("utf-8")).hexdigest()
+        return _sha256(self.text)
 
     def line(self, number: int) -> str:
         """The text of line `number` (from 1) without its line end; empty past the end."""
@@ -94,4 +99,4 @@ class Bundle:
     def digest(self) -> str:
         """SHA-256 over the sorted list of `name`, NUL, file SHA-256, newline of every file."""
         listing = "".join(f"{file.name}\0{file.sha256}\n" for file in sorted(self.files, key=lambda f: f.name))
-        return hashlib.sha256(listing.encode("utf-8")).hexdigest()
+        return _sha256(listing)

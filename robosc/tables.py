@@ -1,7 +1,6 @@
 """Tables in HTML: what results show of themselves in a notebook."""
 
 from collections.abc import Iterable, Sequence
-from html import escape
 from itertools import islice
 
 MAXIMUM_ROWS = 200
@@ -23,7 +22,7 @@ def html_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, caption
     left = sum(1 for _ in remaining)
     lines = ["<table>"]
     if caption:
-        lines.append(f'<caption style="{_STYLE}">{escape(caption)}</caption>')
+        lines.append(f'<caption style="{_STYLE}">{_escaped(caption)}</caption>')
     lines.append(f"<thead><tr>{_cells('th', head)}</tr></thead>")
     lines.append("<tbody>")
     lines += [f"<tr>{_cells('td', row)}</tr>" for row in shown]
@@ -34,8 +33,14 @@ def html_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, caption
 
 def html_text(text: str) -> str:
     """Return a text as it would stand in a terminal."""
-    return f"<pre>{escape(text)}</pre>\n"
+    return f"<pre>{_escaped(text)}</pre>\n"
+
+
+def _escaped(text: str) -> str:
+    from html import escape  # needed in notebooks alone
+
+    return escape(text)
 
 
 def _cells(tag: str, values: Iterable[object]) -> str:
-    return "".join(f'<{tag} style="{_STYLE}">{escape(str(value))}</{tag}>' for value in values)
+    return "".join(f'<{tag} style="{_STYLE}">{_escaped(str(value))}</{tag}>' for value in values)

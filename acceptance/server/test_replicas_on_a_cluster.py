@@ -198,5 +198,5 @@ def test_a_server_is_killed_and_the_others_finish_its_jobs(site: Site, ours: Cli
     assert theirs.get_job(endless.id).state is JobState.CANCELLED
     for job, task in zip(waiting, tasks, strict=True):
         # A job's result does not say what it was asked for.
-        assert ours.job_result(job.id) == replace(theirs.generate(task.bundle, task.target), target="")
+        assert ours.job_result(job.id) == replace(theirs.generate(task.model, task.target), target="")
     assert eventually(lambda: not busy(site.cluster))

@@ -33,6 +33,12 @@ PANEL = ("button_1", "button_2", "bumper_1", "bumper_2")
 """Buttons of an OpenCR board: the bumpers are the one in front and the one behind."""
 
 
+PACK_3S_V = (11.5, 11.1)
+"""Warning and end of a lithium pack of three cells in series, the battery of a TurtleBot3: 3.83 V and 3.7 V a cell.
+
+Its board beeps at 11.1 V, too."""
+
+
 @dataclass(frozen=True, slots=True)
 class DriverFeatures:
     """Features of a device, beside those that all of its kind have.
@@ -45,6 +51,12 @@ class DriverFeatures:
         revolution_s: Time that a revolution of a range scanner takes, in seconds; None: that is not known.
         torque_on_s: Time within which motors that are told to hold do so and report it, in seconds; None: as the
             safety layer has it.
+        astray_s: Longest time that a wheel may be off its goal, in seconds; None: as the safety layer has it.
+        astray_m_s: Difference from its goal up to which a wheel is not off it, in m/s; None: as above.
+        battery_v: Voltages at and below which a person is warned and the robot stops, as of the pack that it is made
+            for; None: they go by its motors, or by what it tells itself.
+        has_own_controls: True if the device has controls of its own that move the wheels while torque is on, such as
+            buttons of a board; an operator's stop switches torque off then, unless it is told not to.
     """
 
     buttons: tuple[str, ...] = ()
@@ -52,6 +64,10 @@ class DriverFeatures:
     needs_turtlebot3: bool = False
     revolution_s: float | None = None
     torque_on_s: float | None = None
+    astray_s: float | None = None
+    astray_m_s: float | None = None
+    battery_v: tuple[float, float] | None = None
+    has_own_controls: bool = False
 
     @property
     def has_bumpers(self) -> bool:
@@ -104,12 +120,14 @@ _BUILT_IN: dict[Kind, dict[str, tuple[str, str, DriverFeatures | None]]] = {
             "a MAVLink rover: ArduPilot Rover, driven in its mode GUIDED over a serial line, UDP or TCP",
             "robosc_bridge.devices.mavlink_drivers:make_rover",
             # Its mode and its arming show in a heartbeat each; there is one a second, of which two may be lost.
-            DriverFeatures(has_imu=True, torque_on_s=8.0),
+            # Its own control is as slow as its mass asks for, and its estimate of a standstill is not zero.
+            DriverFeatures(has_imu=True, torque_on_s=8.0, astray_s=2.0, astray_m_s=0.1),
         ),
         "opencr": (
             "a stock TurtleBot3: its OpenCR board with the ROS 2 firmware",
             "robosc_bridge.devices.opencr:OpenCrBase",
-            DriverFeatures(PANEL, has_imu=True, needs_turtlebot3=True),
+            # Its firmware adds its two buttons and an RC-100 to what it is commanded.
+            DriverFeatures(PANEL, has_imu=True, needs_turtlebot3=True, battery_v=PACK_3S_V, has_own_controls=True),
         ),
     },
     Kind.RANGE_SCANNER: {

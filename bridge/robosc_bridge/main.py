@@ -22,6 +22,9 @@ from robosc.model.check import check
 from robosc.model.layers import layer_findings
 from robosc.model.structure import Deployment, Model
 from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
+from robosc_bridge.captures.commands import add_commands as add_capture_commands
+from robosc_bridge.captures.commands import add_recording, make_recorder
+from robosc_bridge.captures.recorder import RecordingHost
 from robosc_bridge.configuration import init, load, map_channels, schema
 from robosc_bridge.configuration.structure import TURTLEBOTS
 from robosc_bridge.configuration.template import UDEV_RULES, DriveDriver, ScannerDriver
@@ -45,6 +48,7 @@ from robosc_bridge.errors import BridgeError
 from robosc_bridge.health_check import add_command as add_health_command
 from robosc_bridge.ros2.command import add_command as add_ros2_command
 from robosc_bridge.terminal.commands import add_commands
+from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 OK, FAULT, WRONG_USE = 0, 1, 2
 
@@ -109,6 +113,7 @@ def make_parser() -> Parser:
         help="serve the live view, a web page (default: view.address of the configuration; without a value "
         f"{VIEW_ADDRESS})",
     )
+    add_recording(run)
     run.add_argument("--verbose", action="store_true", help="tell more")
     run.set_defaults(run=_run)
 
@@ -141,6 +146,7 @@ def make_parser() -> Parser:
     drivers = commands.add_parser("drivers", help="list the drivers of drive bases and range scanners")
     drivers.add_argument("--json", action="store_true", help="for programs")
     drivers.set_defaults(run=_drivers)
+    add_capture_commands(commands)
     add_health_command(commands)
     add_commands(commands)
     add_ros2_command(commands)
@@ -257,8 +263,12 @@ def _run(arguments: argparse.Namespace) -> int:
     log: EventLog = NullLog()
     if configuration.log.folder is not None:
         log = open_event_log(configuration.log.folder, supervisor.model.name, time.time())
+    recorder = make_recorder(arguments, configuration, SYSTEM_HOST)
+    host = SYSTEM_HOST if recorder is None else RecordingHost(SYSTEM_HOST, recorder)
     try:
-        machine = assemble(configuration, mapping, supervisor, log, deployment, starts_itself=not arguments.standby)
+        machine = assemble(
+            configuration, mapping, supervisor, log, deployment, starts_itself=not arguments.standby, host=host
+        )
         endpoints = make_endpoints(configuration, machine.operations, safety_limits(configuration))
         for number in _SIGNALS:
             signal.signal(number, lambda *_: machine.quit())
@@ -267,6 +277,8 @@ def _run(arguments: argparse.Namespace) -> int:
                 tell("there is no terminal: no key stops the robot")
             have_ended = machine.run(endpoints)
     finally:
+        if recorder is not None:
+            recorder.close()
         log.close()
     return OK if have_ended and not machine.daemon.problem else FAULT
 

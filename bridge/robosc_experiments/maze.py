@@ -51,13 +51,13 @@ def run_maze(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
     )
     say("starting the synthesis server, the simulated robot and the bridge")
     with running(setting) as rig:
-        _until_out(rig, say)
+        _wait_until_out(rig, say)
         figures = rig.finish()
     motion = setting.read_motion()
-    return setting.outcome("maze", "serial", check_maze(place, motion), {**figures, **way_figures(motion)})
+    return setting.outcome("maze", "serial", check_maze(place, motion), {**figures, **path_figures(motion)})
 
 
-def _until_out(rig: Rig, say: Say) -> None:
+def _wait_until_out(rig: Rig, say: Say) -> None:
     """Wait until the robot is there, or has had time enough."""
     watch = Watch(rig.setting.motion, LineCount(rig.setting.event_log).poll, rig.require, say, step_s=LIMIT_S)
     for now in watch.samples("in the maze", LIMIT_S):
@@ -65,7 +65,7 @@ def _until_out(rig: Rig, say: Say) -> None:
             return
 
 
-def way_figures(motion: Motion) -> dict[str, float]:
+def path_figures(motion: Motion) -> dict[str, float]:
     """From the first motion to the goal, else to the end of the record: seconds of the world and of the clock."""
     begin = next((sample for sample in motion.samples if sample.linear_m_s or sample.angular_rad_s), None)
     reached = next((event for event in motion.happenings if event.happening == "goal"), None)

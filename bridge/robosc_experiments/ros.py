@@ -20,7 +20,7 @@ from robosc.supervisor import Supervisor, encode
 from robosc.targets import generate, write_files
 from robosc_experiments.line import BOX, line_figures
 from robosc_experiments.line import MODEL as LINE_MODEL
-from robosc_experiments.maze import LIMIT_S, WORLD_LIMIT_S, way_figures
+from robosc_experiments.maze import LIMIT_S, WORLD_LIMIT_S, path_figures
 from robosc_experiments.processes import Program, finish
 from robosc_experiments.records import Recorded
 from robosc_experiments.scenario import Connection, Outcome, Say, ScenarioError
@@ -298,7 +298,7 @@ def run_maze(
         figures = stage.finish()
     motion = setting.read_motion()
     return setting.outcome(
-        "maze", setting.middleware.connection, check_maze(setting.scene, motion), {**figures, **way_figures(motion)}
+        "maze", setting.middleware.connection, check_maze(setting.scene, motion), {**figures, **path_figures(motion)}
     )
 
 

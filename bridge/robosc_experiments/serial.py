@@ -145,6 +145,8 @@ def configuration(setting: Setting, base: str, scanner: str, camera: str | None)
         f"  angular_acceleration_rad_s2: {min(6.0 * speed, 200.0):g}",
         "  motor_timeout_s: 1.0",
         "  command_timeout_s: 1.0",
+        # The mouth of a maze leads to the open, where an LDS-01 measures nothing.
+        "  stops_when_blind: false",
         "skills:",
         *(f"  {name}: {{{text}}}" for name, text in skills.items()),
         "remote: {grpc_address: 127.0.0.1:0}",

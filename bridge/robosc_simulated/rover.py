@@ -53,6 +53,7 @@ class Rover:
         tells_motion: True if it knows the message ODOMETRY; else only place and attitude.
         obstacles: `ring`, `north ring`, `sensors`, or nothing.
         battery_v: Voltage of its battery.
+        charge_state: Judgement of its own failsafe on the battery: 1 ok, 2 low, 3 critical.
         refusal: Reason why it does not arm; empty: it does.
         refused_modes: Modes that it does not enter.
         refuses_disarming: True if it refuses to disarm until it is forced.
@@ -83,6 +84,7 @@ class Rover:
         self.tells_motion = True
         self.obstacles = "ring"
         self.battery_v = 12.0
+        self.charge_state = 1
         self.refusal = ""
         self.refused_modes: tuple[int, ...] = ()
         self.refuses_disarming = False
@@ -314,7 +316,8 @@ class Rover:
 
     def _battery(self) -> bytes:
         voltages = (round(self.battery_v * 1000), *(_UNKNOWN_CM,) * 9)
-        return self._encoder.encode("BATTERY_STATUS", voltages=voltages, remaining=self._percent, function=1, type=1)
+        words = {"function": 1, "type": 1, "charge_state": self.charge_state}
+        return self._encoder.encode("BATTERY_STATUS", voltages=voltages, remaining=self._percent, **words)
 
     def _yaw(self) -> dict[str, float]:
         yaw_rad = math.remainder(-self._world.heading_rad, 2 * math.pi)

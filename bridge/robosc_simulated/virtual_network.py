@@ -58,7 +58,7 @@ class VirtualNetwork:
             LineBusyError: It is in use.
         """
         if port in used:
-            raise LineBusyError(str(port), "another program listens there, or it is no address of this computer")
+            raise LineBusyError(str(port), "another program listens there, or it is not an address of this computer")
         if port:
             return port
         self._next += 1

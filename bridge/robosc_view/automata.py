@@ -10,7 +10,7 @@ from robosc.certification.supervisor_file import StateInWords
 from robosc.explanation.notation import value_text
 from robosc.expressions import TRUE
 from robosc.expressions.text import expression_text
-from robosc.pipeline.led_run import Step
+from robosc.pipeline.manual_run import Step
 from robosc.pipeline.received_data import data_field
 from robosc.pipeline.systems import SystemSupervisor
 from robosc.source import visible
@@ -159,7 +159,7 @@ class EdgesTaken:
         return found
 
 
-def distinct_beginnings(system: System, states: Sequence[StateInWords]) -> tuple[StateInWords, ...]:
+def distinct_initial_states(system: System, states: Sequence[StateInWords]) -> tuple[StateInWords, ...]:
     """The states to begin in that differ in more than input variables, which events change at any time."""
     inputs = _input_names(system)
     found: dict[tuple[Any, ...], StateInWords] = {}
@@ -169,7 +169,7 @@ def distinct_beginnings(system: System, states: Sequence[StateInWords]) -> tuple
     return tuple(found.values())
 
 
-def told_apart(states: Sequence[StateInWords]) -> tuple[str, ...]:
+def distinguishing_parts(states: Sequence[StateInWords]) -> tuple[str, ...]:
     """Some states, each by what tells it apart from the others, as `robosc simulate` takes it."""
     parts = [state.parts for state in states]
     varying = [name for name in parts[0] if len({item[name] for item in parts}) > 1] if parts else []

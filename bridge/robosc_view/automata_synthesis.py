@@ -1,6 +1,6 @@
 """The process that synthesizes automata for a page: what is wanted comes on standard input, what was made goes out.
 
-It answers with a pickled `MadeModel`, or with the reason why there is none, which only its parent reads.
+It answers with a pickled `SynthesizedModel`, or with the reason why there is none, which only its parent reads.
 """
 
 import argparse
@@ -16,16 +16,16 @@ from robosc.cli.output import CommandError
 from robosc.errors import RoboscError, Severity
 from robosc.explanation import EmptyExplanation, empty_text
 from robosc.pipeline.loading import LoadedAutomata
-from robosc.pipeline.system_runs import beginnings
+from robosc.pipeline.system_runs import initial_states_in_words
 from robosc.pipeline.systems import SystemSynthesis
-from robosc_view.automata import distinct_beginnings, too_large
-from robosc_view.watched_model import MadeModel, finding_text
+from robosc_view.automata import distinct_initial_states, too_large
+from robosc_view.watched_model import SynthesizedModel, finding_text
 
 MAXIMUM_FINDINGS = 10
 """Errors that are told; of more the rest is counted."""
 
 
-def made_of(model: LoadedAutomata, found: SystemSynthesis) -> MadeModel | str:
+def playable_automata(model: LoadedAutomata, found: SystemSynthesis) -> SynthesizedModel | str:
     """Return what a page plays with; or the reason why there is nothing, a line for each part of it.
 
     Raises:
@@ -41,8 +41,8 @@ def made_of(model: LoadedAutomata, found: SystemSynthesis) -> MadeModel | str:
     if why_not:
         return why_not
     # A copy, since the values that a supervisor keeps for itself cannot be pickled.
-    begin = distinct_beginnings(system, beginnings(replace(found.supervisor)))
-    return MadeModel(found.supervisor, told, whole, language, begin)
+    begin = distinct_initial_states(system, initial_states_in_words(replace(found.supervisor)))
+    return SynthesizedModel(found.supervisor, told, whole, language, begin)
 
 
 def _reason(found: SystemSynthesis) -> str:
@@ -64,7 +64,7 @@ def main() -> None:
         **{**wanted, "model": Path(wanted["model"]), "library_path": (), "interface_path": (), "deployment": None}
     )
     try:
-        made = made_of(*automata.synthesized(arguments, text=text))
+        made = playable_automata(*automata.synthesized(arguments, text=text))
     except (CommandError, RoboscError) as error:
         made = str(error)
     sys.stdout.buffer.write(pickle.dumps(made))

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Mapping
 
 from robosc_view.definition import Robot
-from robosc_view.messages import MessageBuilder, PreparedRobot, events_text, gone_text, position_text, scan_text
+from robosc_view.messages import MessageBuilder, PreparedRobot, events_text, position_text, scan_text, source_lost_text
 from robosc_view.reports import EventBatch, LaserScan, Status
 from robosc_view.sources import Source, SourceLostError, SourceWrongError
 
@@ -88,7 +88,7 @@ class Viewer:
         self._news.set()
 
     def show_run(self, text: str) -> None:
-        """The latest of a run that is led by hand."""
+        """The latest of a run that is stepped by hand."""
         self._run = text
         self._news.set()
 
@@ -234,7 +234,7 @@ class Broadcaster:
 
     def _lose(self, why: str) -> None:
         self._builder = self._status = self._update = self._position = None
-        text = gone_text(why)
+        text = source_lost_text(why)
         if text != self._gone:
             _log.warning("the live view has lost its source: %s", why)
         self._gone = text

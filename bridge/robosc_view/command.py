@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from robosc.supervisor import Supervisor
     from robosc_bridge.daemon.view_settings import ViewSettings
     from robosc_view.definition import Robot
-    from robosc_view.motion import SeenMotion
+    from robosc_view.motion import MotionTrace
     from robosc_view.sources import Source
-    from robosc_view.watched_model import MadeModel, WatchedModel
+    from robosc_view.watched_model import SynthesizedModel, WatchedModel
 
 _ADDRESS = "127.0.0.1:8066"
 _MOST_BYTES = (1 << 24) + 1
@@ -313,7 +313,7 @@ def _source(arguments: argparse.Namespace) -> "tuple[Callable[[], Source], bool,
 def _playground(arguments: argparse.Namespace, scene: Any) -> "tuple[Callable[[], Source], bool, Robot]":
     """Return a function that makes the run of a page, that each page has its own, and the robot."""
     from robosc.cli.simulate import model_of_test
-    from robosc_view.playground import KeptRuns, Playground, playable
+    from robosc_view.playground import Playground, StoredRuns, playable
     from robosc_view.requests import ROBOSC
     from robosc_view.watched_model import synthesized, synthesized_automata
 
@@ -324,9 +324,9 @@ def _playground(arguments: argparse.Namespace, scene: Any) -> "tuple[Callable[[]
     words += [] if arguments.max_nodes is None else ["--max-nodes", str(arguments.max_nodes)]
     watched = _watched_automata(arguments) if is_automata(arguments.model) else _watched(arguments, words)
     file = None if arguments.text is not None else model_of_test(arguments)
-    kept = KeptRuns()
+    kept = StoredRuns()
 
-    async def make_of_link(text: str, language: str) -> "MadeModel":
+    async def make_of_link(text: str, language: str) -> "SynthesizedModel":
         if language == ROBOSC:
             return await synthesized(words, text)
         named = argparse.Namespace(**{**vars(arguments), "model": Path(f"model.{language}")})
@@ -346,8 +346,8 @@ def _watched(arguments: argparse.Namespace, words: list[str]) -> "WatchedModel":
     from robosc.errors import RoboscError
     from robosc.pipeline.loading import load
     from robosc_view.watched_model import (
-        MadeModel,
         NoSupervisorError,
+        SynthesizedModel,
         WatchedModel,
         file_digest,
         finding_text,
@@ -358,11 +358,11 @@ def _watched(arguments: argparse.Namespace, words: list[str]) -> "WatchedModel":
     model: Path = arguments.model
     if model.suffix == ".rsup":
 
-        async def read_again() -> MadeModel:
-            return MadeModel(read(model))
+        async def read_again() -> SynthesizedModel:
+            return SynthesizedModel(read(model))
 
         seen = file_digest(model)
-        return WatchedModel(MadeModel(_supervisor(arguments)), seen, lambda: file_digest(model), read_again)
+        return WatchedModel(SynthesizedModel(_supervisor(arguments)), seen, lambda: file_digest(model), read_again)
     text: str | None = arguments.text
     if text is None:
         bundle = read_bundle(arguments)
@@ -383,13 +383,13 @@ def _watched(arguments: argparse.Namespace, words: list[str]) -> "WatchedModel":
         except (UsageError, RoboscError) as error:
             raise NoSupervisorError(str(error)) from error
 
-    async def make() -> MadeModel:
+    async def make() -> SynthesizedModel:
         made = await synthesized((*words, "--", str(model)))
-        return MadeModel(made.supervisor, made.findings, _whole_text(read_again_()))
+        return SynthesizedModel(made.supervisor, made.findings, _whole_text(read_again_()))
 
     findings = tuple(finding_text(item.severity, item.message, item.code) for item in outcome.diagnostics)
     return WatchedModel(
-        MadeModel(outcome.supervisor, findings, _whole_text(bundle)),
+        SynthesizedModel(outcome.supervisor, findings, _whole_text(bundle)),
         seen,
         lambda: seen if text is not None else read_again_().digest,
         make,
@@ -402,7 +402,7 @@ def _watched_automata(arguments: argparse.Namespace) -> "WatchedModel":
     from robosc.cli.output import print_diagnostics
     from robosc.errors import RoboscError
     from robosc.pipeline.automata_files import load_automata_file
-    from robosc_view.automata_synthesis import made_of
+    from robosc_view.automata_synthesis import playable_automata
     from robosc_view.watched_model import NoSupervisorError, WatchedModel, synthesized_automata
 
     model: Path = arguments.model
@@ -412,7 +412,7 @@ def _watched_automata(arguments: argparse.Namespace) -> "WatchedModel":
         automata.report_none(argparse.Namespace(model=model, json=False), found, loaded)
         raise CommandError(f"there is no supervisor of {model}", ExitCode.FAILED)
     print_diagnostics(found.diagnostics, loaded)
-    made = made_of(loaded, found)
+    made = playable_automata(loaded, found)
     if isinstance(made, str):
         raise UsageError(made)
     seen = loaded.digest
@@ -454,10 +454,10 @@ def _log(path: Path) -> "LoggedRun":
     return found
 
 
-def _motion(arguments: argparse.Namespace, run_: "LoggedRun") -> "SeenMotion | None":
+def _motion(arguments: argparse.Namespace, run_: "LoggedRun") -> "MotionTrace | None":
     from robosc.event_logs import MotionOfLogError
     from robosc.event_logs.motions import motion_of_log
-    from robosc_view.motion import SeenMotion
+    from robosc_view.motion import MotionTrace
     from robosc_view.scene_map import scene_start
 
     times_s = [entry.time_s for entry in run_.entries] or [0.0]
@@ -465,13 +465,13 @@ def _motion(arguments: argparse.Namespace, run_: "LoggedRun") -> "SeenMotion | N
         found = motion_of_log(arguments.log, arguments.motion, min(times_s), max(times_s))
     except MotionOfLogError as error:
         raise UsageError(str(error)) from error
-    return None if found is None else SeenMotion(found, scene_start(arguments.scene, arguments.scene_seed))
+    return None if found is None else MotionTrace(found, scene_start(arguments.scene, arguments.scene_seed))
 
 
 def _supervisor(arguments: argparse.Namespace) -> "Supervisor":
-    from robosc.cli.given import given_supervisor
+    from robosc.cli.supervisor_argument import supervisor_of_arguments
 
-    found = given_supervisor(arguments)
+    found = supervisor_of_arguments(arguments)
     if found is None:
         raise CommandError(f"there is no supervisor of {arguments.model}", ExitCode.FAILED)
     return found

@@ -121,7 +121,7 @@ class Robot:
         can_command: True if it can be stopped and commanded through the source.
         log: The log that is replayed; None: it is live.
         scene: Walls and line on the floor, and the way of a recorded run, for the map; None: not known.
-        play: Events that a page can have happen, with the data that they carry; None: it is not led by hand.
+        play: Events that a page can have happen, with the data that they carry; None: it is not stepped by hand.
         automata: Components by name that are automata without a model.
     """
 

@@ -190,7 +190,7 @@ class _Drawing:
             self._add_state(node, 2 * layers[node.name])
         places = {node.name: place for place, node in enumerate(nodes)}
         for arrow in self._arrows:
-            self._add_way(arrow, places[arrow.source], places[arrow.target])
+            self._add_bends(arrow, places[arrow.source], places[arrow.target])
         self._rows = self._order()
         self._spread()
         self._heights = self._stack()
@@ -203,7 +203,7 @@ class _Drawing:
         beside = _LOOP + max(map(_width, loops)) if loops else 0.0
         self._boxes.append(_Box(layer, width + beside, height))
 
-    def _add_way(self, arrow: Arrow, source: int, target: int) -> None:
+    def _add_bends(self, arrow: Arrow, source: int, target: int) -> None:
         """The label of an edge half way, and a bend in every other layer that it crosses."""
         first, last = self._boxes[source].layer, self._boxes[target].layer
         step = 1 if last > first else -1

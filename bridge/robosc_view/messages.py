@@ -12,7 +12,7 @@ from robosc_view.definition import Robot, definition_text
 from robosc_view.reports import EventBatch, LaserScan, Notice, RunReport, Status
 
 if TYPE_CHECKING:
-    from robosc.pipeline.led_run import LedRun
+    from robosc.pipeline.manual_run import ManualRun
 
 MAXIMUM_TEXT = 300
 """Characters of an entry's text."""
@@ -97,6 +97,7 @@ class MessageBuilder:
             },
             "age_s": round(age_s, 3),
             "last": None if status.last is None else dict(status.last),
+            "latencies": [[name, *(round(one_ms, 1) for one_ms in times_ms)] for name, *times_ms in status.latencies],
         }
         return _text(message)
 
@@ -223,12 +224,12 @@ class TransitionTracker:
         elif kind == "event":
             after = _states(entry.get("state"))
             for component, numbers in self._table.get(str(entry.get("event")), {}).items():
-                number = self._taken(component, numbers, after.get(component))
+                number = self._transition_number(component, numbers, after.get(component))
                 if number is not None:
                     yield component, number
             self._before = after
 
-    def _taken(self, component: str, numbers: Mapping[str, int], after: str | None) -> int | None:
+    def _transition_number(self, component: str, numbers: Mapping[str, int], after: str | None) -> int | None:
         number = numbers.get(self._before.get(component) or "")
         if number is not None and self._next.get((component, number)) == after:
             return number
@@ -291,8 +292,8 @@ def position_text(time_s: float, speed: float, *, is_playing: bool) -> str:
     return _text({"type": "position", "time_s": time_s, "is_playing": is_playing, "speed": speed})
 
 
-def run_text(run: "LedRun", entries: int, report: RunReport, beginning: int = 0) -> str:
-    """The message `run`: what can happen in a run that is led by hand, and what was just done.
+def run_text(run: "ManualRun", entries: int, report: RunReport, beginning: int = 0) -> str:
+    """The message `run`: what can happen in a run that is stepped by hand, and what was just done.
 
     Args:
         run: The run.
@@ -334,7 +335,7 @@ def done_text(what: str) -> str:
     return _text({"type": "done", "what": what})
 
 
-def gone_text(why: str) -> str:
+def source_lost_text(why: str) -> str:
     """The message `gone`."""
     return _text({"type": "gone", "why": why})
 

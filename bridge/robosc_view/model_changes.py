@@ -5,15 +5,15 @@ from collections.abc import Iterator, Mapping
 
 from robosc.pipeline.supervisors import Supervisor
 from robosc.pipeline.systems import SystemSupervisor
-from robosc_view.watched_model import MadeModel
+from robosc_view.watched_model import SynthesizedModel
 
 MAXIMUM_CHANGES = 30
 """Sentences that are told; of more the rest is counted."""
 
 
-def model_changes(before: MadeModel, after: MadeModel) -> tuple[str, ...]:
+def model_changes(before: SynthesizedModel, after: SynthesizedModel) -> tuple[str, ...]:
     """Return what has become another: states, events, conditions of the supervisor, findings."""
-    old, new = _made(before), _made(after)
+    old, new = _synthesized(before), _synthesized(after)
     found = [*_sizes(old, new), *_events(old, new), *_conditions(old, new), *_findings(before.findings, after.findings)]
     if not found:
         return ("nothing that the supervisor does has changed",)
@@ -21,20 +21,20 @@ def model_changes(before: MadeModel, after: MadeModel) -> tuple[str, ...]:
     return (*found[:MAXIMUM_CHANGES], *((f"and {more} changes more",) if more > 0 else ()))
 
 
-type _Made = Supervisor | SystemSupervisor
+type _Synthesized = Supervisor | SystemSupervisor
 
 
-def _made(model: MadeModel) -> _Made:
+def _synthesized(model: SynthesizedModel) -> _Synthesized:
     made = model.supervisor
     return made if isinstance(made, SystemSupervisor) else Supervisor.of(made)
 
 
-def _sizes(old: _Made, new: _Made) -> Iterator[str]:
+def _sizes(old: _Synthesized, new: _Synthesized) -> Iterator[str]:
     if old.states != new.states:
         yield f"{new.states} states, which were {old.states}"
 
 
-def _events(old: _Made, new: _Made) -> Iterator[str]:
+def _events(old: _Synthesized, new: _Synthesized) -> Iterator[str]:
     before, after = ([event.name for event in made.system.events] for made in (old, new))
     for word, there, elsewhere in (("new", after, before), ("gone", before, after)):
         names = [name for name in there if name not in elsewhere]
@@ -42,7 +42,7 @@ def _events(old: _Made, new: _Made) -> Iterator[str]:
             yield f"{word}: {', '.join(names)}"
 
 
-def _conditions(old: _Made, new: _Made) -> Iterator[str]:
+def _conditions(old: _Synthesized, new: _Synthesized) -> Iterator[str]:
     before, after = _needs(old), _needs(new)
     for event in dict.fromkeys((*before, *after)):
         was, now = before.get(event, ""), after.get(event, "")
@@ -51,7 +51,7 @@ def _conditions(old: _Made, new: _Made) -> Iterator[str]:
             yield f"{told}{f' (before: {was})' if was else ''}"
 
 
-def _needs(made: _Made) -> Mapping[str, str]:
+def _needs(made: _Synthesized) -> Mapping[str, str]:
     """The conditions that a supervisor adds and that forbid anything, by event."""
     return {event: condition.text for event, condition in made.conditions.items() if condition.text != "true"}
 

@@ -13,7 +13,7 @@ MOST_POINTS = 2000
 _DIGITS = 4
 
 
-class SeenMotion:
+class MotionTrace:
     """Motion as the page shows it: in the coordinates of its map.
 
     Args:

@@ -1,4 +1,4 @@
-"""The source for a model that nothing executes: whoever opens a page leads it by hand, each a run of its own.
+"""The source for a model that nothing executes: whoever opens a page steps it by hand, each a run of its own.
 
 The run is that of `robosc simulate`: events with data, undo and redo, walks by chance and until there is trouble, kept
 as an event log or a test. Of automata it is also chosen where to begin, and which of several outcomes an event has.
@@ -19,22 +19,22 @@ from typing import Any, cast
 from robosc.certification.supervisor_file import StateInWords
 from robosc.errors import RoboscError
 from robosc.pipeline.event_scripts import parse_event
-from robosc.pipeline.led_run import Step, changes_text, event_text
+from robosc.pipeline.manual_run import Step, changes_text, event_text
 from robosc.pipeline.received_data import NO_DATA
 from robosc.pipeline.saved_runs import ModelOfTest, entries_of, event_log, pytest_module, state_by_component
 from robosc.pipeline.simulation import Run
 from robosc.pipeline.system_runs import ChoiceError, SystemRun
 from robosc.pipeline.systems import SystemSupervisor
 from robosc_bridge.daemon.states import OperatorCommand
-from robosc_view.automata import EdgesTaken, robot_of_automata, told_apart
+from robosc_view.automata import EdgesTaken, distinguishing_parts, robot_of_automata
 from robosc_view.definition import Robot, robot_of
 from robosc_view.messages import TransitionTracker, run_text, saved_text
 from robosc_view.model_changes import model_changes
 from robosc_view.replay import LastTaken
 from robosc_view.reports import Choice, EventBatch, Notice, RunReport, SourceKind, Status
-from robosc_view.requests import Back, Form, Happen, LoadModel, Restart, Resume, RunCommand, Save, Walk
+from robosc_view.requests import Form, HistoryMove, LoadModel, Restart, Resume, RunCommand, Save, TakeEvent, Walk
 from robosc_view.sources import RefusedError, ReplayCommand, Sink, not_replayed
-from robosc_view.watched_model import MadeModel, NoSupervisorError, WatchedModel
+from robosc_view.watched_model import NoSupervisorError, SynthesizedModel, WatchedModel
 
 MAXIMUM_WAITING = 50
 """Commands of one page that wait for their turn."""
@@ -81,7 +81,7 @@ def unpacked(text: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class KeptRun:
+class StoredRun:
     """A run of a page.
 
     Attributes:
@@ -90,27 +90,27 @@ class KeptRun:
         beginning: Parts of the state that it has begun in.
     """
 
-    own: MadeModel | None = None
+    own: SynthesizedModel | None = None
     history: tuple[Step, ...] = ()
     beginning: Mapping[str, object] = field(default_factory=dict)
 
 
-class KeptRuns:
+class StoredRuns:
     """Runs of pages, for pages that come back: after a lost connection, or loaded again. The oldest are forgotten."""
 
     def __init__(self) -> None:
-        self._runs: OrderedDict[str, KeptRun] = OrderedDict()
+        self._runs: OrderedDict[str, StoredRun] = OrderedDict()
 
-    def keep(self, page: str, run: KeptRun) -> None:
+    def keep(self, page: str, run: StoredRun) -> None:
         """Keep what a page has done."""
         self._runs[page] = run
         self._runs.move_to_end(page)
         while len(self._runs) > MAXIMUM_KEPT:
             self._runs.popitem(last=False)
 
-    def of(self, page: str) -> KeptRun:
+    def of(self, page: str) -> StoredRun:
         """Return the run that was kept of a page; an empty one where none was."""
-        return self._runs.get(page, KeptRun())
+        return self._runs.get(page, StoredRun())
 
 
 class Playground:
@@ -128,9 +128,9 @@ class Playground:
     def __init__(
         self,
         watched: WatchedModel,
-        kept: KeptRuns,
+        kept: StoredRuns,
         file: ModelOfTest | None,
-        make: Callable[[str, str], Awaitable[MadeModel]],
+        make: Callable[[str, str], Awaitable[SynthesizedModel]],
         scene: Any = None,
         clock: Callable[[], float] = time.time,
     ) -> None:
@@ -145,14 +145,14 @@ class Playground:
         self._commands: asyncio.Queue[RunCommand | None] = asyncio.Queue()
         self._is_changed = False
         # A model of a link takes the place of the watched one.
-        self._own: MadeModel | None = None
+        self._own: SynthesizedModel | None = None
         self._is_begun = False
         self._made = watched.made
         self._run: Run | SystemRun
         self._edges: EdgesTaken | None
         self._beginning = 0
 
-    async def _begin(self, made: MadeModel, beginning: int = 0) -> None:
+    async def _begin(self, made: SynthesizedModel, beginning: int = 0) -> None:
         # In another thread, since that of large automata takes its time.
         self._run, self._edges = await asyncio.to_thread(_run_of, made, beginning)
         self._made, self._beginning, self._is_begun = made, beginning, True
@@ -166,7 +166,7 @@ class Playground:
             if not self._is_begun or (self._own is None and self._made is not self._watched.made):
                 await self._begin(self._watched.made)
             await self._define(sink)
-            await self._show(sink, self._begun())
+            await self._show(sink, self._initial_report())
             while True:
                 command = await self._commands.get()
                 try:
@@ -177,8 +177,8 @@ class Playground:
                 except (RefusedError, RoboscError) as error:
                     await self._show(sink, RunReport("wrong", (str(error),)))
 
-    def lead(self, command: RunCommand) -> None:
-        """Want something of the run; it is done after what was wanted before.
+    def submit(self, command: RunCommand) -> None:
+        """Submit a command for the run; it is done after those before it.
 
         Raises:
             RefusedError: Too much waits already.
@@ -212,7 +212,7 @@ class Playground:
     async def _do(self, command: RunCommand, sink: Sink) -> None:
         run = self._run
         match command:
-            case Happen(line=line, way=way):
+            case TakeEvent(line=line, way=way):
                 self._require_room(1)
                 before = run.state
                 step = await asyncio.to_thread(self._happened, line, way)
@@ -225,10 +225,10 @@ class Playground:
                 await self._show(
                     sink, RunReport("unknown" if told else "step", (f"{event_text(step)}: {changes}", *told))
                 )
-            case Back.UNDO:
+            case HistoryMove.UNDO:
                 step_back = run.undo()
                 await self._show(sink, RunReport("step", (f"taken back: {step_back.event}",) if step_back else ()))
-            case Back.REDO:
+            case HistoryMove.REDO:
                 step_again = run.redo()
                 await self._show(sink, RunReport("step", (f"taken again: {step_again.event}",) if step_again else ()))
             case Restart(beginning=int(beginning)) if isinstance(run, SystemRun):
@@ -277,7 +277,7 @@ class Playground:
         told = f"{event} can lead to {len(ways)} states: choose one beside its button"
         told += f", which offers the first {MAXIMUM_WAYS}" if len(ways) > MAXIMUM_WAYS else ""
         told += ", or enter its data" if run.data_fields(event) else ""
-        return RunReport("choose", (told,), Choice(event, line, told_apart(ways)[:MAXIMUM_WAYS]))
+        return RunReport("choose", (told,), Choice(event, line, distinguishing_parts(ways)[:MAXIMUM_WAYS]))
 
     def _saved(self, form: Form) -> tuple[str, str]:
         """Name and text of a file.
@@ -298,7 +298,7 @@ class Playground:
     async def _resume(self, page: str, sink: Sink) -> None:
         kept = self._kept.of(page)
         self._page = page
-        is_same = not (kept.own or kept.history) and kept.beginning in ({}, self._begun_in)
+        is_same = not (kept.own or kept.history) and kept.beginning in ({}, self._initial_parts)
         if len(self._run) or is_same:
             return
         self._own = kept.own or self._own
@@ -309,12 +309,12 @@ class Playground:
         await self._show(sink, RunReport(*report))
 
     @property
-    def _begun_in(self) -> Mapping[str, object]:
+    def _initial_parts(self) -> Mapping[str, object]:
         """Parts of the state that automata have begun in."""
         return self._made.beginnings[self._beginning].parts if self._made.beginnings else {}
 
     async def _repeat(
-        self, made: MadeModel, beginning: Mapping[str, object], history: tuple[Step, ...]
+        self, made: SynthesizedModel, beginning: Mapping[str, object], history: tuple[Step, ...]
     ) -> tuple[str, ...]:
         """Begin a model as another run did, and do what it did, as far as possible; returns what is in the way."""
         alike = [
@@ -326,18 +326,18 @@ class Playground:
         lost = (
             () if alike or not beginning else (f"it cannot begin where it did, and begins anew: {self._run.initial}",)
         )
-        return (*lost, *await asyncio.to_thread(self._again, history))
+        return (*lost, *await asyncio.to_thread(self._repeated, history))
 
-    def _again(self, history: tuple[Step, ...]) -> tuple[str, ...]:
+    def _repeated(self, history: tuple[Step, ...]) -> tuple[str, ...]:
         """Take the events of a run again, as far as they can happen; returns what is in their way."""
         for number, step in enumerate(history):
             try:
-                self._take_again(step)
+                self._repeat_step(step)
             except RoboscError as error:
                 return (f"of {len(history)} events {number} happened again: {error}",)
         return ()
 
-    def _take_again(self, step: Step) -> None:
+    def _repeat_step(self, step: Step) -> None:
         run, given = self._run, () if step.given is NO_DATA else (step.given,)
         try:
             run.step(step.event, *given)
@@ -364,19 +364,19 @@ class Playground:
             await self._show(sink, RunReport())
             return
         told = list(await asyncio.to_thread(model_changes, before, after))
-        told += await self._repeat(after, self._begun_in, self._run.history)
+        told += await self._repeat(after, self._initial_parts, self._run.history)
         await self._define(sink)
         await self._show(sink, RunReport("changed", ("the model has changed", *told)))
 
     # What is told
 
-    def _begun(self) -> RunReport:
+    def _initial_report(self) -> RunReport:
         """Report of where a run has begun; an empty one where there is no choice."""
         count = len(self._made.beginnings)
         if count <= 1:
             return RunReport()
         offered = f", of which the first {MAXIMUM_WAYS} are offered" if count > MAXIMUM_WAYS else ""
-        where = told_apart(self._made.beginnings)[self._beginning]
+        where = distinguishing_parts(self._made.beginnings)[self._beginning]
         told = f"there are {count} states to begin in{offered}, and this begins where {where}"
         return RunReport("step", (f"{told}: choose another one, and restart",))
 
@@ -416,7 +416,7 @@ class Playground:
         )
         sink.show_run(await asyncio.to_thread(run_text, run, len(everything), report, self._beginning))
         if self._page:
-            self._kept.keep(self._page, KeptRun(self._own, history, self._begun_in))
+            self._kept.keep(self._page, StoredRun(self._own, history, self._initial_parts))
 
     def _entries_of(self, before: StateInWords, step: Step, number: int) -> list[dict[str, Any]]:
         found = list(entries_of(step, number))
@@ -428,7 +428,7 @@ class Playground:
         return found
 
 
-def _run_of(made: MadeModel, beginning: int) -> tuple[Run | SystemRun, EdgesTaken | None]:
+def _run_of(made: SynthesizedModel, beginning: int) -> tuple[Run | SystemRun, EdgesTaken | None]:
     """Return a run of a model, and what tells the edges that its events take, of automata."""
     if not isinstance(made.supervisor, SystemSupervisor):
         return Run(made.supervisor), None
@@ -436,13 +436,13 @@ def _run_of(made: MadeModel, beginning: int) -> tuple[Run | SystemRun, EdgesTake
     return SystemRun(made.supervisor, parts), EdgesTaken(made.supervisor.system)
 
 
-def playable(made: MadeModel, scene: Any = None) -> Robot:
+def playable(made: SynthesizedModel, scene: Any = None) -> Robot:
     """Return the robot of a model that is played with."""
     play: dict[str, Any] = {
         "language": made.language,
         "link": None if made.text is None else packed(made.text),
         # A single state to begin in is nothing to choose.
-        "beginnings": told_apart(made.beginnings)[:MAXIMUM_WAYS] if len(made.beginnings) > 1 else (),
+        "beginnings": distinguishing_parts(made.beginnings)[:MAXIMUM_WAYS] if len(made.beginnings) > 1 else (),
     }
     if isinstance(made.supervisor, SystemSupervisor):
         return robot_of_automata(made.supervisor, {**play, "forms": ()})

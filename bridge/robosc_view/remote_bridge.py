@@ -72,7 +72,7 @@ class RemoteBridge:
             SourceWrongError: It refuses, or is none.
         """
         if self._defining is None or self._defining.done():
-            self._defining = _kept(self._asked(lambda client: robot_from(client.definition(), self._scene)))
+            self._defining = _background_task(self._asked(lambda client: robot_from(client.definition(), self._scene)))
         # Those who come and go while a bridge does not answer ask it once.
         await sink.define(await asyncio.shield(self._defining))
         watch = _Watch(self._address, self._credentials, asyncio.get_running_loop())
@@ -113,9 +113,9 @@ class RemoteBridge:
         if self._stop_to_send is None:
             before = self._stop_sent
             if before is None or before.done():
-                self._stop_sent = _kept(self._asked(BridgeClient.stop))
+                self._stop_sent = _background_task(self._asked(BridgeClient.stop))
                 return self._stop_sent
-            self._stop_to_send = _kept(self._stop_after(before))
+            self._stop_to_send = _background_task(self._stop_after(before))
         return self._stop_to_send
 
     async def _stop_after(self, before: asyncio.Task[None]) -> None:
@@ -147,7 +147,7 @@ class RemoteBridge:
         return await future
 
 
-def _kept[Found](work: Coroutine[Any, Any, Found]) -> asyncio.Task[Found]:
+def _background_task[Found](work: Coroutine[Any, Any, Found]) -> asyncio.Task[Found]:
     """Work that is begun now and goes on, whoever waits for it; what becomes of it need not be asked for."""
     task = asyncio.Task(work, loop=asyncio.get_running_loop(), eager_start=True)
     task.add_done_callback(lambda done: done.cancelled() or done.exception())
@@ -299,6 +299,11 @@ def status_of(snapshot: Snapshot) -> Status:
         enabled=list(snapshot.enabled),
         drive=_drive(snapshot.drive) if snapshot.HasField("drive") else None,
         age_s=snapshot.age_s,
+        latencies=[
+            (item.name, item.p50_s * 1e3, item.p99_s * 1e3, item.max_s * 1e3)
+            for item in snapshot.latencies
+            if item.count
+        ],
     )
 
 

@@ -19,7 +19,7 @@ from robosc.supervisor import Supervisor
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.definition import robot_of
 from robosc_view.messages import TransitionTracker
-from robosc_view.motion import SeenMotion
+from robosc_view.motion import MotionTrace
 from robosc_view.reports import EventBatch, LogSpan, SourceKind, Status
 from robosc_view.sources import Pause, Play, RefusedError, ReplayCommand, Seek, Sink, ViewError
 
@@ -69,7 +69,7 @@ class Recording:
     """
 
     def __init__(
-        self, run: LoggedRun, supervisor: Supervisor, scene: Any = None, motion: SeenMotion | None = None
+        self, run: LoggedRun, supervisor: Supervisor, scene: Any = None, motion: MotionTrace | None = None
     ) -> None:
         if not run.entries:
             raise ViewError("the log has no entries")

@@ -98,6 +98,7 @@ class Status:
         age_s: Age of this when it came, in seconds.
         last: Number of the transition that each component took last; of one that is not named none is known. None:
             the entries show it.
+        latencies: Times that the bridge measures of itself: name, 50th and 99th percentile and maximum in milliseconds.
     """
 
     time_s: float
@@ -113,11 +114,12 @@ class Status:
     drive: Drive | None = None
     age_s: float = 0.0
     last: Mapping[str, int] | None = None
+    latencies: Sequence[tuple[str, float, float, float]] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class RunReport:
-    """Report of what was just done with a run that is led by hand.
+    """Report of what was just done with a run that is stepped by hand.
 
     Attributes:
         kind: `step`, `unknown`, `trouble`, `changed` (the model), `wrong` or `choose`; empty: nothing was done.

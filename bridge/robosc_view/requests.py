@@ -13,7 +13,7 @@ MAXIMUM_BYTES = 4096
 """Maximum size of one request, in bytes."""
 
 MAXIMUM_LED_BYTES = 16384
-"""The same where a run is led by hand: a link holds a model."""
+"""The same where a run is stepped by hand: a link holds a model."""
 
 MAXIMUM_WALK = 5000
 """Events of one walk."""
@@ -42,7 +42,7 @@ class Stop:
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class RobotCommand:
     """Command that is wanted of the robot.
 
     Attributes:
@@ -55,8 +55,8 @@ class Order:
 
 
 @dataclass(frozen=True, slots=True)
-class Happen:
-    """Have an event happen in a run that is led by hand.
+class TakeEvent:
+    """Take an event in a run that is stepped by hand.
 
     Attributes:
         line: The event with its data, as in a file of events.
@@ -67,8 +67,8 @@ class Happen:
     way: int | None = None
 
 
-class Back(StrEnum):
-    """Move in a run that is led by hand."""
+class HistoryMove(StrEnum):
+    """Move in a run that is stepped by hand."""
 
     UNDO = "undo"
     REDO = "redo"
@@ -76,7 +76,7 @@ class Back(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Restart:
-    """Begin a run that is led by hand again.
+    """Begin a run that is stepped by hand again.
 
     Attributes:
         beginning: Number of the state to begin in, of those that the definition tells; None: the same as before.
@@ -144,22 +144,22 @@ class Resume:
     page: str
 
 
-RunCommand = Happen | Back | Restart | Walk | Save | LoadModel | Resume
+RunCommand = TakeEvent | HistoryMove | Restart | Walk | Save | LoadModel | Resume
 
 
 @runtime_checkable
-class LedSource(Source, Protocol):
+class ManualSource(Source, Protocol):
     """A source whose run a page leads by hand."""
 
-    def lead(self, command: RunCommand) -> None:
-        """Want something of the run.
+    def submit(self, command: RunCommand) -> None:
+        """Submit a command for the run.
 
         Raises:
             RefusedError: Too much waits already.
         """
 
 
-PageRequest = Stop | Order | ReplayCommand | RunCommand
+PageRequest = Stop | RobotCommand | ReplayCommand | RunCommand
 
 
 def parse_request(text: str) -> PageRequest:
@@ -182,7 +182,7 @@ def parse_request(text: str) -> PageRequest:
             command = _COMMANDS.get(name) if isinstance(name, str) else None
             if command is None:
                 raise RefusedError(f"a command is one of {', '.join(_COMMANDS)}")
-            return Order(command, document.get("token"))
+            return RobotCommand(command, document.get("token"))
         case "seek":
             return Seek(_number(document, "time_s", -1e12, 1e12))
         case "play":
@@ -190,9 +190,9 @@ def parse_request(text: str) -> PageRequest:
         case "pause":
             return Pause()
         case "event":
-            return Happen(_text(document, "line"), _choice(document, "way"))
+            return TakeEvent(_text(document, "line"), _choice(document, "way"))
         case "undo" | "redo" as name:
-            return Back(name)
+            return HistoryMove(name)
         case "restart":
             return Restart(_choice(document, "beginning"))
         case "walk":
@@ -229,4 +229,4 @@ def _number(document: dict[str, Any], name: str, low: float, high: float) -> flo
 
 
 def _refuse(text: str) -> float:
-    raise ValueError(f"{text} is no JSON number")
+    raise ValueError(f"{text} is not a JSON number")

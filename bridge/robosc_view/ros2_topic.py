@@ -143,7 +143,7 @@ class StateReader:
 
     def _entries(self, transitions: object, time_s: float) -> Iterator[dict[str, Any]]:
         if not isinstance(transitions, list) or len(transitions) > MAXIMUM_TRANSITIONS:
-            raise DefinitionError("the transitions on /state are no list of numbers")
+            raise DefinitionError("the transitions on /state are not a list of numbers")
         taken: list[_Step] = []
         for number in transitions:
             step = self._steps.get(number) if isinstance(number, int) else None

@@ -12,6 +12,7 @@ from robosc_bridge.configuration.channels import channel_name
 from robosc_bridge.daemon.feed import Snapshot
 from robosc_bridge.daemon.operations import UNDONE_BY, Operations
 from robosc_bridge.daemon.states import OperatorCommand
+from robosc_bridge.daemon.timing import shown
 from robosc_bridge.safety import LATCHING, Caution, Reason
 from robosc_view.definition import Robot, robot_of
 from robosc_view.reports import Drive, EventBatch, LaserScan, Notice, SourceKind, Status
@@ -151,6 +152,7 @@ def status_of(snapshot: Snapshot) -> Status:
             reading.is_torque_on,
         ),
         age_s=max(time.time() - snapshot.time_s, 0.0),
+        latencies=shown(snapshot.timing.latencies),
     )
 
 

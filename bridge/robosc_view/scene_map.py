@@ -26,7 +26,7 @@ def scene_map(source: str | None, seed: int = 0) -> Mapping[str, Any] | None:
     if source is None:
         return None
     try:
-        return seen_from_start(load_scene(source, seed))
+        return scene_from_start(load_scene(source, seed))
     except SceneError as error:
         raise ViewError(f"the scene: {error}") from error
 
@@ -41,7 +41,7 @@ def scene_start(source: str | None, seed: int = 0) -> tuple[float, float, float]
     return (0.0, 0.0, 0.0) if source is None else load_scene(source, seed).start
 
 
-def seen_from_start(scene: Scene) -> Mapping[str, Any]:
+def scene_from_start(scene: Scene) -> Mapping[str, Any]:
     """A scene as `scene_map` tells it."""
     begin_x_m, begin_y_m, heading_rad = scene.start
     cosine, sine = math.cos(heading_rad), math.sin(heading_rad)

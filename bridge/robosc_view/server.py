@@ -27,9 +27,9 @@ from robosc_view.page_files import PageFiles, read_page
 from robosc_view.requests import (
     MAXIMUM_BYTES,
     MAXIMUM_LED_BYTES,
-    LedSource,
     LoadModel,
-    Order,
+    ManualSource,
+    RobotCommand,
     RunCommand,
     Stop,
     parse_request,
@@ -195,7 +195,7 @@ class ViewServer:
         server = self._runner.server
         # Those that were accepted just now are no connections of the server's yet.
         if server is None or len({*server.connections, *self._silent}) >= MAXIMUM_CONNECTIONS:
-            return _Full()
+            return _RefusedConnection()
         handler = server()
         self._silent[handler] = asyncio.get_running_loop().time() + REQUEST_LIMIT_S
         return handler
@@ -264,7 +264,7 @@ class ViewServer:
                 self._broadcasters.discard(broadcaster)
 
     async def _serve(self, request: web.Request, broadcaster: Broadcaster) -> web.StreamResponse:
-        largest = MAXIMUM_LED_BYTES if isinstance(broadcaster.source, LedSource) else MAXIMUM_BYTES
+        largest = MAXIMUM_LED_BYTES if isinstance(broadcaster.source, ManualSource) else MAXIMUM_BYTES
         page = web.WebSocketResponse(max_msg_size=largest, compress=False, heartbeat=PING_S, autoping=True)
         page.headers.update(self._headers)
         await page.prepare(request)
@@ -290,7 +290,7 @@ class ViewServer:
         return page
 
 
-class _Full(asyncio.Protocol):
+class _RefusedConnection(asyncio.Protocol):
     """Ends a connection for which there is no place."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -359,27 +359,27 @@ class _Session:
         match wanted:
             case Stop():
                 self._stop()
-            case Order(command=command, token=token):
+            case RobotCommand(command=command, token=token):
                 self._order(command, token)
             case command:
                 try:
                     if not isinstance(command, ReplayCommand):
-                        self._lead(command)
+                        self._submit(command)
                     else:
                         self._source.control_replay(command)
                 except RefusedError as error:
                     self._viewer.answer(refused_text(type(command).__name__.lower(), str(error)))
         return self._is_in_time()
 
-    def _lead(self, command: RunCommand) -> None:
-        if not isinstance(self._source, LedSource):
-            raise RefusedError("nothing here is led by hand: only a model alone is")
+    def _submit(self, command: RunCommand) -> None:
+        if not isinstance(self._source, ManualSource):
+            raise RefusedError("nothing here is stepped by hand: only a model alone is")
         if isinstance(command, LoadModel) and (self._access is None or not self._access.is_token(command.token)):
             raise RefusedError(
                 "a model of a link needs the token of this start: put what follows # behind the address that the "
                 "server has printed, or start robosc view with the link"
             )
-        self._source.lead(command)
+        self._source.submit(command)
 
     def _order(self, command: OperatorCommand, token: object) -> None:
         if self._access is None or not self._access.is_token(token):

@@ -52,7 +52,7 @@ class Sink(Protocol):
         """Receive the position of the replay of a log."""
 
     def show_run(self, text: str) -> None:
-        """Receive the message `run` of a run that is led by hand; the latest alone counts."""
+        """Receive the message `run` of a run that is stepped by hand; the latest alone counts."""
 
     def answer(self, text: str) -> None:
         """Receive a message that answers a page; each is told once."""

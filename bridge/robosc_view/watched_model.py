@@ -32,7 +32,7 @@ class NoSupervisorError(Exception):
 
 
 @dataclass(frozen=True)
-class MadeModel:
+class SynthesizedModel:
     """A model of which there is a supervisor.
 
     Attributes:
@@ -69,10 +69,10 @@ class WatchedModel:
 
     def __init__(
         self,
-        made: MadeModel,
+        made: SynthesizedModel,
         seen: str,
         digest: Callable[[], str],
-        make: Callable[[], Awaitable[MadeModel]],
+        make: Callable[[], Awaitable[SynthesizedModel]],
         pause: Callable[[], Awaitable[None]] = lambda: asyncio.sleep(LOOK_S),
     ) -> None:
         self.made = made
@@ -99,7 +99,7 @@ class WatchedModel:
                 await _ended(watching)
 
     async def _watch(self) -> None:
-        making: asyncio.Task[MadeModel] | None = None
+        making: asyncio.Task[SynthesizedModel] | None = None
         try:
             while True:
                 await self._pause()
@@ -120,10 +120,10 @@ class WatchedModel:
                 self._seen = ""
             await _ended(making)
 
-    async def _made(self) -> MadeModel:
+    async def _made(self) -> SynthesizedModel:
         return await self._make()
 
-    def _take(self, making: asyncio.Task[MadeModel]) -> None:
+    def _take(self, making: asyncio.Task[SynthesizedModel]) -> None:
         try:
             self.made, self.warning = making.result(), ""
         except NoSupervisorError as error:
@@ -132,7 +132,7 @@ class WatchedModel:
             listener()
 
 
-async def _ended(making: "asyncio.Task[MadeModel] | asyncio.Task[None] | None") -> None:
+async def _ended(making: "asyncio.Task[SynthesizedModel] | asyncio.Task[None] | None") -> None:
     """End a synthesis, or a watch, that nobody wants any more."""
     if making is not None:
         making.cancel()
@@ -151,7 +151,7 @@ def file_digest(path: Path) -> str:
         raise NoSupervisorError(f"{path}: {error.strerror or error}") from error
 
 
-async def synthesized(words: Sequence[str], text: str | None = None) -> MadeModel:
+async def synthesized(words: Sequence[str], text: str | None = None) -> SynthesizedModel:
     """The model of which `robosc synth` makes the supervisor; cancelling this ends it.
 
     Args:
@@ -170,11 +170,11 @@ async def synthesized(words: Sequence[str], text: str | None = None) -> MadeMode
         status, output, errors = await _output("robosc.cli.main", "synth", "--json", "--output", str(made), *words)
         if status != 0:
             raise NoSupervisorError(_reason(output, errors))
-        told = msgspec.json.decode(output, type=_Told)
-        return MadeModel(read(made), tuple(map(str, told.diagnostics)), text)
+        told = msgspec.json.decode(output, type=_FailureOutput)
+        return SynthesizedModel(read(made), tuple(map(str, told.diagnostics)), text)
 
 
-async def synthesized_automata(arguments: argparse.Namespace, text: str | None = None) -> MadeModel:
+async def synthesized_automata(arguments: argparse.Namespace, text: str | None = None) -> SynthesizedModel:
     """The automata of which a process of their own makes the supervisor; cancelling this ends it.
 
     Args:
@@ -191,7 +191,7 @@ async def synthesized_automata(arguments: argparse.Namespace, text: str | None =
         raise NoSupervisorError(_reason(b"", errors))
     # From a process of our own. No supervisor's file could hold all of it: names of plain automata may be anything.
     found = pickle.loads(output)  # noqa: S301
-    if isinstance(found, MadeModel):
+    if isinstance(found, SynthesizedModel):
         return found
     raise NoSupervisorError(found)
 
@@ -246,7 +246,7 @@ class _Error(msgspec.Struct):
     message: str
 
 
-class _Told(msgspec.Struct):
+class _FailureOutput(msgspec.Struct):
     """Output of `robosc synth --json` where there is no supervisor."""
 
     reason: str = ""
@@ -256,7 +256,7 @@ class _Told(msgspec.Struct):
 
 def _reason(output: bytes, errors: bytes) -> str:
     try:
-        told = msgspec.json.decode(output, type=_Told)
+        told = msgspec.json.decode(output, type=_FailureOutput)
     except msgspec.DecodeError:
         lines = errors.decode(errors="replace").strip().splitlines()
         return lines[-1] if lines else "synthesis failed"

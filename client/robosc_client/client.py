@@ -4,10 +4,11 @@ import time
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing, suppress
 from types import TracebackType
-from typing import Any, Concatenate, Self
+from typing import TYPE_CHECKING, Any, Concatenate, Self
 
 import grpc
 
+import robosc
 from robosc_api.security import Credentials, SecurityError, close_channel, open_channel
 from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
 from robosc_client import operations
@@ -16,7 +17,7 @@ from robosc_client.convert.failures import failure_of
 from robosc_client.convert.requests import JobStub, SynthesisStub
 from robosc_client.errors import CredentialsError
 from robosc_client.jobs import Job
-from robosc_client.operations import client_method
+from robosc_client.operations import LocalFunction, client_method
 from robosc_client.retry import DEFAULT_RETRIES, RetryPolicy
 
 
@@ -110,6 +111,14 @@ class Client:
     explore = _unary_method(operations.explore)
     verify = _unary_method(operations.verify)
     format = _unary_method(operations.format_)
+
+    # The same nouns as in `robosc`: these need no server, and work here, on what one has made.
+    if TYPE_CHECKING:
+        explain = staticmethod(robosc.explain)
+        simulate = staticmethod(robosc.simulate)
+    else:
+        explain = LocalFunction("explain")
+        simulate = LocalFunction("simulate")
 
     list_targets = _unary_method(operations.list_targets)
     get_version = _unary_method(operations.get_version)

@@ -9,6 +9,7 @@ import secrets
 from collections.abc import Callable, Sequence
 from typing import Any, get_args
 
+import robosc
 from robosc.pipeline.files import given_path, read_bounded
 from robosc.pipeline.findings import Findings
 from robosc.pipeline.loading import FileName, ModelLike, loaded, property_file
@@ -61,14 +62,14 @@ type SupervisorLike = Supervisor | bytes | FileName
 # Tasks that are done at once
 
 
-def check(bundle: ModelLike, *, deadline_s: float | None = None) -> Operation[Findings]:
+def check(model: ModelLike, *, deadline_s: float | None = None) -> Operation[Findings]:
     """Every finding about a model, library or automata, sorted by place."""
-    model = loaded(bundle)
-    return Operation("Check", request_of(Check(model)), lambda: check_reader(model), deadline_s=deadline_s)
+    texts = loaded(model)
+    return Operation("Check", request_of(Check(texts)), lambda: check_reader(texts), deadline_s=deadline_s)
 
 
 def synthesize(
-    bundle: ModelLike,
+    model: ModelLike,
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     is_modular: bool = False,
@@ -76,12 +77,12 @@ def synthesize(
     on_progress: OnProgress = ignore_progress,
 ) -> Operation[Synthesis]:
     """Synthesize and certify a supervisor; `is_modular` synthesizes automata in modules."""
-    task = Synthesize(loaded(bundle), options, is_modular)
+    task = Synthesize(loaded(model), options, is_modular)
     return _streaming_task("Synthesize", task, SynthesisReader, deadline_s, on_progress)
 
 
 def generate(
-    bundle: ModelLike,
+    model: ModelLike,
     target: str,
     generation: GenerateOptions = DEFAULT_GENERATION,
     options: SynthesisOptions = DEFAULT_OPTIONS,
@@ -93,7 +94,7 @@ def generate(
     """Synthesize a supervisor and generate the files of a target around it.
 
     Args:
-        bundle: The model and its libraries, or the path of a model.
+        model: The model and its libraries, or the path of a model.
         target: Name of the target, or `all`.
         generation: Choices about the files.
         options: Options for making the supervisor.
@@ -101,12 +102,12 @@ def generate(
         deadline_s: See the class.
         on_progress: See the class.
     """
-    task = Generate(loaded(bundle), target, generation, options, initial)
+    task = Generate(loaded(model), target, generation, options, initial)
     return _streaming_task("Generate", task, lambda: GenerationReader(target), deadline_s, on_progress)
 
 
 def explore(
-    bundle: ModelLike,
+    model: ModelLike,
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     maximum_states: int | None = None,
@@ -114,12 +115,12 @@ def explore(
     on_progress: OnProgress = ignore_progress,
 ) -> Operation[Exploration]:
     """Explore the robot, or automata, under their supervisor, up to a maximum number of states."""
-    task = Explore(loaded(bundle), options, maximum_states)
+    task = Explore(loaded(model), options, maximum_states)
     return _streaming_task("Explore", task, ExplorationReader, deadline_s, on_progress)
 
 
 def verify(
-    task: Verify | ModelLike,
+    model: Verify | ModelLike,
     properties: str | Sequence[str] = (),
     *,
     property_files: Sequence[FileName | SourceFile] = (),
@@ -133,7 +134,7 @@ def verify(
     """Check a supervisor against its model, or verify properties of the robot under its supervisor.
 
     Args:
-        task: The model and its libraries, or the path of a model; or a task with all other arguments.
+        model: The model and its libraries, or the path of a model; or a task with all other arguments.
         properties: A property in the property language, or several.
         property_files: Files with a property on each line.
         supervisor: The supervisor to check: itself, the path of its file or its bytes; None: one is made of the model.
@@ -143,10 +144,11 @@ def verify(
         deadline_s: See the class.
         on_progress: See the class.
     """
+    task = model
     if not isinstance(task, Verify):
         chosen = options or DEFAULT_OPTIONS
         task = Verify(
-            bundle=loaded(task),
+            model=loaded(task),
             supervisor=b"" if supervisor is None else _content_of(supervisor),
             deployment=None if options is None else options.deployment,
             properties=(properties,) if isinstance(properties, str) else tuple(properties),
@@ -305,6 +307,16 @@ def _job_call[Message, Result](
 
 
 # From functions to methods
+
+
+class LocalFunction:
+    """A function of `robosc` as a method of a client; what it needs is loaded on its first use."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __get__(self, client: object, kind: type | None = None) -> Callable[..., Any]:
+        return getattr(robosc, self._name)  # type: ignore[no-any-return]  # named
 
 
 def client_method[Method: Callable[..., Any]](

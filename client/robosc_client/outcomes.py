@@ -172,7 +172,7 @@ class _AutomataReport(msgspec.Struct):
 
 
 class _NoReport(msgspec.Struct):
-    """A report that there is no supervisor of automata to verify."""
+    """A report that there is not a supervisor of automata to verify."""
 
     status: Literal["empty", "model errors"]
     explanation: dict[str, Any] | None

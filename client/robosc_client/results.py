@@ -74,7 +74,7 @@ class Synthesis(Outcome):
     explanation: EmptyExplanation | None = None
     signature: bytes = b""
 
-    def _made(self) -> object:
+    def _product(self) -> object:
         return self.summary
 
 
@@ -131,7 +131,7 @@ class Exploration(Outcome):
     graph: StateGraph | None
     explanation: EmptyExplanation | None = None
 
-    def _made(self) -> object:
+    def _product(self) -> object:
         return self.graph
 
 

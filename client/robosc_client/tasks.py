@@ -14,7 +14,7 @@ DEFAULT_GENERATION = GenerateOptions()
 class Check:
     """Find everything that is wrong with a model or library."""
 
-    bundle: Bundle
+    model: Bundle
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,12 +22,12 @@ class Synthesize:
     """Synthesize and certify a supervisor.
 
     Attributes:
-        bundle: The model and its libraries, or automata.
+        model: The model and its libraries, or automata.
         options: Options for making the supervisor; of automata, those about the engine.
         is_modular: True if automata are to be synthesized in modules.
     """
 
-    bundle: Bundle
+    model: Bundle
     options: SynthesisOptions = DEFAULT_OPTIONS
     is_modular: bool = False
 
@@ -40,7 +40,7 @@ class Generate:
         initial: Description of the state in which automata begin that may begin in several; None: as the model says.
     """
 
-    bundle: Bundle
+    model: Bundle
     target: str
     generation: GenerateOptions = DEFAULT_GENERATION
     options: SynthesisOptions = DEFAULT_OPTIONS
@@ -55,7 +55,7 @@ class Explore:
         maximum_states: States beyond which it is given up; None: 100,000.
     """
 
-    bundle: Bundle
+    model: Bundle
     options: SynthesisOptions = DEFAULT_OPTIONS
     maximum_states: int | None = None
 
@@ -67,7 +67,7 @@ class Verify:
     Of automata the supervisor is made, and verified by other means; they have no properties and no supervisor's file.
 
     Attributes:
-        bundle: The model and its libraries.
+        model: The model and its libraries.
         supervisor: A supervisor's file (`.rsup`), of which nothing is believed; empty: one is made of the model.
         deployment: Place where the supervisor is to stand; None: as its file says, and a controller without one.
         properties: Properties in the property language.
@@ -79,7 +79,7 @@ class Verify:
         is_strict: True if a given supervisor passes only if permissiveness was checked, too.
     """
 
-    bundle: Bundle
+    model: Bundle
     supervisor: bytes = b""
     deployment: Deployment | None = None
     properties: tuple[str, ...] = ()

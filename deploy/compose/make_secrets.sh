@@ -12,7 +12,7 @@ folder=${2:-$(dirname "$0")/secrets}
 user=10001
 case $name in
     '' | *[!A-Za-z0-9.:_-]*)
-        echo "make_secrets.sh: '$name' is no name or address of a machine" >&2
+        echo "make_secrets.sh: '$name' is not a name or address of a machine" >&2
         exit 2
         ;;
 esac

@@ -144,7 +144,7 @@ class _Checker:
                 yield f"{update.variable}: {error}"
                 continue
             if not is_assignable(found, own[update.variable]):
-                yield f"{update.variable}: {type_text(found)} is no {type_text(own[update.variable])}"
+                yield f"{update.variable}: {type_text(found)} is not {type_text(own[update.variable])}"
 
 
 def _shape(automaton: Automaton, events: set[str]) -> Iterator[str]:
@@ -170,7 +170,7 @@ def _variables(automaton: Automaton) -> Iterator[str]:
             yield f"{variable.name}: it has no value to begin with"
         for value in variable.initial:
             if not has_type(value, variable.type):
-                yield f"{variable.name}: {value!r} is no {type_text(variable.type)}"
+                yield f"{variable.name}: {value!r} is not {type_text(variable.type)}"
 
 
 def _condition(scope: Scope, condition: Expression, what: str) -> Iterator[str]:
@@ -180,7 +180,7 @@ def _condition(scope: Scope, condition: Expression, what: str) -> Iterator[str]:
         yield f"{what}: {error}"
         return
     if not isinstance(found, BooleanType):
-        yield f"{what}: {type_text(found)} is no condition"
+        yield f"{what}: {type_text(found)} is not a condition"
 
 
 def _doubles(what: str, names: Iterable[str]) -> Iterator[str]:

@@ -189,7 +189,7 @@ class ExecutableSystem:
     def _participants(self) -> Mapping[str, tuple[Participant, ...]]:
         found: dict[str, list[Participant]] = {}
         for component, behaviour in self.behaviours:
-            for event, taken in _taken(behaviour).items():
+            for event, taken in _transitions_by_event(behaviour).items():
                 participant = Participant(component, behaviour, is_blocking(event), taken)
                 found.setdefault(event, []).append(participant)
         return {event: tuple(participants) for event, participants in found.items()}
@@ -229,7 +229,7 @@ class ExecutableSystem:
         return Component(component.name, msgspec.structs.replace(behaviour, transitions=tuple(kept)))
 
 
-def _taken(behaviour: Behaviour) -> dict[str, dict[str, Transition]]:
+def _transitions_by_event(behaviour: Behaviour) -> dict[str, dict[str, Transition]]:
     """For each event that a behaviour mentions, the transition that is taken in each state, in the states' order."""
     states = [state.name for state in behaviour.states]
     found: dict[str, dict[str, Transition]] = {}

@@ -135,7 +135,7 @@ class _Rule:
         return self._work_out(state, given)
 
     def _work_out(self, state: State, given: Data = NO_DATA) -> _Outcome:
-        watched = [_taken(observer, state) for observer in self.observers]
+        watched = [_possible_arcs(observer, state) for observer in self.observers]
         # A requirement that has no edge forbids the event and stays where it is.
         meets_condition = _all_hold(self.conditions, state) and all(watched)
         choices = self._choices(state)
@@ -159,10 +159,10 @@ class _Rule:
             return None
         if not _all_hold(self.plant_conditions, state):
             return None
-        taken = [_taken(participant, state) for participant in self.participants]
+        taken = [_possible_arcs(participant, state) for participant in self.participants]
         if not all(taken):
             return None
-        return [*taken, *(arcs for monitor in self.monitors if (arcs := _taken(monitor, state)))]
+        return [*taken, *(arcs for monitor in self.monitors if (arcs := _possible_arcs(monitor, state)))]
 
     def writes_with(self, state: State, data: Carried) -> _Writes | None:
         """Return what the first arcs change with some data; None if there are no arcs, or if that leaves a range."""
@@ -187,7 +187,7 @@ class _Rule:
         return tuple(writes) if _all_hold(self.plant_invariants, _written(state, writes)) else None
 
 
-def _taken(participant: _Participant, state: State) -> list[_Arc]:
+def _possible_arcs(participant: _Participant, state: State) -> list[_Arc]:
     """The arcs that an automaton may take."""
     place, arcs = participant
     return [arc for arc in arcs.get(state[place], ()) if arc.guard(state, NO_DATA) is True]

@@ -211,7 +211,8 @@ class Lowering:
         entry = scope.entries.get(item.name.text)
         is_there = isinstance(entry, Entity) and isinstance(entry.declaration, syntax.Algebraic | syntax.Continuous)
         if not is_there or item.name.text in scope.parameters:
-            self.error("cif-structure", f"'{item.name.text}' is no algebraic variable of this component", item.name.at,
+            message = f"'{item.name.text}' is not an algebraic variable of this component"
+            self.error("cif-structure", message, item.name.at,
                        "Declare it here, with 'alg'.")  # fmt: skip
         self.typing.term(item.value, scope)
 
@@ -417,7 +418,7 @@ class Lowering:
             return _name(place)
         entry = None if item.target.text in scope.parameters else scope.entries.get(item.target.text)
         if not isinstance(entry, Entity) or not isinstance(entry.declaration, syntax.LocationDeclaration):
-            message = f"'{item.target.text}' is no location of this automaton"
+            message = f"'{item.target.text}' is not a location of this automaton"
             self.error("cif-unknown-name", message, item.target.at, "Write the name of one of its locations.")
         return item.target.text
 

@@ -469,7 +469,7 @@ class Scopes:
                 return None
             if isinstance(found, Scope) and found.definition is definition:
                 return found
-            self._error("cif-arguments", f"'{argument}' is no instance of '{parameter.definition}'", argument.at,
+            self._error("cif-arguments", f"'{argument}' is not an instance of '{parameter.definition}'", argument.at,
                         f"Give an instance of '{parameter.definition}'.")  # fmt: skip
             return None
         expected = syntax.Event if parameter.kind is syntax.ParameterKind.EVENT else syntax.LocationDeclaration

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 from robosc.cli.arguments import SYNTHESIS_STATES
+from robosc.cli.machine import THIS_MACHINE, Machine, watched
 from robosc.cli.output import (
     CommandError,
     ExitCode,
-    ProgressLine,
     UsageError,
     has_errors,
     print_diagnostics,
@@ -25,105 +25,15 @@ from robosc.pipeline.automata_files import SUFFIXES, is_automata
 from robosc.source import SourceFile, visible
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from enum import StrEnum
     from pathlib import Path
 
     from robosc.explanation import EmptyExplanation
     from robosc.pipeline.exploring import Exploration
-    from robosc.pipeline.findings import Findings
     from robosc.pipeline.loading import LoadedAutomata
     from robosc.pipeline.options import SynthesisOptions
     from robosc.pipeline.results import Generation, SynthesisStatus, Verification
-    from robosc.pipeline.synthesis import OnProgress
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
-    from robosc.targets import GenerateOptions
-
-
-class Machine(Protocol):
-    """Machine that does the work on automata: this one, or a server; its functions are those of `robosc`."""
-
-    def check(self, model: "LoadedAutomata") -> "Findings":
-        """Return every finding."""
-
-    def synthesize(
-        self, model: "LoadedAutomata", options: "SynthesisOptions", *, is_modular: bool
-    ) -> "SystemSynthesis":
-        """Synthesize the supervisor."""
-
-    def explore(self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int) -> "Exploration":
-        """Return the graph of the controlled system."""
-
-    def verify(
-        self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int, is_strict: bool
-    ) -> "Verification":
-        """Synthesize the supervisor, and verify it."""
-
-    def generate(
-        self,
-        model: "LoadedAutomata",
-        target: str,
-        generation: "GenerateOptions",
-        options: "SynthesisOptions",
-        *,
-        initial: str | None,
-    ) -> "Generation":
-        """Generate the files of a target."""
-
-
-class ThisMachine:
-    """Machine that the command runs on."""
-
-    def check(self, model: "LoadedAutomata") -> "Findings":
-        """Return every finding."""
-        from robosc.pipeline.checking import check
-
-        return check(model)
-
-    def synthesize(
-        self, model: "LoadedAutomata", options: "SynthesisOptions", *, is_modular: bool
-    ) -> "SystemSynthesis":
-        """Synthesize the supervisor."""
-        # Not `robosc.synthesize`: it loads what models of RoboSC need.
-        from robosc.pipeline.automata_models import automata_synthesis
-
-        return _watched(lambda told: automata_synthesis(model, options, told, lambda: False, is_modular=is_modular))
-
-    def explore(self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int) -> "Exploration":
-        """Return the graph of the controlled system."""
-        from robosc.pipeline.exploring import explore
-
-        return _watched(lambda told: explore(model, options, maximum_states=maximum_states, on_progress=told))
-
-    def verify(
-        self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int, is_strict: bool
-    ) -> "Verification":
-        """Synthesize the supervisor, and verify it."""
-        from robosc.pipeline.verifying import verify
-
-        return _watched(
-            lambda told: verify(
-                model, options=options, maximum_states=maximum_states, is_strict=is_strict, on_progress=told
-            )
-        )
-
-    def generate(
-        self,
-        model: "LoadedAutomata",
-        target: str,
-        generation: "GenerateOptions",
-        options: "SynthesisOptions",
-        *,
-        initial: str | None,
-    ) -> "Generation":
-        """Generate the files of a target."""
-        from robosc.pipeline.generating import generate
-
-        return _watched(lambda told: generate(model, target, generation, options, initial=initial, on_progress=told))
-
-
-THIS_MACHINE = ThisMachine()
-
 
 NO_FILE = "FILE.rsup: 'robosc verify' verifies a supervisor's file of automata, and no server does"
 """Refusal of such a file for a server."""
@@ -151,32 +61,26 @@ def synthesized(arguments: argparse.Namespace, text: str | None = None) -> "tupl
     return model, THIS_MACHINE.synthesize(model, synthesis_options(arguments), is_modular=False)
 
 
-def file_of(supervisor: "SystemSupervisor", suffix: str) -> bytes:
-    """Return the content of a file whose name ends so.
-
-    It is the supervisor's own file, or the controlled system: a CIF model, or one automaton of libFAUDES or Supremica.
+def controlled_system(supervisor: "SystemSupervisor", suffix: str) -> bytes:
+    """Return the content of a file whose name ends so: a CIF model, or one automaton of libFAUDES or Supremica.
 
     Raises:
         CommandError: It has too many states for one automaton.
         UnsupportedModelError: A name in it is none of that format, or it is too large.
     """
-    return supervisor.encode() if suffix == SUPERVISOR else _controlled_system(supervisor, suffix).encode()
-
-
-def _controlled_system(supervisor: "SystemSupervisor", suffix: str) -> str:
     from robosc.exploration import DEFAULT_LIMIT, graph_automaton
     from robosc.pipeline.exploring import graph_of
     from robosc.plain_automata import WRITERS
     from robosc.targets.cif import automata
 
     if suffix not in WRITERS:
-        return automata.controlled_system(supervisor)
+        return automata.controlled_system(supervisor).encode()
     try:
         graph = graph_of(supervisor, limit=DEFAULT_LIMIT)
     except UnsupportedModelError as error:
         problem = f"-o: the controlled system has more than {DEFAULT_LIMIT:,} states, or very many transitions"
         raise CommandError(f"{problem}: write it to a file that ends in .cif", ExitCode.FAILED) from error
-    return WRITERS[suffix](graph_automaton(graph, supervisor.system))
+    return WRITERS[suffix](graph_automaton(graph, supervisor.system)).encode()
 
 
 def check(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> ExitCode:
@@ -228,7 +132,10 @@ def synth(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Exi
     if output is not None:
         for file in model.files:
             require_other_file(output, arguments.model.parent / file.name)
-        write_bytes(output, file_of(made.supervisor, output.suffix))
+        if output.suffix == SUPERVISOR:
+            machine.write_supervisor(output, made.supervisor)
+        else:
+            write_bytes(output, controlled_system(made.supervisor, output.suffix))
     initial = made.supervisor.initial_condition
     if arguments.json:
         print_json(
@@ -334,7 +241,7 @@ def _verified(arguments: argparse.Namespace, model: "LoadedAutomata", options: "
     if arguments.signed_by:
         tell_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
     supervisor, limits = decode_system(content), Limits.of(arguments.limit)
-    return _watched(
+    return watched(
         lambda told: file_verification(
             model, supervisor, options, limits, told, lambda: False, is_strict=arguments.strict
         )
@@ -391,7 +298,7 @@ def explain_synthesis(arguments: argparse.Namespace) -> ExitCode:
     from robosc.pipeline.explaining import explain
 
     model, options = loaded(arguments), synthesis_options(arguments)
-    made = _watched(
+    made = watched(
         lambda told: explain(
             model, options, event=arguments.event, state=arguments.state, after=arguments.after, on_progress=told
         )
@@ -459,7 +366,7 @@ def loaded(arguments: argparse.Namespace, text: str | None = None) -> "LoadedAut
     refuse(bool(arguments.library_path), "-L: automata import no libraries, and CIF models files by their places")
     refuse(bool(arguments.interface_path), "-I: automata have no types of ROS")
     deployment = getattr(arguments, "deployment", None)
-    refuse(deployment == str(Deployment.LAYER), "--deployment: automata are no node of a robot")
+    refuse(deployment == str(Deployment.LAYER), "--deployment: automata are not a node of a robot")
     if text is not None:
         return LoadedAutomata(SourceFile(str(arguments.model), text))
     try:
@@ -503,15 +410,6 @@ def synthesis_options(arguments: argparse.Namespace) -> "SynthesisOptions":
         maximum_nodes=arguments.max_nodes,
         condition_seconds=getattr(arguments, "condition_seconds", None),
     )
-
-
-def _watched[T](work: "Callable[[OnProgress], T]") -> T:
-    """Return the result of some work, with a progress line on a terminal meanwhile."""
-    progress = ProgressLine()
-    try:
-        return work(lambda step: progress.show(f"{step.stage}: {step.message}"))
-    finally:
-        progress.clear()
 
 
 class _Outcome(Protocol):

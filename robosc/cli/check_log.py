@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robosc.cli.arguments import add_given_supervisor_options, given_path
-from robosc.cli.given import given_supervisor
 from robosc.cli.output import ExitCode, UsageError, print_json
+from robosc.cli.supervisor_argument import supervisor_of_arguments
 from robosc.model.structure import Deployment
 from robosc.source import visible
 
@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError(f"cannot read {log}: {error.strerror or error}") from error
     except LogError as error:
         raise UsageError(str(error)) from error
-    supervisor = given_supervisor(arguments, is_json=arguments.json)
+    supervisor = supervisor_of_arguments(arguments, is_json=arguments.json)
     if supervisor is None:
         return ExitCode.FAILED
     deployment = None if arguments.deployment is None else Deployment(arguments.deployment)

@@ -41,7 +41,7 @@ class Plugin:
             self.module.add_parser(commands)
             parser = commands.choices.get(self.name)
             if parser is not None:
-                parser.set_defaults(run=_told(self.name, self.module.run))
+                parser.set_defaults(run=_naming_missing_package(self.name, self.module.run))
             return
         parser = commands.add_parser(
             self.name, help="not available: " + self.problem.replace("%", "%%"), add_help=False, prefix_chars="\0"
@@ -84,7 +84,7 @@ def _loaded(item: "EntryPoint") -> Plugin:
     return Plugin(item.name, module)
 
 
-def _told(name: str, run: Callable[[argparse.Namespace], int]) -> Callable[[argparse.Namespace], int]:
+def _naming_missing_package(name: str, run: Callable[[argparse.Namespace], int]) -> Callable[[argparse.Namespace], int]:
     """The command, with a package that it misses only when it runs told in the same sentence."""
 
     def guarded(arguments: argparse.Namespace) -> int:

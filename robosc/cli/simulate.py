@@ -1,4 +1,4 @@
-"""`robosc simulate`: lead a robot under its supervisor by hand, event by event, before there is any ROS."""
+"""`robosc simulate`: step a robot under its supervisor by hand, event by event, before there is any ROS."""
 
 import argparse
 import json
@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from robosc.cli import automata
 from robosc.cli.arguments import add_engine_options, add_model_arguments
-from robosc.cli.given import given_supervisor
 from robosc.cli.output import ESCAPED, CommandError, ExitCode, UsageError, has_unicode_output
+from robosc.cli.supervisor_argument import supervisor_of_arguments
 from robosc.model.structure import Deployment
 from robosc.source import visible
 
 if TYPE_CHECKING:
     from robosc.certification.supervisor_file import StateInWords
-    from robosc.pipeline.led_run import LedRun, Step
+    from robosc.pipeline.manual_run import ManualRun, Step
     from robosc.pipeline.saved_runs import ModelOfTest
     from robosc.pipeline.simulation import Run
     from robosc.pipeline.system_runs import SystemRun
@@ -131,7 +131,7 @@ def run(arguments: argparse.Namespace) -> int:
         return _run_automata(arguments, is_scripted=bool(is_scripted))
     if arguments.initial is not None:
         raise UsageError("--initial chooses where automata begin: a robot begins in one state")
-    supervisor = given_supervisor(arguments, is_json=arguments.json)
+    supervisor = supervisor_of_arguments(arguments, is_json=arguments.json)
     if supervisor is None:
         return ExitCode.FAILED
     if arguments.deployment not in (None, str(supervisor.deployment)):
@@ -153,14 +153,14 @@ def _run_automata(arguments: argparse.Namespace, *, is_scripted: bool) -> int:
     """
     from robosc.cli.simulation_shell import Shell
     from robosc.errors import UnknownNameError
-    from robosc.pipeline.system_runs import ChoiceError, SystemRun, asked_parts
+    from robosc.pipeline.system_runs import ChoiceError, SystemRun, state_parts
 
     automata.refuse(bool(arguments.save), "--save: event logs and tests are of robots, not of automata")
     model, made = automata.synthesized(arguments)
     if made.supervisor is None:
         return automata.report_none(arguments, made, model)
     try:
-        initial = None if arguments.initial is None else asked_parts(made.supervisor.system, arguments.initial)
+        initial = None if arguments.initial is None else state_parts(made.supervisor.system, arguments.initial)
         run_ = SystemRun(made.supervisor, initial)
     except ChoiceError as error:
         choose = f"; choose one: --initial '{_parts_text(error.example)}'" if error.example else ""
@@ -176,7 +176,7 @@ def _parts_text(parts: Mapping[str, object]) -> str:
     return ", ".join(f"{name} = {value_text(value)}" for name, value in parts.items())  # type: ignore[arg-type]
 
 
-def taken(run_: "Run | SystemRun", name: str, data: object, target: str) -> "Step":
+def take_event(run_: "Run | SystemRun", name: str, data: object, target: str) -> "Step":
     """Take an event as a person wrote it.
 
     Args:
@@ -190,13 +190,13 @@ def taken(run_: "Run | SystemRun", name: str, data: object, target: str) -> "Ste
     """
     from robosc.pipeline.received_data import NO_DATA
     from robosc.pipeline.simulation import Run
-    from robosc.pipeline.system_runs import ChoiceError, asked_parts
+    from robosc.pipeline.system_runs import ChoiceError, state_parts
 
     event, given = run_.event_called(name), () if data is NO_DATA else (data,)
     if isinstance(run_, Run):
         return run_.step(event, *given)
     try:
-        return run_.step(event, *given, to=asked_parts(run_.supervisor.system, target) if target else None)
+        return run_.step(event, *given, to=state_parts(run_.supervisor.system, target) if target else None)
     except ChoiceError as error:
         choose = f"; choose one: {name} -> {_parts_text(error.example)}" if error.example else ""
         raise ChoiceError(f"{error.problem}{choose}") from error
@@ -256,7 +256,7 @@ def _take_events(name: str, run_: "Run | SystemRun", report: Callable[["Step"], 
     """
     from robosc.errors import UnknownNameError
     from robosc.pipeline.event_scripts import ScriptError, read_script
-    from robosc.pipeline.led_run import EventNotPossibleError
+    from robosc.pipeline.manual_run import EventNotPossibleError
     from robosc.pipeline.received_data import DataError
     from robosc.pipeline.simulation import Run
     from robosc.pipeline.system_runs import ChoiceError
@@ -278,7 +278,7 @@ def _take_events(name: str, run_: "Run | SystemRun", report: Callable[["Step"], 
             run_.restart()
             continue
         try:
-            report(taken(run_, item.event, item.data, item.target))
+            report(take_event(run_, item.event, item.data, item.target))
         except (ChoiceError, DataError, EventNotPossibleError, UnknownNameError) as error:
             return f"{shown}:{item.line}: {error}"
     return ""
@@ -287,7 +287,7 @@ def _take_events(name: str, run_: "Run | SystemRun", report: Callable[["Step"], 
 class _TextReport:
     """Report for a person."""
 
-    def __init__(self, run_: "LedRun") -> None:
+    def __init__(self, run_: "ManualRun") -> None:
         self._run = run_
         self._count = 0
         self._state = run_.state
@@ -298,13 +298,13 @@ class _TextReport:
         self._state = step.state
 
     def end(self, trouble: "Trouble | None", problem: str) -> None:
-        write_lines([*([] if trouble is None else [str(trouble)]), *standing(self._run)])
+        write_lines([*([] if trouble is None else [str(trouble)]), *state_lines(self._run)])
 
 
 class _JsonReport:
     """Report for a machine: one JSON object a line."""
 
-    def __init__(self, run_: "LedRun") -> None:
+    def __init__(self, run_: "ManualRun") -> None:
         self._run = run_
         self._count = 0
 
@@ -369,7 +369,7 @@ def trouble_json(trouble: "Trouble") -> dict[str, object]:
 
 def step_lines(number: int, step: "Step", before: "StateInWords") -> list[str]:
     """A step in lines: the event with its data, what it changed, what a request sends, and what was unknown."""
-    from robosc.pipeline.led_run import changes_text, event_text
+    from robosc.pipeline.manual_run import changes_text, event_text
 
     lines = [f"{number:4}  {': '.join(filter(None, (event_text(step), changes_text(before, step.state))))}"]
     if step.provided is not None:
@@ -379,7 +379,7 @@ def step_lines(number: int, step: "Step", before: "StateInWords") -> list[str]:
     return lines
 
 
-def standing(run_: "LedRun") -> list[str]:
+def state_lines(run_: "ManualRun") -> list[str]:
     """Return the state and what can happen in it, in lines."""
     others = [event for event in run_.possible if not run_.is_controllable(event)]
     return [

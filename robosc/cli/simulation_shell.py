@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from robosc.cli.output import ExitCode
-from robosc.cli.simulate import DEFAULT_STEPS, standing, step_lines, taken, write_lines
+from robosc.cli.simulate import DEFAULT_STEPS, state_lines, step_lines, take_event, write_lines
 from robosc.errors import RoboscError
 from robosc.pipeline.event_scripts import parse_event, target_split
 from robosc.pipeline.received_data import DataField
 from robosc.source import visible
 
 if TYPE_CHECKING:
-    from robosc.pipeline.led_run import Step
+    from robosc.pipeline.manual_run import Step
     from robosc.pipeline.saved_runs import ModelOfTest
     from robosc.pipeline.simulation import Run
     from robosc.pipeline.system_runs import SystemRun
@@ -100,7 +100,7 @@ class Shell:
             readline.set_completer(lambda text, state: self._completion(readline.get_line_buffer(), text, state))
             is_libedit = getattr(readline, "backend", "readline") == "editline"
             readline.parse_and_bind("bind ^I rl_complete" if is_libedit else "tab: complete")
-        write_lines([f"{self._run.name}: 'help' tells the commands, Tab completes", *standing(self._run)])
+        write_lines([f"{self._run.name}: 'help' tells the commands, Tab completes", *state_lines(self._run)])
         while True:
             try:
                 line = input(PROMPT)
@@ -130,8 +130,8 @@ class Shell:
         text, target = target_split(line) if self._model is None else (line, "")
         event, data = parse_event(text)
         before = self._run.state
-        step = taken(self._run, event, data, target)
-        write_lines([*step_lines(len(self._run), step, before), *standing(self._run)])
+        step = take_event(self._run, event, data, target)
+        write_lines([*step_lines(len(self._run), step, before), *state_lines(self._run)])
         return True
 
     # The commands
@@ -150,7 +150,7 @@ class Shell:
 
     def _state(self, words: Sequence[str]) -> None:
         _no_words("state", words)
-        write_lines(standing(self._run))
+        write_lines(state_lines(self._run))
 
     def _undo(self, words: Sequence[str]) -> None:
         self._repeat("undo", words, self._run.undo, "taken back")
@@ -166,34 +166,34 @@ class Shell:
                 write_lines([f"nothing is left to be {what}"])
                 break
             write_lines([f"{what}: {step.event}"])
-        write_lines(standing(self._run))
+        write_lines(state_lines(self._run))
 
     def _history(self, words: Sequence[str]) -> None:
         _no_words("history", words)
-        self._tell(0)
+        self._print_steps(0)
 
     def _restart(self, words: Sequence[str]) -> None:
         _no_words("restart", words)
         self._run.restart()
-        write_lines(standing(self._run))
+        write_lines(state_lines(self._run))
 
     def _random(self, words: Sequence[str]) -> None:
         count, seed = _numbers("random", words, (None, self._walks))
         self._walks += 1
         before = len(self._run)
         taken = self._run.walk(count, seed)
-        self._tell_walk(before)
+        self._print_walk(before)
         ended = ["nothing more can happen"] if len(taken) < count else []
-        write_lines([*ended, f"seed {seed}", *standing(self._run)])
+        write_lines([*ended, f"seed {seed}", *state_lines(self._run)])
 
     def _until_trouble(self, words: Sequence[str]) -> None:
         count, seed = _numbers("until-trouble", words, (DEFAULT_STEPS, self._walks))
         self._walks += 1
         before = len(self._run)
         trouble = self._run.walk_until_trouble(count, seed)
-        self._tell_walk(before)
+        self._print_walk(before)
         write_lines([str(trouble) if trouble is not None else f"no trouble in {len(self._run) - before} steps"])
-        write_lines([f"seed {seed}", *standing(self._run)])
+        write_lines([f"seed {seed}", *state_lines(self._run)])
 
     def _save(self, words: Sequence[str]) -> None:
         from robosc.pipeline.simulation import Run
@@ -209,15 +209,15 @@ class Shell:
 
     # Output and completion
 
-    def _tell_walk(self, number: int) -> None:
+    def _print_walk(self, number: int) -> None:
         """Tell the steps after so many; of a long walk the last ones."""
         left_out = len(self._run) - number - _MOST_TOLD
         if left_out > 0:
             write_lines([f"      {left_out} events, which 'history' tells"])
             number += left_out
-        self._tell(number)
+        self._print_steps(number)
 
-    def _tell(self, number: int) -> None:
+    def _print_steps(self, number: int) -> None:
         """Tell the steps after so many."""
         before = self._run.history[number - 1].state if number else self._run.initial
         for count, step in enumerate(self._run.history[number:], start=number + 1):

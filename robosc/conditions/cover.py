@@ -171,11 +171,11 @@ def _shortest(space: Space, words: Words, variable: int, low: int, high: int) ->
     candidates = [_filled(space, variable, low, high)] if variable in space.integers else []
     candidates += [_stepwise(words, variable, high, high & ~low), _stepwise(words, variable, low, high & ~low)]
 
-    def told(mask: int) -> tuple[int, int, int]:
+    def rank(mask: int) -> tuple[int, int, int]:
         operands, characters = words.size(variable, mask)
         return operands, words.ranges(variable, mask), characters
 
-    return min(candidates, key=told)
+    return min(candidates, key=rank)
 
 
 def _filled(space: Space, variable: int, low: int, high: int) -> int:

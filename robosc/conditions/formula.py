@@ -196,7 +196,7 @@ class _Formulas:
         self, wanted: Node, forbidden: Node, is_negated: bool, compared: tuple[int, ...], least: int
     ) -> Iterator[Expression]:
         """Relations and whatever else they need, or, where they were found for the opposite, the negation of that."""
-        for description in self._relations.around(wanted, forbidden, compared):
+        for description in self._relations.descriptions(wanted, forbidden, compared):
             parts = self._described(description, is_negated)
             if parts is not None:
                 found = self._join("or" if is_negated else "and", parts)
@@ -251,7 +251,7 @@ class _Formulas:
         """A sum of products, or, where it was found for the opposite, the product of sums and the negation."""
         if not cubes:
             return
-        groups = self._apart(cubes)
+        groups = self._independent(cubes)
         if 1 < len(groups) < len(cubes):
             # Parts that share no place: each may have a shorter form of its own.
             sums = [self._space.sum_of(group) for group in groups]
@@ -301,7 +301,7 @@ class _Formulas:
             _Literal(variable, mask) for variable, mask in enumerate(cube) if mask != self._space.full[variable]
         )
 
-    def _apart(self, cubes: list[Cube]) -> list[list[Cube]]:
+    def _independent(self, cubes: list[Cube]) -> list[list[Cube]]:
         """The cubes in groups that test no place in common."""
         groups: list[tuple[set[int], list[Cube]]] = []
         for cube in cubes:

@@ -230,7 +230,7 @@ class Space:
         self._cubes[cube] = node
         return node
 
-    def around(self, node: Node) -> Cube:
+    def enclosing_cube(self, node: Node) -> Cube:
         """The smallest cube around a node that is not false."""
         masks = [0] * len(self.subjects)
         # Every child but false leads to true.

@@ -111,7 +111,7 @@ class Relations:
         found = (numbers[subject] for subject in comparable(numbers, self._domains))
         return tuple(sorted(found, key=lambda variable: self._words.ranks[variable]))
 
-    def around(
+    def descriptions(
         self, wanted: Node, forbidden: Node, compared: tuple[int, ...], *, depth: int = _DEPTH
     ) -> Iterator[Description]:
         """Yield descriptions with relations that are true where `wanted` is and false where `forbidden` is.
@@ -144,9 +144,9 @@ class Relations:
 
     def _rests(self, wanted: Node, inside: Node, compared: tuple[int, ...], depth: int) -> Iterator[Description]:
         """Yield descriptions that are true where `wanted` is and exclude what is inside relations but forbidden."""
-        near = self._space.both(inside, self._space.of_cube(self._space.around(wanted)))
+        near = self._space.both(inside, self._space.of_cube(self._space.enclosing_cube(wanted)))
         if depth and near != 0:
-            for inner in self.around(near, wanted, compared, depth=depth - 1):
+            for inner in self.descriptions(near, wanted, compared, depth=depth - 1):
                 for single in self._sum(wanted, self._space.without(inside, near)):
                     yield Description((), single, inner)
         for single in self._sum(wanted, inside):
@@ -164,7 +164,7 @@ class Relations:
     def are_enough(self, wanted: Node, forbidden: Node, compared: tuple[int, ...]) -> bool:
         """Return True if relations and the values that each place takes by itself exclude all that is forbidden."""
         relations = self._holding(wanted, compared)
-        inside = self._space.both(self._possible(relations), self._space.of_cube(self._space.around(wanted)))
+        inside = self._space.both(self._possible(relations), self._space.of_cube(self._space.enclosing_cube(wanted)))
         return bool(relations) and self._space.both(inside, forbidden) == 0
 
     def expression(self, relation: Relation) -> Expression:

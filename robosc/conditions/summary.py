@@ -50,7 +50,7 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
         "state_invariants": len(supervisor.model.invariants),
         "states": int(certificate.states),
         "transitions": None if certificate.transitions is None else int(certificate.transitions),
-        "added": {event: told(diagram, formula, components) for event, diagram, formula in added},
+        "added": {event: condition_line(diagram, formula, components) for event, diagram, formula in added},
         "diagrams": {
             event: [line.json() for line in diagram_lines(diagram, vocabulary)]
             for event, diagram, formula in added
@@ -102,7 +102,7 @@ def added_texts(supervisor: Supervisor, system: System) -> dict[str, str]:
     """For each controllable event what the supervisor adds, in the model's words; `true` where nothing."""
     components = _components(supervisor)
     return {
-        event: told(diagram, formula, components)
+        event: condition_line(diagram, formula, components)
         for event, diagram, formula in added_formulas(supervisor.added, system)
     }
 
@@ -129,7 +129,7 @@ def added_formulas(
     ]
 
 
-def told(diagram: DecisionDiagram, formula: Expression | None, components: frozenset[str]) -> str:
+def condition_line(diagram: DecisionDiagram, formula: Expression | None, components: frozenset[str]) -> str:
     """A condition in one line: its formula, or the size of its diagram where it has none that reads well."""
     return size_in_words(diagram) if formula is None else in_words(formula, components)
 
@@ -143,7 +143,7 @@ def added_lines(supervisor: Supervisor, system: System) -> list[str]:
     lines: list[str] = []
     short = short_diagrams(diagram for _, diagram, formula in added if formula is None)
     for event, diagram, formula in added:
-        parts = [told(diagram, formula, components) if formula != TRUE else "nothing"]
+        parts = [condition_line(diagram, formula, components) if formula != TRUE else "nothing"]
         if formula is None and diagram in short:
             parts = [f"{parts[0]}{FROM_THE_FIRST}", *map(str, diagram_lines(diagram, vocabulary))]
         elif formula is None:

@@ -54,7 +54,7 @@ class ConfluenceSearch:
             return None
         run = self._controller.run(start)
         chosen = Order(run.events, run.cycle, None if run.end is None else run.end[0])
-        return Conflict(trace(), chosen, self._another(start, steps, chosen.end))
+        return Conflict(trace(), chosen, self._other_order(start, steps, chosen.end))
 
     def _explore(self, start: Node) -> tuple[dict[Node, list[_Step]], set[_Outcome]]:
         """The states that silent steps reach in any order, with their steps, and every outcome, within the limit."""
@@ -86,14 +86,14 @@ class ConfluenceSearch:
                 stack.append((target, 0))
         return steps, outcomes
 
-    def _another(self, start: Node, steps: dict[Node, list[_Step]], unwanted: _Outcome) -> Order:
+    def _other_order(self, start: Node, steps: dict[Node, list[_Step]], unwanted: _Outcome) -> Order:
         """A shortest order that ends in another state than `unwanted`; where none does, one that does not end."""
         parents: dict[Node, tuple[Node, str] | None] = {start: None}
         queue = [start]
         for node in queue:
             following = steps[node] if node in steps else list(self._controller.silent_steps(node))
             if not following and node[0] != unwanted:
-                return Order(_way(parents, node), (), node[0])
+                return Order(_events_to(parents, node), (), node[0])
             for event, target in following:
                 if target not in parents:
                     parents[target] = (node, event)
@@ -126,7 +126,7 @@ class ConfluenceSearch:
         return Order(tuple(events[: places[node]]), tuple(events[places[node] :]), None)
 
 
-def _way(parents: dict[Node, tuple[Node, str] | None], node: Node) -> tuple[str, ...]:
+def _events_to(parents: dict[Node, tuple[Node, str] | None], node: Node) -> tuple[str, ...]:
     events: list[str] = []
     parent = parents[node]
     while parent is not None:

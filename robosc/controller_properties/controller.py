@@ -155,7 +155,7 @@ class Controller:
 
     def after(self, state: State, event: str) -> State | None:
         """Return the state that a controllable event leads to, or None where it is not enabled."""
-        if not self._stands(state, event):
+        if not self._has_edges(state, event):
             return None
         semantics = self._semantics
         if not semantics.condition(state, event):
@@ -168,7 +168,7 @@ class Controller:
             return None
         return min(targets) if len(targets) > 1 else next(iter(targets))
 
-    def _stands(self, state: State, event: str) -> bool:
+    def _has_edges(self, state: State, event: str) -> bool:
         """Return True if every automaton of an event has an edge here: few have, and this check is quick."""
         return all(state[place] in sources for place, sources in self._sources[event])
 
@@ -238,13 +238,15 @@ class Controller:
             if target is not None and target != state:
                 yield (event,), True, (target, self._forget(target, held))
         for batch in self.batches:
-            for target, (events, is_whole) in sorted(self._together(state, batch).items(), key=lambda item: item[0]):
+            for target, (events, is_whole) in sorted(
+                self._joint_targets(state, batch).items(), key=lambda item: item[0]
+            ):
                 yield events, is_whole, (target, self._forget(target, held))
 
-    def _together(self, state: State, batch: tuple[str, ...]) -> dict[State, tuple[tuple[str, ...], bool]]:
+    def _joint_targets(self, state: State, batch: tuple[str, ...]) -> dict[State, tuple[tuple[str, ...], bool]]:
         """Return the states that the events of a batch lead to, each with the events and True if those are all."""
         if batch not in self._choices:
-            return self._apart(state, batch)
+            return self._separate_targets(state, batch)
         found: dict[State, tuple[tuple[str, ...], bool]] = {}
         for choice, keeps in product(self._choices[batch], (False, True)):
             for target, (events, is_whole) in self._with_choice(state, batch, choice, keeps=keeps).items():
@@ -259,7 +261,7 @@ class Controller:
         """The same for some of the data that the events can carry together, with or without `on_unknown: keep`."""
         found: dict[State, tuple[tuple[str, ...], bool]] = {state: ((), True)}
         for event, options in zip(batch, choice, strict=True):
-            if not self._stands(state, event):
+            if not self._has_edges(state, event):
                 continue
             further: dict[State, tuple[tuple[str, ...], bool]] = {}
             happening = [option for option in options if not (keeps and option.is_unknown)]
@@ -275,11 +277,11 @@ class Controller:
             found = further
         return found
 
-    def _apart(self, state: State, batch: tuple[str, ...]) -> dict[State, tuple[tuple[str, ...], bool]]:
+    def _separate_targets(self, state: State, batch: tuple[str, ...]) -> dict[State, tuple[tuple[str, ...], bool]]:
         """The same where nothing is known of what the events carry together."""
         found: dict[State, tuple[tuple[str, ...], bool]] = {state: ((), True)}
         for event in batch:
-            if not self._stands(state, event):
+            if not self._has_edges(state, event):
                 # The locations that an answer needs are those of its own plant: nothing else moves them.
                 continue
             further: dict[State, tuple[tuple[str, ...], bool]] = {}

@@ -68,7 +68,7 @@ def _conflict(model: Model, system: System, places: Places, conflict: Conflict) 
         Severity.WARNING,
         "not-confluent",
         f"the order of silent steps matters: {_when(conflict.trace)}, the executor's order "
-        f"{_told(model, system, chosen, other)}, but the order {_told(model, system, other, chosen)}",
+        f"{_order_words(model, system, chosen, other)}, but the order {_order_words(model, system, other, chosen)}",
         _place(model, places, at),
         "Let guards decide which of these steps is wanted, so that they are not enabled together.",
         _related(
@@ -77,7 +77,7 @@ def _conflict(model: Model, system: System, places: Places, conflict: Conflict) 
     )
 
 
-def _told(model: Model, system: System, order: Order, beside: Order) -> str:
+def _order_words(model: Model, system: System, order: Order, beside: Order) -> str:
     """An order and where it ends, as far as that is not where another one ends."""
     told = _listed((*order.events, *order.cycle))
     if order.end is None:

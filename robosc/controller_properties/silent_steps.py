@@ -47,7 +47,7 @@ def always_end(system: System, should_stop: Callable[[], bool] = lambda: False) 
         arcs = _on_cycles(taus)
         if arcs:
             cyclic[automaton.name] = arcs
-    return all(_stands_still(system, cyclic, cluster, should_stop) for cluster in _clusters(cyclic))
+    return all(_cannot_cycle(system, cyclic, cluster, should_stop) for cluster in _clusters(cyclic))
 
 
 def _on_cycles(taus: Iterable[Edge]) -> _Arcs:
@@ -126,7 +126,7 @@ def _read(arcs: _Arcs) -> dict[Subject, None]:
     return dict.fromkeys(found)
 
 
-def _stands_still(
+def _cannot_cycle(
     system: System, cyclic: Mapping[str, _Arcs], cluster: tuple[str, ...], should_stop: Callable[[], bool]
 ) -> bool:
     """Return True if the taus of some automata cannot go round, whatever everything else is."""
@@ -146,12 +146,12 @@ def _stands_still(
     for values in product(*domains[len(own) :]):
         if should_stop():
             raise SynthesisCancelled("the check of the controller was stopped")
-        if _goes_round(steps, len(own), [(*locations, *values) for locations in product(*domains[: len(own)])]):
+        if _has_cycle(steps, len(own), [(*locations, *values) for locations in product(*domains[: len(own)])]):
             return False
     return True
 
 
-def _goes_round(steps: _Steps, width: int, states: Iterable[State]) -> bool:
+def _has_cycle(steps: _Steps, width: int, states: Iterable[State]) -> bool:
     """Return True if taus lead from a state back to it: removing states without predecessors leaves some over."""
     after: dict[State, list[State]] = {}
     arriving: dict[State, int] = {}

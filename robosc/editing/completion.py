@@ -175,7 +175,7 @@ class _Names:
         elif self._is_target_wanted():
             yield from self._variables(self._own)
         elif last == "in" or "an expression" in expected or "'true'" in expected:
-            yield from self._values(self._wanted())
+            yield from self._values(self._required_type())
 
     # Where it is
 
@@ -220,7 +220,7 @@ class _Names:
     def _variables(self, component: ComponentNames | None) -> Iterator[Candidate]:
         if component is not None:
             for name, type_ in component.variables.items():
-                yield Candidate(spelled(name), DefinitionKind.VARIABLE, _shown(type_))
+                yield Candidate(spelled(name), DefinitionKind.VARIABLE, _type_words(type_))
 
     def _communications(self, kind: EventKind | None) -> Iterator[Candidate]:
         for item in self._inspected.communications.values():
@@ -285,14 +285,16 @@ class _Names:
                 yield Candidate(spelled(name), DefinitionKind.ENUM_VALUE, wanted.name, is_wanted=True)
         elements = _elements(self._place.before)
         for number, (name, array) in enumerate(elements, 1):
-            yield Candidate(spelled(name), DefinitionKind.ELEMENT, _shown(self._element_of(array, elements[number:])))
+            yield Candidate(
+                spelled(name), DefinitionKind.ELEMENT, _type_words(self._element_of(array, elements[number:]))
+            )
         if self._received() is not None:
-            yield Candidate("value", None, _shown(self._received()))
+            yield Candidate("value", None, _type_words(self._received()))
         yield from self._variables(scope.own)
         for name in scope.components:
             yield Candidate(spelled(name), DefinitionKind.COMPONENT)
         for name, typed in scope.constants.items():
-            yield Candidate(spelled(name), DefinitionKind.CONSTANT, _shown(typed.type if typed else None))
+            yield Candidate(spelled(name), DefinitionKind.CONSTANT, _type_words(typed.type if typed else None))
         for name in scope.enums:
             yield Candidate(spelled(name), DefinitionKind.ENUM)
         for enum in dict.fromkeys(scope.enums.values()):
@@ -322,7 +324,7 @@ class _Names:
         for name in self._scope.types.property_names(type_):
             if name in written:
                 continue
-            shown = _shown(self._scope.types.property_type(type_, name))
+            shown = _type_words(self._scope.types.property_type(type_, name))
             is_key = self._is_property_wanted()
             yield Candidate(f"{spelled(name)}:" if is_key else spelled(name), DefinitionKind.PROPERTY, shown)
 
@@ -396,7 +398,7 @@ class _Names:
         key = self._inspected.units[0].type_name(name)
         return ObjectType(key) if key in self._scope.types.objects else self._scope.enums.get(name)
 
-    def _wanted(self) -> Type | None:
+    def _required_type(self) -> Type | None:
         """The type that is needed, as far as what stands before tells it."""
         before = _up_to_expression(self._place.before)
         item = self._place.item[: len(self._place.item) - (len(self._place.before) - len(before))]
@@ -538,5 +540,5 @@ def _communication(item: Communication) -> Candidate:
     return Candidate(spelled(item.name), _KINDS[item.kind], f"{item.kind} of {item.component}")
 
 
-def _shown(type_: Type | None) -> str:
+def _type_words(type_: Type | None) -> str:
     return "" if type_ is None else type_text(type_)

@@ -108,7 +108,7 @@ def check_log(run: LoggedRun, supervisor: Supervisor, deployment: Deployment | N
     return checking.result(run)
 
 
-def _shown(data: object) -> str:
+def _data_text(data: object) -> str:
     text = json.dumps(data, default=str)
     return text if len(text) <= _DATA_SHOWN else text[: _DATA_SHOWN - 4] + " ..."
 
@@ -163,9 +163,9 @@ class _Checking:
                 self._event(entry)
             case "unexpected" if entry.event:
                 self._unexpected(entry)
-                self._seen(entry.event)
+                self._note_arrival(entry.event)
             case "unknown":
-                self._seen(entry.event)
+                self._note_arrival(entry.event)
             case "blocked":
                 self._held_back(entry)
             case "restart":
@@ -198,7 +198,7 @@ class _Checking:
                 problems.append(f"{event} happened although {pending} was still to be taken before any request")
             if self._awaited:
                 problems.append(f"{event} happened before the first message on {', '.join(sorted(self._awaited))}")
-        self._seen(event)
+        self._note_arrival(event)
         if kind != EventKind.CANCEL and entry.is_controllable is not replay.is_controllable(event):
             # A cancel is the caller's or the layer's own; both stand in the log of a layer.
             what = "controllable" if entry.is_controllable else "uncontrollable"
@@ -215,7 +215,7 @@ class _Checking:
         if problems:
             self._wrong(entry, "; ".join(problems))
 
-    def _seen(self, event: str) -> None:
+    def _note_arrival(self, event: str) -> None:
         """Note that an event has come, whether the state could accept it or not."""
         if self._awaited and event in self._identifiers:
             self._awaited.discard(self._identifiers[event])
@@ -226,7 +226,7 @@ class _Checking:
         if not is_known:
             yield f"{event} happened although the data that the model provides for it was not known"
         elif not is_provided(data, provided):
-            yield f"{event} carries {_shown(data)}, where the model provides {_shown(provided)}"
+            yield f"{event} carries {_data_text(data)}, where the model provides {_data_text(provided)}"
 
     def _unexpected(self, entry: LogEntry) -> None:
         if self._replay.has(entry.event) and self._replay.is_possible(entry.event):

@@ -27,7 +27,7 @@ _CLOSE = 1e-9
 
 
 class Misfit:
-    """Mark for data in the log that is no value of the type."""
+    """Mark for data in the log that is not a value of the type."""
 
 
 MISFIT: Final = Misfit()

@@ -127,7 +127,7 @@ class _Reading:
             if read_bytes > MAXIMUM_BYTES or number > MAXIMUM_ENTRIES:
                 # It may also have grown since its size was looked up.
                 self._refuse(number, f"a log of more than {MAXIMUM_ENTRIES} lines is not read")
-            entry = self._taken(number, content)
+            entry = self._read_entry(number, content)
             if entry is not None:
                 self._has_entries = True
                 yield entry
@@ -136,7 +136,7 @@ class _Reading:
         if len(self._torn) > self.dropped:
             self._refuse(*self._torn[0])
 
-    def _taken(self, number: int, content: bytes) -> LogEntry | None:
+    def _read_entry(self, number: int, content: bytes) -> LogEntry | None:
         if not content.strip():
             return None
         try:
@@ -215,4 +215,4 @@ def _is_component(part: object) -> bool:
 
 
 def _refuse_constant(text: str) -> NoReturn:
-    raise ValueError(f"{text} is no JSON number")
+    raise ValueError(f"{text} is not a JSON number")

@@ -154,7 +154,7 @@ class Analysis:
             safe = safe & ~steps.bad
         self.safe = safe
         """The states that are not bad."""
-        self._troubled = ~self._fixed_point.nonblocking_states(self._problem, safe)
+        self._troubled = ~self._fixed_point.nonblocking_ahead(self._problem, safe)
         self.good = good
         """The states that a supervisor may be in."""
         free = (*dropped, *(item for item in constraints if item.kind is not ConstraintKind.MARKING))
@@ -265,7 +265,7 @@ class Analysis:
 
     def counterexample_after(self, start: Any) -> Counterexample:
         """Return a run into trouble from one of some states that must be avoided."""
-        for steps, is_forced in self._ways_on():
+        for steps, is_forced in self._continuations():
             possible = {
                 name: item.plant & self._restricted(item)
                 for name, item in steps.items()
@@ -276,7 +276,7 @@ class Analysis:
                 return self._named(run, is_forced)
         raise InternalError("a state that must be avoided does not run into trouble")
 
-    def _ways_on(self) -> Iterator[tuple[Mapping[str, Steps], bool]]:
+    def _continuations(self) -> Iterator[tuple[Mapping[str, Steps], bool]]:
         """Events by which trouble is looked for, and whether by uncontrollable ones alone; the better ones first."""
         if self._dropped_ranges:
             # Updates that stop at the end of a range are no steps that the robot takes.
@@ -385,7 +385,7 @@ class Analysis:
         """The states that an event leads to from some states."""
         return self._steps[event].image(states)
 
-    def lost_after(self, event: str, states: Any, good: Any) -> Any:
+    def bad_after(self, event: str, states: Any, good: Any) -> Any:
         """The states that are not good to which an event leads from some states."""
         steps = self._steps[event]
         return steps.image(states & steps.plant) & ~good

@@ -144,10 +144,10 @@ def explain_empty(
     """
     with workspace(words.system, engine, should_stop, on_progress) as place:
         monitor = BoundedMonitor(place.monitor)
-        return explain_lost(place, monitor, Problems(place.encoding, monitor), words)
+        return explain_problem(place, monitor, Problems(place.encoding, monitor), words)
 
 
-def explain_lost(place: Workspace, monitor: BoundedMonitor, problems: Problems, words: Words) -> EmptyExplanation:
+def explain_problem(place: Workspace, monitor: BoundedMonitor, problems: Problems, words: Words) -> EmptyExplanation:
     """Explain why a problem has no supervisor."""
     encoding, false = place.encoding, place.encoding.manager.false
     constraints, terms = words.terms.constraints, words.terms

@@ -109,7 +109,7 @@ class _Condition:
 
 
 @dataclass(frozen=True, slots=True)
-class _Kept:
+class _RangeCheck:
     """An update that must stay in a range."""
 
     subject: Subject
@@ -123,7 +123,7 @@ class _Part:
     """A component whose behaviour mentions a request: in each state that allows it, the updates that have a range."""
 
     name: str
-    kept: Mapping[str, tuple[_Kept, ...]]
+    kept: Mapping[str, tuple[_RangeCheck, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,22 +216,22 @@ class Requests:
         return _Rule(
             event.name,
             event.moves,
-            tuple(_Part(item.component, self._kept(item)) for item in event.participants),
+            tuple(_Part(item.component, self._range_checks(item)) for item in event.participants),
             tuple(map(self._need, event.requirements)),
             None if added is None else self._decision(added),
         )
 
-    def _kept(self, participant: Participant) -> dict[str, tuple[_Kept, ...]]:
+    def _range_checks(self, participant: Participant) -> dict[str, tuple[_RangeCheck, ...]]:
         """The updates that must stay in a range, by the state in which they are made."""
         types = {item.name: item.type for item in participant.behaviour.variables if item.is_synthesis}
-        found: dict[str, tuple[_Kept, ...]] = {}
+        found: dict[str, tuple[_RangeCheck, ...]] = {}
         for states, transition in participant.branches:
             kept = []
             for update in transition.updates:
                 match types.get(update.variable):
                     case IntegerType(low=int(low), high=int(high)):
                         function = compile_expression(update.expression, self._places)
-                        kept.append(_Kept(Subject(participant.component, update.variable), function, low, high))
+                        kept.append(_RangeCheck(Subject(participant.component, update.variable), function, low, high))
             found.update(dict.fromkeys(states, tuple(kept)))
         return {state: found[state] for state in participant.taken}
 
@@ -341,9 +341,9 @@ class Requests:
         return f"{need.text}: {told} do{'' if len(failing) > 1 else 'es'} not hold{self._values(read, state)}"
 
     def _values(self, read: Iterable[Subject], state: State) -> str:
-        return bracketed([self._told(subject, state) for subject in read])
+        return bracketed([self._value_words(subject, state) for subject in read])
 
-    def _told(self, subject: Subject, state: State) -> str:
+    def _value_words(self, subject: Subject, state: State) -> str:
         value = state[self._places[subject]]
         name = automaton_text(subject.automaton, self._components) if subject.variable is None else str(subject)
         return f"{name} is {cut(value_text(value))}"
@@ -357,7 +357,7 @@ class Requests:
             value = state[node.place]
             if value is None:
                 return None, told
-            told.append(self._told(order[node.place], state))
+            told.append(self._value_words(order[node.place], state))
             number = node.child(decision.indices[node.place](value))
         return number == 1, told
 

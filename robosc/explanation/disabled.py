@@ -129,7 +129,7 @@ class Disabled:
         condition = self._added.get(event)
         if not isinstance(condition, Decision):
             return ""
-        return bracketed([self._told(self._subjects[place], state) for place in condition.tested(state)])
+        return bracketed([self._value_words(self._subjects[place], state) for place in condition.tested(state)])
 
     def _holds(self, condition: Expression, state: State) -> bool:
         return compile_expression(condition, self._places)(state, NO_DATA) is True
@@ -139,7 +139,7 @@ class Disabled:
 
     def _values(self, expression: Expression, state: State) -> str:
         read = sorted(subjects_read(expression), key=self._places.__getitem__)
-        return bracketed([self._told(subject, state) for subject in read])
+        return bracketed([self._value_words(subject, state) for subject in read])
 
-    def _told(self, subject: Subject, state: State) -> str:
+    def _value_words(self, subject: Subject, state: State) -> str:
         return f"{subject} is {cut(value_text(state[self._places[subject]]))}"

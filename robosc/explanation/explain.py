@@ -9,7 +9,7 @@ from typing import Any
 from robosc.automata.state import subjects
 from robosc.errors import InternalError
 from robosc.explanation.analysis import Analysis, Detour, Hindrance, HindranceKind
-from robosc.explanation.blame import explain_lost
+from robosc.explanation.blame import explain_problem
 from robosc.explanation.conflict import minimal_conflict
 from robosc.explanation.explanations import EventHere, EventReport, Explanation, Reason, Remark, StateReport
 from robosc.explanation.notation import events_text
@@ -69,10 +69,10 @@ def explain_synthesis(
         problems = Problems(encoding, monitor)
         fixed_point, problem = problems.without(())
         with place.reordering():
-            good = fixed_point.good_states(problem, encoding.manager.false)
+            good = fixed_point.solution(problem, encoding.manager.false)
             reachable = None if good.reason else fixed_point.reachable_states(problem, good.states)
         if good.reason:
-            empty = explain_lost(place, monitor, problems, words)
+            empty = explain_problem(place, monitor, problems, words)
             return Explanation(empty=empty, is_of_automata=words.is_of_automata)
         analysis = Analysis(encoding, monitor, problems, words.terms.constraints, good.states)
         explainer = _Explainer(encoding, monitor, words, analysis, reachable, fixed_point.initial & good.states)
@@ -283,8 +283,8 @@ class _Explainer:
             for kind in (True, False)
         )
         waiting = self._reachable & ~controllable
-        yield from self._shown("only-uncontrollable", waiting & uncontrollable, "only the environment can move on")
-        yield from self._shown("deadlock", waiting & ~uncontrollable, "nothing at all can happen")
+        yield from self._remarks("only-uncontrollable", waiting & uncontrollable, "only the environment can move on")
+        yield from self._remarks("deadlock", waiting & ~uncontrollable, "nothing at all can happen")
 
     def _moving(self, event: str) -> Any:
         """Return the states where an event counts as a step: a silent one that changes nothing is never taken."""
@@ -292,7 +292,7 @@ class _Explainer:
             return self._analysis.moving(event)
         return self._encoding.manager.true
 
-    def _shown(self, kind: str, states: Any, what: str) -> Iterator[Remark]:
+    def _remarks(self, kind: str, states: Any, what: str) -> Iterator[Remark]:
         count = count_models(self._encoding.manager, states, self._encoding.state_names)
         left, shown = states, 0
         while left != self._false and shown < MAXIMUM_STATES:

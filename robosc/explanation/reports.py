@@ -38,7 +38,7 @@ class Reporter:
         message, part = self._terms.hindered(item, state)
         trouble = None
         if item.kind is HindranceKind.SUPERVISOR:
-            lost = self._analysis.lost_after(item.event, self._analysis.predicate(state), good)
+            lost = self._analysis.bad_after(item.event, self._analysis.predicate(state), good)
             trouble = self.counterexample(self._analysis.counterexample_after(lost))
         return Reason(str(item.kind), message, part, self.path(run) if run else None, trouble)
 

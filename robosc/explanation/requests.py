@@ -112,10 +112,12 @@ class Requests(ABC):
             values = {value_text(value): value for value in subject_domain(self._system, subject)}
             if text in values:
                 return EnumValue(type_.name, text) if isinstance(type_, EnumType) else Constant(values[text])
-        raise RequestError(f"{_shown(text)} is no value of {subject}{_hint(text, list(values) or ['a whole number'])}")
+        raise RequestError(
+            f"{_quoted(text)} is not a value of {subject}{_hint(text, list(values) or ['a whole number'])}"
+        )
 
 
-class ModelRequests(Requests):
+class ModelQuestionReader(Requests):
     """Reader of what is asked about a model's automata.
 
     Args:
@@ -149,7 +151,7 @@ class ModelRequests(Requests):
         """
         found = _ATOM.fullmatch(text.replace("^", ""))
         if found is None:
-            raise RequestError(f"{_shown(text)} is no condition such as Door.closed, Lift.n = 2 or !Lamp.on")
+            raise RequestError(f"{_quoted(text)} is not a condition such as Door.closed, Lift.n = 2 or !Lamp.on")
         owner, name = found["owner"], found["name"]
         plants = {item.name: communication_plant_name(item) for item in self._model.communications}
         if found["kind"]:
@@ -176,7 +178,7 @@ class ModelRequests(Requests):
         return Unary("not", result) if found["not"] else result
 
 
-class SystemRequests(Requests):
+class SystemQuestionReader(Requests):
     """Reader of what is asked about automata, whose names may be anything."""
 
     def event(self, text: str) -> str:
@@ -231,7 +233,7 @@ class SystemRequests(Requests):
 
 
 def _unknown(what: str, name: str, known: list[str]) -> RequestError:
-    return RequestError(f"unknown {what} {_shown(name)}{_hint(name, known)}")
+    return RequestError(f"unknown {what} {_quoted(name)}{_hint(name, known)}")
 
 
 def _hint(name: str, known: list[str]) -> str:
@@ -243,5 +245,5 @@ def _hint(name: str, known: list[str]) -> str:
     return f"; there is {shown}" if known else ""
 
 
-def _shown(text: str) -> str:
+def _quoted(text: str) -> str:
     return f"'{visible(text[:MAXIMUM_SHOWN])}'"

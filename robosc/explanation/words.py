@@ -9,7 +9,7 @@ from typing import Protocol
 from robosc.automata import System, SystemPlaces
 from robosc.explanation.constraints import relaxable_constraints
 from robosc.explanation.explanations import Remark
-from robosc.explanation.requests import ModelRequests, Requests, SystemRequests
+from robosc.explanation.requests import ModelQuestionReader, Requests, SystemQuestionReader
 from robosc.explanation.requirement_automata import as_conditions
 from robosc.explanation.system_terms import SystemTerms
 from robosc.explanation.terms import ModelTerms, Terms
@@ -89,7 +89,7 @@ class ModelWords:
     @property
     def requests(self) -> Requests:
         """Reader of what is asked."""
-        return ModelRequests(self.system, self.model)
+        return ModelQuestionReader(self.system, self.model)
 
     def remarks(self, answers: Answers) -> Iterator[Remark]:
         """Warnings that follow from the answers."""
@@ -161,7 +161,7 @@ class SystemWords:
     @property
     def requests(self) -> Requests:
         """Reader of what is asked."""
-        return SystemRequests(self.system)
+        return SystemQuestionReader(self.system)
 
     def remarks(self, answers: Answers) -> Iterator[Remark]:
         """Warnings that follow from the answers."""

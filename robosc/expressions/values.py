@@ -166,7 +166,7 @@ def array_part(value: Any, low: Any = None, high: Any = None) -> Any:
     """
     Return the elements of a received array from `low` to `high`, both included.
 
-    None where it is no array.
+    None where it is not an array.
 
     :param value: Received value.
     :param low: Index of the first element; None for the whole array.

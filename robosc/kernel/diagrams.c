@@ -1,8 +1,9 @@
 /* Decision diagrams of CUDD: saturation, restriction and extraction, without Python in between.
  *
  * Each function here is the twin of one in robosc/synthesis, operation by operation: `closure` of saturation.py,
- * `restrict` of nodes.py, `extract` of diagrams.py. CUDD is the one inside dd.cudd, found when this module is connected with it, so that a diagram of dd is one
- * of this module. Python's lock is held all the time: whatever frees a predicate of the same manager waits.
+ * `restrict`, `without` and `told_apart` of nodes.py, `extract` of diagrams.py. CUDD is the one inside dd.cudd, found when this
+ * module is connected with it, so that a diagram of dd is one of this module. Python's lock is held all the time:
+ * whatever frees a predicate of the same manager waits.
  *
  * A node is passed as its address, 0 where there is none. Functions that return a node own one reference of it, unless
  * they say that it is borrowed; NULL is a failure, with Python's exception set or of CUDD itself.
@@ -629,6 +630,115 @@ PyObject *diagram_restrict(PyObject *module, PyObject *arguments) {
     DdNode *found = restricted(manager, &known, (DdNode *)(uintptr_t)f, (DdNode *)(uintptr_t)care);
     free_table(manager, &known);
     return passed(found);
+}
+
+/* Places without which two sets are told apart */
+
+static DdNode *without(DdManager *manager, DdNode *f, DdNode *cube) {
+    return owned(cudd.and_exist(manager, f, cudd.one(manager), cube));
+}
+
+/* The product of the variables of places from one up to another, by halves: one by one would take squares of steps. */
+static DdNode *product(DdManager *manager, DdNode **cubes, Py_ssize_t first, Py_ssize_t end) {
+    if (end - first < 2) {
+        return owned(end == first ? cudd.one(manager) : cubes[first]);
+    }
+    Py_ssize_t middle = first + (end - first) / 2;
+    DdNode *left = product(manager, cubes, first, middle);
+    DdNode *right = left == NULL ? NULL : product(manager, cubes, middle, end);
+    DdNode *found = right == NULL ? NULL : conjunction(manager, left, right);
+    drop(manager, left);
+    drop(manager, right);
+    return found;
+}
+
+/* Leave out of two sets, which are replaced, each place from one up to another that can go, earlier ones first. Where
+ * all can go together, each can; else they are tried by halves.
+ */
+static int leave_out(DdManager *manager, DdNode **sets, DdNode **cubes, Py_ssize_t first, Py_ssize_t end) {
+    DdNode *cube = product(manager, cubes, first, end), *fewer[2] = {NULL, NULL};
+    if (cube != NULL) {
+        fewer[0] = without(manager, sets[0], cube);
+        fewer[1] = fewer[0] == NULL ? NULL : without(manager, sets[1], cube);
+    }
+    drop(manager, cube);
+    if (fewer[1] == NULL) {
+        drop(manager, fewer[0]);
+        return 0;
+    }
+    if (cudd.leq(manager, fewer[0], negation(fewer[1]))) {
+        sets[0] = instead(manager, sets[0], fewer[0]);
+        sets[1] = instead(manager, sets[1], fewer[1]);
+        return 1;
+    }
+    drop(manager, fewer[0]);
+    drop(manager, fewer[1]);
+    if (end - first < 2) {
+        return 1;
+    }
+    Py_ssize_t middle = first + (end - first) / 2;
+    return leave_out(manager, sets, cubes, first, middle) && leave_out(manager, sets, cubes, middle, end);
+}
+
+/* The variables of places, each the product of its own, borrowed from a tuple of them. */
+static DdNode **read_cubes(PyObject *places, Py_ssize_t *count) {
+    *count = PyTuple_Size(places);
+    DdNode **cubes = *count < 0 ? NULL : PyMem_Calloc((size_t)*count + 1, sizeof(DdNode *));
+    if (cubes == NULL) {
+        return PyErr_Occurred() ? NULL : (DdNode **)PyErr_NoMemory();
+    }
+    for (Py_ssize_t place = 0; place < *count; place++) {
+        cubes[place] = (DdNode *)(uintptr_t)PyLong_AsUnsignedLongLong(PyTuple_GetItem(places, place));
+    }
+    if (PyErr_Occurred()) {
+        PyMem_Free(cubes);
+        return NULL;
+    }
+    return cubes;
+}
+
+PyObject *diagram_without(PyObject *module, PyObject *arguments) {
+    (void)module;
+    PyObject *bdd, *places;
+    unsigned long long f;
+    Py_ssize_t count;
+    if (!PyArg_ParseTuple(arguments, "OKO", &bdd, &f, &places)) {
+        return NULL;
+    }
+    DdNode **cubes = read_cubes(places, &count);
+    if (cubes == NULL) {
+        return NULL;
+    }
+    DdManager *manager = manager_of(bdd);
+    DdNode *cube = product(manager, cubes, 0, count);
+    DdNode *found = cube == NULL ? NULL : without(manager, (DdNode *)(uintptr_t)f, cube);
+    drop(manager, cube);
+    PyMem_Free(cubes);
+    return passed(found);
+}
+
+PyObject *diagram_told_apart(PyObject *module, PyObject *arguments) {
+    (void)module;
+    PyObject *bdd, *places;
+    unsigned long long one, other;
+    Py_ssize_t count;
+    if (!PyArg_ParseTuple(arguments, "OKKO", &bdd, &one, &other, &places)) {
+        return NULL;
+    }
+    DdNode **cubes = read_cubes(places, &count);
+    if (cubes == NULL) {
+        return NULL;
+    }
+    DdManager *manager = manager_of(bdd);
+    DdNode *sets[2] = {owned((DdNode *)(uintptr_t)one), owned((DdNode *)(uintptr_t)other)};
+    int is_done = count == 0 || leave_out(manager, sets, cubes, 0, count);
+    PyMem_Free(cubes);
+    if (!is_done) {
+        drop(manager, sets[0]);
+        drop(manager, sets[1]);
+        return passed(NULL);
+    }
+    return Py_BuildValue("KK", (unsigned long long)(uintptr_t)sets[0], (unsigned long long)(uintptr_t)sets[1]);
 }
 
 /* Extraction */

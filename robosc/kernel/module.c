@@ -10,6 +10,8 @@ static PyMethodDef FUNCTIONS[] = {
     {"closure", diagram_closure, METH_VARARGS, "Return a set of states closed under steps: see synthesis/saturation.py."},
     {"restrict", diagram_restrict, METH_VARARGS, "Return a predicate that equals another where a third is true."},
     {"implies", diagram_implies, METH_VARARGS, "Return whether a predicate is true only where another one is."},
+    {"without", diagram_without, METH_VARARGS, "Return a set of states, whatever some places have."},
+    {"told_apart", diagram_told_apart, METH_VARARGS, "Return two sets without the places that do not tell them apart."},
     {"extract", diagram_extract, METH_VARARGS, "Return a predicate as nodes over places: see synthesis/diagrams.py."},
     {"release", diagram_release, METH_VARARGS, "Give back the reference of a node that was returned."},
     {"space", space_make_store, METH_VARARGS, "Return an empty store, for places with so many classes."},

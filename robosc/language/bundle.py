@@ -64,7 +64,7 @@ def load_bundle(
         main=main,
         libraries=libraries,
         interfaces=find_interfaces((file.text for file in (main, *libraries)), packages),
-        searched=tuple(_shown(folder, model) for folder in folders),
+        searched=tuple(_relative_name(folder, model) for folder in folders),
     )
 
 
@@ -104,9 +104,9 @@ def _candidates(model: Path, folders: Iterable[Path], unsaved: Mapping[str, str]
             try:
                 if real in unsaved:
                     text = unsaved[real]
-                    files[real] = _Candidate(SourceFile(_shown(path, model), text), declared_libraries(text))
+                    files[real] = _Candidate(SourceFile(_relative_name(path, model), text), declared_libraries(text))
                 elif path.is_file():
-                    files[real] = _candidate(path, _shown(path, model))
+                    files[real] = _candidate(path, _relative_name(path, model))
             except OSError:
                 continue
     return tuple(sorted(files.values(), key=lambda candidate: candidate.file.name))
@@ -122,7 +122,7 @@ def _candidate(path: Path, name: str) -> _Candidate:
     return _Candidate(SourceFile(name, text), declared_libraries(text), fault)
 
 
-def _shown(path: Path, model: Path) -> str:
+def _relative_name(path: Path, model: Path) -> str:
     """A path as seen from the model's folder: names must not depend on where the project lies."""
     return _printable(Path(os.path.relpath(path, Path(os.path.realpath(model)).parent)).as_posix())
 

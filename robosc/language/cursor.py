@@ -138,14 +138,14 @@ class Cursor:
             self.texts[index - 1] if index else "", token, expected, self.texts[index + 1 : index + 4]
         )
         self.report("syntax-error", message, self.at(index), fix, *related)
-        return self.told()
+        return self.reported_fault()
 
     def expect(self, *words: str) -> None:
         """Note what could stand here instead of the end of the text, if this is the end; the first note counts."""
         if self.kinds[self.place] == _END and not self.expected:
             self.expected = words
 
-    def told(self) -> Fault:
+    def reported_fault(self) -> Fault:
         """Return the error to raise behind one that has been reported with `report`."""
         self._faults += 1
         if len(self.diagnostics) >= MAXIMUM_SYNTAX_ERRORS:
@@ -163,7 +163,7 @@ class Cursor:
         if self._depth > MAXIMUM_NESTING:
             message = f"brackets and conditions are nested deeper than {MAXIMUM_NESTING}"
             self.report("nesting-too-deep", message, self.at(opening), "Split the expression or definition.")
-            raise self.told()
+            raise self.reported_fault()
 
     def shallower(self, levels: int = 1) -> None:
         """Count brackets that are closed."""
@@ -217,7 +217,7 @@ class Cursor:
         message = f"{shown(written[0])} does not fit here; expected a text in quotes"
         fix = f"Write '\"{written[1]}\"' instead of '{written[0]}'."
         self.report("syntax-error", message, self._places.location(*written.span()), fix)
-        return self.told()
+        return self.reported_fault()
 
     def source(self, begin: int) -> str:
         """The text from a token to the last one that was read."""
@@ -357,7 +357,7 @@ class Cursor:
         message = f"there is no {shown(word)} in the language: {why(family)}"
         # With states and requirements in it, it may be longer than what `report` lets pass.
         self.diagnostics.append(Diagnostic(Severity.ERROR, "syntax-error", message, self.at(index), fix))
-        self.told()
+        self.reported_fault()
         self.place = end
         return True
 

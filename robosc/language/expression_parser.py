@@ -41,7 +41,7 @@ class ExpressionParser(Cursor):
         """Raise the fault that a tree from token `begin` on has too many levels, if it has."""
         if self._is_deep(tree, begin):
             self._too_deep(begin)
-            raise self.told()
+            raise self.reported_fault()
 
     def _is_deep(self, tree: syntax.Expression, begin: int) -> bool:
         # Fewer tokens than levels that are allowed cannot nest too deeply.
@@ -132,7 +132,7 @@ class ExpressionParser(Cursor):
             return self.fault("an operator", "')'")
         self.expect("an operator", "')'")
         self.report("syntax-error", "this '(' is never closed", self.at(opening), self._closing(opening))
-        return self.told()
+        return self.reported_fault()
 
     def _closing(self, opening: int) -> str:
         """Advice on where to close a parenthesis: before the next token, if that is in the same line."""
@@ -196,7 +196,7 @@ class ExpressionParser(Cursor):
             message = f"'{name.text}' needs a name for the elements before its array"
             fix = f"Write '{name.text}(x in array: condition)', with a name that is not reserved."
             self.report("syntax-error", message, self.at(self.place), fix)
-            raise self.told()
+            raise self.reported_fault()
         if self.texts[self.place] != ")":
             raise self._unclosed(opening)
         self.place += 1
@@ -278,7 +278,7 @@ class ExpressionParser(Cursor):
                 message = "the '(' of this array is never closed"
                 self.expect("')'")
                 self.report("syntax-error", message, self.at(opening), self._closing(opening))
-                raise self.told()
+                raise self.reported_fault()
             self.place += 1
             tree = syntax.ArrayType(tree, self.since(opening))
         self.shallower(len(openings))

@@ -444,7 +444,7 @@ class _Parser(ExpressionParser):
         written, place = self.source(begin), self.since(begin)
         message = f"{shown(written)} does not fit here; expected ':='"
         self.report("syntax-error", message, place, f"Write '{meant}' instead of '{written}'.")
-        return self.told()
+        return self.reported_fault()
 
     def _tau(self) -> syntax.TauTransition:
         place = self.at(self.take("transition"))
@@ -474,7 +474,7 @@ class _Parser(ExpressionParser):
         message = "the condition of a transition stands before 'goto'"
         fix = f"Write '{self.source(condition)} {target}' instead of '{self.source(begin)}'."
         self.report("syntax-error", message, self.since(begin), fix)
-        return self.told()
+        return self.reported_fault()
 
     # Requirements and data
 

@@ -452,7 +452,7 @@ class BehaviourBuilder:
             near = self._findings.near(wanted, own.variables) if own else None
             self._findings.error(
                 "update-out-of-scope",
-                f"'{wanted}' is no variable of this behaviour" + (f"; did you mean '{near}'?" if near else ""),
+                f"'{wanted}' is not a variable of this behaviour" + (f"; did you mean '{near}'?" if near else ""),
                 access.location,
                 f"Write '{spelled(near)}'."
                 if near

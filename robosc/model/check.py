@@ -31,7 +31,7 @@ from robosc.model.interfaces import InterfaceChecker
 from robosc.model.own_requests import OwnRequests
 from robosc.model.places import Places
 from robosc.model.restrictions import Restrictions
-from robosc.model.scopes import Scopes
+from robosc.model.robot_scopes import RobotScopes
 from robosc.model.sent_messages import SentMessages
 from robosc.model.structure import (
     Behaviour,
@@ -105,7 +105,7 @@ class Inspected:
     checked: Checked
     parsed: Parsed
     parts: tuple[Part, ...] = ()
-    scopes: Scopes | None = None
+    scopes: RobotScopes | None = None
     units: tuple[Unit, ...] = ()
     communications: Mapping[str, Communication] = field(default_factory=dict)
     fields: Mapping[str, Mapping[str, Field]] = field(default_factory=dict)
@@ -159,7 +159,7 @@ class _RobotChecker:
         self._libraries = Libraries(bundle, self._unit, findings)
         self.parts = parts_of(self._unit, self._libraries, findings)
         self.places = Places(tree.name.location)
-        self.scopes: Scopes | None = None
+        self.scopes: RobotScopes | None = None
         self.communications: Mapping[str, Communication] = {}
         self.fields: Mapping[str, Mapping[str, Field]] = {}
 
@@ -179,7 +179,7 @@ class _RobotChecker:
             for part in self.parts
         }
         constants = Constants(self._types, self._libraries, self.findings)
-        self.scopes = scopes = Scopes(self._unit, self._types, self.parts, self._libraries, names, constants)
+        self.scopes = scopes = RobotScopes(self._unit, self._types, self.parts, self._libraries, names, constants)
         scopes.of(self._unit)  # Also a file whose constants nothing uses has them checked.
         enums = self._enums(scopes)
         behaviours = self._behaviours(behaviour_trees, scopes, communications)
@@ -234,7 +234,7 @@ class _RobotChecker:
         check_topics(found.values(), self.places.communications, self._types, self.findings)
         return found
 
-    def _enums(self, scopes: Scopes) -> tuple[EnumDefinition, ...]:
+    def _enums(self, scopes: RobotScopes) -> tuple[EnumDefinition, ...]:
         """The definition of every enum, its rules resolved."""
         found = []
         for key, (enum, unit, tree) in self._types.enums.items():
@@ -256,7 +256,7 @@ class _RobotChecker:
     def _behaviours(
         self,
         trees: Mapping[str, BehaviourTree | None],
-        scopes: Scopes,
+        scopes: RobotScopes,
         communications: Mapping[str, Communication],
     ) -> dict[str, Behaviour]:
         defaults = {

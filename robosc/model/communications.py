@@ -12,7 +12,7 @@ from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.identifiers import identifier_fault
 from robosc.model.options import build_options
-from robosc.model.scopes import Scopes
+from robosc.model.robot_scopes import RobotScopes
 from robosc.model.structure import Communication, CommunicationKind, Interface
 from robosc.model.types import Types
 from robosc.model.units import Part, unique
@@ -115,7 +115,7 @@ def build_communication(item: CommunicationTree, types: Types, findings: Finding
 def with_conditions(
     trees: Iterable[CommunicationTree],
     communications: Mapping[str, Communication],
-    scopes: Scopes,
+    scopes: RobotScopes,
     findings: Findings,
 ) -> dict[str, Communication]:
     """The communications with the conditions (`when`) that tell those on one identifier apart."""

@@ -489,7 +489,7 @@ class ExpressionChecker:
         step = tree.steps[0]
         if not isinstance(step, syntax.Name):
             self._findings.error(
-                "type-mismatch", f"'{component.name}' is no array", step.location, "Name a state or variable of it."
+                "type-mismatch", f"'{component.name}' is not an array", step.location, "Name a state or variable of it."
             )
             return None
         if step.text in component.variables:
@@ -558,7 +558,7 @@ class ExpressionChecker:
         if found is None:
             self._findings.error(
                 "no-value-here",
-                "'value' means received data, and none is received here",
+                "'value' is the received data, and nothing is received here",
                 tree.location,
                 "Use it in enum rules and in updates on response and feedback only.",
             )
@@ -606,7 +606,9 @@ class ExpressionChecker:
         if isinstance(step, syntax.Index):
             if isinstance(whole, ArrayType):
                 return whole.element
-            self._findings.error("type-mismatch", f"{type_text(whole)} is no array", step.location, "Remove the index.")
+            self._findings.error(
+                "type-mismatch", f"{type_text(whole)} is not an array", step.location, "Remove the index."
+            )
             return None
         found = self._scope.types.property_type(whole, step.text)
         if found is not None and isinstance(whole, ObjectType):

@@ -1,6 +1,5 @@
 """Collects what the checks find."""
 
-import difflib
 import re
 from collections.abc import Collection, Iterable
 
@@ -144,5 +143,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str | None:
         return folded[name.casefold()]
     if len(name) > _MAXIMUM_COMPARED:
         return None
+    import difflib  # needed for misspelt names alone
+
     near = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.7)
     return folded[near[0]] if near else None

@@ -164,7 +164,7 @@ class InterfaceChecker:
             # Told are the faults of the version that comes nearest.
             told = [outcome for (_, language), outcome in outcomes.items() if language is Language.PYTHON]
             for fault in min(told, key=lambda outcome: len(outcome.faults)).faults:
-                self._tell(fault)
+                self._report_once(fault)
             return None
         for type_, location in fitting.unknown.items():
             self._note_missing(type_.partition("/")[0], type_, location)
@@ -175,7 +175,7 @@ class InterfaceChecker:
         self._report_limits(ros1, ros2)
         return fitting.catalogue
 
-    def _tell(self, fault: Fault) -> None:
+    def _report_once(self, fault: Fault) -> None:
         """Report a fault that all nodes have, once."""
         if fault in self._told:
             return
@@ -233,7 +233,7 @@ class InterfaceChecker:
         if any(catalogue.has(kind, package, type_) for catalogue in self._catalogues for kind in INTERFACE_KINDS):
             return
         if knowing:
-            self._tell(_unknown_type(interface, knowing[0], INTERFACE_KINDS))
+            self._report_once(_unknown_type(interface, knowing[0], INTERFACE_KINDS))
         else:
             self._note_missing(package, f"{package}/{type_}", interface.package.location)
 

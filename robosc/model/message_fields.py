@@ -226,7 +226,7 @@ class FieldChecker:
         return isinstance(type_, BooleanType) and field_type in {"uint8", *(() if is_ros1 else ("byte", "char"))}
 
     def _misfit(self, field: Field, type_: Type, owner: str, place: Location, used: Location) -> Fault:
-        wanted = self._wanted(field)
+        wanted = self._required_type(field)
         return Fault(
             "field-type-mismatch",
             f"the field '{field.name}' of {owner} is {field.type_text}, not {type_text(type_)}",
@@ -236,7 +236,7 @@ class FieldChecker:
             _used_here(place, used),
         )
 
-    def _wanted(self, field: Field) -> str:
+    def _required_type(self, field: Field) -> str:
         """The type in the model that a field needs; empty where it is none, or an object."""
         found = model_type(field)
         is_byte = field.type == "byte" and not self._fits("byte", IntegerType())

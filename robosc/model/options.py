@@ -17,7 +17,7 @@ _PURPOSE = {
     "depth": "says how many messages are kept",
     "max_age": "says when an outgoing message is stale",
     "stamped": "stamps what the controller sends: an incoming message or an action's request",
-    "when": "tells incoming messages on one identifier apart",
+    "when": "distinguishes incoming messages on one identifier",
 }
 
 

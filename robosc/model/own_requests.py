@@ -11,7 +11,7 @@ from robosc.model.structure import Behaviour, EventKind, Transition
 _MAXIMUM_JUDGEMENTS = 20_000
 
 
-class _Anywhere:
+class _UnknownLocation:
     """A location of which nothing is known: whether it is a given one is unknown."""
 
     __hash__ = None  # type: ignore[assignment]
@@ -20,7 +20,7 @@ class _Anywhere:
         return None
 
 
-_ANYWHERE = _Anywhere()
+_UNKNOWN_LOCATION = _UnknownLocation()
 
 
 class OwnRequests:
@@ -47,14 +47,14 @@ class OwnRequests:
         if self._judgements > _MAXIMUM_JUDGEMENTS or _tests_knowledge(requirement):
             return None
         for component, behaviour, transition in self._taken.get(f"{action}.{EventKind.REQUEST}", ()):
-            for state in _telling_states(requirement, component, behaviour, transition):
+            for state in _distinct_states(requirement, component, behaviour, transition):
                 self._judgements += 1
                 if _breaks(requirement, component, transition, state):
                     return component
         return None
 
 
-def _telling_states(
+def _distinct_states(
     requirement: Expression, component: str, behaviour: Behaviour, transition: Transition
 ) -> Iterator[str]:
     """The states that a transition can be taken in, of those that a requirement does not tell apart only the first."""
@@ -81,7 +81,7 @@ def _known_value(
     return evaluate(  # type: ignore[no-any-return]
         expression,
         lambda owner, variable: variables.get(variable) if owner == component else None,  # type: ignore[arg-type, return-value]
-        lambda owner: state if owner == component else _ANYWHERE,  # type: ignore[arg-type, return-value]  # compared only
+        lambda owner: state if owner == component else _UNKNOWN_LOCATION,  # type: ignore[arg-type, return-value]  # compared only
     )
 
 

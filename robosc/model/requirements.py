@@ -55,7 +55,7 @@ def _restricted(
         elif communication.kind is CommunicationKind.OUTGOING_MESSAGE:
             findings.error(
                 "requirement-on-outgoing",
-                f"'{name.text}' is an outgoing message: a component sends it, nobody can forbid it",
+                f"'{name.text}' is an outgoing message: a component sends it, and no requirement can forbid it",
                 name.location,
                 "Restrict an incoming message, a service or an action.",
             )

@@ -10,7 +10,7 @@ from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.places import Places
 from robosc.model.requirements import ProvideBuilder, build_invariant, build_requirement
-from robosc.model.scopes import Scopes
+from robosc.model.robot_scopes import RobotScopes
 from robosc.model.structure import Communication, Invariant, Provide, Requirement
 from robosc.model.types import Types
 from robosc.model.units import Libraries, Part, Unit
@@ -75,7 +75,7 @@ class Restrictions:
         unit: Unit,
         parts: Sequence[Part],
         libraries: Libraries,
-        scopes: Scopes,
+        scopes: RobotScopes,
         types: Types,
         findings: Findings,
     ) -> None:

@@ -90,12 +90,12 @@ def unique(names: list[syntax.Name], code: str, what: str, findings: Findings) -
                 code,
                 f"the {what} '{name.text}' is defined twice{same}",
                 name.location,
-                f"Rename or remove one of the two {what}s: write '{_another(name.text, taken)}', for instance.",
+                f"Rename or remove one of the two {what}s: write '{_free_name(name.text, taken)}', for instance.",
                 RelatedPlace(f"'{earlier.text}' is defined here first", earlier.location),
             )
 
 
-def _another(name: str, taken: Collection[str]) -> str:
+def _free_name(name: str, taken: Collection[str]) -> str:
     """A name like one that is taken."""
     return next(found for number in count(2) if (found := f"{name}_{number}").casefold() not in taken)
 

@@ -27,7 +27,7 @@ from robosc.model_checking.runs import Path, Runs
 
 
 @dataclass(frozen=True, slots=True)
-class _Shown:
+class _PartialRun:
     """Result so far: the way, where it closes, and what is left to show."""
 
     path: Path
@@ -65,11 +65,11 @@ class Evidence:
             shown.left,
         )
 
-    def _show(self, formula: Formula, holds: bool, path: Path) -> _Shown:
+    def _show(self, formula: Formula, holds: bool, path: Path) -> _PartialRun:
         """Go on from the end of a path, where a formula is known to hold, or not to."""
         match formula:
             case Condition() | Enabled():
-                return _Shown(path)
+                return _PartialRun(path)
             case Not(operand=operand):
                 return self._show(operand, not holds, path)
             case Joined(operator=operator, left=left, right=right):
@@ -77,17 +77,17 @@ class Evidence:
                     return self._show_both(left, right, holds, path)
                 return self._show_either(left, right, holds, path)
             case _ if (formula.quantifier == "E") != holds:
-                return _Shown(path, left=(Remainder(len(path.events), formula, holds),))
+                return _PartialRun(path, left=(Remainder(len(path.events), formula, holds),))
             case Next(operand=operand):
                 step = self._runs.step(path.end, self._states(operand, holds))
                 return self._show(operand, holds, path.then(step))
             case Finally(operand=operand):
                 if holds:
                     return self._reach(self._structure.states, operand, holds, path)
-                return self._stay(self._states(operand, False), path)
+                return self._remain(self._states(operand, False), path)
             case Globally(operand=operand):
                 if holds:
-                    return self._stay(self._where(operand), path)
+                    return self._remain(self._where(operand), path)
                 return self._reach(self._structure.states, operand, holds, path)
             case Until(left=left, right=right):
                 if holds:
@@ -99,14 +99,14 @@ class Evidence:
         inside = self._where(formula)
         return inside if holds else self._structure.states & ~inside
 
-    def _show_either(self, left: Formula, right: Formula, holds: bool, path: Path) -> _Shown:
+    def _show_either(self, left: Formula, right: Formula, holds: bool, path: Path) -> _PartialRun:
         """Go on for the one of two parts that is the simpler to show; one at least is so."""
         false = self._structure.manager.false
         parts = [part for part in (left, right) if path.end & self._states(part, holds) != false]
         shown = [self._show(part, holds, path) for part in parts]
         return min(shown, key=lambda found: (len(found.left), len(found.path.events)))
 
-    def _show_both(self, left: Formula, right: Formula, holds: bool, path: Path) -> _Shown:
+    def _show_both(self, left: Formula, right: Formula, holds: bool, path: Path) -> _PartialRun:
         """Go on for two parts; one run goes one way, so where both need one the second is left."""
         first, second = self._show(left, holds, path), self._show(right, holds, path)
         place = len(path.events)
@@ -115,18 +115,18 @@ class Evidence:
         left_over = second.left if len(second.path.events) == place else (Remainder(place, right, holds),)
         return replace(first, left=(*first.left, *left_over))
 
-    def _reach(self, within: Any, operand: Formula, holds: bool, path: Path) -> _Shown:
+    def _reach(self, within: Any, operand: Formula, holds: bool, path: Path) -> _PartialRun:
         """A run to a state where a formula holds, or does not, and on for what is to be shown there."""
         way = self._runs.path(path.end, within, self._states(operand, holds))
         return self._show(operand, holds, path.then(way))
 
-    def _stay(self, states: Any, path: Path) -> _Shown:
+    def _remain(self, states: Any, path: Path) -> _PartialRun:
         """A run that stays in some states for ever."""
         lasso, loop = self._runs.lasso(path.end, self._forever(states))
-        return _Shown(path.then(lasso), len(path.events) + loop)
+        return _PartialRun(path.then(lasso), len(path.events) + loop)
 
-    def _break(self, left: Formula, right: Formula, path: Path) -> _Shown:
+    def _break(self, left: Formula, right: Formula, path: Path) -> _PartialRun:
         """A run on which `left` ends before `right` begins; where there is none, one on which `right` never does."""
         late = self._states(right, False)
         way = self._runs.search(path.end, late, late & self._states(left, False))
-        return self._stay(late, path) if way is None else self._show_both(left, right, False, path.then(way))
+        return self._remain(late, path) if way is None else self._show_both(left, right, False, path.then(way))

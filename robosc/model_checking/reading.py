@@ -255,7 +255,7 @@ class _PropertyParser(ExpressionParser):
             self.report(
                 "syntax-error", message, self.at(self.place), f"Write 'enabled({name.text}.request)', for instance."
             )
-            raise self.told()
+            raise self.reported_fault()
         self.take(".")
         kind = self.place
         if self.kinds[kind] not in (_NAME, _WORD):

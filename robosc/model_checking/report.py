@@ -37,7 +37,7 @@ def _run_lines(run: EvidenceRun, system: System, components: frozenset[str]) -> 
     width = max(len(event or _NOTHING) for event in ("initially", *run.events))
     before: dict[str, str] = {}
     for number, state in enumerate(run.states):
-        shown = {_name(subject, components): _value_text(value) for subject, value in _shown(system, state)}
+        shown = {_name(subject, components): _value_text(value) for subject, value in _changing_values(system, state)}
         changes = ", ".join(f"{name} = {value}" for name, value in shown.items() if before.get(name) != value)
         before = shown
         event = run.events[number - 1] or _NOTHING if number else "initially"
@@ -52,7 +52,7 @@ def _run_lines(run: EvidenceRun, system: System, components: frozenset[str]) -> 
         yield f"      in {item.place}, '{formula_text(item.formula, components)}' {holds}, which this run does not show"
 
 
-def _shown(system: System, state: State) -> Iterator[tuple[Subject, Value]]:
+def _changing_values(system: System, state: State) -> Iterator[tuple[Subject, Value]]:
     """Yield the subjects that can change, with their values: the plants of messages have one location only."""
     for subject, value in zip(subjects(system), state, strict=True):
         if subject.variable is not None or len(subject_domain(system, subject)) > 1:

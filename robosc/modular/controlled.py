@@ -52,7 +52,7 @@ def controlled_module(
     """Return a module under its supervisor; None if it has more than `limit` states."""
     semantics = Semantics(system)
     predicates = state_predicates(system, added)
-    may_begin = _anywhere if initial is None else state_predicate(system, initial)
+    may_begin = _always_true if initial is None else state_predicate(system, initial)
     graph = controlled_graph(semantics, predicates, limit=limit, initial=may_begin, should_stop=should_stop)
     if graph is None:
         return None
@@ -69,7 +69,7 @@ def controlled_module(
     )
 
 
-def _anywhere(state: State) -> bool:
+def _always_true(state: State) -> bool:
     return True
 
 

@@ -159,13 +159,13 @@ def _by_label(graph: Graph, state: int) -> dict[Label, list[int]]:
 
 def reduced(graph: Graph) -> Graph:
     """Return a smaller automaton that blocks the same others: weakly bisimilar, what is lost being one state."""
-    graph = _quotient(graph, _with_lost_as_one(graph))
+    graph = _quotient(graph, _merge_blocking(graph))
     graph = _quotient(graph, _silent_circles(graph))
     blocks = _weak_blocks(graph)
     return graph if blocks is None else _quotient(graph, blocks)
 
 
-def _with_lost_as_one(graph: Graph) -> list[int]:
+def _merge_blocking(graph: Graph) -> list[int]:
     """For each state its number, or a common one for those that reach no marked state; these lose their steps."""
     alive = _leading_to(graph, graph.marked)
     lost = next((state for state in range(len(graph.edges)) if state not in alive), 0)

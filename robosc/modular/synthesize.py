@@ -75,7 +75,7 @@ class ModularResult:
     states: int | None = None
 
     @property
-    def lost(self) -> ModuleSupervisor | None:
+    def unsolved(self) -> ModuleSupervisor | None:
         """The module without a supervisor; None where there is none."""
         return next((item for item in self.modules if item.result.status is SynthesisStatus.EMPTY), None)
 

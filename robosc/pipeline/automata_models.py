@@ -39,9 +39,9 @@ def begun(system: System, initial: str) -> System:
     Raises:
         RequestError: It names what is not there.
     """
-    from robosc.explanation.requests import SystemRequests
+    from robosc.explanation.requests import SystemQuestionReader
 
-    return replace(system, initial=conjunction(system.initial, SystemRequests(system).state(initial)))
+    return replace(system, initial=conjunction(system.initial, SystemQuestionReader(system).state(initial)))
 
 
 def automata_synthesis(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from robosc.automata import System
 from robosc.conditions.literals import Vocabulary
 from robosc.conditions.rendering import Line, diagram_lines
-from robosc.conditions.summary import ELSEWHERE, FROM_THE_FIRST, added_formulas, short_diagrams, told
+from robosc.conditions.summary import ELSEWHERE, FROM_THE_FIRST, added_formulas, condition_line, short_diagrams
 from robosc.errors import UnknownNameError
 from robosc.expressions import TRUE, Expression
 from robosc.model.findings import did_you_mean
@@ -117,7 +117,7 @@ def conditions_of(added: Sequence[AddedCondition], system: System, components: f
     vocabulary = Vocabulary(diagram_domains(system), components)
     return Conditions(
         [
-            Condition(event, told(diagram, formula, components), formula, diagram, vocabulary)
+            Condition(event, condition_line(diagram, formula, components), formula, diagram, vocabulary)
             for event, diagram, formula in found
         ]
     )
@@ -136,4 +136,4 @@ def condition_of(
         components: Names of the automata that go by their own names in conditions.
     """
     vocabulary = Vocabulary(diagram_domains(system), components)
-    return Condition(event, told(diagram, formula, components), formula, diagram, vocabulary)
+    return Condition(event, condition_line(diagram, formula, components), formula, diagram, vocabulary)

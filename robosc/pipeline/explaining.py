@@ -40,7 +40,7 @@ class Explained(Outcome):
     reason: str
     explanation: Explanation | NoSupervisor
 
-    def _made(self) -> object:
+    def _product(self) -> object:
         return self.explanation if isinstance(self.explanation, Explanation) else None
 
 

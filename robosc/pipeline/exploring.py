@@ -59,7 +59,7 @@ class Exploration(Outcome):
         write_whole(path, _content(self.graph, path))
         return path
 
-    def _made(self) -> object:
+    def _product(self) -> object:
         return self.graph
 
     def _repr_svg_(self) -> str | None:

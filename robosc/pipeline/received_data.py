@@ -155,7 +155,7 @@ class GivenData:
             path: Its place in the data, for messages.
 
         Raises:
-            DataError: It is no value of that type.
+            DataError: It is not a value of that type.
         """
         if given is None:
             return None
@@ -206,7 +206,7 @@ class GivenData:
             if not isinstance(source, StringType):
                 near = did_you_mean(given, type_.values)
                 hint = f"did you mean '{near}'?" if near else f"there are {', '.join(type_.values)}"
-                raise DataError(f"{path} of '{self._event}' is {given!r:.100}, which is no {type_text(type_)}; {hint}")
+                raise DataError(f"{path} of '{self._event}' is {given!r:.100}, which is not {type_text(type_)}; {hint}")
         try:
             return self.value(source, given, path)
         except DataError as error:

@@ -101,7 +101,7 @@ class Outcome:
     diagnostics: tuple[Diagnostic, ...]
     reason: str
 
-    def _made(self) -> object:
+    def _product(self) -> object:
         """The value that was made, or None."""
         return None
 
@@ -111,7 +111,7 @@ class Outcome:
         return None if isinstance(explanation, NoSupervisor) else explanation
 
     def __repr__(self) -> str:
-        made = self._made()
+        made = self._product()
         told = [str(self.status)] if made is None else [repr(made)]
         if made is None and self.reason:
             told.append(self.reason)
@@ -125,13 +125,13 @@ class Outcome:
             parts = []
         if self.reason:
             parts.append(visible(self.reason))
-        made = self._made()
+        made = self._product()
         parts += [item for item in (self._why() if made is None else made,) if item is not None]
         return "\n".join(str(part).rstrip() for part in parts) or str(self.status)
 
     def _repr_html_(self) -> str:
         parts = [Findings(self.diagnostics)._repr_html_()] if self.diagnostics else []
-        made = self._made()
+        made = self._product()
         shown = self._why() if made is None else made
         if made is None:
             parts.append(html_text(f"{self.status}: {self.reason}" if self.reason else str(self.status)))
@@ -178,7 +178,7 @@ class Generation(Outcome):
 
         return write_generated(self.files, self.target, given_path(folder), force=force)
 
-    def _made(self) -> object:
+    def _product(self) -> object:
         return self.files
 
 
@@ -214,7 +214,7 @@ class Verification(Outcome):
         held = f": {sum(self.holds)} of {len(self.holds)} properties hold" if self.holds else ""
         return visible(f"<Verification: {self.status}{held}{f'; {self.reason}' if self.reason else ''}>")
 
-    def _made(self) -> object:
+    def _product(self) -> object:
         if self.text:
             return self.text
         if self.holds:

@@ -15,7 +15,7 @@ from robosc.pipeline.received_data import NO_DATA
 
 if TYPE_CHECKING:
     from robosc.certification.supervisor_file import StateInWords
-    from robosc.pipeline.led_run import LedRun, Step
+    from robosc.pipeline.manual_run import ManualRun, Step
     from robosc.pipeline.simulation import Run
 
 _WIDTH = 112
@@ -38,7 +38,7 @@ class ModelOfTest:
     interface_paths: tuple[Path, ...] = ()
 
 
-def event_log(run: "LedRun") -> str:
+def event_log(run: "ManualRun") -> str:
     """Return the text of an event log of a run; its clock counts the events, a second each."""
     return "".join(json_line(entry) for number, step in enumerate(run, start=1) for entry in entries_of(step, number))
 
@@ -138,7 +138,7 @@ def pytest_module(run: "Run", model: ModelOfTest, file: Path) -> str:
         state = now
     is_file = model.path.suffix == ".rsup"
     folders = "".join(
-        f", {name}=[{', '.join(f'FOLDER / {_seen_from(file, item)!r}' for item in paths)}]"
+        f", {name}=[{', '.join(f'FOLDER / {_path_from(file, item)!r}' for item in paths)}]"
         for name, paths in (("library_paths", model.library_paths), ("interface_paths", model.interface_paths))
         if paths
     )
@@ -147,7 +147,7 @@ def pytest_module(run: "Run", model: ModelOfTest, file: Path) -> str:
     return _TEST.format(
         name=run.supervisor.model.name,
         imports="import math\n" if "math." in written else "",
-        source=f"FOLDER = Path(__file__).parent\nMODEL = FOLDER / {_seen_from(file, model.path)!r}",
+        source=f"FOLDER = Path(__file__).parent\nMODEL = FOLDER / {_path_from(file, model.path)!r}",
         initial=_literal(initial),
         enabled=_literal(enabled),
         steps=written,
@@ -155,7 +155,7 @@ def pytest_module(run: "Run", model: ModelOfTest, file: Path) -> str:
     )
 
 
-def _seen_from(file: Path, path: Path) -> str:
+def _path_from(file: Path, path: Path) -> str:
     return os.path.relpath(os.path.realpath(path), os.path.realpath(file.parent))
 
 

@@ -18,8 +18,8 @@ from robosc.expressions.text import automaton_text, expression_text
 from robosc.model.structure import CommunicationKind
 from robosc.pipeline.conditions import unknown_event
 from robosc.pipeline.files import FileAccessError, given_path, write_whole
-from robosc.pipeline.led_run import LedRun, Step, UnknownEventError
 from robosc.pipeline.loading import FileName
+from robosc.pipeline.manual_run import ManualRun, Step, UnknownEventError
 from robosc.pipeline.received_data import (
     NO_DATA,
     DataError,
@@ -37,7 +37,7 @@ from robosc.pipeline.systems import SystemSupervisor
 from robosc.pipeline.walking import ModelWalker, Walker
 
 
-class Run(LedRun):
+class Run(ManualRun):
     """A run of a robot under its supervisor, from its initial state.
 
     Args:
@@ -114,7 +114,7 @@ class Run(LedRun):
         Raises:
             UnknownEventError: There is no such event; the message names the nearest one.
         """
-        return data_fields(self._model, self._known(event))
+        return data_fields(self._model, self._require_event(event))
 
     @property
     def locations(self) -> dict[str, str]:
@@ -148,7 +148,7 @@ class Run(LedRun):
             EventNotPossibleError: It cannot happen in the current state; the message says why.
             DataError: It does not carry such data.
         """
-        self._known(event)
+        self._require_event(event)
         given = one_datum(event, data, fields)
         reading = self._reading(event, given)
         self._require_possible(event)
@@ -263,7 +263,7 @@ def simulate(supervisor: SupervisorLike) -> Run: ...
 def simulate(
     supervisor: SupervisorLike | SystemSupervisor, *, initial: Mapping[str, Value] | None = None
 ) -> Run | SystemRun:
-    """Return a run of the system that a supervisor controls, to be led by hand.
+    """Return a run of the system that a supervisor controls, to be stepped by hand.
 
     Args:
         supervisor: A supervisor that was made, of a model or of automata; of a model also the path of its file or its

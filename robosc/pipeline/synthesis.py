@@ -58,7 +58,7 @@ class Synthesis(Outcome):
         """The supervisor in figures and words, or None where there is none."""
         return None if self.supervisor is None else self.supervisor.summary
 
-    def _made(self) -> object:
+    def _product(self) -> object:
         return self.supervisor
 
 

@@ -22,7 +22,7 @@ from robosc.expressions.inference import has_type
 from robosc.expressions.text import expression_text
 from robosc.model.findings import did_you_mean
 from robosc.pipeline.conditions import unknown_event
-from robosc.pipeline.led_run import LedRun, Step
+from robosc.pipeline.manual_run import ManualRun, Step
 from robosc.pipeline.received_data import NO_DATA, DataError, DataField, data_field, one_datum
 from robosc.pipeline.systems import SystemSupervisor
 from robosc.pipeline.walking import Trouble, TroubleKind, Walker
@@ -50,7 +50,7 @@ class ChoiceError(RoboscError, ValueError):
         self.example = example or {}
 
 
-def asked_parts(system: System, text: str) -> dict[str, Value]:
+def state_parts(system: System, text: str) -> dict[str, Value]:
     """The parts of a state that a text tells, such as `Buffer = full, Buffer.count = 2`.
 
     Raises:
@@ -71,24 +71,24 @@ def asked_parts(system: System, text: str) -> dict[str, Value]:
     return found
 
 
-def beginnings(supervisor: SystemSupervisor) -> tuple[StateInWords, ...]:
+def initial_states_in_words(supervisor: SystemSupervisor) -> tuple[StateInWords, ...]:
     """The states that automata under their supervisor may begin in, in the order of their values.
 
     Raises:
         UnsupportedModelError: They are too many to go through them.
     """
     semantics = Semantics(supervisor.system)
-    return tuple(state_in_words(supervisor.system, None, state) for state in _beginnings(semantics, supervisor))
+    return tuple(state_in_words(supervisor.system, None, state) for state in _initial_states(semantics, supervisor))
 
 
-def _beginnings(semantics: Semantics, supervisor: SystemSupervisor) -> list[State]:
+def _initial_states(semantics: Semantics, supervisor: SystemSupervisor) -> list[State]:
     try:
         return [item for item in semantics.initial_states if supervisor.may_begin(item)]
     except TooManyChoicesError as error:
         raise UnsupportedModelError(f"{supervisor.system.name} cannot be simulated: {error}") from None
 
 
-class SystemRun(LedRun):
+class SystemRun(ManualRun):
     """A run of automata under their supervisor.
 
     In its states, `components` has the location of each automaton, and `communications` nothing.
@@ -108,7 +108,7 @@ class SystemRun(LedRun):
         self._inputs: dict[str, list[InputVariable]] = {}
         for item in system.inputs:
             self._inputs.setdefault(item.event, []).append(item)
-        ways = _beginnings(self._semantics, supervisor)
+        ways = _initial_states(self._semantics, supervisor)
         self._first = self._now = self._only(ways, initial or {}, system.name, "begin in", "initial")
         super().__init__(system.name, {event.name: event.is_controllable for event in system.events})
 
@@ -133,7 +133,7 @@ class SystemRun(LedRun):
         Raises:
             UnknownEventError: There is no such event; the message names the nearest one.
         """
-        inputs = self._inputs.get(self._known(event), ())
+        inputs = self._inputs.get(self._require_event(event), ())
         return tuple(data_field(tuple(map(str, item.path)), item.type, is_read=True) for item in inputs)
 
     def choices(self, event: str, data: object = NO_DATA, /) -> tuple[StateInWords, ...]:
@@ -147,7 +147,7 @@ class SystemRun(LedRun):
             UnknownEventError: There is no such event; the message names the nearest one.
             DataError: It does not carry such data.
         """
-        given = self._given(self._known(event), data)
+        given = self._given(self._require_event(event), data)
         return tuple(map(self._in_words, self._targets(event, given))) if self._can_happen(event) else ()
 
     def step(
@@ -171,7 +171,7 @@ class SystemRun(LedRun):
             ChoiceError: It can lead to several such states, or to none.
             DataError: It does not carry such data.
         """
-        self._known(event)
+        self._require_event(event)
         given = one_datum(event, data, fields)
         read = self._given(event, given)
         self._require_possible(event)
@@ -233,7 +233,7 @@ class SystemRun(LedRun):
         ]
         if len(found) == 1:
             return found[0]
-        told = self._ways(found or states)
+        told = self._alternatives(found or states)
         if not found:
             asked = ", ".join(f"{name} = {value_text(part)}" for name, part in wanted.items())
             with_what = f" with {asked}" if asked else ""
@@ -241,7 +241,7 @@ class SystemRun(LedRun):
         example = {self._subjects[place]: found[0][place] for place in _varying(found)}
         raise ChoiceError(f"{what} can {verb} {len(found)} states: {told}", example, keyword)
 
-    def _ways(self, states: Sequence[State]) -> str:
+    def _alternatives(self, states: Sequence[State]) -> str:
         """States by what tells them apart; of very many the first."""
         places = _varying(states) if len(states) > 1 else range(len(self._subjects))
         told = [
@@ -280,7 +280,7 @@ def _read(
             found[path] = None
         elif data is None or not has_type(data, type_):
             raise DataError(
-                f"{place} is {'unknown' if data is None else f'{data!r:.100}'}, and must be {_wanted(type_)}"
+                f"{place} is {'unknown' if data is None else f'{data!r:.100}'}, and must be {_type_words(type_)}"
             )
         else:
             found[path] = data
@@ -305,7 +305,7 @@ def _read(
         _read(event, inputs, (*path, step), inside, found)
 
 
-def _wanted(type_: Type) -> str:
+def _type_words(type_: Type) -> str:
     return f"one of {', '.join(type_.values)}" if isinstance(type_, EnumType) else type_text(type_)
 
 

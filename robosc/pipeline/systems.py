@@ -120,7 +120,7 @@ class SystemSupervisor:
 
         Raises:
             FileAccessError: The file cannot be read.
-            InvalidSupervisorError: It is no supervisor of automata.
+            InvalidSupervisorError: It is not a supervisor of automata.
         """
         return decode_system(read_bounded(given_path(file), MAXIMUM_BYTES))
 
@@ -150,10 +150,10 @@ class SystemSupervisor:
 
     def __str__(self) -> str:
         return (
-            f"{self.system.name}: a supervisor exists ({self._size})\n{self.conditions}{''.join(self._modules_told())}"
+            f"{self.system.name}: a supervisor exists ({self._size})\n{self.conditions}{''.join(self._module_lines())}"
         )
 
-    def _modules_told(self) -> Iterator[str]:
+    def _module_lines(self) -> Iterator[str]:
         """Lines about the modules."""
         for number, module in enumerate(self.modules, start=1):
             yield f"\nmodule {number}, {module.states} states: {visible(', '.join(module.automata))}"
@@ -195,7 +195,9 @@ def decode_system(data: bytes) -> SystemSupervisor:
         raise InvalidSupervisorError(f"the supervisor file is inconsistent: {one_line(error)}") from None
     names = {automaton.name for automaton in supervisor.system.automata}
     if any(min(item.states, item.group) < 1 or not names.issuperset(item.automata) for item in supervisor.modules):
-        raise InvalidSupervisorError("the supervisor file is inconsistent: a module is none of its automata")
+        raise InvalidSupervisorError(
+            "the supervisor file is inconsistent: a module names an automaton that it does not have"
+        )
     figures = supervisor.statistics
     if min(figures.state_bits, figures.iterations, figures.peak_nodes) < 0 or figures.states < (not supervisor.modules):
         raise InvalidSupervisorError("the supervisor file is inconsistent: a figure of the synthesis is too small")
@@ -222,7 +224,7 @@ class SystemSynthesis(Outcome):
     diagnostics: Findings = field(default_factory=Findings)
     explanation: "EmptyExplanation | NoSupervisor | None" = None
 
-    def _made(self) -> object:
+    def _product(self) -> object:
         return self.supervisor
 
 
@@ -285,13 +287,15 @@ def _synthesized_in_modules(
         )
     except UnsupportedModelError as error:
         return _unsupported(error)
-    if found.lost is not None:
-        names = ", ".join(found.lost.automata[:MAXIMUM_NAMES]) + ", ..." * (len(found.lost.automata) > MAXIMUM_NAMES)
+    if found.unsolved is not None:
+        names = ", ".join(found.unsolved.automata[:MAXIMUM_NAMES]) + ", ..." * (
+            len(found.unsolved.automata) > MAXIMUM_NAMES
+        )
         from robosc.explanation import SystemWords
 
-        reason = f"no supervisor exists: {names}: {found.lost.result.reason}"
-        words = SystemWords(*found.partition.problem_of(found.lost.module, places))
-        return _empty(words, reason, found.lost.result.statistics, engine, on_progress, should_stop)
+        reason = f"no supervisor exists: {names}: {found.unsolved.result.reason}"
+        words = SystemWords(*found.partition.problem_of(found.unsolved.module, places))
+        return _empty(words, reason, found.unsolved.result.statistics, engine, on_progress, should_stop)
     figures = [item.result.statistics for item in found.modules]
     statistics = Statistics(
         engine=figures[0].engine,

@@ -129,7 +129,7 @@ def verify(
         if isinstance(model, CoreSupervisor):
             made: Verification | CoreSupervisor = model
         else:
-            made = _made(bundle or loaded(model), claims, chosen, on_progress, should_stop)
+            made = _synthesized(bundle or loaded(model), claims, chosen, on_progress, should_stop)
         if isinstance(made, Verification):
             return made
         if claims:
@@ -266,7 +266,7 @@ def _checked(
     )
 
 
-def _made(
+def _synthesized(
     model: LoadedModel, claims: _Claims, options: SynthesisOptions, on_progress: OnProgress, should_stop: ShouldStop
 ) -> Verification | CoreSupervisor:
     """Return the supervisor that is made of a model, or the result if a property is wrong or there is none."""

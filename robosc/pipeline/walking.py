@@ -12,7 +12,7 @@ from robosc.model.structure import EventKind, Model, is_tau
 from robosc.pipeline.received_data import RandomData
 
 if TYPE_CHECKING:
-    from robosc.pipeline.led_run import LedRun, Step
+    from robosc.pipeline.manual_run import ManualRun, Step
     from robosc.pipeline.simulation import Run
 
 
@@ -62,7 +62,7 @@ class Walker(ABC):
         run: The run that it leads.
     """
 
-    def __init__(self, run: "LedRun") -> None:
+    def __init__(self, run: "ManualRun") -> None:
         self._run = run
         # Trouble that was found before.
         self._told: set[tuple[TroubleKind, str, tuple[str, ...]]] = set()

@@ -286,7 +286,7 @@ def write_gen(system: System) -> str:
     """A file of libFAUDES: plants are generators of the type `System`, requirements of none.
 
     Raises:
-        UnsupportedModelError: Automata are not plain, or a name is no symbol of libFAUDES.
+        UnsupportedModelError: Automata are not plain, or a name is not a symbol of libFAUDES.
     """
     require_plain(system)
     controllable = {event.name for event in system.events if event.is_controllable}
@@ -316,7 +316,9 @@ def _section(name: str, parts: Iterable[str]) -> list[str]:
 
 def _symbol(text: str) -> str:
     if not _SYMBOL.fullmatch(text):
-        raise UnsupportedModelError(f"{text!a:.100} is no symbol of libFAUDES: printable ASCII without #, % and quotes")
+        raise UnsupportedModelError(
+            f"{text!a:.100} is not a symbol of libFAUDES: printable ASCII without #, % and quotes"
+        )
     return f'"{text}"'
 
 

@@ -20,5 +20,5 @@ def require_plain(system: System) -> None:
         has_guards = any(edge.guard != TRUE or edge.updates for edge in automaton.edges)
         if automaton.variables or automaton.monitors or has_guards:
             raise UnsupportedModelError(
-                f"{automaton.name} has variables, guards or monitors, and is no plain automaton"
+                f"{automaton.name} has variables, guards or monitors, and is not a plain automaton"
             )

@@ -114,7 +114,7 @@ class _Reader:
                 for component in part.children:
                     self._component(component)
             elif part.tag in ("EventAliasList", "InstanceList", "ParameterList") and part.children:
-                self._unsupported(part, f"{part.tag} is no part of plain automata", "Flatten the module.")
+                self._unsupported(part, f"{part.tag} is not part of plain automata", "Flatten the module.")
 
     def _event(self, event: _Element) -> None:
         name, kind = event.named(), event.attributes.get("Kind", "")
@@ -141,7 +141,7 @@ class _Reader:
         if component.tag != "SimpleComponent":
             self._unsupported(
                 component,
-                f"a {component.tag} is no plain automaton",
+                f"a {component.tag} is not a plain automaton",
                 "Flatten the module, and write its variables as automata.",
             )
             return
@@ -175,7 +175,7 @@ class _Reader:
     def _node(self, draft: Draft, node: _Element) -> bool:
         """Read a state; returns True if it is accepting."""
         if node.tag != "SimpleNode":
-            self._unsupported(node, f"a {node.tag} is no single state", "Draw an edge from each state.")
+            self._unsupported(node, f"a {node.tag} is not a single state", "Draw an edge from each state.")
             return False
         name = node.named()
         propositions = {name for part in node.children for name in _names(part)}

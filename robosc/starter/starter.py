@@ -81,7 +81,7 @@ def make_starter(robot: str, *, is_stamped: bool = False) -> Starter:
     stem = snake_case(robot)
     if len(stem) > MAXIMUM_STEM:
         raise InvalidNameError(
-            f"the name of the robot is too long for a file: {_shown(robot)} becomes {len(stem)} characters, "
+            f"the name of the robot is too long for a file: {_one_line(robot)} becomes {len(stem)} characters, "
             f"and at most {MAXIMUM_STEM} fit"
         )
     names = {"robot": robot, "library": f"{robot}Parts", "stem": stem, **(_STAMPED if is_stamped else _PLAIN)}
@@ -97,7 +97,7 @@ def make_starter(robot: str, *, is_stamped: bool = False) -> Starter:
 def _require_name(robot: str) -> None:
     if not _NAME.fullmatch(robot):
         raise InvalidNameError(
-            f"{_shown(robot)} is no name for a robot: letters A to Z, digits and '_', the first no digit, as in "
+            f"{_one_line(robot)} is no name for a robot: letters A to Z, digits and '_', the first no digit, as in "
             "'LineFollower'"
         )
     if robot in RESERVED_WORDS:
@@ -107,7 +107,7 @@ def _require_name(robot: str) -> None:
         )
 
 
-def _shown(text: str) -> str:
+def _one_line(text: str) -> str:
     """A text of a user, whatever it holds, as one short line."""
     return ascii(text if len(text) <= _MAXIMUM_SHOWN else f"{text[:_MAXIMUM_SHOWN]}...")
 

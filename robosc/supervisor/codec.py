@@ -112,7 +112,7 @@ def _raw(data: bytes) -> object:
     except RecursionError:
         raise _too_deep() from None
     except ValueError as error:
-        raise InvalidSupervisorError(f"the supervisor file is no UTF-8 JSON: {one_line(error)}") from error
+        raise InvalidSupervisorError(f"the supervisor file is not UTF-8 JSON: {one_line(error)}") from error
     if _nesting(raw) > _MAXIMUM_NESTING:
         raise _too_deep()
     return raw
@@ -129,7 +129,7 @@ def _unique(pairs: list[tuple[str, object]]) -> dict[str, object]:
 
 
 def _refuse_constant(text: str) -> NoReturn:
-    raise ValueError(f"{text} is no JSON number")
+    raise ValueError(f"{text} is not a JSON number")
 
 
 def _nesting(raw: object) -> int:
@@ -149,7 +149,7 @@ def _too_deep() -> InvalidSupervisorError:
 
 def _require_known_version(raw: object, wanted: str) -> None:
     if not isinstance(raw, dict) or raw.get("format") != FORMAT:
-        raise InvalidSupervisorError(f"this is no supervisor file: its field 'format' is not {FORMAT!r}")
+        raise InvalidSupervisorError(f"this is not a supervisor file: its field 'format' is not {FORMAT!r}")
     version = raw.get("version")
     if version != FORMAT_VERSION or isinstance(version, bool):
         raise InvalidSupervisorError(

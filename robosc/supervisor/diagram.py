@@ -87,7 +87,7 @@ def validate(diagram: DecisionDiagram, domains: Domains) -> None:
         if any(child >= number for child in node.children):
             raise ValueError(f"node {number} has a child that does not stand before it")
     if diagram.root >= len(diagram.nodes) + 2:
-        raise ValueError("the root is no node")
+        raise ValueError("the root is not a node")
     _require_order(diagram)
 
 

@@ -265,7 +265,7 @@ def _validate_options(communication: Communication, names: _Names) -> None:
     if communication.when is not None:
         without_state = replace(names.scope, variables={}, states=frozenset())
         if not isinstance(without_state.infer(communication.when, communication.request), BooleanType):
-            raise InvalidSupervisorError("its condition is no condition")
+            raise InvalidSupervisorError("its condition is not boolean")
 
 
 def _validate_data(communication: Communication, names: _Names) -> None:
@@ -312,7 +312,7 @@ def _validate_variable(variable: Variable, scope: Scope) -> None:
     if isinstance(variable.type, NoneType | ObjectType | ArrayType):
         raise InvalidSupervisorError(f"a variable cannot be {type_text(variable.type)}")
     if not has_type(variable.initial, variable.type):
-        raise InvalidSupervisorError(f"its initial value is no {type_text(variable.type)}")
+        raise InvalidSupervisorError(f"its initial value is not {type_text(variable.type)}")
     if variable.is_synthesis and not is_finite(variable.type):
         raise InvalidSupervisorError(f"{type_text(variable.type)} is not finite, so it cannot take part in synthesis")
 
@@ -468,11 +468,13 @@ def _validate_certificate(certificate: Certificate) -> None:
         texts.append(("method of the controller's properties", certificate.controller.method))
     for name, text in texts:
         if len(text) > _MAXIMUM_TEXT or not text.isprintable():
-            raise InvalidSupervisorError(f"certificate: the {name} is no line of at most {_MAXIMUM_TEXT} characters")
+            raise InvalidSupervisorError(
+                f"certificate: the {name} is not one line of at most {_MAXIMUM_TEXT} characters"
+            )
     if not _COUNT.match(certificate.states) or certificate.states == "0":
-        raise InvalidSupervisorError("certificate: the number of states is no positive decimal number")
+        raise InvalidSupervisorError("certificate: the number of states is not a positive decimal number")
     if certificate.transitions is not None and not _COUNT.match(certificate.transitions):
-        raise InvalidSupervisorError("certificate: the number of transitions is no decimal number")
+        raise InvalidSupervisorError("certificate: the number of transitions is not a decimal number")
 
 
 def validate_added(added: Iterable[AddedCondition], system: System) -> None:

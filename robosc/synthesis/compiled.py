@@ -1,6 +1,6 @@
 """The kernel at work on predicates: the diagrams of CUDD inside dd."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -82,6 +82,19 @@ class Kernel:
     def implies(self, predicate: Any, other: Any) -> bool:
         """Return what `nodes.implies` does."""
         return bool(self._module.implies(self._manager, self.address(predicate), self.address(other)))
+
+    def without(self, predicate: Any, cubes: Sequence[Any]) -> Any:
+        """Return what `nodes.without` does."""
+        return self._returned(self._module.without(self._manager, self.address(predicate), self._addresses(cubes)))
+
+    def told_apart(self, one: Any, other: Any, cubes: Sequence[Any]) -> tuple[Any, Any]:
+        """Return what `nodes.told_apart` does."""
+        addresses = self._addresses(cubes)
+        first, second = self._module.told_apart(self._manager, self.address(one), self.address(other), addresses)
+        return self._returned(first), self._returned(second)
+
+    def _addresses(self, predicates: Sequence[Any]) -> tuple[int, ...]:
+        return tuple(map(self.address, predicates))
 
     def extract(
         self, predicate: Any, blocks: tuple[tuple[tuple[int, tuple[int, ...]], ...], ...], branches: int, maximum: int

@@ -101,17 +101,47 @@ class FixedPoint:
             problem: The problem.
             known: States that are told beforehand to be good.
         """
-        limit, start = _FIRST_STEPS, self.initial & problem.safe
-        while True:
-            found = self._bounded(limit, lambda solver: solver.good_states(problem, known))
-            if found is not None:
-                return found
-            reached = self._bounded(limit, lambda solver: solver.states_from(problem, start, problem.safe))
-            if reached is not None:
-                break
-            limit *= 2
+        start = self.initial & problem.safe
+        found, reached = self._first_of(
+            lambda solver: solver.good_states(problem, known),
+            lambda solver: solver.states_from(problem, start, problem.safe),
+        )
+        if found is not None:
+            return found
         found = self.good_states(Problem(problem.steps, reached), known & reached)
         return replace(found, is_of_reached=True)
+
+    def nonblocking_ahead(self, problem: Problem, states: Any) -> Any:
+        """Return those of some safe states that reach a marked one through transitions that stay in them.
+
+        As in `solution` some may be left out, but none that a step leads to which may lead out of the safe states, too:
+        a supervisor never lets it happen, and whoever asks why looks at all of its targets.
+        """
+        found, ahead = self._first_of(
+            lambda solver: solver.nonblocking_states(problem, states),
+            lambda solver: solver._states_ahead(problem),
+        )
+        return self.nonblocking_states(problem, states & ahead) if found is None else found
+
+    def _states_ahead(self, problem: Problem) -> Any:
+        """The safe states that steps lead to from the initial ones and from each other, wherever else they may lead."""
+        everywhere = self._encoding.manager.true
+        closure = self._closure((self._onwards(steps, everywhere) for steps in self._each(problem)), problem.safe)
+        return closure.of(self.initial & problem.safe, "reachability")
+
+    def _first_of[First, Second](
+        self, first: Callable[["FixedPoint"], First], second: Callable[["FixedPoint"], Second]
+    ) -> tuple[First | None, Second | None]:
+        """Return the result of one of two works, tried in turn with more and more steps; None for the other."""
+        limit = _FIRST_STEPS
+        while True:
+            found = self._bounded(limit, first)
+            if found is not None:
+                return found, None
+            other = self._bounded(limit, second)
+            if other is not None:
+                return None, other
+            limit *= 2
 
     def _bounded[T](self, limit: int, work: Callable[["FixedPoint"], T]) -> T | None:
         """Return the result of some work, or None if it takes more steps than a limit."""

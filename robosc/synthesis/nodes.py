@@ -99,6 +99,40 @@ class _Counter:
         return found[1]
 
 
+def without(manager: Manager, states: Any, cubes: Sequence[Any]) -> Any:
+    """States, whatever the variables of some cubes have.
+
+    Args:
+        manager: Their manager.
+        states: The states.
+        cubes: The cubes, each of some variables that are true in it.
+    """
+    kernel = kernel_of(manager)
+    if kernel is not None:
+        return kernel.without(states, cubes)
+    names = [name for cube in cubes for name in manager.support(cube)]
+    return manager.exist(names, states) if names else states
+
+
+def told_apart(manager: Manager, one: Any, other: Any, cubes: Sequence[Any]) -> tuple[Any, Any]:
+    """Two sets of states that share none, whatever the variables of as many cubes as can go have, earlier ones first.
+
+    Args:
+        manager: Their manager.
+        one: Some states.
+        other: Other states.
+        cubes: The cubes, each of variables that go together.
+    """
+    kernel = kernel_of(manager)
+    if kernel is not None:
+        return kernel.told_apart(one, other, cubes)
+    for cube in cubes:
+        fewer = without(manager, one, [cube]), without(manager, other, [cube])
+        if fewer[0] & fewer[1] == manager.false:
+            one, other = fewer
+    return one, other
+
+
 def restrict(manager: Manager, node: Any, care: Any) -> Any:
     """A predicate that equals `node` wherever `care` is true, mostly a smaller one."""
     kernel = kernel_of(manager)

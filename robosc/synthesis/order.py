@@ -44,17 +44,16 @@ def block_order(system: System, blocks: Sequence[tuple[Subject, ...]]) -> tuple[
 def hyperedges(system: System) -> tuple[frozenset[Subject], ...]:
     """For each event, each condition and each part of one, the subjects it touches; each set once, in first order."""
     found: dict[frozenset[Subject], None] = {}
-    for event in system.events:
-        touched = set[Subject]()
-        for automaton in system.automata:
-            for edge in automaton.edges:
-                if edge.event == event.name:
-                    touched.add(Subject(automaton.name))
-                    touched |= subjects_read(edge.guard)
-                    for update in edge.updates:
-                        touched.add(Subject(automaton.name, update.variable))
-                        touched |= subjects_read(update.expression)
-        found[frozenset(touched)] = None
+    touched = defaultdict[str, set[Subject]](set)
+    for automaton in system.automata:
+        for edge in automaton.edges:
+            together = touched[edge.event]
+            together.add(Subject(automaton.name))
+            together |= subjects_read(edge.guard)
+            for update in edge.updates:
+                together.add(Subject(automaton.name, update.variable))
+                together |= subjects_read(update.expression)
+    found.update((frozenset(touched[event.name]), None) for event in system.events)
     on_events = (item.condition for item in (*system.conditions, *system.plant_conditions))
     for condition in (*on_events, *system.invariants, *system.plant_invariants):
         found[subjects_read(condition)] = None

@@ -29,10 +29,14 @@ from robosc.supervisor.diagram import Subject as Place
 from robosc.supervisor.diagram import diagram_domains
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.nodes import implies, restrict
+from robosc.synthesis.nodes import implies, restrict, told_apart, without
 
 MAXIMUM_NODES = 20_000
 """Nodes of what matters up to which more than restricting is tried."""
+
+MAXIMUM_VAIN = 3
+"""Conditions in a row that restricting made larger, after which it is not tried where that many nodes matter: what is
+entangled in one condition of a system mostly is so in the next one, and each takes long."""
 
 MAXIMUM_KEPT_NODES = 1_000
 """Nodes of it that may be left over the places that a restricted condition tests."""
@@ -70,7 +74,17 @@ class Simplifier:
         self._manager = encoding.manager
         self._domains = diagram_domains(encoding.system)
         self._home = {name: subject for subject, bits in encoding.subjects.items() for name in bits.names}
+        self._ranks: dict[Place, int] = {subject: rank for rank, subject in enumerate(self._domains)}
+        # Places without a bit have one value, and no predicate depends on them.
+        self._cubes = {
+            subject: encoding.all_of(map(self._manager.var, bits.names))
+            for subject, bits in encoding.subjects.items()
+            if bits.names
+        }
+        self._variables = encoding.all_of(map(self._manager.var, reversed(encoding.state_names)))
         self._formulas = Formulas(self._domains)
+        self._told_apart: dict[tuple[int, int], tuple[Any, Any, tuple[DecisionDiagram, ...]]] = {}
+        self._vain = 0
         self._end = None if seconds is None else monotonic() + seconds
         self._more, self._left = Effort(TOTAL_STEPS), MAXIMUM_EFFORT
 
@@ -92,11 +106,9 @@ class Simplifier:
         if self._is_over():
             with suppress(UnsupportedModelError):
                 return extract(self._encoding, plain)
-        simple = restrict(self._manager, wanted, care)
-        if simple.dag_size > plain.dag_size:
-            simple = plain
-        places = self._places(simple)
         is_large = care.dag_size > MAXIMUM_NODES
+        simple = plain if is_large and self._vain == MAXIMUM_VAIN else self._restricted(wanted, care, plain)
+        places = self._places(simple)
         first = extract(self._encoding, simple) if is_large or len(places) == 1 else None
         if first is not None and (is_large or self._length(first) < _SHORT):
             return first
@@ -124,6 +136,13 @@ class Simplifier:
                 if diagram not in found:
                     found[diagram] = self._length(diagram, SHORT)
         return min(found, key=lambda diagram: found[diagram])
+
+    def _restricted(self, wanted: Any, care: Any, plain: Any) -> Any:
+        """Return the smaller of a condition as it is and of one that was restricted to the states that matter."""
+        found = restrict(self._manager, wanted, care)
+        is_larger = found.dag_size > plain.dag_size
+        self._vain = self._vain + 1 if is_larger else 0
+        return plain if is_larger else found
 
     def _is_over(self) -> bool:
         return self._end is not None and monotonic() >= self._end
@@ -169,11 +188,19 @@ class Simplifier:
 
     def _over(self, places: set[Subject], positive: Any, negative: Any) -> tuple[Any, Any]:
         """The values that some places have in the states."""
-        away = [name for name in self._encoding.state_names if self._home[name] not in places]
-        return self._away(away, positive), self._away(away, negative)
+        away = [without(self._manager, self._variables, [self._cubes[subject] for subject in places])]
+        return without(self._manager, positive, away), without(self._manager, negative, away)
 
-    def _telling_apart(self, positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
+    def _telling_apart(self, positive: Any, negative: Any) -> Sequence[DecisionDiagram]:
         """Conditions that are true in the positive states and false in the negative ones."""
+        # Sets are kept with what was found: the engine could otherwise give the nodes to other ones. Many events of one
+        # system need the same.
+        key = int(positive), int(negative)
+        if key not in self._told_apart:
+            self._told_apart[key] = positive, negative, tuple(self._new_telling_apart(positive, negative))
+        return self._told_apart[key][2]
+
+    def _new_telling_apart(self, positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
         try:
             diagrams = [extract(self._encoding, states, MAXIMUM_RANGES) for states in (positive, negative)]
         except UnsupportedModelError:
@@ -185,10 +212,6 @@ class Simplifier:
                 # Each place is needed.
                 return
         yield from self._sums(diagrams)
-
-    def _away(self, names: Iterable[str], states: Any) -> Any:
-        """The values that the other places have in states, whatever some have."""
-        return self._manager.exist(names, states) if names else states
 
     def _needed(
         self, tested: Iterable[Subject], positive: Any, negative: Any, *, is_reversed: bool = False
@@ -202,19 +225,14 @@ class Simplifier:
             is_reversed: True if of places of one size the first ones in the model's text go first: of several that
                 tell the same, others are left then.
         """
-        ranks = {subject: rank for rank, subject in enumerate(self._domains)}
         direction = 1 if is_reversed else -1
 
         def cost(subject: Subject) -> tuple[int, int]:
-            rank = ranks[subject.automaton, subject.variable]
+            rank = self._ranks[subject.automaton, subject.variable]
             return -len(self._encoding.subjects[subject].domain), direction * rank
 
-        for subject in sorted(tested, key=cost):
-            names = self._encoding.subjects[subject].names
-            fewer = self._away(names, positive), self._away(names, negative)
-            if fewer[0] & fewer[1] == self._manager.false:
-                positive, negative = fewer
-        return positive, negative
+        cubes = [self._cubes[subject] for subject in sorted(tested, key=cost)]
+        return told_apart(self._manager, positive, negative, cubes)
 
     def _related(self, diagrams: Sequence[DecisionDiagram]) -> Iterator[DecisionDiagram]:
         """The states that relations between variables and a short sum of products describe together."""
@@ -233,7 +251,7 @@ class Simplifier:
         for wanted, forbidden in pairs:
             try:
                 with space.within(self._formulas.effort.part(STEPS)):
-                    for description in relations.around(wanted, forbidden, places):
+                    for description in relations.descriptions(wanted, forbidden, places):
                         states = relations.states(description)
                         yield space.diagram(states if wanted == sets[0] else space.without(1, states))
             except EffortExceededError:

@@ -93,7 +93,7 @@ class PackageMetadata:
             if not text.strip() or not text.isprintable() or len(text) > _MAXIMUM_TEXT:
                 raise ValueError(f"{what} must be one line of at most {_MAXIMUM_TEXT} characters")
         if not _EMAIL.match(self.email) or len(self.email) > _MAXIMUM_TEXT:
-            raise ValueError(f"the maintainer's e-mail address {self.email[:_MAXIMUM_TEXT]!a} is none")
+            raise ValueError(f"the maintainer's e-mail address {self.email[:_MAXIMUM_TEXT]!a} is not an e-mail address")
         if self.version is not None and not _VERSION.match(self.version):
             raise ValueError("the version of the package must be three numbers, such as 1.0.0")
         if self.copyright is not None and not _COPYRIGHT.match(self.copyright):

@@ -91,12 +91,12 @@ class Reached:
         return tuple(reversed(events))
 
 
-def _anywhere(code: int) -> bool:
+def _begins_anywhere(code: int) -> bool:
     """The supervisor lets the system begin wherever it likes."""
     return True
 
 
-def search(packing: Packing, added: Added, effort: Effort, begins: CodeTest = _anywhere) -> Reached | None:
+def search(packing: Packing, added: Added, effort: Effort, begins: CodeTest = _begins_anywhere) -> Reached | None:
     """Every state of the controlled system, or None if there are more than the effort allows.
 
     It begins in the initial states in which the supervisor lets it begin.

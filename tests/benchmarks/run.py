@@ -4,7 +4,8 @@ Usage: run.py [NAME...]                       (all of them without an argument)
        run.py cif DIR [--against FILE]    (a folder of CIF models: see cif.py)
 
 Names: cold-start, conditions, editor, execution, language, synthesis; of the service: service-load, isolation; of
-the bridge: decoders, drive-bases, live-view, live-view-pixels, loop-period, maze, reaction, endurance, twin.
+the bridge: decoders, drive-bases, live-view, live-view-pixels, loop-period, maze, reaction,
+endurance, shipped, twin.
 """
 
 import sys
@@ -22,6 +23,7 @@ import live_view_pixels
 import loop_period
 import maze
 import reaction
+import shipped
 import twin
 
 import cif
@@ -49,6 +51,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "maze": maze.table,
     "reaction": reaction.table,
     "service-load": load.table,
+    "shipped": shipped.table,
     "synthesis": synthesis.table,
     "twin": twin.table,
 }

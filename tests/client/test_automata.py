@@ -216,6 +216,32 @@ class TestCommands:
         assert (status, "the server's supervisor" in err) == (3, True)
         assert not Path("refused.cif").exists()
 
+    def test_a_supervisor_s_file_is_signed(self, folder: Path, remote: Run, keys: Path) -> None:
+        """Its bytes are those of this machine, and it has the signature that `get` writes."""
+        made = folder / "made.rsup"
+        beside = folder / "made.rsup.sig"
+        assert local_main(["synth", "models/tank.cif", "-o", "local.rsup"]) == 0
+        assert remote("synth", "models/tank.cif", "--signed-by", keys / "server.pub", "-o", made)[0] == 0
+        assert made.read_bytes() == Path("local.rsup").read_bytes()
+        assert local_main(["verify", str(made), "models/tank.cif", "--signed-by", str(keys / "server.pub")]) == 0
+        job = remote("submit", "synth", "models/tank.cif", "--watch")[1].splitlines()[0]
+        assert remote("get", job, "-o", "got.rsup")[0] == 0
+        assert Path("got.rsup").read_bytes() == made.read_bytes()
+        assert Path("got.rsup.sig").read_bytes() == beside.read_bytes()
+        # The signature of an earlier supervisor is replaced; what is refused leaves both as they are.
+        before = beside.read_bytes()
+        assert remote("synth", "models/several.cif", "--signed-by", keys / "other.pub", "-o", made)[0] == 3
+        assert beside.read_bytes() == before
+        assert remote("synth", "models/several.cif", "-o", made)[0] == 0
+        assert beside.read_bytes() != before
+        assert local_main(["verify", str(made), "models/several.cif", "--signed-by", str(keys / "server.pub")]) == 0
+
+    def test_a_server_without_a_key_signs_nothing(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        Path("made.rsup.sig").write_bytes(b"of another supervisor")
+        with served() as address:
+            assert remote_main(["synth", "models/tank.cif", "-o", "made.rsup", "--server", address]) == 0
+        assert not Path("made.rsup.sig").exists()
+
 
 class TestJobs:
     def submitted(self, remote: Run, *arguments: object) -> str:
@@ -233,7 +259,7 @@ class TestJobs:
         status, _, err = remote("get", job, "-o", "job.txt")
         assert (status, "ends in .cif" in err) == (2, True)
         status, _, err = remote("get", job, "--result", "--deployment", "controller")
-        assert (status, "automata are no node" in err) == (2, True)
+        assert (status, "automata are not a node" in err) == (2, True)
         assert json.loads(remote("get", job, "--result")[1])["summary"].startswith("tank: a supervisor exists")
 
     def test_the_other_tasks(self, folder: Path, remote: Run) -> None:

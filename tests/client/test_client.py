@@ -114,10 +114,14 @@ def test_both_clients_have_the_same_methods() -> None:
     assert names[0] == names[1]
 
 
+_LOCAL = ("close", "explain", "simulate")
+"""Methods that call no server."""
+
+
 def test_methods_say_what_they_take_and_give() -> None:
     """Methods document themselves, although they are described elsewhere."""
     for kind in (Client, AsyncClient):
-        for name in (name for name in vars(kind) if not name.startswith("_") and name != "close"):
+        for name in (name for name in vars(kind) if not name.startswith("_") and name not in _LOCAL):
             method = getattr(kind, name)
             assert (method.__name__, method.__qualname__) == (name, f"{kind.__name__}.{name}")
             assert method.__doc__[0].isupper()
@@ -138,7 +142,7 @@ TASKS: dict[str, Any] = {
     "Synthesize": (lambda client: client.synthesize(BUNDLE), [progress(), synthesis()]),
     "Generate": (lambda client: client.generate(BUNDLE, "ros2"), generation()),
     "Explore": (lambda client: client.explore(BUNDLE), exploration()),
-    "Verify": (lambda client: client.verify(Verify(bundle=BUNDLE, properties=("AG a",))), [verification()]),
+    "Verify": (lambda client: client.verify(Verify(model=BUNDLE, properties=("AG a",))), [verification()]),
     "Format": (lambda client: client.format(BUNDLE.main), [pb.FormatResponse(text="robot R {\n}\n")]),
     "ListTargets": (lambda client: client.list_targets(), [pb.ListTargetsResponse()]),
     "GetVersion": (lambda client: client.get_version(), [pb.GetVersionResponse(version="1")]),
@@ -342,7 +346,7 @@ class TestErrors:
                 with pytest.raises(RequestRefusedError, match=r"maximum_states is .* at least 1"):
                     client.explore(BUNDLE, maximum_states=states)
                 with pytest.raises(RequestRefusedError, match=r"maximum_states is .* at least 1"):
-                    client.verify(Verify(bundle=BUNDLE, supervisor=b"x", maximum_states=states))
+                    client.verify(Verify(model=BUNDLE, supervisor=b"x", maximum_states=states))
                 with pytest.raises(RequestRefusedError, match=r"maximum_nodes is .* at least 1"):
                     client.synthesize(BUNDLE, SynthesisOptions(maximum_nodes=states))
             with pytest.raises(RequestRefusedError):
@@ -727,7 +731,7 @@ class TestConversion:
         assert request_of(Format(bundle.main)) == pb.FormatRequest(file=sent.main)
         assert request_of(
             Verify(
-                bundle=bundle,
+                model=bundle,
                 supervisor=b"x",
                 deployment=Deployment.LAYER,
                 properties=("AG a",),
@@ -749,4 +753,4 @@ class TestConversion:
             maximum_states=9,
             strict=True,
         )
-        assert request_of(Verify(bundle=bundle)) == pb.VerifyRequest(bundle=sent, options=pb.SynthesisOptions())
+        assert request_of(Verify(model=bundle)) == pb.VerifyRequest(bundle=sent, options=pb.SynthesisOptions())

@@ -21,7 +21,7 @@ from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.commands.bench import varied
 from robosc_client.jobs import MAXIMUM_IDEMPOTENCY_KEY, MAXIMUM_LABEL
-from robosc_client.load import Measured
+from robosc_client.load_measurement import Measured
 from robosc_client.main import main
 from robosc_server.jobs import convert
 from support.answers import (
@@ -417,8 +417,8 @@ class TestListAndCancel:
         [
             (["--most", "0"], "must be a number from 1 to 1,000,000"),
             (["--most", "x"], "must be a number from 1 to 1,000,000"),
-            (["--kind", "fly"], "'fly' is none of check, synthesize, generate, explore, verify, format, synth"),
-            (["--state", "idle"], "'idle' is none of queued, running, succeeded, failed, cancelled"),
+            (["--kind", "fly"], "'fly' is not one of check, synthesize, generate, explore, verify, format, synth"),
+            (["--state", "idle"], "'idle' is not one of queued, running, succeeded, failed, cancelled"),
             (["--deadline", "inf"], "above 0 and below 1,000,000,000"),
             (["--deadline", "soon"], "above 0 and below 1,000,000,000"),
         ],

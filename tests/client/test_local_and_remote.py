@@ -1,7 +1,10 @@
 """The same nouns here and on a server: what is asked of `robosc` and of a client gives results that are alike."""
 
+import asyncio
 import inspect
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -12,8 +15,9 @@ import robosc
 import robosc_client
 from robosc.source import SourceFile
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_client import Client, Verify
+from robosc_client import AsyncClient, Client, Verify
 from robosc_client.convert.requests import request_of
+from support.both_clients import KINDS, client_of
 from support.models import EMPTY, EXAMPLES, UNSUPPORTED
 from support.service import served
 
@@ -142,7 +146,7 @@ def test_paths_are_models(client: Client) -> None:
 
 
 def test_a_task_says_by_itself_what_is_to_be_verified(client: Client) -> None:
-    task = Verify(bundle=robosc.load(NAVIGATION), properties=("AG EF Navigator.ready",))
+    task = Verify(model=robosc.load(NAVIGATION), properties=("AG EF Navigator.ready",))
     assert client.verify(task) == client.verify(NAVIGATION, "AG EF Navigator.ready")
     with pytest.raises(TypeError, match="give either a task, or a model with options"):
         client.verify(task, "invariant true")
@@ -159,16 +163,60 @@ def test_values_that_mean_the_same_are_the_same() -> None:
 def test_parameters_have_the_same_names(name: str) -> None:
     local = list(inspect.signature(getattr(robosc, name)).parameters)
     remote = list(inspect.signature(getattr(Client, name)).parameters)[1:]
-    # The first one keeps its older name; work here is stopped by a function, and there by a deadline.
-    assert remote[0] in ("bundle", "task")
-    assert [item for item in local[1:] if item not in ("should_stop", "on_progress")] == [
-        item for item in remote[1:] if item not in ("deadline_s", "on_progress")
+    # Work here is stopped by a function, and there by a deadline.
+    assert [item for item in local if item not in ("should_stop", "on_progress")] == [
+        item for item in remote if item not in ("deadline_s", "on_progress")
     ]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_explaining_needs_no_server(kind: str) -> None:
+    event = "navigate.request"
+    with client_of(kind, "localhost:1") as service:
+        assert service.explain(NAVIGATION, event=event) == robosc.explain(NAVIGATION, event=event)
+        assert service.explain(code="unknown-name") == robosc.explain(code="unknown-name")
+        with pytest.raises(robosc.RequestError):
+            service.explain(NAVIGATION, event="nothing.request")
+
+
+@pytest.mark.parametrize("kind", [Client, AsyncClient])
+def test_explaining_takes_the_same_parameters(kind: type[Client | AsyncClient]) -> None:
+    local, remote = (list(inspect.signature(function).parameters) for function in (robosc.explain, kind.explain))
+    assert [name for name in local if name != "should_stop"] == [name for name in remote if name != "should_stop"]
+
+
+def test_cancelling_an_explanation_ends_its_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, ended = threading.Event(), threading.Event()
+
+    def explain(*_: object, should_stop: Callable[[], bool], **__: object) -> None:
+        begun.set()
+        while not should_stop():
+            time.sleep(0.01)
+        ended.set()
+
+    async def cancel() -> None:
+        work = asyncio.create_task(AsyncClient.explain(NAVIGATION))
+        await asyncio.to_thread(begun.wait)
+        work.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await work
+        await asyncio.to_thread(ended.wait)
+
+    monkeypatch.setattr(robosc, "explain", explain)
+    asyncio.run(cancel())
+
+
+@pytest.mark.parametrize("kind", [Client, AsyncClient])
+def test_what_a_server_has_made_is_simulated_here(kind: type[Client | AsyncClient]) -> None:
+    supervisor = robosc.synthesize(NAVIGATION).supervisor
+    assert supervisor is not None
+    assert kind.simulate is robosc.simulate
+    assert kind.simulate(supervisor.encode()).enabled == robosc.simulate(supervisor).enabled
 
 
 def test_a_file_of_properties_is_sent_under_a_name_that_a_server_takes() -> None:
     names = ("/home/somebody/properties.txt", "folder/properties.txt")
     files = tuple(SourceFile(name, "reachable true") for name in names)
-    request = request_of(Verify(bundle=robosc.load(NAVIGATION), property_files=files))
+    request = request_of(Verify(model=robosc.load(NAVIGATION), property_files=files))
     assert isinstance(request, pb.VerifyRequest)
     assert [file.name for file in request.property_files] == ["properties.txt", "folder/properties.txt"]

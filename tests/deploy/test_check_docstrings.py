@@ -68,4 +68,4 @@ def test_an_opening_without_subject_is_found_in_its_line(
 
 def test_a_folder_that_is_not_there_is_wrong_use(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, PROGRAM, "parts"], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (2, "parts is no folder\n")
+    assert (done.returncode, done.stderr) == (2, "parts is not a folder\n")

@@ -192,7 +192,7 @@ def test_the_secrets_of_compose_are_made_and_kept(compose: dict[str, Any], tmp_p
     subprocess.run(command, check=True, capture_output=True)
     assert _contents(folder) == before
     wrong = subprocess.run(["sh", str(COMPOSE / "make_secrets.sh"), "a b"], capture_output=True, text=True)
-    assert (wrong.returncode, wrong.stderr) == (2, "make_secrets.sh: 'a b' is no name or address of a machine\n")
+    assert (wrong.returncode, wrong.stderr) == (2, "make_secrets.sh: 'a b' is not a name or address of a machine\n")
 
 
 def test_variables_of_the_images_are_settings() -> None:

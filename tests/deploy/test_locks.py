@@ -52,7 +52,7 @@ def test_an_extra_that_is_not_spelt_out_is_found() -> None:
         ("a==1.* --hash=sha256:" + "0" * 64, "a has no single version"),
         ("a==1", "a has no hash"),
         ("a==1 --hash=md5:" + "0" * 32, "a has no hash"),
-        ("-r others.txt", "an option is no requirement: -r others.txt"),
+        ("-r others.txt", "an option is not a requirement: -r others.txt"),
     ],
 )
 def test_what_a_release_could_change_is_found(text: str, fault: str) -> None:

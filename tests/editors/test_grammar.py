@@ -34,11 +34,11 @@ STRING = re.compile(r"string\.")
 COMMENT = re.compile(r"comment\.")
 FUNCTIONS = frozenset({"abs", "all", "any", "clamp", "length", "max", "min"})
 
-Scopes = list[list[str]]
+RobotScopes = list[list[str]]
 """Scopes of each character of a text, in its order."""
 
 
-def coloured(texts: Sequence[str]) -> list[Scopes]:
+def coloured(texts: Sequence[str]) -> list[RobotScopes]:
     """Return the scopes that the grammar finds in texts, by one process of Node for all of them."""
     node_tool("vscode-tmgrammar-snap", EXTENSION_FOLDER)
     ran = subprocess.run(
@@ -48,11 +48,11 @@ def coloured(texts: Sequence[str]) -> list[Scopes]:
     return [_by_character(text, lines) for text, lines in zip(texts, json.loads(ran.stdout), strict=True)]
 
 
-def _by_character(text: str, lines: list[list[tuple[int, int, list[str]]]]) -> Scopes:
-    found: Scopes = []
+def _by_character(text: str, lines: list[list[tuple[int, int, list[str]]]]) -> RobotScopes:
+    found: RobotScopes = []
     for line, tokens in zip(text.split("\n"), lines, strict=True):
         # Columns are counted in UTF-16 there.
-        units: Scopes = [[] for _ in range(len(line.encode("utf-16-le", "surrogatepass")) // 2 + 1)]
+        units: RobotScopes = [[] for _ in range(len(line.encode("utf-16-le", "surrogatepass")) // 2 + 1)]
         for begin, end, scopes in tokens:
             units[begin:end] = [scopes] * (min(end, len(units)) - begin)
         place = 0
@@ -67,7 +67,7 @@ def has(scopes: list[str], what: re.Pattern[str]) -> bool:
     return any(what.match(scope) for scope in scopes)
 
 
-def check_tokens(text: str, found: Scopes) -> None:
+def check_tokens(text: str, found: RobotScopes) -> None:
     """Hold the colours of any text, a broken one too, up to its tokens."""
     behind = 0
     for word, kind, start in zip(*tokenize(text), strict=True):
@@ -93,7 +93,7 @@ def check_tokens(text: str, found: Scopes) -> None:
                 assert has(scopes, NAME) and not has(scopes, WORD_OF_THE_LANGUAGE), told
 
 
-def check_names(text: str, found: Scopes) -> None:
+def check_names(text: str, found: RobotScopes) -> None:
     """Hold the colours of a text without errors up to what its words are for our parser."""
     file = SourceFile("model.rscd", text)
     tree = parse(file).tree

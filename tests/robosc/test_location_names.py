@@ -10,7 +10,7 @@ from robosc.cli.main import main
 from robosc.conditions.literals import Vocabulary
 from robosc.conditions.rendering import diagram_lines
 from robosc.explanation import RequestError
-from robosc.explanation.requests import ModelRequests
+from robosc.explanation.requests import ModelQuestionReader
 from robosc.expressions import StateTest, Unary
 from robosc.expressions.text import automaton_text, expression_text
 from robosc.model.structure import Deployment
@@ -74,9 +74,9 @@ def test_what_is_printed_is_read_back(automaton: str) -> None:
     (found,) = properties_of(model, [SourceFile("p", text)])
     assert found.formula == Condition(StateTest(automaton, "idle"))
     system = to_automata(model, Deployment.CONTROLLER)
-    assert ModelRequests(system, model).state(f"{text}, !{text}") is not None
-    assert ModelRequests(system, model).state(text) == StateTest(automaton, "idle")
-    assert ModelRequests(system, model).state(f"not {text}") == Unary("not", StateTest(automaton, "idle"))
+    assert ModelQuestionReader(system, model).state(f"{text}, !{text}") is not None
+    assert ModelQuestionReader(system, model).state(text) == StateTest(automaton, "idle")
+    assert ModelQuestionReader(system, model).state(f"not {text}") == Unary("not", StateTest(automaton, "idle"))
 
 
 def test_a_word_before_a_name_that_is_no_service() -> None:
@@ -84,7 +84,7 @@ def test_a_word_before_a_name_that_is_no_service() -> None:
     system = to_automata(model, Deployment.CONTROLLER)
     for text in ("service Arm.near", "action Drive.idle", "service go.idle"):
         with pytest.raises(RequestError, match=f"unknown {text.split()[0]}"):
-            ModelRequests(system, model).state(text)
+            ModelQuestionReader(system, model).state(text)
 
 
 def test_the_conditions_of_the_supervisor(capsys: pytest.CaptureFixture[str], path: str, tmp_path: Path) -> None:

@@ -131,7 +131,7 @@ class Scope:
 
     def _boolean(self, node: Node, here: str | None) -> Typed:
         typed = self.typed(node, here)
-        _require(typed.type == BOOL, "a condition is no condition")
+        _require(typed.type == BOOL, "a condition is not a condition")
         return typed
 
     def typed(self, node: Node, here: str | None) -> Typed:
@@ -168,7 +168,7 @@ class Scope:
 
     def _choice(self, operands: list[Typed]) -> Typed:
         conditions, results = operands[:-1:2], [*operands[1::2], operands[-1]]
-        _require(all(item.type == BOOL for item in conditions), "a condition of `if` is no condition")
+        _require(all(item.type == BOOL for item in conditions), "a condition of `if` is not a condition")
         _require(len({item.type.name for item in results}) == 1, "the results of `if` have different types")
         low, high = min(item.type.low for item in results), max(item.type.high for item in results)
 

@@ -67,6 +67,7 @@ class Recorded:
     Attributes:
         told: Time, and speeds of the left and the right wheel in m/s; each entry differs from the one before.
         heard_s: Times at which the host was heard.
+        heard: Bytes that were heard at these times.
     """
 
     def __init__(self, device: Device, robot: SimulatedTurtleBot3) -> None:
@@ -74,6 +75,7 @@ class Recorded:
         self._robot = robot
         self.told: list[tuple[float, float, float]] = [(robot.time.now_s(), 0.0, 0.0)]
         self.heard_s: list[float] = []
+        self.heard: list[bytes] = []
 
     @property
     def baud(self) -> int | None:
@@ -81,6 +83,7 @@ class Recorded:
 
     def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
         self.heard_s.append(self._robot.time.now_s())
+        self.heard.append(data)
         return self._watched(list(self._device.receive(data, baud)))
 
     def update(self) -> Iterable[Sending]:

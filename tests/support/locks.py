@@ -32,7 +32,7 @@ def read_lock(text: str) -> Lock:
         if not words[0].strip():
             continue
         if words[0].startswith("-"):
-            faults.append(f"an option is no requirement: {words[0].strip()}")
+            faults.append(f"an option is not a requirement: {words[0].strip()}")
             continue
         requirement = Requirement(words[0])
         requirements[canonicalize_name(requirement.name)] = requirement

@@ -22,6 +22,7 @@ from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.programs import FromProgram, Program
 from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import OperatorCommand, Order, State
+from robosc_bridge.daemon.timing import BOUNDS_S, Latency, TimingFigures
 from robosc_bridge.devices.interface import BINS, DriveReading, MotorFault, Pose, RawScan, Scan, Velocity
 from robosc_bridge.host import monotonic
 from robosc_bridge.remote import RemoteEndpoint, RemoteSettings, serve
@@ -104,6 +105,10 @@ SNAPSHOT = Snapshot(
     reading=None,
     scan=None,
     overruns=4,
+    timing=TimingFigures(
+        (Latency("exchange", tuple(int(index in (10, 17)) for index in range(len(BOUNDS_S) + 1)), 0.012, 0.01),),
+        {"drive": {"requests": 70, "unanswered": 3}},
+    ),
 )
 
 

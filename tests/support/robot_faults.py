@@ -15,7 +15,6 @@ PAGE = (Path(__file__).parents[2] / "docs" / "bridge-safety.md").read_text(encod
 TABLE = PAGE.partition("## Every fault, measured at the motors")[2]
 STATED_S = {name: float(time_s) for name, time_s in re.findall(r"^\| ([^|]+?) \| ([0-9.]+) s \|", TABLE, re.MULTILINE)}
 BASES = ("opencr", "dynamixel")
-SCAN_TIMEOUTS_S = {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
 
 
 @dataclass(frozen=True)
@@ -59,10 +58,21 @@ def answer_as(robot: SimulatedTurtleBot3, device_id: int | None) -> None:
 
 def empty(bridge: Driven) -> None:
     """Let the battery be empty."""
+    stop_v = bridge.limits.battery_stop_v
+    if stop_v is None:
+        assert bridge.robot.rover is not None
+        bridge.robot.rover.charge_state = 3
+        return
     for servo in (bridge.robot.left, bridge.robot.right):
-        servo.brown_out(11.05)
+        servo.brown_out(stop_v - 0.05)
     if bridge.robot.opencr is not None:
-        bridge.robot.opencr.set_battery(11.05)
+        bridge.robot.opencr.set_battery(stop_v - 0.05)
+
+
+def steer(bridge: Driven) -> None:
+    """Let OpenCR's own remote control steer, too."""
+    assert bridge.robot.opencr is not None
+    bridge.robot.opencr.steer(0.04, 0.0)
 
 
 # What a person must see to.
@@ -77,13 +87,15 @@ GRAVE = (
         is_line=True,
     ),
     Fault(
-        "a motor has lost its power",
+        "a motor behind OpenCR is mute",
         lambda bridge: bridge.robot.right.brown_out(0.0),
-        "A motor tells of a fault.",
+        "OpenCR answers too slowly, as when a wheel servo does not answer it: it may be disconnected",
         ("opencr",),
+        is_line=True,
     ),
+    Fault("OpenCR's remote control steers", steer, "A motor tells of a fault.", ("opencr",)),
     Fault("a wheel is held", lambda bridge: bridge.robot.left.block_wheel(), "A motor tells of a fault."),
-    Fault("the battery is empty", empty, "The battery is empty."),
+    Fault("the battery is empty", empty, "The battery is empty.", (*BASES, "mavlink-rover")),
     Fault("the base is unplugged", lambda bridge: bridge.robot.base_line.disconnect(), "the drive base is lost: /",
           is_line=True),
     Fault("the base hears nothing", lambda bridge: wires(bridge, is_deaf=True), " not answer", is_line=True),

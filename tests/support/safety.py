@@ -16,6 +16,10 @@ LIMITS = SafetyLimits(
     separation_m=0.16,
     scan_timeout_s=0.6,
     operator_timeout_s=5.0,
+    loop_timeout_s=0.2,
+    angular_acceleration_rad_s2=4.0,
+    battery_warn_v=11.5,
+    battery_stop_v=11.1,
 )
 STEP_S = 0.02
 
@@ -43,6 +47,7 @@ class Bench:
         wheels_m_s: Speeds of the wheels, in m/s; None: as ordered.
         holds: True if the motors hold; None: as ordered.
         ranges_m: Ranges of a full scan, in metres.
+        acceleration_m_s2: Acceleration that the motors report; None: as fast as they can.
     """
 
     def __init__(self, **changes: Any) -> None:
@@ -55,6 +60,7 @@ class Bench:
         self.holds: bool | None = None
         self.battery_v: float | None = 12.0
         self.ranges_m: tuple[float, ...] = ()
+        self.acceleration_m_s2: float | None = None
         self.last = Output(STANDSTILL, False, (), ())
 
     def report(self) -> None:
@@ -80,6 +86,7 @@ class Bench:
                     wheels_m_s=self.wheels_m_s or (v - turn, v + turn),
                     is_torque_on=self.last.is_torque_wanted if self.holds is None else self.holds,
                     battery_v=self.battery_v,
+                    acceleration_m_s2=self.acceleration_m_s2,
                 )
             )
         self.now_s += step_s

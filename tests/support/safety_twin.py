@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from robosc_bridge.devices.interface import STANDSTILL, DriveReading, MotorFault, Velocity
+from robosc_bridge.devices.interface import STANDSTILL, BatteryLevel, DriveReading, MotorFault, Velocity
 from robosc_bridge.safety import LATCHING, Output, Reason, SafetyLimits
 
 _FACTS = {"scan": Reason.SCAN_STALE, "loop": Reason.LOOP_OVERRUN, "operator": Reason.OPERATOR_LOST}
@@ -83,6 +83,12 @@ class SafetyTwin:
     def _readings(self) -> list[DriveReading]:
         return [each.value for each in self.past if each.name == "drive"]
 
+    def is_empty(self) -> bool:
+        """Return True if the battery is empty, by its voltage or by the last word of the drive base on it."""
+        levels = [each.battery_level for each in self._readings() if each.battery_level is not None]
+        is_low = self.limits.battery_stop_v is not None and self.mean_v() <= self.limits.battery_stop_v
+        return is_low or levels[-1:] == [BatteryLevel.EMPTY]
+
     def mean_v(self) -> float:
         """Return the mean voltage of the last time that was long enough, in volts."""
         mean_v, window = math.inf, list[tuple[float, float]]()
@@ -96,38 +102,70 @@ class SafetyTwin:
                 mean_v, window = sum(voltage for voltage, _ in window) / len(window), []
         return mean_v
 
-    def _torque_story(self) -> tuple[bool, bool, float | None]:
-        """Tell whether the motors reported that they hold, whether they let go since, and how long a wheel is off."""
+    def _torque_story(self) -> tuple[bool, bool, list[tuple[tuple[float, float], DriveReading]]]:
+        """Tell whether the motors reported that they hold, whether they let go since, and what was read meanwhile."""
         began = [each for each in self.past if each.name in ("output", "drive", "pause")]
         for index in reversed(range(len(began))):
             if began[index].name == "output" and began[index].torque_since_s is None:
                 began = began[index + 1 :]
                 break
         is_seen = is_lost = False
-        off: list[float] = []
+        read: list[tuple[tuple[float, float], DriveReading]] = []
         since_s: float | None = None
         velocity = STANDSTILL
-        longest_s: float | None = None
         for each in began:
             if each.name == "output":
                 since_s, velocity = each.torque_since_s, each.velocity
             elif each.name == "pause":
-                off = []
+                read = []
             elif since_s is not None and each.value.time_s > since_s:
                 is_seen, is_lost = (
                     is_seen or each.value.is_torque_on,
                     is_lost or (is_seen and not each.value.is_torque_on),
                 )
-                if not each.value.is_torque_on:
-                    continue
-                turn = velocity.angular_rad_s * self.limits.separation_m / 2
-                goals = (velocity.linear_m_s - turn, velocity.linear_m_s + turn)
-                errors = [abs(goal - speed) for goal, speed in zip(goals, each.value.wheels_m_s, strict=True)]
-                allowed = [max(self.limits.astray_m_s, abs(goal) / 2) for goal in goals]
-                off = [*off, each.value.time_s] if any(not a <= b for a, b in zip(errors, allowed, strict=True)) else []
-                if off and each.value.time_s - min(off) > self.limits.astray_s:
-                    longest_s = each.value.time_s - min(off)
-        return is_seen, is_lost, longest_s
+                if each.value.is_torque_on:
+                    turn = velocity.angular_rad_s * self.limits.separation_m / 2
+                    read.append(((velocity.linear_m_s - turn, velocity.linear_m_s + turn), each.value))
+        return is_seen, is_lost, read
+
+    def _is_astray(self, read: list[tuple[tuple[float, float], DriveReading]]) -> bool:
+        """Return True if a wheel is off its goal, as its motor goes there, in all readings of too long a time."""
+        found = False
+        for wheel in (0, 1):
+            off = list[float]()
+            now, last_s = None, 0.0
+            for goals, each in read:
+                speed = each.wheels_m_s[wheel]
+                if now is None:
+                    now, last_s = speed if math.isfinite(speed) else 0.0, each.time_s
+                passed_s, last_s = max(0.0, each.time_s - last_s), each.time_s
+                now = self._moved_by(now, goals[wheel], each.acceleration_m_s2, passed_s)
+                follows = abs(now - speed) <= self.limits.astray_m_s or abs(now - speed) <= abs(now) / 2
+                off = [] if follows else [*off, each.time_s]
+            found = found or bool(off and off[-1] - min(off) > self.limits.astray_s)
+        return found
+
+    @staticmethod
+    def _moved_by(now: float, goal: float, acceleration: float | None, passed_s: float) -> float:
+        if acceleration is None:
+            return goal
+        step = acceleration * passed_s
+        return min(goal, now + step) if goal >= now else max(goal, now - step)
+
+    def _is_unbidden(self, read: list[tuple[tuple[float, float], DriveReading]]) -> bool:
+        """Return True if a wheel rotates in all readings of too long a time, nothing being asked since all stood."""
+        begin = max([index + 1 for index, (goals, _) in enumerate(read) if goals != (0.0, 0.0)], default=0)
+        fastest = [(self._fastest(each), each.time_s) for _, each in read[begin:]]
+        still = [index for index, (speed, _) in enumerate(fastest) if speed <= self.limits.standstill_m_s]
+        moving = list[float]()
+        for speed, time_s in fastest[still[0] :] if still else []:
+            moving = [] if speed <= self.limits.astray_m_s else [*moving, time_s]
+        return bool(moving) and moving[-1] - min(moving) > self.limits.unbidden_s
+
+    @staticmethod
+    def _fastest(reading: DriveReading) -> float:
+        speeds = [abs(speed) for speed in reading.wheels_m_s]
+        return math.inf if any(map(math.isnan, speeds)) else max(speeds)
 
     def latched(self) -> set[Reason]:
         """Return the reasons that have arisen since the last reset that was allowed, and that hold until the next."""
@@ -146,11 +184,13 @@ class SafetyTwin:
     def tells(self, reading: DriveReading) -> None:
         """The drive base has answered; what latches of it is noted at once."""
         self.happens("drive", reading, reading.time_s)
-        _, is_lost, off_s = self._torque_story()
+        _, is_lost, read = self._torque_story()
+        is_judged = bool(read) and read[-1][1] is reading and self._is_wanted()
         latched = {
-            Reason.BATTERY_LOW: self.mean_v() <= self.limits.battery_stop_v,
+            Reason.BATTERY_LOW: self.is_empty(),
             Reason.TORQUE_LOST: is_lost and self._is_wanted(),
-            Reason.WHEEL_ASTRAY: off_s is not None and self._is_wanted(),
+            Reason.WHEEL_ASTRAY: is_judged and self._is_astray(read),
+            Reason.UNBIDDEN_MOTION: is_judged and self._is_unbidden(read),
         }
         self.past[-1].latched = frozenset(reason for reason, is_so in latched.items() if is_so)
 
@@ -159,7 +199,7 @@ class SafetyTwin:
         return last is not None and last.torque_since_s is not None
 
     def _torque_off(self) -> set[Reason]:
-        found = {Reason.MOTOR_FAULT, Reason.TORQUE_LOST, Reason.WHEEL_ASTRAY}
+        found = {Reason.MOTOR_FAULT, Reason.TORQUE_LOST, Reason.WHEEL_ASTRAY, Reason.UNBIDDEN_MOTION}
         return found | ({Reason.OPERATOR_STOP} if self.limits.is_torque_off_on_operator_stop else set())
 
     def reset(self) -> tuple[Reason, ...]:
@@ -171,7 +211,7 @@ class SafetyTwin:
                 remaining.add(reason)
             if reason is Reason.MOTOR_FAULT and readings[-1].faults - {MotorFault.VOLTAGE}:
                 remaining.add(reason)
-            if reason is Reason.BATTERY_LOW and self.mean_v() <= self.limits.battery_stop_v:
+            if reason is Reason.BATTERY_LOW and self.is_empty():
                 remaining.add(reason)
             if reason in self._torque_off() and self._is_wanted():
                 remaining.add(reason)
@@ -233,7 +273,9 @@ class SafetyTwin:
         limits = self.limits
         last = self._last("output") or Past("output")
         is_clock_wrong = not (math.isfinite(now_s) and now_s >= last.now_s)
-        step_s = min(now_s - last.now_s, limits.motor_timeout_s)
+        present, step_s = last.velocity, now_s - last.now_s
+        if step_s > limits.motor_timeout_s:
+            present, step_s = STANDSTILL, 0.0
         now_s = now_s if math.isfinite(now_s) else last.now_s
         is_seen, _, _ = self._torque_story()
         noted = set[Reason]()
@@ -247,7 +289,8 @@ class SafetyTwin:
                 since_s, is_seen = now_s, False
         elif since_s is not None:
             letting_go_s = now_s if last.letting_go_s is None else min(last.letting_go_s, now_s)
-            if self._is_still_since(letting_go_s, now_s) or now_s - letting_go_s >= limits.torque_off_s:
+            is_over = now_s - letting_go_s >= limits.torque_off_s or Reason.UNBIDDEN_MOTION in latched
+            if is_over or self._is_still_since(letting_go_s, now_s):
                 since_s = letting_go_s = None
         wanted = STANDSTILL if self._is_held() else self._command()
         failures = [each.name for each in self._since_last("drive") if each.name == "failure"]
@@ -272,13 +315,13 @@ class SafetyTwin:
         if not reasons and wanted != STANDSTILL:
             velocity = self._limited(
                 self._moved(
-                    last.velocity.linear_m_s,
+                    present.linear_m_s,
                     wanted.linear_m_s,
                     limits.linear_acceleration_m_s2 * step_s,
                     limits.linear_deceleration_m_s2 * step_s,
                 ),
                 self._moved(
-                    last.velocity.angular_rad_s,
+                    present.angular_rad_s,
                     wanted.angular_rad_s,
                     limits.angular_acceleration_rad_s2 * step_s,
                     limits.angular_deceleration_rad_s2 * step_s,

@@ -152,7 +152,7 @@ def on_registers(data: bytes) -> None:
     """Any contents of the registers that OpenCR and servos are asked for."""
     block = opencr.decode_block(data[: opencr.BLOCK_LENGTH].ljust(opencr.BLOCK_LENGTH, b"\0"))
     _require(0.0 <= block.battery_share <= 1.0, "an impossible charge")
-    _require(all(math.isfinite(value) for value in block.motion.values()), "a motion that is no number")
+    _require(all(math.isfinite(value) for value in block.motion.values()), "a motion that is not a number")
     servo.decode_measurement(data[: servo.MEASUREMENT_LENGTH].ljust(servo.MEASUREMENT_LENGTH, b"\0"))
 
 

@@ -12,7 +12,7 @@ from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 from robosc_simulated import SimulatedTurtleBot3
 from support.driven import PATIENT, driven
-from support.robot_faults import GRAVE, SCAN_TIMEOUTS_S, STATED_S
+from support.robot_faults import GRAVE, STATED_S
 
 pytestmark = pytest.mark.real_time
 
@@ -49,8 +49,7 @@ def test_an_operators_stop_holds() -> None:
 
 def test_a_lidar_that_is_silent_stops_the_wheels_until_it_is_not() -> None:
     lidar = "lds03"
-    timeout = f"{{scan_timeout_s: {SCAN_TIMEOUTS_S[lidar]}}}"
-    with driven("dynamixel", lidar, host=SYSTEM_HOST, safety=timeout) as bridge:
+    with driven("dynamixel", lidar, host=SYSTEM_HOST) as bridge:
         scanner = bridge.robot.scanner
         bridge.stopped_after(lambda: setattr(scanner, "is_stalled", True), STATED_S[f"{lidar} is silent"])
         bridge.stays(WHILE_S)

@@ -18,7 +18,7 @@ def test_obstacles_come_and_it_is_told_that_somebody_is_there() -> None:
             scan = scanner.receive(3.0)
             assert scan is not None
             assert begin_s < scan.time_s <= monotonic()
-            while (255, 190) not in bench.rover.heartbeats:
+            while (254, 191) not in bench.rover.heartbeats:
                 assert monotonic() < begin_s + 5.0
                 scanner.receive(0.1)
         finally:

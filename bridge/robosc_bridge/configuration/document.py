@@ -83,7 +83,7 @@ def parse_document(data: bytes, name: str) -> Document:
         name: Of its file, for messages.
 
     Raises:
-        ConfigurationError: It is no YAML, too large in some dimension, or uses what is not allowed here.
+        ConfigurationError: It is not YAML, too large in some dimension, or uses what is not allowed here.
     """
     if len(data) > MAXIMUM_BYTES:
         raise ConfigurationError(name, [Problem(f"is larger than {MAXIMUM_BYTES} bytes")])
@@ -209,4 +209,4 @@ def _line(event: Any) -> int:
 def _syntax_problem(error: Any) -> Problem:
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     words = getattr(error, "problem", None) or getattr(error, "reason", None) or "cannot be read"
-    return Problem(f"is no YAML: {words}", line=None if mark is None else mark.line + 1)
+    return Problem(f"is not YAML: {words}", line=None if mark is None else mark.line + 1)

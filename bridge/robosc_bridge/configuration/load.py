@@ -27,7 +27,7 @@ def load(path: FilePath) -> Loaded:
     """Read a configuration file.
 
     Raises:
-        ConfigurationError: It cannot be read, is no YAML, or is no valid configuration; lists all that is wrong.
+        ConfigurationError: It cannot be read, is not YAML, or is no valid configuration; lists all that is wrong.
     """
     return parse(read_file(path), str(path))
 
@@ -40,7 +40,7 @@ def parse(data: bytes, name: str) -> Loaded:
         name: Of its file, for messages.
 
     Raises:
-        ConfigurationError: It is no YAML or no valid configuration; lists all that is wrong.
+        ConfigurationError: It is not YAML or no valid configuration; lists all that is wrong.
     """
     document = parse_document(data, name)
     configuration = decode(document, Configuration)
@@ -61,6 +61,8 @@ def _contradictions(configuration: Configuration) -> Iterator[tuple[Path, str]]:
     )
     for section, path, low, high, may_be_equal in pairs:
         first, second = getattr(section, low), getattr(section, high)
+        if first is None or second is None:
+            continue
         if first > second or (first == second and not may_be_equal):
             words = "at most" if may_be_equal else "below"
             yield (*path, low), f"is {first:g}; it must be {words} '{high}', which is {second:g}"
@@ -76,14 +78,16 @@ def _contradictions(configuration: Configuration) -> Iterator[tuple[Path, str]]:
 
 def _times(configuration: Configuration) -> Iterator[tuple[Path, str]]:
     """A loop that does all in time must not stop the wheels again and again."""
-    overrun_s, period_s = configuration.safety.overrun_s, configuration.execution.period_s
-    if overrun_s < 2 * period_s:
-        if overrun_s == Safety().overrun_s:  # Not written, most often: what is, is the other one.
-            text = f"is {period_s:g}; it must be at most half of 'safety.overrun_s', which is {overrun_s:g}"
-            yield ("execution", "period_s"), text
-        else:
-            text = f"is {overrun_s:g}; it must be at least twice 'execution.period_s', which is {period_s:g}"
-            yield ("safety", "overrun_s"), text
+    period_s, plain = configuration.execution.period_s, Safety()
+    for name in ("overrun_s", "command_timeout_s"):
+        limit_s = getattr(configuration.safety, name)
+        if limit_s < 2 * period_s:
+            if limit_s == getattr(plain, name):  # Not written, most often: what is, is the other one.
+                text = f"is {period_s:g}; it must be at most half of 'safety.{name}', which is {limit_s:g}"
+                yield ("execution", "period_s"), text
+            else:
+                text = f"is {limit_s:g}; it must be at least twice 'execution.period_s', which is {period_s:g}"
+                yield ("safety", name), text
 
 
 def _idle(configuration: Configuration) -> Iterator[tuple[Path, str]]:
@@ -101,5 +105,3 @@ def _idle(configuration: Configuration) -> Iterator[tuple[Path, str]]:
     if (view.tls_certificate is None) != (view.tls_key is None):
         missing = "tls_key" if view.tls_key is None else "tls_certificate"
         yield ("view",), f"a certificate and its key belong together: '{missing}' is missing"
-    if configuration.safety.stops_when_blind and configuration.scanner is None:
-        yield ("safety", "stops_when_blind"), "means nothing without the section 'scanner'"

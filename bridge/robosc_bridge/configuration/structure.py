@@ -6,6 +6,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from robosc_bridge.configuration.channels import Channel
+from robosc_bridge.safety.limits import BOUNDS, SCAN_TIMEOUT_S, SCAN_TIMEOUTS_S, SafetyLimits
 from robosc_bridge.skills.settings import EmergencyStopSettings, LineSettings, RotateSettings
 
 _Text = Annotated[str, Meta(min_length=1, max_length=4096)]
@@ -67,7 +68,8 @@ class Scanner(_Section, frozen=True):
 class Execution(_Section, frozen=True):
     """Execution of the supervisor."""
 
-    period_s: Annotated[float, Meta(ge=0.001, le=10, description="Time between decisions, in seconds.")] = 0.02
+    # The safety layer waits for the loop for two periods at least.
+    period_s: Annotated[float, Meta(ge=0.001, le=0.5, description="Time between decisions, in seconds.")] = 0.02
     every: Annotated[
         Literal["period", "event"], Meta(description="Times of decisions: each period, or after each message as well.")
     ] = "period"
@@ -105,67 +107,99 @@ class Execution(_Section, frozen=True):
     ] = 1.0
 
 
+def _scan_timeouts() -> str:
+    """Return the times of the LiDARs in words."""
+    known = ", ".join(f"{time_s:g} of `{driver}`" for driver, time_s in SCAN_TIMEOUTS_S.items())
+    return f"{known}, three revolutions of others, {SCAN_TIMEOUT_S:g} where these are not known"
+
+
+def _within(name: str, description: str = "") -> Meta:
+    """Return the bounds of a number of the safety layer, and what its key means."""
+    bounds = BOUNDS[name]
+    least = {"gt": 0} if bounds.least is None else {"ge": bounds.least}
+    return Meta(**least, le=bounds.most, description=description or None)
+
+
 class Safety(_Section, frozen=True):
     """Limits and times of the safety layer; whatever the supervisor asks for stays within them."""
 
     linear_m_s: Annotated[
-        Annotated[float, Meta(gt=0, le=5)] | None,
+        Annotated[float, _within("linear_m_s")] | None,
         Meta(description="Fastest forward and backward, in m/s; null: what the drive can do."),
     ] = None
     angular_rad_s: Annotated[
-        Annotated[float, Meta(gt=0, le=20)] | None,
+        Annotated[float, _within("angular_rad_s")] | None,
         Meta(description="Fastest rotation, in rad/s; null: what the drive can do."),
     ] = None
     linear_acceleration_m_s2: Annotated[
-        float, Meta(gt=0, le=50, description="Largest change of speed, in m/s²; stopping for safety ignores it.")
-    ] = 1.0
+        float, _within("linear_acceleration_m_s2", "Largest change of speed, in m/s²; stopping for safety ignores it.")
+    ] = SafetyLimits.linear_acceleration_m_s2
     angular_acceleration_rad_s2: Annotated[
-        float, Meta(gt=0, le=200, description="Largest change of the yaw rate, in rad/s²; the same holds.")
-    ] = 6.0
+        float, _within("angular_acceleration_rad_s2", "Largest change of the yaw rate, in rad/s²; the same holds.")
+    ] = SafetyLimits.angular_acceleration_rad_s2
     command_timeout_s: Annotated[
-        float, Meta(ge=0.02, le=10, description="Seconds without a command after which the wheels stop.")
-    ] = 0.5
+        float,
+        _within(
+            "command_timeout_s",
+            "Seconds without a command after which the wheels stop; at least twice `execution.period_s`.",
+        ),
+    ] = SafetyLimits.command_timeout_s
     scan_timeout_s: Annotated[
-        float, Meta(ge=0.05, le=10, description="Seconds without a full revolution of the LiDAR after which they stop.")
-    ] = 0.6
+        Annotated[float, _within("scan_timeout_s")] | None,
+        Meta(
+            description="Seconds without a full revolution of the LiDAR after which they stop; null: "
+            f"{_scan_timeouts()}."
+        ),
+    ] = None
     min_valid_share: Annotated[
         float,
-        Meta(
-            gt=0,
-            le=1,
-            description="Share of valid ranges, 30° to both sides of where it goes, below which it is blind.",
+        _within(
+            "min_valid_share", "Share of valid ranges, 30° to both sides of where it goes, below which it is blind."
         ),
-    ] = 0.05
+    ] = SafetyLimits.min_valid_share
     stops_when_blind: Annotated[
-        bool, Meta(description="True: it may not go where the LiDAR measures nothing; else somebody is warned.")
-    ] = False
+        bool,
+        Meta(
+            description="True: it may not go where the LiDAR measures nothing; false: somebody is warned, and it goes."
+        ),
+    ] = SafetyLimits.is_stopped_when_blind
     bad_frames_share: Annotated[
         float,
         Meta(gt=0, le=1, description="Share of the LiDAR's frames that are damaged above which somebody is warned."),
     ] = 0.1
     motor_timeout_s: Annotated[
-        float, Meta(ge=0.06, le=10, description="Seconds without an answer of the drive after which it has failed.")
-    ] = 0.2
+        float, _within("motor_timeout_s", "Seconds without an answer of the drive after which it has failed.")
+    ] = SafetyLimits.motor_timeout_s
     overrun_s: Annotated[
         float,
-        Meta(
-            ge=0.005,
-            le=10,
-            description="Seconds without a cycle of the supervisor's loop after which the wheels stop; at least twice "
+        _within(
+            "loop_timeout_s",
+            "Seconds without a cycle of the supervisor's loop after which the wheels stop; at least twice "
             "`execution.period_s`.",
         ),
-    ] = 0.1
-    battery_warning_v: Annotated[float, Meta(ge=0, le=100, description="Voltage below which somebody is warned.")] = (
-        11.5
-    )
-    battery_stop_v: Annotated[float, Meta(ge=0, le=100, description="Voltage below which the robot stops.")] = 11.1
-    operator_link_timeout_s: Annotated[
-        Annotated[float, Meta(ge=0.1, le=3600)] | None,
-        Meta(description="Seconds without the operator after which the robot stops; null: it needs none."),
+    ] = SafetyLimits.loop_timeout_s
+    battery_warning_v: Annotated[
+        Annotated[float, _within("battery_warn_v")] | None,
+        Meta(description="Voltage at and below which somebody is warned; null: the drive decides it."),
     ] = None
+    battery_stop_v: Annotated[
+        Annotated[float, _within("battery_stop_v")] | None,
+        Meta(
+            description="Voltage at and below which the robot stops; null: 11.1 of `opencr`, the lowest supply of its "
+            "servos of `dynamixel`, none of others; a rover tells by itself that its battery is empty."
+        ),
+    ] = None
+    operator_link_timeout_s: Annotated[
+        Annotated[float, _within("operator_timeout_s")] | None,
+        Meta(description="Seconds without the operator after which the robot stops; null: it needs none."),
+    ] = SafetyLimits.operator_timeout_s
     torque_off_on_operator_stop: Annotated[
-        bool, Meta(description="True: the motors let go, too, once the wheels stand still after an operator's stop.")
-    ] = False
+        bool | None,
+        Meta(
+            description="True: the motors let go, too, once the wheels stand still after an operator's stop; null: "
+            "they do where the drive has controls of its own (`opencr`)."
+        ),
+    ] = None
 
 
 class Skills(_Section, frozen=True):
@@ -213,6 +247,10 @@ class Remote(_Section, frozen=True):
     mavlink_interval_s: Annotated[
         float, Meta(ge=0.05, le=10, description="Seconds between two messages of pose, and of obstacles.")
     ] = 0.1
+    metrics_address: Annotated[
+        _Text | None,
+        Meta(description="HOST:PORT at which Prometheus reads metrics, over HTTP at /metrics; null: none."),
+    ] = None
 
 
 class View(_Section, frozen=True):

@@ -14,7 +14,7 @@ from robosc_bridge.configuration import channels as kinds
 from robosc_bridge.configuration.channel_mapping import unsuitable_because
 from robosc_bridge.configuration.channels import CHANNELS, Channel, channel_name
 from robosc_bridge.configuration.reference import default_of, struct_of, summary
-from robosc_bridge.configuration.structure import Configuration, Safety, Scanner, TurtleBot
+from robosc_bridge.configuration.structure import Configuration, Scanner, TurtleBot
 from robosc_bridge.driver_registry import PANEL, DriverFeatures, features_of
 
 DriveDriver = Literal["opencr", "dynamixel"]
@@ -38,9 +38,6 @@ UDEV_PORTS: dict[str, str] = {
     "lds03": "/dev/robosc-lds",
 }
 """Port of each device by the udev rules of deploy/udev, whatever the order of plugging in."""
-
-SCAN_TIMEOUTS_S: dict[str, float] = {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
-"""Three revolutions of each LiDAR."""
 
 _PLAIN_PATH = re.compile(r"/[A-Za-z0-9/._-]+")
 _WIDTH = 110
@@ -79,7 +76,7 @@ def init(
         "",
         *_device("drive", drive, drive_port or ports[drive]),
         *_device("scanner", scanner, scanner_port or ports[scanner]),
-        *_sections(scanner),
+        *_sections(),
         "# What each communication of the model is mapped to.",
         *_channels(model, drive),
     ]
@@ -149,29 +146,28 @@ def _device(section: str, driver: str, port: str) -> list[str]:
     ]
 
 
-def _settings(section: type[msgspec.Struct], given: dict[str, float], depth: int = 1) -> Iterator[str]:
-    """Every setting of a section with what it means and its default, or what is given."""
+def _settings(section: type[msgspec.Struct], depth: int = 1) -> Iterator[str]:
+    """Every setting of a section with what it means and its default."""
     indent = "  " * depth
     for field in msgspec.structs.fields(section):
         for line in wrap(summary(field.type), _WIDTH - len(indent)):
             yield f"{indent}# {line}"
         inner = struct_of(field.type)
         if inner is None:
-            yield f"{indent}{field.name}: {json.dumps(given.get(field.name, default_of(field)))}"
+            yield f"{indent}{field.name}: {json.dumps(default_of(field))}"
         else:
             yield f"{indent}{field.name}:"
-            yield from _settings(inner, {}, depth + 1)
+            yield from _settings(inner, depth + 1)
 
 
-def _sections(scanner: str) -> Iterator[str]:
-    """The sections that have defaults; what the LiDAR decides stands in the one on safety."""
+def _sections() -> Iterator[str]:
+    """The sections that have defaults."""
     for field in msgspec.structs.fields(Configuration):
         section = struct_of(field.type)
         if section is not None and not field.required and section is not Scanner:
-            given = {"scan_timeout_s": SCAN_TIMEOUTS_S[scanner]} if section is Safety else {}
             yield from wrap(summary(field.type), _WIDTH, initial_indent="# ", subsequent_indent="# ")
             yield f"{field.name}:"
-            yield from _settings(section, given)
+            yield from _settings(section)
             yield ""
 
 

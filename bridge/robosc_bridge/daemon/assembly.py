@@ -1,10 +1,15 @@
 """From a configuration to a daemon with its devices' threads."""
 
 import contextlib
+import dataclasses
+import inspect
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+from typing import Any
 
 import msgspec
 
@@ -16,7 +21,7 @@ from robosc.supervisor import Supervisor
 from robosc_api.security import SecurityError, check_listening
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import GrpcChannel
-from robosc_bridge.configuration.structure import Configuration, Scanner
+from robosc_bridge.configuration.structure import Configuration, Safety, Scanner
 from robosc_bridge.daemon.camera_setup import camera_problems, camera_worker, needs_camera
 from robosc_bridge.daemon.device_thread import DeviceThread
 from robosc_bridge.daemon.endpoints import Endpoint, LivenessMonitor, is_remote, is_startable
@@ -25,13 +30,17 @@ from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.files import file_problems
 from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.reports import Device
+from robosc_bridge.daemon.service_manager import ServiceManager
 from robosc_bridge.daemon.states import OperatorCommand
+from robosc_bridge.daemon.timing import Timing
 from robosc_bridge.daemon.view_settings import settings_of as view_settings
 from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
 from robosc_bridge.devices.options import checked_options
 from robosc_bridge.devices.robots import ROBOTS, Body, Robot
 from robosc_bridge.driver_registry import (
+    Driver,
     DriverFeatures,
     Kind,
     features_of,
@@ -44,17 +53,32 @@ from robosc_bridge.host import Host
 from robosc_bridge.protocol.mavlink_signing import SigningError
 from robosc_bridge.remote import settings_of
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
+from robosc_bridge.safety.limits import REVOLUTIONS, SCAN_TIMEOUT_S, SCAN_TIMEOUTS_S
 from robosc_bridge.skills import EmergencyStop, Rotate
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 EXCHANGE_S = 0.02
 """Time between exchanges with the drive base: what OpenCR refreshes its registers at."""
 
+MOTOR_MARGIN_V = 0.5
+"""Voltage above the lowest supply of its motors at which somebody is warned, where the battery is not known."""
+
 RESTART_S = 3.0
 """After so long without a full revolution a LiDAR's motor is restarted, as its official driver does."""
 
-LONGEST_PERIOD_S = 0.9
-"""The safety layer waits for the loop for two seconds at most, and for two periods at least (`safety.overrun_s`)."""
+KEYS: Mapping[str, str] = MappingProxyType(
+    {
+        "linear_acceleration_m_s2": "linear_acceleration_m_s2",
+        "angular_acceleration_rad_s2": "angular_acceleration_rad_s2",
+        "command_timeout_s": "command_timeout_s",
+        "motor_timeout_s": "motor_timeout_s",
+        "loop_timeout_s": "overrun_s",
+        "operator_timeout_s": "operator_link_timeout_s",
+        "min_valid_share": "min_valid_share",
+        "is_stopped_when_blind": "stops_when_blind",
+    }
+)
+"""Numbers of the safety layer that are those of a key below `safety`, and the key."""
 
 SWITCH_S = 0.0005
 """After how long a thread that computes lets others run. With Python's own 5 ms, a remote endpoint that is busy
@@ -76,35 +100,61 @@ def safety_limits(configuration: Configuration) -> SafetyLimits:
     """
     robot, chosen = _robot(configuration), configuration.safety
     features = features_of(configuration.drive.driver) or DriverFeatures()
-    if configuration.execution.period_s > LONGEST_PERIOD_S:
-        raise AssemblyError(f"execution.period_s may be {LONGEST_PERIOD_S:g} at most")
     can = robot.limits if isinstance(robot, Body) else robot.limits(robot.motor.velocity_limit_raw)
-    linear = chosen.linear_acceleration_m_s2
-    angular = chosen.angular_acceleration_rad_s2
+    numbers = {name: getattr(chosen, key) for name, key in KEYS.items()}
+    for part in ("linear", "angular"):
+        unit = "m" if part == "linear" else "rad"
+        slower = f"{part}_deceleration_{unit}_s2"
+        numbers[slower] = max(numbers[f"{part}_acceleration_{unit}_s2"], getattr(SafetyLimits, slower))
+    warn_v, stop_v = _battery(chosen, features, robot)
     try:
         return SafetyLimits(
+            **numbers,
             linear_m_s=min(chosen.linear_m_s or math.inf, can.linear_m_s),
             angular_rad_s=min(chosen.angular_rad_s or math.inf, can.angular_rad_s),
             wheel_m_s=can.wheel_m_s,
             separation_m=robot.wheel_separation_m,
-            scan_timeout_s=None if configuration.scanner is None else chosen.scan_timeout_s,
-            linear_acceleration_m_s2=linear,
-            linear_deceleration_m_s2=max(linear, SafetyLimits.linear_deceleration_m_s2),
-            angular_acceleration_rad_s2=angular,
-            angular_deceleration_rad_s2=max(angular, SafetyLimits.angular_deceleration_rad_s2),
-            command_timeout_s=chosen.command_timeout_s,
-            motor_timeout_s=chosen.motor_timeout_s,
-            loop_timeout_s=chosen.overrun_s,
-            operator_timeout_s=chosen.operator_link_timeout_s,
-            battery_warn_v=chosen.battery_warning_v,
-            battery_stop_v=chosen.battery_stop_v,
+            scan_timeout_s=None if configuration.scanner is None else scan_timeout_s(configuration.scanner, chosen),
             torque_on_s=features.torque_on_s or SafetyLimits.torque_on_s,
-            min_valid_share=chosen.min_valid_share,
-            is_torque_off_on_operator_stop=chosen.torque_off_on_operator_stop,
-            is_stopped_when_blind=chosen.stops_when_blind,
+            astray_s=features.astray_s or SafetyLimits.astray_s,
+            astray_m_s=features.astray_m_s or SafetyLimits.astray_m_s,
+            battery_warn_v=warn_v,
+            battery_stop_v=stop_v,
+            has_own_controls=features.has_own_controls,
+            is_torque_off_on_operator_stop=(
+                features.has_own_controls
+                if chosen.torque_off_on_operator_stop is None
+                else chosen.torque_off_on_operator_stop
+            ),
         )
     except ValueError as error:
         raise AssemblyError(f"safety: {error}") from error
+
+
+def _battery(chosen: Safety, features: DriverFeatures, robot: Robot | Body) -> tuple[float | None, float | None]:
+    """Return the voltages of a warning and of the end: those that are chosen, else of the pack or the motors."""
+    warn_v, stop_v = features.battery_v or (None, None)
+    if features.battery_v is None and isinstance(robot, Robot):
+        stop_v = robot.motor.lowest_v
+        warn_v = stop_v + MOTOR_MARGIN_V
+    stop_v = stop_v if chosen.battery_stop_v is None else chosen.battery_stop_v
+    if chosen.battery_warning_v is not None:
+        warn_v = chosen.battery_warning_v
+    elif stop_v is not None:
+        warn_v = stop_v if warn_v is None else max(warn_v, stop_v)
+    return warn_v, stop_v
+
+
+def scan_timeout_s(scanner: Scanner, chosen: Safety) -> float:
+    """Return the time without a full scan after which a LiDAR counts as silent, in seconds."""
+    if chosen.scan_timeout_s is not None:
+        return chosen.scan_timeout_s
+    if scanner.driver in SCAN_TIMEOUTS_S:
+        return SCAN_TIMEOUTS_S[scanner.driver]
+    features = features_of(scanner.driver, Kind.RANGE_SCANNER)
+    if features is None or features.revolution_s is None:
+        return SCAN_TIMEOUT_S
+    return REVOLUTIONS * features.revolution_s
 
 
 def check_settings(configuration: Configuration, mapping: ChannelMapping, deployment: Deployment) -> Settings:
@@ -150,9 +200,11 @@ def check_settings(configuration: Configuration, mapping: ChannelMapping, deploy
 
 def _scan_problems(configuration: Configuration) -> list[str]:
     """A time within which no revolution can be complete would stop the robot for ever."""
-    scanner, timeout_s = configuration.scanner, configuration.safety.scan_timeout_s
+    scanner = configuration.scanner
     features = None if scanner is None else features_of(scanner.driver, Kind.RANGE_SCANNER)
-    if features is None or features.revolution_s is None or timeout_s > features.revolution_s:
+    if scanner is None or features is None or features.revolution_s is None:
+        return []
+    if scan_timeout_s(scanner, configuration.safety) > features.revolution_s:
         return []
     return [
         f"safety.scan_timeout_s: a revolution of the LiDAR takes {features.revolution_s:g} s; the time must be longer"
@@ -178,23 +230,24 @@ def drive_base(configuration: Configuration, host: Host = SYSTEM_HOST) -> DriveB
     drive = configuration.drive
     driver = find_driver(Kind.DRIVE_BASE, drive.driver)
     try:
-        options = checked_options(driver, drive.options)
-        return make_drive_base(drive.driver, path=drive.port, robot=_robot(configuration), **_on(host), **options)
+        options = checked_options(driver, drive.options) | _on(host, driver)
+        return make_drive_base(drive.driver, path=drive.port, robot=_robot(configuration), **options)
     except (SigningError, TypeError, ValueError) as error:
         raise AssemblyError(f"driver '{drive.driver}': {error}") from error
 
 
-def _on(host: Host) -> dict[str, Host]:
+def _on(host: Host, driver: Driver) -> dict[str, Host]:
     """Arguments of a driver; that of a plug-in need not know any host but this computer."""
-    return {} if host is SYSTEM_HOST else {"host": host}
+    takes_host = "host" in inspect.signature(driver.make).parameters
+    return {"host": host} if takes_host and host is not SYSTEM_HOST else {}
 
 
 def range_scanner(scanner: Scanner, host: Host = SYSTEM_HOST) -> RangeScanner:
     """The LiDAR, not opened yet; raises as `drive_base`."""
     driver = find_driver(Kind.RANGE_SCANNER, scanner.driver)
     try:
-        options = checked_options(driver, scanner.options)
-        return make_range_scanner(scanner.driver, path=scanner.port, **_on(host), **options)
+        options = checked_options(driver, scanner.options) | _on(host, driver)
+        return make_range_scanner(scanner.driver, path=scanner.port, **options)
     except (SigningError, TypeError, ValueError) as error:
         raise AssemblyError(f"driver '{scanner.driver}': {error}") from error
 
@@ -210,6 +263,7 @@ class Machine:
         camera: The camera's thread; None: nothing is mapped to what it shows.
         operations: The daemon as remote endpoints see it.
         liveness: Threads and endpoints that must not end by themselves.
+        manager: Service manager that is told that the bridge lives.
     """
 
     daemon: Daemon
@@ -218,6 +272,7 @@ class Machine:
     camera: DeviceThread | None
     operations: Operations
     liveness: LivenessMonitor
+    manager: ServiceManager
 
     def run(self, endpoints: Sequence[Endpoint] = ()) -> bool:
         """Start the remote endpoints and the threads, run the loop to its end, and stop them.
@@ -238,9 +293,12 @@ class Machine:
                 self.liveness.watch(endpoint)
             for thread in threads:
                 thread.start()
+            self.manager.ready()
+            stack.callback(self.manager.close)
             try:
                 self.daemon.run()
             finally:
+                self.manager.stopping()
                 # The drive base first: whatever else hangs, the wheels stop.
                 ended = [thread.stop(_THREAD_LIMIT_S) for thread in threads]
         return all(ended)
@@ -329,19 +387,22 @@ def assemble(
     rotate = msgspec.structs.replace(rotate, speed_rad_s=speed_rad_s, slowest_rad_s=slowest_rad_s)
     stop = EmergencyStop(configuration.skills.emergency_stop)
     feed = Feed()
+    base = drive_base(configuration, host)
+    lidar = None if configuration.scanner is None else range_scanner(configuration.scanner, host)
+    timing = Timing(host.monotonic, _line_counts(base, lidar))
     try:
-        daemon = Daemon(job, safety, Rotate(rotate), stop, host, log, feed, host.queue())
+        daemon = Daemon(job, safety, Rotate(rotate), stop, host, log, feed, host.queue(), timing)
     except (DeploymentError, SettingsError) as error:
         raise AssemblyError(str(error)) from error
-    worker = DriveWorker(drive_base(configuration, host), safety, daemon.post, EXCHANGE_S, host.monotonic)
+    worker = DriveWorker(base, safety, daemon.post, EXCHANGE_S, host.monotonic, timing=timing)
     drive = DeviceThread(worker, host)
     scanner = None
-    if configuration.scanner is not None:
+    if lidar is not None and configuration.scanner is not None:
         listener = ScannerWorker(
-            range_scanner(configuration.scanner, host),
+            lidar,
             safety,
             daemon.post,
-            configuration.safety.scan_timeout_s,
+            scan_timeout_s(configuration.scanner, configuration.safety),
             RESTART_S,
             host.monotonic,
             bad_frames_share=configuration.safety.bad_frames_share,
@@ -362,4 +423,19 @@ def assemble(
         is_layer=is_layer,
         turtlebot=configuration.robot if isinstance(configuration.robot, str) else "",
     )
-    return Machine(daemon, drive, scanner, camera, operations, liveness)
+    manager = ServiceManager(lambda now_s: drive.is_alive and worker.is_cycling(now_s))
+    daemon.beat = lambda now_s: manager.beat(now_s, daemon.state)
+    return Machine(daemon, drive, scanner, camera, operations, liveness, manager)
+
+
+def _line_counts(base: DriveBase, lidar: RangeScanner | None) -> dict[str, Callable[[], dict[str, int]]]:
+    """Counts of the devices' lines, by device; those of drivers that keep none are left out."""
+    found: dict[str, Callable[[], dict[str, int]]] = {}
+    for device, driver in ((Device.DRIVE, base), (Device.SCANNER, lidar)):
+        if dataclasses.is_dataclass(getattr(driver, "counters", None)):
+            found[device] = partial(_counted, driver)
+    return found
+
+
+def _counted(driver: Any) -> dict[str, int]:
+    return dataclasses.asdict(driver.counters)

@@ -87,6 +87,12 @@ def make_endpoints(configuration: Configuration, operations: Operations, limits:
     ground = ground_settings(configuration, Velocity(limits.linear_m_s, limits.angular_rad_s))
     if ground is not None:
         endpoints.append(GroundLink(operations, ground))
+    if configuration.remote.metrics_address is not None:
+        # Its modules are loaded only where somebody asks for them.
+        from robosc_bridge.daemon.metrics import MetricsEndpoint
+
+        is_open = configuration.remote.insecure_beyond_loopback
+        endpoints.append(MetricsEndpoint(operations.feed, configuration.remote.metrics_address, is_open=is_open))
     page = view_settings(configuration)
     if page is not None:
         # The page's modules are loaded only where somebody asks for the page.

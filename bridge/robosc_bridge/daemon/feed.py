@@ -13,6 +13,7 @@ from typing import Any
 from robosc.execution.runtime.event_log import Entry, EventLog
 from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import State
+from robosc_bridge.daemon.timing import TimingFigures
 from robosc_bridge.devices.interface import DriveReading, Scan
 from robosc_bridge.safety import Caution, Reason
 
@@ -40,6 +41,7 @@ class Snapshot:
         scan: The LiDAR's last full revolution; None: the same.
         overruns: Number of decisions that were left out because the one before took too long.
         communications: Location of each service and action, by name; empty: nothing is executed.
+        timing: Times that the bridge measures of itself, and counts of its lines.
     """
 
     number: int
@@ -56,6 +58,7 @@ class Snapshot:
     scan: Scan | None
     overruns: int
     communications: Mapping[str, str] = field(default_factory=dict)
+    timing: TimingFigures = field(default_factory=TimingFigures)
 
 
 @dataclass(frozen=True)

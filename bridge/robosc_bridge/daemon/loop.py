@@ -31,6 +31,7 @@ from robosc_bridge.daemon.snapshots import Snapshots
 from robosc_bridge.daemon.states import OperatorCommand, Order, State
 from robosc_bridge.daemon.stop_switch import StopSwitch
 from robosc_bridge.daemon.supervised import Listeners
+from robosc_bridge.daemon.timing import Timing
 from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Scan, Velocity
 from robosc_bridge.host import Queue
 from robosc_bridge.safety import SafetyLayer
@@ -72,6 +73,7 @@ class Daemon:
         log: The executor's event log.
         feed: Feed that shows everything; None: nobody looks.
         inbox: Queue that the loop waits at; None: one of this computer.
+        timing: Measurement of its times; None: one of its own.
     """
 
     def __init__(
@@ -84,9 +86,12 @@ class Daemon:
         log: EventLog,
         feed: Feed | None = None,
         inbox: Queue[Item] | None = None,
+        timing: Timing | None = None,
     ) -> None:
         self._safety = safety
         self._clock = clock
+        self._timing = timing or Timing(clock.monotonic)
+        self.beat: Callable[[float], None] = lambda now_s: None
         feed = feed or Feed()
         self._inbox: Queue[Item] = queue.SimpleQueue() if inbox is None else inbox
         checker = RequestChecker(job.supervisor.model, job.mapping, is_layer=job.is_layer)
@@ -117,12 +122,14 @@ class Daemon:
         )
         self._execution = Execution(job, self._robot, requesters, clock, WatchedLog(log, feed))
         self._programs = ProgramDispatcher(clients, program_channel, requesters, self._execution, self._robot)
-        self._snapshots = Snapshots(feed, self._execution, self._readiness, clock)
+        self._snapshots = Snapshots(feed, self._execution, self._readiness, clock, self._timing.figures)
         lifecycle.attach(self._execution, self._robot, self._motion, self._switch, self._snapshots.note)
         self._wish = Velocity()
         # Taken out of the inbox, and not taken up to its end.
         self._in_hand: tuple[Item, ...] = ()
         self._hurry: Callable[[], None] = lambda: None
+
+    # `beat` is called at the end of each cycle, with its time.
 
     @property
     def state(self) -> State:
@@ -207,7 +214,7 @@ class Daemon:
         self._take_from_programs()
         now_s = self._clock.monotonic()
         if now_s >= self._execution.due_s:
-            self._execution.decide(now_s, is_running=self.state is State.RUNNING)
+            self._decide(now_s)
         self._lifecycle.poll(now_s)
         executor = self._execution.executor
         if self.state is State.RUNNING and executor is not None:
@@ -215,8 +222,19 @@ class Daemon:
             self._motion.pause(bool(executor.reasons), now_s)
             self._motion.refresh(now_s)
         self._snapshots.poll(self.state, self.problem, self._lifecycle.notice)
+        self.beat(now_s)
         if self.state is State.OVER:
             self._close()
+
+    def _decide(self, now_s: float) -> None:
+        is_running = self.state is State.RUNNING
+        if is_running:
+            self._timing.deciding()
+        else:
+            self._timing.rested()
+        self._execution.decide(now_s, is_running=is_running)
+        if is_running:
+            self._timing.decided()
 
     def _take_from_programs(self) -> None:
         """Take up some of what programs have sent: what the model makes of large data takes its time."""
@@ -234,6 +252,7 @@ class Daemon:
         match item:
             case DriveReading():
                 self._readiness.reading = item
+                self._timing.reading_taken(item.time_s)
                 if executor is not None:
                     self._robot.on_drive_reading(item, executor)
                 else:
@@ -241,7 +260,9 @@ class Daemon:
             case Scan():
                 self._readiness.scan = item
                 if executor is not None:
+                    self._timing.scan_taken(item.time_s)
                     self._robot.on_scan(item, executor)
+                    self._timing.scan_passed()
             case Sighting():
                 if executor is not None:
                     self._robot.on_line(item, executor)
@@ -267,8 +288,12 @@ class Daemon:
                 assert_never(item)
 
     def _command(self, velocity: Velocity, now_s: float) -> None:
+        is_other = velocity != self._wish
+        if is_other:
+            # Before the command can be taken up.
+            self._timing.commanding()
         self._safety.command(velocity, now_s)
-        if velocity == self._wish:
+        if not is_other:
             return
         self._wish = velocity
         # On its way, a rotation has another speed after each exchange; the next one is soon enough for it.

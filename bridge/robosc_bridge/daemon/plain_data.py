@@ -47,7 +47,7 @@ def why_not_plain(data: Any) -> str:
             return f"the data is nested more than {MAXIMUM_DEPTH} deep"
         if isinstance(value, dict):
             if not all(isinstance(key, str) and len(key) <= MAXIMUM_TEXT for key in value):
-                return f"the data has a name that is no text of at most {MAXIMUM_TEXT} characters"
+                return f"the data has a name that is not a text of at most {MAXIMUM_TEXT} characters"
             waiting.extend((part, depth + 1) for part in value.values())
         elif isinstance(value, list):
             waiting.extend((part, depth + 1) for part in value)

@@ -160,7 +160,7 @@ class ProgramChannel:
         is_goal = not isinstance(item, Replied | CallFailed)
         if executor is None or asked is None or asked.program is not item.program or asked.is_goal is not is_goal:
             what = "goal" if is_goal else "call"
-            self._clients.refuse(item.program, f"{item.number} is no {what} that this program is asked for now")
+            self._clients.refuse(item.program, f"{item.number} is not a {what} that this program has been asked for")
             return
         number = asked.number
         match item:

@@ -23,7 +23,7 @@ MAXIMUM_WAITING_BYTES = 2_000_000
 
 @dataclass(frozen=True)
 class Unreadable:
-    """Item of a program that is no plain data of a reasonable size, or that asks for what makes no sense.
+    """Item of a program that is not plain data of a reasonable size, or that asks for what makes no sense.
 
     Attributes:
         program: Program that sent it.

@@ -179,7 +179,7 @@ class Requesters:
                 return f"the id '{own_id}' is in use" if own in self._calls or own in self._goals else ""
             case CancelRequested(program=program, action=action, goal_id=goal_id):
                 is_own = self._goals.get((program, goal_id)) == action
-                return "" if is_own else f"'{goal_id:.255}' is no goal of '{action:.255}' that is under way"
+                return "" if is_own else f"'{goal_id:.255}' is not a goal of '{action:.255}' in progress"
         return ""
 
     # What the layer tells.

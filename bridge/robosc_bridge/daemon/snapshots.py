@@ -1,6 +1,6 @@
 """Snapshots that the loop shows: one whenever something changes that a person would want to see at once."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from robosc.execution.runtime.clock import Clock
@@ -8,6 +8,7 @@ from robosc_bridge.daemon.feed import Feed, Snapshot
 from robosc_bridge.daemon.readiness import Readiness
 from robosc_bridge.daemon.reports import SafetyNotice
 from robosc_bridge.daemon.states import State
+from robosc_bridge.daemon.timing import TimingFigures
 
 INTERVAL_S = 0.05
 """Time between snapshots that differ in measurements alone."""
@@ -44,13 +45,22 @@ class Snapshots:
         execution: The supervisor at work.
         readiness: Knowledge about the devices.
         clock: The time.
+        timing: Function that returns the times that the bridge measures of itself.
     """
 
-    def __init__(self, feed: Feed, execution: ExecutionState, readiness: Readiness, clock: Clock) -> None:
+    def __init__(
+        self,
+        feed: Feed,
+        execution: ExecutionState,
+        readiness: Readiness,
+        clock: Clock,
+        timing: Callable[[], TimingFigures] = TimingFigures,
+    ) -> None:
         self._feed = feed
         self._execution = execution
         self._readiness = readiness
         self._clock = clock
+        self._timing = timing
         self._number = 0
         self._changes = -1
         self._components: Mapping[str, Mapping[str, Any]] = {}
@@ -97,5 +107,6 @@ class Snapshots:
                 self._readiness.scan,
                 self._execution.overruns,
                 self._communications,
+                self._timing(),
             )
         )

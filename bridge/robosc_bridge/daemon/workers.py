@@ -13,6 +13,7 @@ from typing import Protocol
 from robosc_bridge.daemon.backoff import Backoff
 from robosc_bridge.daemon.frame_errors import FrameErrorMonitor
 from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
+from robosc_bridge.daemon.timing import Timing
 from robosc_bridge.devices.interface import DriveBase, DriveReading, MotorFault, RangeScanner, Scan, Velocity
 from robosc_bridge.errors import BridgeError, DeviceSilentError
 from robosc_bridge.safety import Caution, Reason
@@ -40,6 +41,13 @@ RESTART_LIMIT = 3
 
 VALID_LIMIT = 8
 """A revolution with fewer valid ranges shows nothing: the LiDAR is covered, or something is too near."""
+
+
+_EXCHANGE_LIMIT_S = 2.0
+"""Time that no exchange takes: those of all drivers end after some tenths of a second."""
+
+_STEP_LIMIT_S = 30.0
+"""Time that no other step takes: opening a MAVLink rover that is to be brought to rest takes half of it."""
 
 
 class DriveCommand(Protocol):
@@ -108,6 +116,11 @@ class DriveWorker:
         period_s: Time between exchanges, in seconds.
         clock: Clock that returns the time, in seconds.
         backoff: Pauses between attempts to open it.
+        timing: Measurement of the bridge's times; None: one of its own.
+
+    Attributes:
+        stepped_s: Time at which its last step began or ended.
+        is_exchanging: True during an exchange, which takes no longer than its line's limit.
     """
 
     name = "drive"
@@ -120,7 +133,11 @@ class DriveWorker:
         period_s: float,
         clock: Callable[[], float],
         backoff: Backoff | None = None,
+        timing: Timing | None = None,
     ) -> None:
+        self.stepped_s = clock()
+        self.is_exchanging = False
+        self._timing = timing or Timing(clock)
         self._base = base
         self._gate = gate
         self._report = report
@@ -136,12 +153,24 @@ class DriveWorker:
         # Faults that a person was told of since it was opened or reset: one that comes and goes is told once.
         self._told: frozenset[MotorFault] = frozenset()
 
+    def is_cycling(self, now_s: float) -> bool:
+        """Return True if its steps come to an end, each in its time; asked by other threads."""
+        return now_s - self.stepped_s <= (_EXCHANGE_LIMIT_S if self.is_exchanging else _STEP_LIMIT_S)
+
     def reset(self) -> None:
         """Let the next step reboot motors that have switched themselves off; called from other threads."""
         self._is_reset_wanted = True
 
     def step(self, now_s: float) -> float:
         """Open it, or exchange once."""
+        self.stepped_s = now_s
+        try:
+            return self._step(now_s)
+        finally:
+            self.is_exchanging = False
+            self.stepped_s = self._clock()
+
+    def _step(self, now_s: float) -> float:
         try:
             if self._is_open:
                 self._exchange(now_s)
@@ -178,16 +207,24 @@ class DriveWorker:
         if is_reset:
             self._is_reset_wanted = False
             self._reset()
+        scan_s = self._timing.take_command()
         command = self._ask(now_s)
         if command.is_torque_wanted != self._has_torque:
             self._base.set_torque(command.is_torque_wanted)
             self._has_torque = command.is_torque_wanted
             # That took a while: what was to be done then may be wrong now.
             command = self._ask(self._clock())
-        reading = self._base.exchange(command.velocity)
+        began_s = self._clock()
+        self.is_exchanging, self.stepped_s = True, began_s
+        try:
+            reading = self._base.exchange(command.velocity)
+        except BridgeError:
+            self._timing.put_back(scan_s)
+            raise
+        self._timing.exchanged(began_s, scan_s)
         self._silent = 0
         if news := reading.faults - self._told:
-            _log.warning("the motors tell: %s", ", ".join(sorted(news)))
+            _log.warning("the motors report: %s", ", ".join(sorted(news)))
             self._told |= news
         self._gate.on_drive_reading(reading)
         self._report(reading)

@@ -11,13 +11,13 @@ import contextlib
 import logging
 from collections.abc import Sequence
 
-from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, DynamixelBus, exchange_limit_s
+from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, BusCounters, DynamixelBus, exchange_limit_s
 from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFault, Velocity
 from robosc_bridge.devices.kinematics import body_velocity, wheel_goals
 from robosc_bridge.devices.odometry import Odometry
 from robosc_bridge.devices.robots import ACCELERATION_RAW_RAD_S2, Robot
 from robosc_bridge.devices.servo_pair import ServoPair
-from robosc_bridge.devices.wheel_following import FollowingMonitor
+from robosc_bridge.devices.wheel_following import FOLLOWING_LIMIT_S, FollowingMonitor
 from robosc_bridge.errors import BridgeError, DeviceError, DeviceSilentError
 from robosc_bridge.host import Host, Port
 from robosc_bridge.protocol import servo
@@ -29,8 +29,6 @@ FACTORY_BAUD = 57_600
 
 CHECK_PERIOD_S = 0.1
 """Time between checks of the motors' torque and of tripped watchdogs, in seconds, beside every exchange."""
-
-_FOLLOWING_S = 0.7
 
 _log = logging.getLogger(__name__)
 
@@ -80,7 +78,7 @@ class DynamixelBase:
         self._exchange_limit_s = exchange_limit_s(answer_limit_s)
         self._limits = robot.limits(robot.motor.velocity_limit_raw)
         self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m)
-        self._following = FollowingMonitor(_FOLLOWING_S + ramp_s)
+        self._following = FollowingMonitor(FOLLOWING_LIMIT_S + ramp_s)
         self._host = host
         self._line: Port | None = None
         self._bus: DynamixelBus | None = None
@@ -99,6 +97,12 @@ class DynamixelBase:
     def limits(self) -> DriveLimits:
         """Limits of the wheels; known after `open`."""
         return self._limits
+
+    @property
+    def counters(self) -> BusCounters:
+        """Health of the line since it was opened."""
+        bus = self._bus
+        return BusCounters() if bus is None else bus.counters
 
     def open(self) -> None:
         """Find both motors, check that they can be driven, and set them up; wheels at rest, torque off.
@@ -235,6 +239,8 @@ class DynamixelBase:
         if self._is_torque_wanted:
             if not self._stops:
                 goals = wheel_goals(velocity, self._limits, self._robot.wheel_separation_m, self._robot.raw_m_s)
+            if self._host.monotonic() > velocity.until_s:
+                goals = (0, 0)
             pair.command(goals)
             self._commanded_s = self._host.monotonic()
         answers = pair.measure()
@@ -307,11 +313,17 @@ class DynamixelBase:
             wheels_m_s=(left_m_s, right_m_s),
             is_torque_on=self._is_torque_on,
             faults=faults,
+            acceleration_m_s2=self._acceleration_raw * ACCELERATION_RAW_RAD_S2 * self._robot.wheel_radius_m or None,
             battery_v=min(one.voltage_v for one in measured),
             temperature_c=max(one.temperature_c for one in measured),
+            goals_m_s=self._goals_m_s(goals) if self._is_torque_wanted else None,
             wheels_m=self._odometry.wheels_m,
             wheel_radius_m=self._robot.wheel_radius_m,
         )
+
+    def _goals_m_s(self, goals: tuple[int, int]) -> tuple[float, float]:
+        left, right = goals
+        return left * self._robot.raw_m_s, right * self._robot.raw_m_s
 
 
 def _profile(robot: Robot, acceleration_rad_s2: float | None) -> tuple[int, float]:

@@ -19,10 +19,12 @@ class Velocity:
     Attributes:
         linear_m_s: Forward.
         angular_rad_s: Counter-clockwise.
+        until_s: Time after which it may be commanded no more, in seconds; two velocities may differ in it and be equal.
     """
 
     linear_m_s: float = 0.0
     angular_rad_s: float = 0.0
+    until_s: float = field(default=math.inf, compare=False)
 
 
 STANDSTILL = Velocity()
@@ -54,6 +56,15 @@ class MotorFault(StrEnum):
     TORQUE_LOST = "torque off by itself"
     WATCHDOG = "bus watchdog"
     BLOCKED = "does not rotate as told"
+    UNCOMMANDED = "rotates without a command"
+
+
+class BatteryLevel(StrEnum):
+    """Judgement of a drive base on its battery, by what it knows of it."""
+
+    SOUND = "sound"
+    LOW = "low"
+    EMPTY = "empty"
 
 
 @dataclass(frozen=True)
@@ -65,10 +76,14 @@ class DriveReading:
         pose: Odometry.
         velocity: Velocity as the wheels measure it.
         wheels_m_s: Speed of the left and the right wheel.
+        goals_m_s: Speeds that the left and the right wheel were told in this exchange, as the device rounds them;
+            None: they were told none, or the driver does not say.
         is_torque_on: True if the motors hold and obey.
         faults: Faults of any motor.
+        acceleration_m_s2: Acceleration with which the motors bring a wheel to a new goal; None: as fast as they can.
         battery_v: Voltage of the battery, in volts; None: it is not reported.
         battery_share: Charge of the battery, 0 to 1; None: it is not reported.
+        battery_level: Judgement of the drive base itself on the battery; None: it makes none.
         temperature_c: Temperature of the hottest motor, in degrees Celsius; None: it is not reported.
         buttons: True for each button that is pressed, by name: `button_1`, `bumper_1` and so on.
         imu: Further measurements by name, such as `angular_velocity_z`; empty: there are none.
@@ -82,11 +97,14 @@ class DriveReading:
     wheels_m_s: tuple[float, float]
     is_torque_on: bool
     faults: frozenset[MotorFault] = frozenset()
+    acceleration_m_s2: float | None = None
     battery_v: float | None = None
     battery_share: float | None = None
+    battery_level: BatteryLevel | None = None
     temperature_c: float | None = None
     buttons: Mapping[str, bool] = field(default_factory=dict)
     imu: Mapping[str, float] = field(default_factory=dict)
+    goals_m_s: tuple[float, float] | None = None
     wheels_m: tuple[float, float] | None = None
     wheel_radius_m: float | None = None
 
@@ -131,6 +149,9 @@ class DriveBase(Protocol):
 
     def exchange(self, velocity: Velocity) -> DriveReading:
         """One cycle: command a velocity within the limits, keep every watchdog fed, read everything.
+
+        A velocity whose `until_s` is over is not commanded, but zero: a thread that was halted between the decision and
+        the writing of it must not set the wheels in motion when it goes on. It is looked at right before the writing.
 
         With torque off the velocity is not sent, and zero is what the device has as its goal.
 

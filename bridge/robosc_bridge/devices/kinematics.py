@@ -6,13 +6,30 @@ carries.
 """
 
 import math
+from typing import Protocol
 
-from robosc_bridge.devices.interface import DriveLimits, Velocity
+from robosc_bridge.devices.interface import Velocity
 
 _CM = 100  # OpenCR takes centimetres and hundredths of a radian per second.
 
 
-def clamped(velocity: Velocity, limits: DriveLimits) -> Velocity:
+class VelocityLimits(Protocol):
+    """Limits of a body and its wheels: those of a drive base or of the safety layer."""
+
+    @property
+    def linear_m_s(self) -> float:
+        """Fastest speed forward and backward."""
+
+    @property
+    def angular_rad_s(self) -> float:
+        """Fastest rotation."""
+
+    @property
+    def wheel_m_s(self) -> float:
+        """Fastest wheel."""
+
+
+def clamped(velocity: Velocity, limits: VelocityLimits) -> Velocity:
     """Return the velocity with each part within its limit; a part that is not a number becomes zero.
 
     Args:
@@ -25,7 +42,8 @@ def clamped(velocity: Velocity, limits: DriveLimits) -> Velocity:
 
 
 def _clamped(value: float, limit: float) -> float:
-    return 0.0 if math.isnan(value) else max(-limit, min(limit, value))
+    # Comparing takes integers of any size, too, and nothing compares with what is not a number.
+    return max(-limit, min(limit, value)) if -math.inf <= value <= math.inf else 0.0
 
 
 def wheel_speeds(velocity: Velocity, separation_m: float) -> tuple[float, float]:
@@ -39,7 +57,7 @@ def body_velocity(left_m_s: float, right_m_s: float, separation_m: float) -> Vel
     return Velocity((left_m_s + right_m_s) / 2, (right_m_s - left_m_s) / separation_m)
 
 
-def within_limits(velocity: Velocity, limits: DriveLimits, separation_m: float) -> Velocity:
+def within_limits(velocity: Velocity, limits: VelocityLimits, separation_m: float) -> Velocity:
     """The velocity within all limits, of the same curvature as the clamped one."""
     found = clamped(velocity, limits)
     fastest_m_s = max(abs(speed) for speed in wheel_speeds(found, separation_m))
@@ -49,7 +67,7 @@ def within_limits(velocity: Velocity, limits: DriveLimits, separation_m: float) 
     return Velocity(found.linear_m_s * factor, found.angular_rad_s * factor)
 
 
-def wheel_goals(velocity: Velocity, limits: DriveLimits, separation_m: float, raw_m_s: float) -> tuple[int, int]:
+def wheel_goals(velocity: Velocity, limits: VelocityLimits, separation_m: float, raw_m_s: float) -> tuple[int, int]:
     """Return the goal velocities of the left and the right servo.
 
     Args:
@@ -67,7 +85,7 @@ def wheel_goals(velocity: Velocity, limits: DriveLimits, separation_m: float, ra
     return left, right
 
 
-def opencr_words(velocity: Velocity, limits: DriveLimits, separation_m: float) -> tuple[int, int]:
+def opencr_words(velocity: Velocity, limits: VelocityLimits, separation_m: float) -> tuple[int, int]:
     """Return the words that command OpenCR, such that none of its own limits ever acts.
 
     Its firmware clamps both parts on their own and then each wheel, which changes the curvature; and its commands to

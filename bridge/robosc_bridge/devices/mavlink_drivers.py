@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from robosc_bridge.devices.mavlink_link import BAUD
+from robosc_bridge.devices.mavlink_link import BAUD, OWN_COMPONENT, OWN_SYSTEM
 from robosc_bridge.devices.mavlink_obstacles import MavlinkObstacles
 from robosc_bridge.devices.mavlink_rover import MavlinkRover
 from robosc_bridge.devices.robots import Body
@@ -17,8 +17,8 @@ def make_rover(
     baud: int = BAUD,
     *,
     system: int | None = None,
-    own_system: int = 255,
-    own_component: int = 190,
+    own_system: int = OWN_SYSTEM,
+    own_component: int = OWN_COMPONENT,
     signing_key: str | None = None,
     signing_link: int = 0,
     motion_limit_s: float = 1.0,
@@ -32,8 +32,8 @@ def make_rover(
         robot: Abilities of the robot.
         baud: Speed of a serial port.
         system: System number of the vehicle; None: the first rover that is heard.
-        own_system: Our system number.
-        own_component: Our component number.
+        own_system: Our system number, from 1 to 255.
+        own_component: Our component number, from 1 to 255; not both may be the autopilot's.
         signing_key: File with the key of signing; None: nothing is signed.
         signing_link: Number of the signed stream.
         motion_limit_s: Time for which the vehicle's last estimate of its motion holds, in seconds.
@@ -63,8 +63,8 @@ def make_obstacles(
     baud: int = BAUD,
     *,
     system: int | None = None,
-    own_system: int = 255,
-    own_component: int = 190,
+    own_system: int = OWN_SYSTEM,
+    own_component: int = OWN_COMPONENT,
     signing_key: str | None = None,
     signing_link: int = 0,
     host: Host = SYSTEM_HOST,

@@ -17,6 +17,8 @@ from robosc_bridge.host import Host, NetworkPort
 from robosc_bridge.protocol.framing import FrameCounts
 from robosc_bridge.protocol.mavlink import Codec, Decoder
 from robosc_bridge.protocol.mavlink_messages import (
+    AUTOPILOT,
+    ONBOARD_COMPUTER,
     MavCommand,
     Message,
     ObstacleRing,
@@ -30,8 +32,15 @@ from robosc_bridge.protocol.mavlink_signing import Signing
 from robosc_bridge.transport.system_host import SYSTEM_HOST, open_line
 
 BAUD = 57_600
+OWN_SYSTEM = 254
+"""Neither a vehicle's usual number nor 255, which ground stations have."""
+
+OWN_COMPONENT = ONBOARD_COMPUTER
+"""MAV_COMP_ID_ONBOARD_COMPUTER of `minimal.xml`, which `common.xml` includes; 190 is that of ground stations."""
+
 HEARTBEAT_S = 1.0
 _KEPT_OBSTACLES = 32
+_LARGEST_NUMBER = 255
 _READ_S = 0.2
 # A read that takes so long was paused, with the process.
 _PAUSE_S = 0.5
@@ -47,17 +56,35 @@ class LinkSettings:
         path: Path of a serial port, or an address of `transport.network_line`.
         baud: Speed of a serial port.
         system: System number of the vehicle; None: the first rover that is heard.
-        own_system: Our system number; ArduPilot's failsafe counts the heartbeats of 255 alone, unless set otherwise.
+        own_system: Our system number. ArduPilot's failsafe counts the heartbeats of 255 alone, unless set otherwise.
         own_component: Our component number.
         signing: Signing of packets; None: none, and signatures are not asked for.
+
+    Raises:
+        ValueError: A number is out of its range, or ours are those of the vehicle's autopilot.
     """
 
     path: str
     baud: int = BAUD
     system: int | None = None
-    own_system: int = 255
-    own_component: int = 190
+    own_system: int = OWN_SYSTEM
+    own_component: int = OWN_COMPONENT
     signing: Signing | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("system", "own_system", "own_component"):
+            number = getattr(self, name)
+            if number is not None and not 1 <= number <= _LARGEST_NUMBER:
+                raise ValueError(f"{name} must be from 1 to {_LARGEST_NUMBER}, not {number}")
+        if self.is_own(self.system, AUTOPILOT):
+            raise ValueError(
+                f"own_system {self.own_system} and own_component {self.own_component} are the autopilot's own; choose "
+                f"another own_component, such as {OWN_COMPONENT}"
+            )
+
+    def is_own(self, system: int | None, component: int | None) -> bool:
+        """Return True if these numbers are ours."""
+        return (system, component) == (self.own_system, self.own_component)
 
 
 class VehicleLink:

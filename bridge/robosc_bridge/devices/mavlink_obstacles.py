@@ -8,7 +8,16 @@ import math
 import threading
 
 from robosc_bridge.devices.interface import RawScan, Scan, ScannerCounters
-from robosc_bridge.devices.mavlink_link import BAUD, LinkSettings, Obstacle, VehicleLink, acquire, release
+from robosc_bridge.devices.mavlink_link import (
+    BAUD,
+    OWN_COMPONENT,
+    OWN_SYSTEM,
+    LinkSettings,
+    Obstacle,
+    VehicleLink,
+    acquire,
+    release,
+)
 from robosc_bridge.devices.mavlink_state import Timestamped, VehicleState
 from robosc_bridge.errors import LineLostError
 from robosc_bridge.host import Host
@@ -45,8 +54,8 @@ class MavlinkObstacles:
         baud: int = BAUD,
         *,
         system: int | None = None,
-        own_system: int = 255,
-        own_component: int = 190,
+        own_system: int = OWN_SYSTEM,
+        own_component: int = OWN_COMPONENT,
         signing: Signing | None = None,
         host: Host = SYSTEM_HOST,
     ) -> None:

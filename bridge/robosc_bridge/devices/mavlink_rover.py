@@ -7,12 +7,21 @@ Sources: ArduPilot Rover (`GCS_MAVLink_Rover.cpp`, `mode_guided.cpp`, `AP_Arming
 """
 
 import contextlib
+import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
-from robosc_bridge.devices.interface import STANDSTILL, DriveLimits, DriveReading, MotorFault, Velocity
+from robosc_bridge.devices.interface import STANDSTILL, BatteryLevel, DriveLimits, DriveReading, MotorFault, Velocity
 from robosc_bridge.devices.kinematics import wheel_speeds, within_limits
-from robosc_bridge.devices.mavlink_link import BAUD, LinkSettings, VehicleLink, acquire, release
+from robosc_bridge.devices.mavlink_link import (
+    BAUD,
+    OWN_COMPONENT,
+    OWN_SYSTEM,
+    LinkSettings,
+    VehicleLink,
+    acquire,
+    release,
+)
 from robosc_bridge.devices.mavlink_odometry import VehicleOdometry, estimate
 from robosc_bridge.devices.mavlink_state import Timestamped, VehicleState
 from robosc_bridge.devices.robots import Body
@@ -25,7 +34,9 @@ from robosc_bridge.errors import (
     WrongDeviceError,
 )
 from robosc_bridge.host import Host
+from robosc_bridge.protocol.framing import FrameCounts
 from robosc_bridge.protocol.mavlink_messages import (
+    ChargeState,
     Heartbeat,
     MavCommand,
     Mode,
@@ -66,6 +77,21 @@ _NEW_TARGET_S = 0.02
 _WARNING = 4
 _FOLLOWING_LIMIT_S = 2.0
 _MM = 1000
+_LEVELS: Mapping[int, BatteryLevel] = {
+    ChargeState.OK: BatteryLevel.SOUND,
+    ChargeState.CHARGING: BatteryLevel.SOUND,
+    ChargeState.LOW: BatteryLevel.LOW,
+    ChargeState.UNHEALTHY: BatteryLevel.LOW,
+    ChargeState.CRITICAL: BatteryLevel.EMPTY,
+    ChargeState.EMERGENCY: BatteryLevel.EMPTY,
+    ChargeState.FAILED: BatteryLevel.EMPTY,
+}
+_LONG_TARGETS = (
+    "the rover is armed; where the bridge or its line fails, it drives on for up to 3 s, until its target expires "
+    "(docs/bridge-safety.md says what shortens that)"
+)
+
+_log = logging.getLogger(__name__)
 
 
 class MavlinkRover:
@@ -94,8 +120,8 @@ class MavlinkRover:
         baud: int = BAUD,
         *,
         system: int | None = None,
-        own_system: int = 255,
-        own_component: int = 190,
+        own_system: int = OWN_SYSTEM,
+        own_component: int = OWN_COMPONENT,
         signing: Signing | None = None,
         host: Host = SYSTEM_HOST,
         motion_limit_s: float = 1.0,
@@ -117,6 +143,13 @@ class MavlinkRover:
         self._is_torque_lost = False
         self._target = STANDSTILL
         self._target_s = -math.inf
+        self._is_warned = False
+
+    @property
+    def counters(self) -> FrameCounts:
+        """Health of the line since it was opened."""
+        link = self._link
+        return FrameCounts() if link is None else link.counts
 
     def open(self) -> None:
         """Find the vehicle and check that it is a rover that tells where it is and that nobody else drives.
@@ -143,8 +176,8 @@ class MavlinkRover:
                 self._link.request((telemetry,), _TELEMETRY_S.get(telemetry, self._telemetry_s))
             if not self._waits(lambda state: self._fresh(state) is not None, _SHOWN_LIMIT_S):
                 raise DeviceFaultError(
-                    f"{self._path}: the rover does not tell where it is; its estimator has no origin (GPS, or another "
-                    "source of its position)"
+                    f"{self._path}: the rover does not report where it is; its estimator has no origin (GPS, or "
+                    "another source of its position)"
                 )
         except BaseException:
             self._release()
@@ -181,6 +214,9 @@ class MavlinkRover:
         self._is_torque_wanted = True
         self._is_torque_lost = False
         self._following.forget()
+        if not self._is_warned:
+            self._is_warned = True
+            _log.warning("%s: %s", self._path, _LONG_TARGETS)
 
     def exchange(self, velocity: Velocity) -> DriveReading:
         """Send the velocity and our heartbeat where they are due, and tell what came; waits for nothing.
@@ -206,10 +242,14 @@ class MavlinkRover:
             # Nor is one driven that no longer tells what it does.
             target = STANDSTILL if self._is_torque_lost or told is None else velocity
             target = within_limits(target, self.limits, self._robot.wheel_separation_m)
+            if self._host.monotonic() > velocity.until_s:
+                target = STANDSTILL
             if self._is_due(target):
                 self._send_target(target)
         if told is None:
-            raise DeviceSilentError(f"{self._path}: the rover has not told its motion for {self._motion_limit_s:g} s")
+            raise DeviceSilentError(
+                f"{self._path}: the rover has not reported its motion for {self._motion_limit_s:g} s"
+            )
         return self._reading(state, told, is_obeying)
 
     def reset(self) -> None:
@@ -249,6 +289,11 @@ class MavlinkRover:
     def _find(self, link: VehicleLink) -> None:
         if self._waits(lambda state: state.heartbeat is not None, _FIRST_HEARTBEAT_LIMIT_S):
             self._heartbeat(link.state)
+            if self._settings.is_own(link.state.system, link.state.component):
+                raise WrongDeviceError(
+                    f"{self._path}: the rover has the numbers {link.state.system} (system) and {link.state.component} "
+                    "(component), as the bridge; set own_system or own_component to others"
+                )
             return
         stranger = link.state.stranger
         if stranger is not None:
@@ -416,5 +461,6 @@ class MavlinkRover:
             faults=frozenset(faults),
             battery_v=next((found.voltage_v for found in (main, pack) if found and found.voltage_v is not None), None),
             battery_share=next((found.share for found in (main, pack) if found and found.share is not None), None),
+            battery_level=None if pack is None else _LEVELS.get(pack.state),
             imu={"angular_velocity_z": velocity.angular_rad_s},
         )

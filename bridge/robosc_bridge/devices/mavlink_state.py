@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 from robosc_bridge.protocol.mavlink_messages import (
     ARDUPILOT,
+    AUTOPILOT,
     GROUND_ROVER,
     GROUND_STATIONS,
     Answer,
@@ -21,7 +22,6 @@ _KEPT_TEXTS = 8
 _MOST_CHUNKS = 20
 # A vehicle's clock goes back when it starts anew; datagrams overtake each other by less.
 _OVERTAKEN_S = 2.0
-_AUTOPILOT = 1  # Component.
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +113,7 @@ class VehicleState:
             return replace(
                 self, system=message.system, component=message.component, heartbeat=Timestamped(time_s, heartbeat)
             )
-        if message.component == _AUTOPILOT and heartbeat.kind not in GROUND_STATIONS:
+        if message.component == AUTOPILOT and heartbeat.kind not in GROUND_STATIONS:
             return replace(self, stranger=heartbeat)
         return self
 

@@ -55,7 +55,7 @@ def checked_options(driver: Driver, options: Mapping[str, Any]) -> dict[str, Any
     """
     for name in _SAID_ELSEWHERE:
         if name in options:
-            raise DriverOptionError(f"'{name}' is no option: it is said outside of the options")
+            raise DriverOptionError(f"'{name}' is not an option: it has a key of its own outside of the options")
     types = option_types(driver)
     if types is None:
         return dict(options)

@@ -26,15 +26,17 @@ class Motor:
         name: Name as on its label.
         model_number: Number that it reports.
         velocity_limit_raw: Limit of its goal velocity, as it left the factory; what is beyond, it ignores.
+        lowest_v: Lowest supply that it is made for, in volts.
     """
 
     name: str
     model_number: int
     velocity_limit_raw: int
+    lowest_v: float
 
 
-XL430_W250 = Motor("XL430-W250", 1060, 265)
-XM430_W210 = Motor("XM430-W210", 1030, 330)
+XL430_W250 = Motor("XL430-W250", 1060, 265, 6.5)
+XM430_W210 = Motor("XM430-W210", 1030, 330, 10.0)
 MOTORS = {motor.model_number: motor for motor in (XL430_W250, XM430_W210)}
 
 

@@ -28,7 +28,7 @@ class VideoDevice:
     Raises:
         LineMissingError: There is no such device.
         LineDeniedError: This user may not open it.
-        LineError: OpenCV cannot read it: another program has it, or it is no camera.
+        LineError: OpenCV cannot read it: another program has it, or it is not a camera.
     """
 
     def __init__(self, path: str) -> None:
@@ -38,7 +38,7 @@ class VideoDevice:
         self._capture = cv2.VideoCapture(path, cv2.CAP_ANY if self._is_film else cv2.CAP_V4L2)
         if not self._capture.isOpened():
             self._capture.release()
-            raise LineError(path, "no pictures can be read: another program uses it, or it is no camera")
+            raise LineError(path, "no pictures can be read: another program uses it, or it is not a camera")
         # The newest picture counts: those that wait show the past. Not every device can do so.
         self._capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
 

@@ -8,6 +8,8 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.ground_station.status import AUTO, GUIDED
 from robosc_bridge.protocol.mavlink_messages import CUSTOM_MODE, FORCE, MavCommand, Mode, Result
@@ -88,7 +90,7 @@ class Refusal:
 type Meaning = Stop | Change | Interval | Once | Checks | Refusal
 
 _UNSUPPORTED = Refusal(Result.UNSUPPORTED)
-_CAPABILITIES = 148
+_CAPABILITIES: int = dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION
 
 
 def meaning(number: int, parameters: Parameters) -> Meaning:

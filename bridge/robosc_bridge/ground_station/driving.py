@@ -46,7 +46,7 @@ def from_position_target(told: Any) -> Velocity:
     aside_m_s = 0.0 if mask & _VY else told.vy
     yaw_rate_rad_s = 0.0 if mask & _YAW_RATE else told.yaw_rate
     if not all(map(math.isfinite, (speed_m_s, aside_m_s, yaw_rate_rad_s))):
-        raise Unusable("A set-point is no number.")
+        raise Unusable("A set-point is not a number.")
     if aside_m_s != 0.0:
         raise Unusable("The robot cannot go sideways: vy must be 0.")
     return Velocity(speed_m_s, -yaw_rate_rad_s + 0.0)

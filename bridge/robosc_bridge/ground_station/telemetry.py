@@ -9,6 +9,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
 from robosc_bridge.daemon.feed import Snapshot
 from robosc_bridge.daemon.reports import Device
 from robosc_bridge.devices.interface import DriveReading, Scan
@@ -20,21 +22,18 @@ from robosc_bridge.safety import Caution, Reason
 type Make = Callable[[Any], Any]
 """Makes a message with the library's codec."""
 
-_GENERIC = 0  # Autopilot.
-_MOTORS, _BATTERY, _PROXIMITY = 0x8000, 0x2000000, 0x4000000
+_MOTORS: int = dialect.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+_BATTERY: int = dialect.MAV_SYS_STATUS_SENSOR_BATTERY
+_PROXIMITY: int = dialect.MAV_SYS_STATUS_SENSOR_PROXIMITY
 # There is none; MAVProxy takes one that is not healthy for broken, whether it is there or not.
-_FENCE = 0x100000
-_ALL_BATTERIES, _LITHIUM_POLYMER = 1, 1
+_FENCE: int = dialect.MAV_SYS_STATUS_GEOFENCE
 _NO_TEMPERATURE = 32767
-_OK, _LOW, _CRITICAL = 1, 2, 3
-_WHEELS = 1  # Naive odometry.
-_LASER = 0
 
 
 def heartbeat(status: VehicleStatus) -> Make:
     """Make the message that reports that it is there, and its status."""
     return lambda codec: codec.heartbeat_encode(
-        GROUND_ROVER, _GENERIC, status.base_mode, int(status.mode), int(status.system_status)
+        GROUND_ROVER, dialect.MAV_AUTOPILOT_GENERIC, status.base_mode, int(status.mode), int(status.system_status)
     )
 
 
@@ -79,13 +78,14 @@ def battery_status(snapshot: Snapshot) -> Make | None:
     millivolts = _millivolts(reading)
     if reading is None or (millivolts == UNKNOWN and _percent(reading) < 0):
         return None
-    charge = _OK
+    charge = dialect.MAV_BATTERY_CHARGE_STATE_OK
     if Reason.BATTERY_LOW in snapshot.reasons:
-        charge = _CRITICAL
+        charge = dialect.MAV_BATTERY_CHARGE_STATE_CRITICAL
     elif Caution.BATTERY in snapshot.warnings:
-        charge = _LOW
+        charge = dialect.MAV_BATTERY_CHARGE_STATE_LOW
     return lambda codec: codec.battery_status_encode(
-        0, _ALL_BATTERIES, _LITHIUM_POLYMER, _NO_TEMPERATURE, [millivolts] + [UNKNOWN] * 9, -1, -1, -1,
+        0, dialect.MAV_BATTERY_FUNCTION_ALL, dialect.MAV_BATTERY_TYPE_LIPO, _NO_TEMPERATURE,
+        [millivolts] + [UNKNOWN] * 9, -1, -1, -1,
         _percent(reading), 0, charge,
     )  # fmt: skip
 
@@ -98,7 +98,7 @@ def odometry(reading: DriveReading) -> Make:
     return lambda codec: codec.odometry_encode(
         _microseconds(reading.time_s), LOCAL_FRD, BODY_FRD, pose.x_m, -pose.y_m + 0.0, 0.0,
         [math.cos(half_rad), 0.0, 0.0, math.sin(half_rad)], velocity.linear_m_s, 0.0, 0.0,
-        0.0, 0.0, -velocity.angular_rad_s + 0.0, unknown, unknown, 0, _WHEELS, 0,
+        0.0, 0.0, -velocity.angular_rad_s + 0.0, unknown, unknown, 0, dialect.MAV_ESTIMATOR_TYPE_NAIVE, 0,
     )  # fmt: skip
 
 
@@ -129,8 +129,8 @@ def obstacle_distance(scan: Scan, least_m: float, most_m: float) -> Make:
     least_cm, most_cm = math.ceil(least_m * 100 - 1e-6), int(most_m * 100 + 1e-6)
     distances_cm = ring_distances_cm(scan.ranges_m, least_cm, most_cm)
     return lambda codec: codec.obstacle_distance_encode(
-        _microseconds(scan.time_s), _LASER, list(distances_cm), RING_STEP_DEG, least_cm, most_cm,
-        float(RING_STEP_DEG), 0.0, BODY_FRD,
+        _microseconds(scan.time_s), dialect.MAV_DISTANCE_SENSOR_LASER, list(distances_cm), RING_STEP_DEG, least_cm,
+        most_cm, float(RING_STEP_DEG), 0.0, BODY_FRD,
     )  # fmt: skip
 
 

@@ -10,20 +10,33 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
-GROUND_ROVER = 10
-ARDUPILOT = 3
-GROUND_STATIONS = frozenset({6})
-ARMED = 128
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-_ONBOARD_CONTROLLER = 18
-NO_AUTOPILOT = 8
-_ACTIVE = 4
-BODY_NED = 8
+GROUND_ROVER: int = dialect.MAV_TYPE_GROUND_ROVER
+ARDUPILOT: int = dialect.MAV_AUTOPILOT_ARDUPILOTMEGA
+NO_AUTOPILOT: int = dialect.MAV_AUTOPILOT_INVALID
+AUTOPILOT: int = dialect.MAV_COMP_ID_AUTOPILOT1
+ONBOARD_COMPUTER: int = dialect.MAV_COMP_ID_ONBOARD_COMPUTER
+GROUND_STATIONS = frozenset({dialect.MAV_TYPE_GCS})
+ARMED: int = dialect.MAV_MODE_FLAG_SAFETY_ARMED
+CUSTOM_MODE: int = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+BODY_NED: int = dialect.MAV_FRAME_BODY_NED
+LOCAL_NED: int = dialect.MAV_FRAME_LOCAL_NED
+LOCAL_FRD: int = dialect.MAV_FRAME_LOCAL_FRD
+BODY_FRD: int = dialect.MAV_FRAME_BODY_FRD
 # All but the speeds and the yaw rate is to be ignored; that of accelerations must be said.
-VELOCITY_AND_TURN_RATE = 0x05E7
-CUSTOM_MODE = 1
+VELOCITY_AND_TURN_RATE: int = (
+    dialect.POSITION_TARGET_TYPEMASK_X_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_Y_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_Z_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_VZ_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_AX_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_AY_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_AZ_IGNORE
+    | dialect.POSITION_TARGET_TYPEMASK_YAW_IGNORE
+)
+# The dialect has no names for these three.
 FORCE = 21196
-LOCAL_NED, LOCAL_FRD, BODY_FRD = 1, 20, 12
 UNKNOWN = 65535
 CHUNK = 50
 
@@ -31,77 +44,77 @@ CHUNK = 50
 class Mode(IntEnum):
     """Mode of ArduPilot Rover."""
 
-    MANUAL = 0
-    ACRO = 1
-    STEERING = 3
-    HOLD = 4
-    LOITER = 5
-    FOLLOW = 6
-    SIMPLE = 7
-    DOCK = 8
-    CIRCLE = 9
-    AUTO = 10
-    RTL = 11
-    SMART_RTL = 12
-    GUIDED = 15
-    INITIALISING = 16
+    MANUAL = dialect.ROVER_MODE_MANUAL
+    ACRO = dialect.ROVER_MODE_ACRO
+    STEERING = dialect.ROVER_MODE_STEERING
+    HOLD = dialect.ROVER_MODE_HOLD
+    LOITER = dialect.ROVER_MODE_LOITER
+    FOLLOW = dialect.ROVER_MODE_FOLLOW
+    SIMPLE = dialect.ROVER_MODE_SIMPLE
+    DOCK = dialect.ROVER_MODE_DOCK
+    CIRCLE = dialect.ROVER_MODE_CIRCLE
+    AUTO = dialect.ROVER_MODE_AUTO
+    RTL = dialect.ROVER_MODE_RTL
+    SMART_RTL = dialect.ROVER_MODE_SMART_RTL
+    GUIDED = dialect.ROVER_MODE_GUIDED
+    INITIALISING = dialect.ROVER_MODE_INITIALIZING
 
 
 class MavCommand(IntEnum):
     """Command that a vehicle can be given, with its number."""
 
-    SET_MODE = 176
-    FLIGHT_TERMINATION = 185
-    PAUSE_CONTINUE = 193
-    REBOOT_SHUTDOWN = 246
-    ARM_DISARM = 400
-    RUN_PREARM_CHECKS = 401
-    SET_MESSAGE_INTERVAL = 511
-    REQUEST_MESSAGE = 512
-    REQUEST_CAPABILITIES = 520
+    SET_MODE = dialect.MAV_CMD_DO_SET_MODE
+    FLIGHT_TERMINATION = dialect.MAV_CMD_DO_FLIGHTTERMINATION
+    PAUSE_CONTINUE = dialect.MAV_CMD_DO_PAUSE_CONTINUE
+    REBOOT_SHUTDOWN = dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
+    ARM_DISARM = dialect.MAV_CMD_COMPONENT_ARM_DISARM
+    RUN_PREARM_CHECKS = dialect.MAV_CMD_RUN_PREARM_CHECKS
+    SET_MESSAGE_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+    REQUEST_MESSAGE = dialect.MAV_CMD_REQUEST_MESSAGE
+    REQUEST_CAPABILITIES = dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES
 
 
 class Incoming(IntEnum):
     """Messages that a vehicle handles, with their numbers."""
 
-    HEARTBEAT = 0
-    PING = 4
-    SET_MODE = 11
-    PARAM_REQUEST_READ = 20
-    PARAM_REQUEST_LIST = 21
-    PARAM_SET = 23
-    MISSION_REQUEST_LIST = 43
-    MANUAL_CONTROL = 69
-    COMMAND_INT = 75
-    COMMAND_LONG = 76
-    SET_POSITION_TARGET = 84
-    FILE_TRANSFER = 110
-    TIMESYNC = 111
+    HEARTBEAT = dialect.MAVLINK_MSG_ID_HEARTBEAT
+    PING = dialect.MAVLINK_MSG_ID_PING
+    SET_MODE = dialect.MAVLINK_MSG_ID_SET_MODE
+    PARAM_REQUEST_READ = dialect.MAVLINK_MSG_ID_PARAM_REQUEST_READ
+    PARAM_REQUEST_LIST = dialect.MAVLINK_MSG_ID_PARAM_REQUEST_LIST
+    PARAM_SET = dialect.MAVLINK_MSG_ID_PARAM_SET
+    MISSION_REQUEST_LIST = dialect.MAVLINK_MSG_ID_MISSION_REQUEST_LIST
+    MANUAL_CONTROL = dialect.MAVLINK_MSG_ID_MANUAL_CONTROL
+    COMMAND_INT = dialect.MAVLINK_MSG_ID_COMMAND_INT
+    COMMAND_LONG = dialect.MAVLINK_MSG_ID_COMMAND_LONG
+    SET_POSITION_TARGET = dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
+    FILE_TRANSFER = dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL
+    TIMESYNC = dialect.MAVLINK_MSG_ID_TIMESYNC
 
 
 class Result(IntEnum):
     """Answer to a command."""
 
-    ACCEPTED = 0
-    TEMPORARILY_REJECTED = 1
-    DENIED = 2
-    UNSUPPORTED = 3
-    FAILED = 4
-    IN_PROGRESS = 5
+    ACCEPTED = dialect.MAV_RESULT_ACCEPTED
+    TEMPORARILY_REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
+    DENIED = dialect.MAV_RESULT_DENIED
+    UNSUPPORTED = dialect.MAV_RESULT_UNSUPPORTED
+    FAILED = dialect.MAV_RESULT_FAILED
+    IN_PROGRESS = dialect.MAV_RESULT_IN_PROGRESS
 
 
 class Telemetry(IntEnum):
     """Messages that a vehicle sends again and again, with their numbers."""
 
-    SYS_STATUS = 1
-    ATTITUDE = 30
-    LOCAL_POSITION = 32
-    DISTANCE_SENSOR = 132
-    BATTERY_STATUS = 147
-    NAMED_VALUE_FLOAT = 251
-    NAMED_VALUE_INT = 252
-    OBSTACLE_DISTANCE = 330
-    ODOMETRY = 331
+    SYS_STATUS = dialect.MAVLINK_MSG_ID_SYS_STATUS
+    ATTITUDE = dialect.MAVLINK_MSG_ID_ATTITUDE
+    LOCAL_POSITION = dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED
+    DISTANCE_SENSOR = dialect.MAVLINK_MSG_ID_DISTANCE_SENSOR
+    BATTERY_STATUS = dialect.MAVLINK_MSG_ID_BATTERY_STATUS
+    NAMED_VALUE_FLOAT = dialect.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT
+    NAMED_VALUE_INT = dialect.MAVLINK_MSG_ID_NAMED_VALUE_INT
+    OBSTACLE_DISTANCE = dialect.MAVLINK_MSG_ID_OBSTACLE_DISTANCE
+    ODOMETRY = dialect.MAVLINK_MSG_ID_ODOMETRY
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +174,19 @@ class MotionEstimate:
     resets: int = 0
 
 
+class ChargeState(IntEnum):
+    """Judgement of an autopilot on its battery (MAV_BATTERY_CHARGE_STATE), by its own failsafe parameters."""
+
+    UNDEFINED = 0
+    OK = 1
+    LOW = 2
+    CRITICAL = 3
+    EMERGENCY = 4
+    FAILED = 5
+    UNHEALTHY = 6
+    CHARGING = 7
+
+
 @dataclass(frozen=True, slots=True)
 class BatteryState:
     """State of the first battery; None: not reported.
@@ -169,11 +195,13 @@ class BatteryState:
         is_main: True if it is the summary that every vehicle sends.
         voltage_v: Voltage of the whole pack.
         share: Charge, 0 to 1.
+        state: Judgement of the vehicle on it, one of `ChargeState` if it is known.
     """
 
     is_main: bool
     voltage_v: float | None
     share: float | None
+    state: int = ChargeState.UNDEFINED
 
 
 @dataclass(frozen=True, slots=True)
@@ -318,7 +346,8 @@ def _battery_status(told: Any) -> BatteryState | None:
     if told.id != 0:
         return None
     cells_mv = [cell_mv for cell_mv in told.voltages if cell_mv != UNKNOWN]
-    return BatteryState(False, sum(cells_mv) / 1000 if any(cells_mv) else None, _share(told.battery_remaining))
+    voltage_v = sum(cells_mv) / 1000 if any(cells_mv) else None
+    return BatteryState(False, voltage_v, _share(told.battery_remaining), told.charge_state)
 
 
 def _text(told: Any) -> Text:
@@ -347,14 +376,14 @@ def _distance(told: Any) -> SectorDistance:
 
 
 READERS: Mapping[int, Callable[[Any], Content]] = {
-    0: _heartbeat,
+    dialect.MAVLINK_MSG_ID_HEARTBEAT: _heartbeat,
     Telemetry.SYS_STATUS: _sys_status,
     Telemetry.ATTITUDE: _attitude,
     Telemetry.LOCAL_POSITION: _local_position,
-    77: _answer,
+    dialect.MAVLINK_MSG_ID_COMMAND_ACK: _answer,
     Telemetry.DISTANCE_SENSOR: _distance,
     Telemetry.BATTERY_STATUS: _battery_status,
-    253: _text,
+    dialect.MAVLINK_MSG_ID_STATUSTEXT: _text,
     Telemetry.OBSTACLE_DISTANCE: _obstacle_ring,
     Telemetry.ODOMETRY: _odometry,
 }
@@ -363,7 +392,7 @@ READERS: Mapping[int, Callable[[Any], Content]] = {
 
 def own_heartbeat(codec: Any) -> Any:
     """Return the heartbeat of a companion computer."""
-    return codec.heartbeat_encode(_ONBOARD_CONTROLLER, NO_AUTOPILOT, 0, 0, _ACTIVE)
+    return codec.heartbeat_encode(dialect.MAV_TYPE_ONBOARD_CONTROLLER, NO_AUTOPILOT, 0, 0, dialect.MAV_STATE_ACTIVE)
 
 
 def command(

@@ -68,5 +68,5 @@ class Decoder:
             del header
             del self._held[:end]
         if len(self._held) >= _LONGEST_HEADER:
-            raise NotPicturesError("what comes are no grey pictures (PGM)")
+            raise NotPicturesError("the stream does not hold grey pictures (PGM)")
         return newest

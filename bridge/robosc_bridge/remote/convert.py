@@ -182,6 +182,17 @@ def _snapshot(snapshot: Snapshot) -> pb.Snapshot:
         has_scan=snapshot.scan is not None,
         overruns=snapshot.overruns,
     )
+    for latency in snapshot.timing.latencies:
+        made.latencies.add(
+            name=latency.name,
+            count=latency.count,
+            p50_s=latency.share_s(0.5),
+            p99_s=latency.share_s(0.99),
+            max_s=latency.max_s,
+            sum_s=latency.sum_s,
+        )
+    for device, counts in snapshot.timing.lines.items():
+        made.lines.add(device=device, counts=counts)
     made.time.FromNanoseconds(round(snapshot.time_s * 1e9))
     if snapshot.reading is not None:
         made.drive.CopyFrom(_drive(snapshot.reading))

@@ -102,7 +102,7 @@ def _fill(value: Value, data: Any) -> None:
     elif isinstance(data, list | tuple):
         _fill_list(value.list_value, data)
     else:
-        raise TypeError(f"{type(data).__name__} is no plain data")
+        raise TypeError(f"{type(data).__name__} is not plain data")
 
 
 def _fill_struct(struct: Struct, data: dict[str, Any]) -> None:

@@ -3,7 +3,7 @@
 import math
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from robosc_bridge.devices.interface import STANDSTILL, DriveReading, MotorFault, Velocity
 from robosc_bridge.safety.limits import SafetyLimits
@@ -20,7 +20,7 @@ class Output:
     """Command for the drive base in its next exchange.
 
     Attributes:
-        velocity: Standstill whenever there is a reason.
+        velocity: Standstill whenever there is a reason; it holds for `SafetyLimits.motor_timeout_s`.
         is_torque_wanted: True if the motors are to hold.
         reasons: Reasons why it may not move, in the order of `Reason`.
         warnings: Warnings that a person should know, in the order of `Caution`.
@@ -142,7 +142,7 @@ class SafetyLayer:
             self._faults = reading.faults
             if reading.faults - _HARMLESS:
                 self._latched.add(Reason.MOTOR_FAULT)
-            self._battery.update(reading.battery_v, reading.time_s)
+            self._battery.update(reading.battery_v, reading.time_s, reading.battery_level)
             if self._battery.is_empty:
                 self._latched.add(Reason.BATTERY_LOW)
             is_still = all(abs(speed) <= self._limits.standstill_m_s for speed in reading.wheels_m_s)
@@ -156,8 +156,11 @@ class SafetyLayer:
                 self._latched.add(Reason.TORQUE_LOST)
             return
         self._is_torque_seen = True
-        if self._wheels.is_astray(wheels(self._velocity, self._limits), reading.wheels_m_s, reading.time_s):
+        self._wheels.update(wheels(self._velocity, self._limits), reading)
+        if self._wheels.is_astray:
             self._latched.add(Reason.WHEEL_ASTRAY)
+        if self._wheels.is_unbidden:
+            self._latched.add(Reason.UNBIDDEN_MOTION)
 
     def drive_failed(self) -> None:
         """An exchange with the drive base has failed."""
@@ -222,8 +225,10 @@ class SafetyLayer:
         with self._lock:
             self._find_pause(now_s)
             is_clock_wrong = not self._now_s <= now_s < math.inf
-            # For a time in which nothing was read there is no acceleration.
-            step_s = min(now_s - self._now_s, self._limits.motor_timeout_s)
+            step_s = now_s - self._now_s
+            if step_s > self._limits.motor_timeout_s:
+                # What was put out before holds no longer: motion begins anew.
+                self._velocity, step_s = STANDSTILL, 0.0
             if math.isfinite(now_s):
                 self._now_s = now_s
             # A time ahead of the clock counts from now.
@@ -237,7 +242,9 @@ class SafetyLayer:
                 self._velocity = STANDSTILL
             else:
                 self._velocity = ramped(self._velocity, self._wanted, self._limits, step_s)
-            return Output(self._velocity, self._torque_since_s is not None, self._reasons, self._find_warnings())
+            # What is written later than this was decided from what is no longer so.
+            velocity = replace(self._velocity, until_s=self._now_s + self._limits.motor_timeout_s)
+            return Output(velocity, self._torque_since_s is not None, self._reasons, self._find_warnings())
 
     def _find_pause(self, now_s: float) -> None:
         """Find out whether nothing of the bridge was at work for too long; what was known before is no longer so.
@@ -271,7 +278,9 @@ class SafetyLayer:
         elif self._torque_since_s is not None:
             self._letting_go_s = self._now_s if self._letting_go_s is None else min(self._letting_go_s, self._now_s)
             self._still_s = min(self._still_s, self._now_s)
-            if self._still_s > self._letting_go_s or self._now_s - self._letting_go_s >= self._limits.torque_off_s:
+            # Motors that rotate against a goal of zero obey something else: they come to rest without torque alone.
+            is_over = self._now_s - self._letting_go_s >= self._limits.torque_off_s
+            if self._still_s > self._letting_go_s or is_over or Reason.UNBIDDEN_MOTION in self._latched:
                 self._torque_since_s = self._letting_go_s = None
 
     def _find_reasons(self, is_clock_wrong: bool) -> tuple[Reason, ...]:
@@ -295,5 +304,8 @@ class SafetyLayer:
             Caution.COMMAND_REFUSED: self._is_refused,
             Caution.SCAN_BLIND: self._sight.is_blind(self._asked_m_s),
             Caution.SCAN_NOISY: self._is_noisy,
+            Caution.TORQUE_HELD: self._limits.has_own_controls
+            and self._torque_since_s is not None
+            and Reason.OPERATOR_STOP in self._latched,
         }
         return tuple(caution for caution, is_so in holds.items() if is_so)

@@ -1,31 +1,77 @@
-"""The numbers of the safety layer."""
+"""The numbers of the safety layer: what they are where nobody says otherwise, and what they may be.
+
+The configuration, its schema, its page and the template of `robosc-bridge init` take them from here.
+"""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from types import MappingProxyType
 
+REVOLUTIONS = 3
+"""Revolutions of a scanner without a full scan after which it counts as silent."""
+
+SCAN_TIMEOUT_S = 0.6
+"""Time after which a scanner counts as silent whose driver does not tell how long a revolution takes, in seconds."""
+
 SCAN_TIMEOUTS_S: Mapping[str, float] = MappingProxyType({"lds01": 0.6, "lds02": 0.5, "lds03": 0.3})
-"""After how long a scanner counts as silent: three revolutions, by its driver's name."""
+"""Time after which a scanner counts as silent, by its driver's name: three revolutions, in seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """Bounds of a number.
+
+    Attributes:
+        least: Smallest value; None: all above 0.
+        most: Largest value; None: all that are finite.
+    """
+
+    least: float | None = None
+    most: float | None = None
+
+    def problem(self, value: float) -> str:
+        """Return what the value must be, where it is not; empty: it is within the bounds."""
+        if not (math.isfinite(value) and value > 0):
+            return "must be finite and above 0"
+        if self.least is not None and value < self.least:
+            return f"must be at least {self.least:g}"
+        return f"must be at most {self.most:g}" if self.most is not None and value > self.most else ""
+
 
 # A time that was meant in milliseconds, or is as long as a journey, must not switch a rule off.
-_LONGEST_S = {
-    "command_timeout_s": 1.0,
-    "scan_timeout_s": 2.0,
-    "motor_timeout_s": 1.0,
-    "loop_timeout_s": 2.0,
-    "pause_s": 2.0,
-    "operator_timeout_s": 10.0,
-    "battery_mean_s": 10.0,
-    "astray_s": 5.0,
-    "torque_on_s": 10.0,
-    "torque_off_s": 5.0,
-}
+BOUNDS: Mapping[str, Bounds] = MappingProxyType(
+    {
+        "linear_m_s": Bounds(most=5),
+        "angular_rad_s": Bounds(most=20),
+        "linear_acceleration_m_s2": Bounds(most=50),
+        "linear_deceleration_m_s2": Bounds(most=50),
+        "angular_acceleration_rad_s2": Bounds(most=200),
+        "angular_deceleration_rad_s2": Bounds(most=200),
+        "command_timeout_s": Bounds(0.02, 1),
+        "scan_timeout_s": Bounds(0.05, 2),
+        "motor_timeout_s": Bounds(0.06, 1),
+        "loop_timeout_s": Bounds(0.005, 2),
+        "pause_s": Bounds(most=2),
+        "operator_timeout_s": Bounds(0.1, 10),
+        "battery_warn_v": Bounds(most=100),
+        "battery_stop_v": Bounds(most=100),
+        "battery_mean_s": Bounds(most=10),
+        "astray_s": Bounds(most=5),
+        "unbidden_s": Bounds(most=5),
+        "torque_on_s": Bounds(most=10),
+        "torque_off_s": Bounds(most=5),
+        "min_valid_share": Bounds(most=1),
+    }
+)
+"""Bounds of the numbers that a configuration may set, and of the times; the others are above 0 and finite."""
+
 _NOT_BELOW = (
     ("linear_deceleration_m_s2", "linear_acceleration_m_s2"),
     ("angular_deceleration_rad_s2", "angular_acceleration_rad_s2"),
     ("battery_warn_v", "battery_stop_v"),
 )
+_MAY_BE_NONE = ("scan_timeout_s", "operator_timeout_s", "battery_warn_v", "battery_stop_v")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,26 +90,31 @@ class SafetyLimits:
         angular_acceleration_rad_s2: Acceleration away from standstill.
         angular_deceleration_rad_s2: Deceleration towards standstill.
         command_timeout_s: Time for which a command to move holds.
-        motor_timeout_s: Longest time without a reading of the drive base.
+        motor_timeout_s: Longest time without a reading of the drive base, and for which an output holds.
         motor_failures: Number of failed exchanges in a row that count as silence, too.
         loop_timeout_s: Longest time between two cycles of the supervisor's loop.
         pause_s: Longest time in which neither the drive base's thread nor the loop turns while the motors hold.
         operator_timeout_s: Longest time without a sign of the operator; None: none is needed.
-        battery_warn_v: Mean voltage at and below which the safety layer warns.
-        battery_stop_v: Mean voltage at and below which it stops the robot.
+        battery_warn_v: Mean voltage at and below which the safety layer warns; None: only what the drive base itself
+            tells of its battery counts.
+        battery_stop_v: Mean voltage at and below which it stops the robot; None: the same.
         battery_mean_s: Time that a mean is made of, so that a dip stops nothing.
         astray_m_s: Difference from its goal above which a wheel is astray, if it is also more than half of the goal.
         astray_s: Longest time that a wheel may be astray.
+        unbidden_s: Longest time that a wheel may rotate faster than `astray_m_s`, after all have stood still and with
+            nothing commanded since.
         torque_on_s: Longest time that the motors take to hold.
         torque_off_s: Longest wait for the wheels to stand still before torque goes off.
         standstill_m_s: Fastest speed of a wheel that counts as standstill.
         min_valid_share: Smallest share of the scanner's ranges where the robot goes that must be valid in a full
             scan; with a smaller one, the scanner sees nothing there; at most 1.
+        has_own_controls: True if the drive base has controls of its own that move the wheels while torque is on.
         is_torque_off_on_operator_stop: True if an operator's stop wants torque off, too.
-        is_stopped_when_blind: True if the robot may not go where the scanner sees nothing; else a person is informed.
+        is_stopped_when_blind: True if the robot may not go where the scanner sees nothing: what is unknown counts as an
+            obstacle. Else a person is informed.
 
     Raises:
-        ValueError: A number is not finite, not above 0, too large or inconsistent with another; all of them are
+        ValueError: A number is not finite, not within its bounds or inconsistent with another; all of them are
             listed.
     """
 
@@ -74,48 +125,44 @@ class SafetyLimits:
     scan_timeout_s: float | None
     linear_acceleration_m_s2: float = 1.0
     linear_deceleration_m_s2: float = 2.5
-    angular_acceleration_rad_s2: float = 4.0
+    angular_acceleration_rad_s2: float = 6.0
     angular_deceleration_rad_s2: float = 10.0
     command_timeout_s: float = 0.3
     motor_timeout_s: float = 0.2
     motor_failures: int = 3
-    loop_timeout_s: float = 0.2
+    loop_timeout_s: float = 0.1
     pause_s: float = 0.5
     operator_timeout_s: float | None = None
-    battery_warn_v: float = 11.5
-    battery_stop_v: float = 11.1
+    battery_warn_v: float | None = None
+    battery_stop_v: float | None = None
     battery_mean_s: float = 2.0
     astray_m_s: float = 0.02
     astray_s: float = 0.8
+    unbidden_s: float = 0.5
     torque_on_s: float = 2.0
     torque_off_s: float = 1.0
     standstill_m_s: float = 0.01
     min_valid_share: float = 0.05
+    has_own_controls: bool = False
     is_torque_off_on_operator_stop: bool = False
-    is_stopped_when_blind: bool = False
+    is_stopped_when_blind: bool = True
 
     def __post_init__(self) -> None:
-        values = {each.name: getattr(self, each.name) for each in fields(self)}
-        del values["is_torque_off_on_operator_stop"], values["is_stopped_when_blind"]
-        for name in ("scan_timeout_s", "operator_timeout_s"):
+        values: dict[str, float] = {
+            each.name: getattr(self, each.name) for each in fields(self) if not each.name.startswith(("is_", "has_"))
+        }
+        for name in _MAY_BE_NONE:
             if values[name] is None:
                 del values[name]
         problems = [
-            f"{name} must be finite and above 0, not {value}"
+            f"{name} {problem}, not {value}"
             for name, value in values.items()
-            if not (math.isfinite(value) and value > 0)
-        ]
-        problems += [
-            f"{name} must be at most {longest} s, not {values[name]}"
-            for name, longest in _LONGEST_S.items()
-            if name in values and values[name] > longest
+            if (problem := BOUNDS.get(name, Bounds()).problem(value))
         ]
         problems += [
             f"{name} ({values[name]}) must not be below {other} ({values[other]})"
             for name, other in _NOT_BELOW
-            if values[name] < values[other]
+            if name in values and other in values and values[name] < values[other]
         ]
-        if self.min_valid_share > 1:
-            problems.append(f"min_valid_share must be at most 1, not {self.min_valid_share}")
         if problems:
             raise ValueError("; ".join(problems))

@@ -8,6 +8,8 @@ first looked at, and one that is no time is ignored.
 import math
 from collections.abc import Sequence
 
+from robosc_bridge.devices.interface import BatteryLevel, DriveReading
+from robosc_bridge.devices.wheel_following import FollowingMonitor
 from robosc_bridge.safety.limits import SafetyLimits
 
 SECTOR_DEG = 30
@@ -76,7 +78,9 @@ class ScanCoverageMonitor:
 
 
 class BatteryMonitor:
-    """Mean voltages of times that follow each other, so that two of them at the latest tell of an empty battery.
+    """Battery as mean voltages and the drive base's own word tell it.
+
+    The times of the means follow each other, so that two of them at the latest tell of an empty battery.
 
     Args:
         limits: The voltages, and the time of a mean.
@@ -84,13 +88,15 @@ class BatteryMonitor:
 
     def __init__(self, limits: SafetyLimits) -> None:
         self._limits = limits
+        self._level: BatteryLevel | None = None
         self._mean_v = math.inf
         self._sum_v = 0.0
         self._count = 0
         self._begin_s = 0.0
 
-    def update(self, voltage_v: float | None, time_s: float) -> None:
-        """A voltage was measured; None and what is not finite tell nothing."""
+    def update(self, voltage_v: float | None, time_s: float, level: BatteryLevel | None = None) -> None:
+        """A voltage was measured, and the drive base judged; None and what is not finite tell nothing."""
+        self._level = level or self._level
         if voltage_v is None or not math.isfinite(voltage_v) or not math.isfinite(time_s):
             return
         if not self._count or time_s < self._begin_s:
@@ -104,12 +110,14 @@ class BatteryMonitor:
     @property
     def is_near_empty(self) -> bool:
         """True if a person should be warned."""
-        return self._mean_v <= self._limits.battery_warn_v
+        warn_v = self._limits.battery_warn_v
+        return self._level in (BatteryLevel.LOW, BatteryLevel.EMPTY) or (warn_v is not None and self._mean_v <= warn_v)
 
     @property
     def is_empty(self) -> bool:
         """True if the robot must stop."""
-        return self._mean_v <= self._limits.battery_stop_v
+        stop_v = self._limits.battery_stop_v
+        return self._level is BatteryLevel.EMPTY or (stop_v is not None and self._mean_v <= stop_v)
 
 
 class WheelMonitor:
@@ -117,30 +125,47 @@ class WheelMonitor:
 
     Args:
         limits: Limits of how far off a wheel may be, and for how long.
+
+    Attributes:
+        is_astray: True if some wheel has been off its goal for too long.
+        is_unbidden: True if some wheel has rotated for too long after all stood still, though nothing was commanded.
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
         self._limits = limits
-        self._since_s: float | None = None
+        self._following = FollowingMonitor(limits.astray_s, limits.astray_m_s, math.inf)
+        self.forget()
 
     def forget(self) -> None:
         """Forget since when a wheel is off its goal."""
-        self._since_s = None
+        self.is_astray = self.is_unbidden = False
+        self._following.forget()
+        self._has_rested = False
+        self._moving_since_s: float | None = None
 
-    def is_astray(self, goals_m_s: tuple[float, float], wheels_m_s: tuple[float, float], time_s: float) -> bool:
-        """Return True if some wheel has been off its goal for too long.
+    def update(self, goals_m_s: tuple[float, float], reading: DriveReading) -> None:
+        """The wheels were read.
 
         Args:
             goals_m_s: Goals of the left and the right wheel.
-            wheels_m_s: Actual speeds of the left and the right wheel.
-            time_s: Time at which the speeds were measured, in seconds.
+            reading: Reading with their speeds, and the acceleration that their motors keep to.
         """
-        if self._follows(goals_m_s[0], wheels_m_s[0]) and self._follows(goals_m_s[1], wheels_m_s[1]):
-            self._since_s = None
-            return False
-        self._since_s = time_s if self._since_s is None else min(self._since_s, time_s)
-        return time_s - self._since_s > self._limits.astray_s
+        self.is_astray = self._following.is_blocked(
+            goals_m_s, reading.wheels_m_s, reading.time_s, reading.acceleration_m_s2
+        )
+        self.is_unbidden = False
+        if goals_m_s != (0.0, 0.0):
+            self._has_rested = False
+        elif self._are_within(reading.wheels_m_s, self._limits.standstill_m_s):
+            self._has_rested = True
+        if not self._has_rested or self._are_within(reading.wheels_m_s, self._limits.astray_m_s):
+            self._moving_since_s = None
+        else:
+            since_s = self._moving_since_s
+            self._moving_since_s = since_s = reading.time_s if since_s is None else min(since_s, reading.time_s)
+            self.is_unbidden = reading.time_s - since_s > self._limits.unbidden_s
 
-    def _follows(self, goal_m_s: float, speed_m_s: float) -> bool:
-        # What is not a number does not follow.
-        return abs(goal_m_s - speed_m_s) <= max(self._limits.astray_m_s, abs(goal_m_s) / 2)
+    @staticmethod
+    def _are_within(wheels_m_s: tuple[float, float], limit_m_s: float) -> bool:
+        # What is not a number is not.
+        return all(abs(speed) <= limit_m_s for speed in wheels_m_s)

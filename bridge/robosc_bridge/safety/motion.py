@@ -1,10 +1,7 @@
-"""Velocities within their limits: pure functions.
-
-The limits are applied in the order of the drive bases: the body's velocity is clamped; where a wheel would be too fast,
-both parts are slowed by the same factor, which keeps the curvature.
-"""
+"""Velocities within the limits of the safety layer: pure functions, on those of the drive bases."""
 
 from robosc_bridge.devices.interface import Velocity
+from robosc_bridge.devices.kinematics import wheel_speeds, within_limits
 from robosc_bridge.safety.limits import SafetyLimits
 
 
@@ -15,19 +12,12 @@ def within(velocity: Velocity, limits: SafetyLimits) -> Velocity:
         velocity: Velocity of numbers, however large.
         limits: Limits that it is brought within.
     """
-    linear_m_s = _clamped(velocity.linear_m_s, limits.linear_m_s)
-    angular_rad_s = _clamped(velocity.angular_rad_s, limits.angular_rad_s)
-    fastest_m_s = abs(linear_m_s) + abs(angular_rad_s) * limits.separation_m / 2
-    if fastest_m_s > limits.wheel_m_s:
-        linear_m_s *= limits.wheel_m_s / fastest_m_s
-        angular_rad_s *= limits.wheel_m_s / fastest_m_s
-    return Velocity(linear_m_s, angular_rad_s)
+    return within_limits(velocity, limits, limits.separation_m)
 
 
 def wheels(velocity: Velocity, limits: SafetyLimits) -> tuple[float, float]:
     """Speeds of the left and the right wheel, in metres per second."""
-    rotation_m_s = velocity.angular_rad_s * limits.separation_m / 2
-    return velocity.linear_m_s - rotation_m_s, velocity.linear_m_s + rotation_m_s
+    return wheel_speeds(velocity, limits.separation_m)
 
 
 def ramped(present: Velocity, wanted: Velocity, limits: SafetyLimits, step_s: float) -> Velocity:
@@ -55,10 +45,6 @@ def ramped(present: Velocity, wanted: Velocity, limits: SafetyLimits, step_s: fl
         limits.angular_deceleration_rad_s2 * step_s,
     )
     return within(Velocity(linear_m_s, angular_rad_s), limits)
-
-
-def _clamped(value: float, limit: float) -> float:
-    return max(-limit, min(limit, value))
 
 
 def _stepped(present: float, wanted: float, faster: float, slower: float) -> float:

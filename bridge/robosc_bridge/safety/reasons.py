@@ -16,7 +16,8 @@ class Reason(StrEnum):
     PAUSED = "The bridge's computer stood still for too long."
     MOTOR_FAULT = "A motor tells of a fault."
     TORQUE_LOST = "A motor does not hold, or has let go by itself."
-    WHEEL_ASTRAY = "A wheel does not rotate as it is told: it is blocked, or does not stop."
+    WHEEL_ASTRAY = "A wheel does not rotate as commanded: it is blocked, or does not stop."
+    UNBIDDEN_MOTION = "The wheels rotate though nobody commanded it, as by a button of the board or its remote control."
     BATTERY_LOW = "The battery is empty."
     TORQUE_AWAITED = "The motors do not hold yet."
     COMMAND_SILENT = "No command came for too long."
@@ -34,12 +35,14 @@ LATCHING = (
     Reason.MOTOR_FAULT,
     Reason.TORQUE_LOST,
     Reason.WHEEL_ASTRAY,
+    Reason.UNBIDDEN_MOTION,
     Reason.BATTERY_LOW,
 )
 """They hold until `SafetyLayer.reset`."""
 
-TORQUE_OFF = (Reason.MOTOR_FAULT, Reason.TORQUE_LOST, Reason.WHEEL_ASTRAY)
+TORQUE_OFF = (Reason.MOTOR_FAULT, Reason.TORQUE_LOST, Reason.WHEEL_ASTRAY, Reason.UNBIDDEN_MOTION)
 """They want torque off, too, once the wheels stand still or the time for that is over; so does standby.
+With `Reason.UNBIDDEN_MOTION` it goes at once: such wheels do not come to rest otherwise.
 
 `Reason.OPERATOR_STOP` joins them if `SafetyLimits.is_torque_off_on_operator_stop`.
 """
@@ -49,7 +52,8 @@ class Caution(StrEnum):
     """Caution that does not stop the robot, as a sentence for a person."""
 
     BATTERY = "The battery will soon be empty."
-    MOTOR_VOLTAGE = "A motor tells that its supply is out of range."
-    COMMAND_REFUSED = "A command was no number and counts as a stop."
+    MOTOR_VOLTAGE = "A motor reports that its supply is out of range."
+    COMMAND_REFUSED = "A command was not a number and counts as a stop."
     SCAN_BLIND = "The scanner measures nothing where the robot goes: it is covered, or nothing is in its range."
     SCAN_NOISY = "Many frames of the scanner are damaged."
+    TORQUE_HELD = "The motors hold after the stop: buttons and remote control of the board can still move them."

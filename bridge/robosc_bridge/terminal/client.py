@@ -186,7 +186,7 @@ class BridgeClient:
         if code is grpc.StatusCode.DEADLINE_EXCEEDED:
             return UnreachableError(f"the bridge at {self._address} does not answer in time")
         if code is grpc.StatusCode.UNIMPLEMENTED:
-            return UnreachableError(f"what answers at {self._address} is no bridge of this version")
+            return UnreachableError(f"what answers at {self._address} is not a bridge of this version")
         return UnreachableError(f"the bridge at {self._address} failed ({code.name.lower()}): {details}")
 
 

@@ -43,11 +43,11 @@ def add_commands(commands: Any) -> None:
         parser.set_defaults(command=name)
         _finish(parser, _want)
 
-    status = commands.add_parser("status", help="tell what a bridge is doing", epilog=EPILOG)
+    status = commands.add_parser("status", help="print what a bridge is doing", epilog=EPILOG)
     status.add_argument("--json", action="store_true", help="for programs")
     _finish(status, _status)
 
-    watch = commands.add_parser("watch", help="tell what happens, until Ctrl-C", epilog=EPILOG)
+    watch = commands.add_parser("watch", help="print what happens, until Ctrl-C", epilog=EPILOG)
     watch.add_argument("--json", action="store_true", help="for programs: one JSON document a line")
     watch.add_argument("--scans", action="store_true", help="with the LiDAR's revolutions (only with --json)")
     watch.add_argument("--rate", type=float, default=10.0, metavar="HZ", help="looks a second (default: %(default)g)")

@@ -31,6 +31,14 @@ def status_lines(snapshot: Snapshot) -> Iterator[str]:
         yield from map(printable, _drive_lines(snapshot.drive))
     if snapshot.overruns:
         yield f"  decisions left out: {snapshot.overruns}"
+    for latency in snapshot.latencies:
+        if latency.count:
+            milliseconds = (1e3 * time_s for time_s in (latency.p50_s, latency.p99_s, latency.max_s))
+            figures = "p50 {:.1f} ms, p99 {:.1f} ms, at most {:.1f} ms".format(*milliseconds)
+            yield printable(f"  {latency.name.replace('_', ' ')}: {figures}")
+    for line in snapshot.lines:
+        told = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in sorted(line.counts.items()))
+        yield printable(f"  line of the {line.device}: {told}")
     width = max((len(item.name) for item in snapshot.components), default=0)
     for item in snapshot.components:
         variables = " ".join(f"{name}={_word(value)}" for name, value in sorted(item.variables.items()))

@@ -158,7 +158,7 @@ def _parsed(address: str) -> tuple[str, tuple[str, int]]:
     scheme, _, place = address.partition(":")
     host, _, port = place.rpartition(":")
     if scheme not in SCHEMES or not host or not port.isascii() or not port.isdecimal() or int(port) > 65535:
-        raise LineError(address, f"this is no address; it is written {'|'.join(SCHEMES)}:HOST:PORT")
+        raise LineError(address, f"this is not an address; it is written {'|'.join(SCHEMES)}:HOST:PORT")
     return scheme, (host, int(port))
 
 
@@ -170,5 +170,5 @@ def _not_opened(address: str, error: OSError) -> LineError:
     if isinstance(error, PermissionError):
         return LineDeniedError(address, "this user may not use this port")
     if error.errno in (errno.EADDRINUSE, errno.EADDRNOTAVAIL):
-        return LineBusyError(address, "another program listens there, or it is no address of this computer")
+        return LineBusyError(address, "another program listens there, or it is not an address of this computer")
     return LineError(address, f"cannot be used: {error.strerror}")

@@ -25,7 +25,7 @@ let lastCauses = null;
 /** The update is new. */
 export function paintStatus() {
   const { update } = received;
-  const state = update?.state || (isReplay() ? "recorded" : isModel() ? "led by hand" : "not known");
+  const state = update?.state || (isReplay() ? "recorded" : isModel() ? "stepped by hand" : "not known");
   say(byId("state-word"), state);
   mark(byId("state"), "data-state", update?.state || "unknown");
   if (update === null) {
@@ -33,6 +33,7 @@ export function paintStatus() {
     lastDevices = "";
     byId("causes").replaceChildren();
     byId("devices").replaceChildren();
+    paintTimes([]);
     return;
   }
   const causes = causesOf(update);
@@ -47,6 +48,31 @@ export function paintStatus() {
   lastState = state;
   lastCauses = key;
   paintDevices(update.devices ?? {});
+  paintTimes(update.latencies ?? []);
+}
+
+const TIMES = {
+  __proto__: null,
+  scan_to_wheel: "scan to wheel",
+  scan_to_decision: "scan to decision",
+  decision_period: "between decisions",
+  queueing: "waiting of readings",
+  exchange: "exchange with the wheels",
+};
+
+let lastTimes = "";
+
+/** What the bridge measures of itself; other sources tell nothing of that. */
+function paintTimes(latencies) {
+  const key = JSON.stringify(latencies);
+  if (key === lastTimes) return;
+  lastTimes = key;
+  show(byId("times"), latencies.length > 0);
+  byId("times-rows").replaceChildren(
+    ...latencies.map(([name, half, most, longest]) =>
+      make("tr", {}, make("th", { scope: "row" }, quoted(TIMES[name] ?? name)), ...[half, most, longest].map((ms) => make("td", {}, ms.toFixed(1)))),
+    ),
+  );
 }
 
 /** A bridge tells all that keeps its robot from moving; of another source nothing is known of that. */

@@ -8,23 +8,26 @@ from typing import TYPE_CHECKING
 from robosc.cli import automata
 from robosc.cli.output import UsageError
 from robosc.pipeline.options import SynthesisOptions
-from robosc_client import Check, Client, Explore, Generate, Synthesize, Task, Verify
+from robosc_client import Check, Client, Explore, Generate, Synthesis, Synthesize, Task, Verify
 from robosc_client.commands.numbers import checked_number
 from robosc_client.commands.progress_line import ProgressLine
-from robosc_client.commands.signed import require_signature
+from robosc_client.commands.signature_checks import require_signature
+from robosc_client.commands.supervisor_file import write_supervisor
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from robosc.pipeline.exploring import Exploration
     from robosc.pipeline.findings import Findings
     from robosc.pipeline.loading import LoadedAutomata
     from robosc.pipeline.results import Generation, Verification
-    from robosc.pipeline.systems import SystemSynthesis
+    from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
     from robosc.signatures import PublicKey
     from robosc.targets import GenerateOptions
 
 
 class Server:
-    """Machine of `robosc.cli.automata` that is a server, whose answers are not believed.
+    """Machine of `robosc.cli.machine` that is a server, whose answers are not believed.
 
     Args:
         client: Connection to the server.
@@ -36,6 +39,7 @@ class Server:
         self._client = client
         self._deadline_s = deadline_s
         self._keys = keys
+        self._answers: list[tuple[SystemSupervisor, Synthesis]] = []
 
     def check(self, model: "LoadedAutomata") -> "Findings":
         """Return every finding."""
@@ -54,9 +58,17 @@ class Server:
                 on_progress=line.report,
             )
         made = automata_synthesis_of(found, model)
-        if made.supervisor is not None and self._keys:
-            require_signature(self._keys, found.supervisor, found.signature)
+        if made.supervisor is not None:
+            if self._keys:
+                require_signature(self._keys, found.supervisor, found.signature)
+            self._answers.append((made.supervisor, found))
         return made
+
+    def write_supervisor(self, output: "Path", made: "SystemSupervisor") -> None:
+        """Write the file of a supervisor that the server has made, byte for byte, with its signature."""
+        # The signature fits the bytes that the supervisor was read from, and no others.
+        found = next(answer for supervisor, answer in self._answers if supervisor is made)
+        write_supervisor(output, found.supervisor, found.signature)
 
     def explore(self, model: "LoadedAutomata", options: SynthesisOptions, *, maximum_states: int) -> "Exploration":
         """Return the graph of the controlled system."""
@@ -139,7 +151,7 @@ def task_of(arguments: argparse.Namespace, package: str | None) -> Task:
         case _:
             automata.refuse(arguments.supervisor is not None, automata.NO_FILE)
             return Verify(
-                bundle=automata.loaded_for_verification(arguments),
+                model=automata.loaded_for_verification(arguments),
                 engine=options.engine,
                 allow_reordering=options.allow_reordering,
                 maximum_nodes=options.maximum_nodes,

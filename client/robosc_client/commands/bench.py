@@ -16,7 +16,7 @@ from robosc_client.commands.connection import add_connection_arguments, exit_sta
 from robosc_client.commands.progress_line import ProgressLine
 from robosc_client.commands.tasks import add_synthesis_arguments, synthesis_options
 from robosc_client.convert.requests import request_of
-from robosc_client.load import MAXIMUM_CONCURRENCY, Load, Measured, measure
+from robosc_client.load_measurement import MAXIMUM_CONCURRENCY, Load, Measured, measure
 
 _DESCRIPTION = """\
 Send the same request repeatedly, and print the rate of answered calls and their duration. Each of the concurrent

@@ -61,7 +61,7 @@ from robosc_client.commands.connection import (
     seconds,
 )
 from robosc_client.commands.progress_line import ProgressLine
-from robosc_client.commands.signed import require_signature, trusted_keys
+from robosc_client.commands.signature_checks import require_signature, trusted_keys
 from robosc_client.commands.supervisor_file import write_supervisor
 from robosc_client.commands.tasks import (
     add_signed_by_argument,
@@ -169,7 +169,7 @@ def _one_of[Choice: StrEnum](choices: type[Choice], shorter: Mapping[str, Choice
 
     def read(text: str) -> Choice:
         if text not in names:
-            raise argparse.ArgumentTypeError(f"{text!r} is none of {', '.join(names)}")
+            raise argparse.ArgumentTypeError(f"{text!r} is not one of {', '.join(names)}")
         return names[text]
 
     return read
@@ -443,7 +443,7 @@ def _sound_automata(
     """
     from robosc_client.outcomes import automata_supervisor_of
 
-    automata.refuse(bool(arguments.deployment), "--deployment: automata are no node of a robot")
+    automata.refuse(bool(arguments.deployment), "--deployment: automata are not a node of a robot")
     automata.refuse_output(arguments.output)
     supervisor = automata_supervisor_of(found.supervisor)
     if keys:
@@ -587,7 +587,7 @@ def _write(arguments: argparse.Namespace, found: TaskResult, supervisor: "System
         case tuple():
             raise UsageError("a check has no result file: use --result to print its findings")
         case Synthesis() if supervisor is not None and arguments.output.suffix != automata.SUPERVISOR:
-            write_bytes(arguments.output, automata.file_of(supervisor, arguments.output.suffix))
+            write_bytes(arguments.output, automata.controlled_system(supervisor, arguments.output.suffix))
         case Synthesis() if found.supervisor:
             write_supervisor(arguments.output, found.supervisor, found.signature)
         case Generation() if found.files is not None:

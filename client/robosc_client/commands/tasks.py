@@ -50,7 +50,7 @@ from robosc_client.commands.automata import Server
 from robosc_client.commands.connection import SERVICE, SIGNED_SERVICE, add_connection_arguments, exit_statuses
 from robosc_client.commands.numbers import checked_number
 from robosc_client.commands.progress_line import ProgressLine
-from robosc_client.commands.signed import require_signature, trusted_keys
+from robosc_client.commands.signature_checks import require_signature, trusted_keys
 from robosc_client.commands.supervisor_file import write_supervisor
 from robosc_client.errors import malformed
 
@@ -142,7 +142,7 @@ def verify_task(arguments: argparse.Namespace, bundle: Bundle, supervisor: bytes
     """Return the task that the arguments of `verify` ask for."""
     texts, listings = property_texts(arguments)
     return Verify(
-        bundle=bundle,
+        model=bundle,
         supervisor=supervisor,
         deployment=None if arguments.deployment is None else Deployment(arguments.deployment),
         properties=tuple(file.text for file in texts),

@@ -66,14 +66,14 @@ def request_of(task: Task) -> Request:
 def _request(task: Task) -> Request:
     match task:
         case Check():
-            return pb.CheckRequest(bundle=_bundle(task.bundle))
+            return pb.CheckRequest(bundle=_bundle(task.model))
         case Synthesize():
             return pb.SynthesizeRequest(
-                bundle=_bundle(task.bundle), options=_options(task.options), modular=task.is_modular
+                bundle=_bundle(task.model), options=_options(task.options), modular=task.is_modular
             )
         case Generate():
             return pb.GenerateRequest(
-                bundle=_bundle(task.bundle),
+                bundle=_bundle(task.model),
                 options=_options(task.options),
                 target=task.target,
                 generation=_generate_options(task.generation),
@@ -81,7 +81,7 @@ def _request(task: Task) -> Request:
             )
         case Explore():
             return pb.ExploreRequest(
-                bundle=_bundle(task.bundle),
+                bundle=_bundle(task.model),
                 options=_options(task.options),
                 maximum_states=_limit(task.maximum_states, "maximum_states"),
             )
@@ -140,7 +140,7 @@ def _verify_request(task: Verify) -> pb.VerifyRequest:
         maximum_nodes=_limit(task.maximum_nodes, "maximum_nodes"),
     )
     return pb.VerifyRequest(
-        bundle=_bundle(task.bundle),
+        bundle=_bundle(task.model),
         options=options,
         supervisor=task.supervisor,
         properties=task.properties,

@@ -109,7 +109,7 @@ class StopPanel(HelperNode):
         elif name:
             # When in doubt, stop: somebody in a hurry misses the key.
             self._sent_to["stop"].publish(Empty())
-            self.get_logger().warning(f"stop: {name!r:.40} is none of {', '.join(self._sent_to)}, quit")
+            self.get_logger().warning(f"stop: {name!r:.40} is not one of {', '.join(self._sent_to)}, quit")
 
     def stop(self) -> None:
         """Stop the robot, since nobody watches it any more, and give the terminal back."""

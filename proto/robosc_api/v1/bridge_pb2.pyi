@@ -130,7 +130,7 @@ class GetStatusResponse(_message.Message):
     def __init__(self, snapshot: _Optional[_Union[Snapshot, _Mapping]] = ...) -> None: ...
 
 class Snapshot(_message.Message):
-    __slots__ = ("number", "time", "age_s", "state", "problem", "reasons", "warnings", "stops", "devices", "components", "enabled", "drive", "has_scan", "overruns", "communications")
+    __slots__ = ("number", "time", "age_s", "state", "problem", "reasons", "warnings", "stops", "devices", "components", "enabled", "drive", "has_scan", "overruns", "communications", "latencies", "lines")
     NUMBER_FIELD_NUMBER: _ClassVar[int]
     TIME_FIELD_NUMBER: _ClassVar[int]
     AGE_S_FIELD_NUMBER: _ClassVar[int]
@@ -146,6 +146,8 @@ class Snapshot(_message.Message):
     HAS_SCAN_FIELD_NUMBER: _ClassVar[int]
     OVERRUNS_FIELD_NUMBER: _ClassVar[int]
     COMMUNICATIONS_FIELD_NUMBER: _ClassVar[int]
+    LATENCIES_FIELD_NUMBER: _ClassVar[int]
+    LINES_FIELD_NUMBER: _ClassVar[int]
     number: int
     time: _timestamp_pb2.Timestamp
     age_s: float
@@ -161,7 +163,40 @@ class Snapshot(_message.Message):
     has_scan: bool
     overruns: int
     communications: _containers.RepeatedCompositeFieldContainer[CommunicationState]
-    def __init__(self, number: _Optional[int] = ..., time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., age_s: _Optional[float] = ..., state: _Optional[_Union[BridgeState, str]] = ..., problem: _Optional[str] = ..., reasons: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., warnings: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., stops: _Optional[_Iterable[str]] = ..., devices: _Optional[_Iterable[_Union[DeviceState, _Mapping]]] = ..., components: _Optional[_Iterable[_Union[ComponentState, _Mapping]]] = ..., enabled: _Optional[_Iterable[str]] = ..., drive: _Optional[_Union[DriveState, _Mapping]] = ..., has_scan: _Optional[bool] = ..., overruns: _Optional[int] = ..., communications: _Optional[_Iterable[_Union[CommunicationState, _Mapping]]] = ...) -> None: ...
+    latencies: _containers.RepeatedCompositeFieldContainer[Latency]
+    lines: _containers.RepeatedCompositeFieldContainer[LineCounts]
+    def __init__(self, number: _Optional[int] = ..., time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., age_s: _Optional[float] = ..., state: _Optional[_Union[BridgeState, str]] = ..., problem: _Optional[str] = ..., reasons: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., warnings: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., stops: _Optional[_Iterable[str]] = ..., devices: _Optional[_Iterable[_Union[DeviceState, _Mapping]]] = ..., components: _Optional[_Iterable[_Union[ComponentState, _Mapping]]] = ..., enabled: _Optional[_Iterable[str]] = ..., drive: _Optional[_Union[DriveState, _Mapping]] = ..., has_scan: _Optional[bool] = ..., overruns: _Optional[int] = ..., communications: _Optional[_Iterable[_Union[CommunicationState, _Mapping]]] = ..., latencies: _Optional[_Iterable[_Union[Latency, _Mapping]]] = ..., lines: _Optional[_Iterable[_Union[LineCounts, _Mapping]]] = ...) -> None: ...
+
+class Latency(_message.Message):
+    __slots__ = ("name", "count", "p50_s", "p99_s", "max_s", "sum_s")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    COUNT_FIELD_NUMBER: _ClassVar[int]
+    P50_S_FIELD_NUMBER: _ClassVar[int]
+    P99_S_FIELD_NUMBER: _ClassVar[int]
+    MAX_S_FIELD_NUMBER: _ClassVar[int]
+    SUM_S_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    count: int
+    p50_s: float
+    p99_s: float
+    max_s: float
+    sum_s: float
+    def __init__(self, name: _Optional[str] = ..., count: _Optional[int] = ..., p50_s: _Optional[float] = ..., p99_s: _Optional[float] = ..., max_s: _Optional[float] = ..., sum_s: _Optional[float] = ...) -> None: ...
+
+class LineCounts(_message.Message):
+    __slots__ = ("device", "counts")
+    class CountsEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: int
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[int] = ...) -> None: ...
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
+    COUNTS_FIELD_NUMBER: _ClassVar[int]
+    device: str
+    counts: _containers.ScalarMap[str, int]
+    def __init__(self, device: _Optional[str] = ..., counts: _Optional[_Mapping[str, int]] = ...) -> None: ...
 
 class CommunicationState(_message.Message):
     __slots__ = ("name", "location")

@@ -1,4 +1,4 @@
-"""Automata under their supervisor as a library in C99, with a program that leads it by hand."""
+"""Automata under their supervisor as a library in C99, with a program that steps it by hand."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

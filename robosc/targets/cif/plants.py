@@ -232,7 +232,7 @@ def _number_update(number: Number, type_: Type, old: Text, place: Place) -> Text
     synthesis. Naming the variable widens the range of the expression, not its value.
     """
     stored = Number(number.terms, number.constant + shift(type_), number.known)
-    is_apart = _is_apart(number, type_)
+    is_apart = _is_outside(number, type_)
     if not fits(stored):
         if not is_apart:
             raise UnsupportedModelError(
@@ -246,7 +246,7 @@ def _number_update(number: Number, type_: Type, old: Text, place: Place) -> Text
     return number_text(stored)
 
 
-def _is_apart(number: Number, type_: Type) -> bool:
+def _is_outside(number: Number, type_: Type) -> bool:
     """Return True if a number is always outside a range."""
     low, high = number.bounds
     return isinstance(type_, IntegerType) and (

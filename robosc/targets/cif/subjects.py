@@ -139,7 +139,7 @@ class Reader:
             return TRUE
         is_unknown_wanted = values[-1] is None and runs[-1][-1] == len(values) - 1
         if is_unknown_wanted:
-            return negated(self.test(source, _others(runs, len(values)), place))
+            return negated(self.test(source, _gaps(runs, len(values)), place))
         return all_of([self.known(source, place), self._value_test(source, runs, values, place)])
 
     def _value_test(self, source: Source, runs: list[range], values: Sequence[Value | None], place: Place) -> Text:
@@ -177,7 +177,7 @@ class Reader:
         return all_of([comparison(">=", number, low), comparison("<=", number, high)])
 
 
-def _others(runs: list[range], count: int) -> list[range]:
+def _gaps(runs: list[range], count: int) -> list[range]:
     """The runs between some runs."""
     found, start = [], 0
     for run in runs:

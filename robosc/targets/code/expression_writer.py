@@ -148,7 +148,7 @@ class ExpressionWriter(ABC):
     def _nan_comparison(self, operator: str, left: Code, right: Code) -> Code | None:
         """A native comparison that is false where a number is NaN, or None if there is none."""
 
-    def _alike(self, left: Code, right: Code) -> tuple[Code, Code]:
+    def _in_one_type(self, left: Code, right: Code) -> tuple[Code, Code]:
         """Two operands as native operations take them."""
         return left, right
 
@@ -294,7 +294,7 @@ class ExpressionWriter(ABC):
 
     def _comparison_is(self, operator: str, left: Code, right: Code, wanted: bool) -> Code:
         """Return a test that a comparison is `wanted`, with native operators wherever NaN stands for unknown."""
-        left, right = self._alike(left, right)
+        left, right = self._in_one_type(left, right)
         wanted_operator = operator if wanted else OPPOSITE[operator]
         if left.is_known and right.is_known:
             return self._compare(wanted_operator, left, right)
@@ -329,7 +329,7 @@ class ExpressionWriter(ABC):
 
     def _conditional(self, condition: Code, then: Code, otherwise: Code) -> Code:
         """A conditional expression; both branches are pure, so it does not matter whether both are worked out."""
-        then, otherwise = self._alike(then, otherwise)
+        then, otherwise = self._in_one_type(then, otherwise)
         if condition.is_known:
             unknown = self._joined_unknown(then, otherwise)
             code = operation("if", condition, then, otherwise, sort=then.sort, unknown=unknown)
@@ -360,7 +360,7 @@ class ExpressionWriter(ABC):
     def _binary(self, operator: str, left: Code, right: Code, divisor: Expression) -> Code:
         is_known = left.is_known and right.is_known
         if operator in COMPARISONS:
-            left, right = self._alike(left, right)
+            left, right = self._in_one_type(left, right)
             return (self._compare if is_known else self._kleene_comparison)(operator, left, right)
         if operator in ("div", "mod"):
             return self._whole(operator, left, right)

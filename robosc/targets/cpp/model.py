@@ -124,11 +124,11 @@ class Writer:
         lines: list[str] = []
         for component, behaviour in layout.executable.behaviours:
             states = [state.name for state in behaviour.states]
-            lines += _told("component", component, states, f"state.{layout.locations[component]}")
+            lines += _visited_text("component", component, states, f"state.{layout.locations[component]}")
             for variable in behaviour.variables:
                 member, type_ = layout.variables[component, variable.name]
                 if isinstance(type_, EnumType):
-                    lines += _told("variable", variable.name, type_.values, f"state.{member}")
+                    lines += _visited_text("variable", variable.name, type_.values, f"state.{member}")
                 else:
                     lines.append(f"visitor.variable({string_literal(variable.name)}, state.{member});")
         return _function(
@@ -144,7 +144,7 @@ class Writer:
         for item in layout.model.communications:
             if item.kind in CALLED_KINDS:
                 place = f"state.{layout.locations[communication_plant_name(item)]}"
-                lines += _told("communication", item.name, PLANT_LOCATIONS[item.kind], place)
+                lines += _visited_text("communication", item.name, PLANT_LOCATIONS[item.kind], place)
         return _function(
             f"template <class Visitor>\nvoid visit_communications("
             f"[[maybe_unused]] const {layout.prefix}_state_t& state, [[maybe_unused]] Visitor& visitor)",
@@ -422,7 +422,7 @@ def _array(head: str, items: Iterable[str]) -> list[str]:
     return [f"inline {head}[] = {{", *indent(rows), "};", ""]
 
 
-def _told(what: str, name: str, texts: Iterable[str], place: str) -> list[str]:
+def _visited_text(what: str, name: str, texts: Iterable[str], place: str) -> list[str]:
     """Statements that tell a visitor the text with the number that stands in a place."""
     listed = ", ".join(map(string_literal, texts))
     return [

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 
 import jinja2
 
@@ -11,7 +10,7 @@ from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind, Deployment, EventKind, Interface
 from robosc.supervisor import Supervisor
 from robosc.targets.code import templates
-from robosc.targets.code.c.header import head, with_prefix
+from robosc.targets.code.c.header import head, runtime_text
 from robosc.targets.code.c.package import generate as generate_c
 from robosc.targets.code.c.text import safe, string_literal
 from robosc.targets.code.c.unit import Unit, make_unit
@@ -107,9 +106,8 @@ def _generate(supervisor: Supervisor, name: str, options: GenerateOptions, middl
     files["src/model.hpp"] = f"{top}\n{Writer(unit, name).text()}"
     for module, headers in (("robosc.targets.cpp", _RUNTIME), (middleware.module, middleware.runtime)):
         for path in headers:
-            text = resources.files(f"{module}.runtime").joinpath(path).read_text(encoding="utf-8")
             # Each package has a namespace of its own: two of them may be loaded into one process.
-            text = with_prefix(unit.layout, text).replace("namespace robosc", f"namespace {name}")
+            text = runtime_text(unit.layout, path, module).replace("namespace robosc", f"namespace {name}")
             files[f"src/runtime/{path}"] = f"{top}\n{text}"
     environment = _environment(middleware.module)
     context = _context(supervisor, unit, name, found, asked, options, middleware)

@@ -136,7 +136,7 @@ class _Writer:
         edges = {item.name: [edge for edge in item.edges if edge.event == event.name] for item in participants}
         choices, data = self._data(event, [edge for found in edges.values() for edge in found])
         translator = Translator(self._system, self._names, data)
-        guards = [any_of([self._taken(edge, item) for edge in edges[item.name]]) for item in participants]
+        guards = [any_of([self._edge_condition(edge, item) for edge in edges[item.name]]) for item in participants]
         guards += [self._translator.condition(c.condition) for c in self._conditions(event)]
         if event.is_controllable:
             guards += [
@@ -161,7 +161,7 @@ class _Writer:
         if event.is_controllable:
             yield from (item for item in self._system.conditions if item.event == event.name)
 
-    def _taken(self, edge: Edge, automaton: Automaton) -> str:
+    def _edge_condition(self, edge: Edge, automaton: Automaton) -> str:
         """Return the condition that an edge can be taken."""
         location = self._names.locations[automaton.name, edge.source]
         place = "true" if Subject(automaton.name) not in self._names.places else location
@@ -174,7 +174,7 @@ class _Writer:
             number = self._translator.value(update.expression, type_)
             outside = _outside(number.text, number.low, number.high, type_)
             if outside != "false":
-                leaves = all_of([self._taken(edge, automaton), number.known, outside])
+                leaves = all_of([self._edge_condition(edge, automaton), number.known, outside])
                 yield negated(leaves)
 
     def _data(self, event: Event, edges: Sequence[Edge]) -> tuple[list[_Choice], dict[Path, Datum]]:
@@ -213,11 +213,11 @@ class _Writer:
         for edge in edges:
             writes = list(self._writes(event, automaton, edge, translator))
             if not writes:
-                idle.append(self._taken(edge, automaton))
+                idle.append(self._edge_condition(edge, automaton))
                 continue
             targets |= {subject: self._next[subject] for subject, _ in writes}
             statements = [line for _, lines in writes for line in lines]
-            options.append((self._taken(edge, automaton), statements))
+            options.append((self._edge_condition(edge, automaton), statements))
         if not options:
             return
         written |= targets

@@ -56,7 +56,7 @@ def _component(model: Model, component: Component, numbers: dict[tuple[str, str,
                     "initial": state.is_initial,
                     "transitions": [
                         _transition(component.name, state.name, index, transition, numbers)
-                        for index, transition in _standing_in(behaviour, state.name)
+                        for index, transition in _transitions_of(behaviour, state.name)
                     ],
                 }
                 for state in behaviour.states
@@ -65,7 +65,7 @@ def _component(model: Model, component: Component, numbers: dict[tuple[str, str,
     return result
 
 
-def _standing_in(behaviour: Behaviour, state: str) -> list[tuple[int, Transition]]:
+def _transitions_of(behaviour: Behaviour, state: str) -> list[tuple[int, Transition]]:
     """The transitions of a state, its own before the behaviour's."""
     fitting = [(i, item) for i, item in enumerate(behaviour.transitions) if item.source in (state, None)]
     return sorted(fitting, key=lambda pair: pair[1].source is None)
@@ -92,7 +92,7 @@ def _add_transitions(
     numbers: dict[tuple[str, str, int], int],
 ) -> None:
     for state in behaviour.states:
-        for index, transition in _standing_in(behaviour, state.name):
+        for index, transition in _transitions_of(behaviour, state.name):
             by_state = table.setdefault(transition.event, {}).setdefault(component, {})
             by_state.setdefault(state.name, numbers[component, state.name, index])
 

@@ -203,7 +203,7 @@ def _values(payload: bytes) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise FrameError("a payload that is no JSON") from error
     if not isinstance(values, dict):
-        raise FrameError("a payload that is no object")
+        raise FrameError("a payload that is not an object")
     return values
 
 

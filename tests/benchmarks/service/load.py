@@ -19,7 +19,7 @@ from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc
 from robosc_client import Check, Client, SynthesisOptions, Synthesize
 from robosc_client.commands.bench import varied
 from robosc_client.convert.requests import request_of
-from robosc_client.load import Load, Measured, measure
+from robosc_client.load_measurement import Load, Measured, measure
 from service.echo import METHOD, REQUEST, echo_server
 from support.long_work import long_work
 from support.models import EXAMPLES, bundle_of

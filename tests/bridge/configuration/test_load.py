@@ -53,13 +53,13 @@ def test_what_is_written_is_there() -> None:
         """
 scanner: {driver: lds02, port: /dev/ttyUSB0, options: {baud: 115200, tries: [1, 2.5, no]}}
 execution:
-  period_s: 1
+  period_s: 0.5
   priority: [a, b]
   policy: priority
   max_age_s: {/scan: 1}
   release_identifiers: []
   service_timeout_s: null
-safety: {overrun_s: 2}
+safety: {overrun_s: 2, command_timeout_s: 1}
 skills: {rotate: {speed_rad_s: 1}, emergency_stop: {stop_keys: [s]}}
 remote: {grpc_address: "[::1]:50061"}
 channels:
@@ -69,7 +69,8 @@ channels:
     )
     assert found.scanner is not None
     assert found.scanner.options == {"baud": 115200, "tries": (1, 2.5, "no")}
-    assert (found.execution.period_s, type(found.execution.period_s)) == (1.0, float)
+    assert found.execution.period_s == 0.5
+    assert (found.safety.overrun_s, type(found.safety.overrun_s)) == (2.0, float)
     assert found.execution.priority == ("a", "b")
     assert found.execution.max_age_s == {"/scan": 1.0}
     assert found.execution.release_identifiers == ()
@@ -112,7 +113,7 @@ zz: 1
         "c.yaml:2: drive.options.a: is a mapping; it must be true or false or a whole number or a number or a text or "
         "a list: true or false or a whole number or a number or a text each",
         'c.yaml:2: drive.options.B: is "B"; it must be a text like baud or watchdog_s',
-        "c.yaml:4: execution.period_s: is 0; it must be a number from 0.001 to 10",
+        "c.yaml:4: execution.period_s: is 0; it must be a number from 0.001 to 0.5",
         "c.yaml:5: execution.perod_s: there is no such key; did you mean 'period_s'?",
         'c.yaml:6: execution.every: is "evnt"; it must be one of period, event',
         "c.yaml:7: execution.priority[0]: is 1; it must be a text of 1 to 255 characters",
@@ -148,11 +149,11 @@ def test_a_file_that_is_no_mapping_is_told(text: str, what: str) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("period_s: true", "is true; it must be a number from 0.001 to 10"),
+        ("period_s: true", "is true; it must be a number from 0.001 to 0.5"),
         ('period_s: "1"', 'is "1"; it must be a number'),
         ("period_s: .nan", 'is ".nan"; it must be a number'),
         ("period_s:", "is nothing; it must be a number"),
-        ("period_s: 10.001", "is 10.001"),
+        ("period_s: 0.501", "is 0.501"),
         ("seed: true", "is true; it must be a whole number"),
         ("seed: -1", "is -1"),
         ("priority: a", 'is "a"; it must be a list: a text of 1 to 255 characters each'),
@@ -200,7 +201,7 @@ def test_the_server_is_a_host_with_or_without_a_port(address: str) -> None:
             "skills.line.smallest: is 0.7; it must be below 'largest', which is 0.6",
         ),
         (
-            "safety: {battery_stop_v: 12}",
+            "safety: {battery_stop_v: 12, battery_warning_v: 11.5}",
             "safety.battery_stop_v: is 12; it must be at most 'battery_warning_v', which is 11.5",
         ),
         (
@@ -220,7 +221,10 @@ def test_the_server_is_a_host_with_or_without_a_port(address: str) -> None:
             "safety: {overrun_s: 0.03}",
             "safety.overrun_s: is 0.03; it must be at least twice 'execution.period_s', which is 0.02",
         ),
-        ("safety: {stops_when_blind: true}", "safety.stops_when_blind: means nothing without the section 'scanner'"),
+        (
+            "safety: {command_timeout_s: 0.03}",
+            "safety.command_timeout_s: is 0.03; it must be at least twice 'execution.period_s', which is 0.02",
+        ),
         ("remote: {mavlink_key: k}", "remote.mavlink_key: means nothing without 'mavlink_url'"),
         (
             "remote: {mavlink_unsigned_commands: true}",
@@ -254,7 +258,7 @@ def test_a_key_that_a_terminal_gives_is_taken(key: str) -> None:
 
 def test_a_drive_is_not_silent_before_three_exchanges() -> None:
     (line,) = errors_of("safety: {motor_timeout_s: 0.05}")
-    assert "is 0.05; it must be a number from 0.06 to 10" in line
+    assert "is 0.05; it must be a number from 0.06 to 1" in line
     assert configuration("safety: {motor_timeout_s: 0.06}").safety.motor_timeout_s == pytest.approx(3 * EXCHANGE_S)
 
 

@@ -16,6 +16,7 @@ from robosc_bridge.configuration import template as template_module
 from robosc_bridge.configuration.document import parse_document
 from robosc_bridge.configuration.structure import TurtleBot
 from robosc_bridge.configuration.template import UDEV_RULES, DriveDriver, ScannerDriver, quoted
+from robosc_bridge.daemon.assembly import safety_limits
 from support.models import EXAMPLES, bundle_of
 
 COMBINATIONS = list(
@@ -102,12 +103,13 @@ def test_a_drive_without_buttons_has_none_tied() -> None:
     assert {item.path[1] for item in caught.value.problems} == {"/person", "/button"}
 
 
-def test_every_setting_has_its_default_but_what_the_lidar_decides() -> None:
+def test_every_setting_has_its_default() -> None:
     bare = "robot: burger\ndrive: {driver: opencr, port: /dev/ttyACM0}\nscanner: {driver: lds03, port: /dev/ttyUSB0}\n"
     default = parse(bare.encode(), "c.yaml").configuration
     found = parse(init("burger", "opencr", "lds03", example("maze_solver")).encode(), "c.yaml").configuration
-    assert found.safety == msgspec.structs.replace(default.safety, scan_timeout_s=0.3)
-    assert msgspec.structs.replace(found, safety=default.safety, channels={}) == default
+    assert msgspec.structs.replace(found, channels={}) == default
+    assert safety_limits(found) == safety_limits(default)
+    assert safety_limits(found).scan_timeout_s == 0.3
 
 
 @pytest.mark.parametrize(("drive", "board"), [("opencr", "opencr"), ("dynamixel", "u2d2")])

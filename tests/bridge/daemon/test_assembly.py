@@ -63,7 +63,7 @@ def test_a_layer_releases_what_drives(chosen: str, supervisor: Supervisor) -> No
 
 def test_the_loop_may_be_late_as_long_as_is_said() -> None:
     text = CONFIGURATION.replace("period_s: 0.02", "period_s: 0.5").replace(
-        "skills:", "safety: {overrun_s: 1}\nskills:"
+        "skills:", "safety: {overrun_s: 1, command_timeout_s: 1}\nskills:"
     )
     assert safety_limits(parse(text.encode(), "test.yaml").configuration).loop_timeout_s == 1.0
     assert safety_limits(parse(CONFIGURATION.encode(), "test.yaml").configuration).loop_timeout_s == 0.1

@@ -272,14 +272,14 @@ def test_a_goal_is_cancelled_by_who_asked_and_nobody_else(scene: Scene, program:
     other = Connected(scene, "another")
     program.say(GoalRequested, "face", "g", {"angle": 90})
     scene.live(0.3, 2.0)
-    assert refused(other.say(CancelRequested, "face", "g")) == ["'g' is no goal of 'face' that is under way"]
+    assert refused(other.say(CancelRequested, "face", "g")) == ["'g' is not a goal of 'face' in progress"]
     # One id means another goal with another program: held back, as the first is under way.
     assert without_sensors(other.say(GoalRequested, "face", "g", {"angle": 5})) == [GoalRejected("g"), Blocked("/face")]
     assert scene.out.angular_rad_s > 0.0
     assert without_sensors(program.say(CancelRequested, "face", "g")) == [GoalOver("g", "cancelled", None)]
     scene.exchange()
     assert scene.out == STANDSTILL
-    assert refused(program.say(CancelRequested, "face", "g")) == ["'g' is no goal of 'face' that is under way"]
+    assert refused(program.say(CancelRequested, "face", "g")) == ["'g' is not a goal of 'face' in progress"]
 
 
 def test_an_id_that_is_in_use_is_refused_and_free_again_afterwards(scene: Scene, program: Connected) -> None:
@@ -362,7 +362,7 @@ WRONG = [
     (CallRequested, ("think", "1", 5), "'think': the data must be a text"),
     (GoalRequested, ("turn", "1", {}), "the model has no action 'turn'"),
     (GoalRequested, ("face", "1", {"angle": 1e9}), "beyond a hundred revolutions"),
-    (CancelRequested, ("face", "1"), "'1' is no goal of 'face' that is under way"),
+    (CancelRequested, ("face", "1"), "'1' is not a goal of 'face' in progress"),
 ]
 
 

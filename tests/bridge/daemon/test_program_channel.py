@@ -135,7 +135,7 @@ def test_a_call_is_answered_by_the_program_that_serves_it() -> None:
     assert (state(scene), variable(scene, "answer")) == ("asked", True)
     # Once only.
     assert why(server.say(Replied, call.number, True)) == [
-        f"{call.number} is no call that this program is asked for now"
+        f"{call.number} is not a call that this program has been asked for"
     ]
 
 
@@ -330,8 +330,8 @@ for _ in range(100):
         (DEEP, "the data is nested more than 20 deep"),
         ([0] * 20_000, "the data has more than 20000 parts"),
         ({"x": "y" * 65_537}, "the data has a text of more than 65536 characters"),
-        ({"x" * 65_537: 1}, "the data has a name that is no text of at most 65536 characters"),
-        ({1: 1}, "the data has a name that is no text of at most 65536 characters"),
+        ({"x" * 65_537: 1}, "the data has a name that is not a text of at most 65536 characters"),
+        ({1: 1}, "the data has a name that is not a text of at most 65536 characters"),
         (1 << 64, "the data has a number of more than 64 bits"),
         (b"bytes", "the data is not plain"),
         (object(), "the data is not plain"),

@@ -20,11 +20,11 @@ RESTART_S, SILENT_S = 3.0, 0.6
 class Scene:
     """A LiDAR, its driver and worker, and the safety layer, on a virtual host."""
 
-    def __init__(self, robot: SimulatedTurtleBot3, time: VirtualHost) -> None:
+    def __init__(self, robot: SimulatedTurtleBot3, time: VirtualHost, *, stops_when_blind: bool = True) -> None:
         self.robot = robot
         self.time = time
         self._due_s = 0.0
-        self.safety = SafetyLayer(replace(LIMITS, scan_timeout_s=None))
+        self.safety = SafetyLayer(replace(LIMITS, scan_timeout_s=None, is_stopped_when_blind=stops_when_blind))
         self.reports: list[Report] = []
         self.worker = ScannerWorker(
             make_lds01(robot.scanner_path, host=self.time),
@@ -115,16 +115,17 @@ def test_damaged_frames_are_warned_of_until_they_are_sound(scene: Scene, caplog:
     assert sound.startswith("scanner: its frames are sound again: 0 of ")
 
 
-def test_one_that_sees_nothing_ahead_is_warned_of() -> None:
+@pytest.mark.parametrize("is_stopped", [True, False])
+def test_one_that_sees_nothing_ahead_stops_or_is_warned_of(is_stopped: bool) -> None:
     """Check a scanner with two walls at its sides: it sees nothing within 30 degrees of its way."""
     far = Walls(((-9.0, 2.0, 9.0, 2.0), (-9.0, -2.0, 9.0, -2.0)))
     with VirtualHost() as time, SimulatedTurtleBot3(lidar="lds01", walls=far, clock=time) as robot:
-        scene = Scene(robot, time)
+        scene = Scene(robot, time, stops_when_blind=is_stopped)
         scene.until(lambda: DeviceUp(Device.SCANNER) in scene.reports)
         scene.safety.enable()
         velocity, reasons, warnings = scene.output(0.1)
-        assert (reasons, warnings) == ((), (Caution.SCAN_BLIND,))
-        assert velocity != STANDSTILL
+        assert (reasons, warnings) == ((Reason.SCAN_BLIND,) if is_stopped else (), (Caution.SCAN_BLIND,))
+        assert (velocity == STANDSTILL) is is_stopped
         robot.world.walls = Walls((*far.segments, (0.8, -1.0, 0.8, 1.0)))
         scene.live(0.6)
         assert scene.output(0.1)[1:] == ((), ())

@@ -92,7 +92,7 @@ def test_one_who_sends_without_end_does_not_hold_it_up(served: Served, monkeypat
 
 def test_what_are_no_pictures_is_told(served: Served) -> None:
     served.end.sendall(b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n")
-    with pytest.raises(BridgeError, match=f"{served.path}: what comes are no grey pictures"):
+    with pytest.raises(BridgeError, match=f"{served.path}: the stream does not hold grey pictures"):
         served.camera.receive(LIMIT_S)
 
 
@@ -186,7 +186,9 @@ def test_what_is_wrong_with_a_camera_is_told(tmp_path: Path, monkeypatch: pytest
     text.write_text("no film")
     camera = make_camera(str(text))
     camera.open()
-    with pytest.raises(LineError, match="text: no pictures can be read: another program uses it, or it is no camera"):
+    with pytest.raises(
+        LineError, match="text: no pictures can be read: another program uses it, or it is not a camera"
+    ):
         until(camera, lambda found: False)
     camera.close()
     monkeypatch.setattr("robosc_bridge.devices.camera.os.access", lambda *_: False)

@@ -57,7 +57,7 @@ def test_options_are_converted_to_what_the_driver_takes() -> None:
         ("dynamixel", {"watchdog_s": "long"}, "option 'watchdog_s': Expected `float`, got `str`"),
         ("opencr", {"calibrates_gyro": "yes"}, "option 'calibrates_gyro': Expected `bool`, got `str`"),
         ("opencr", {"calibrate": True}, "no option 'calibrate'; there is answer_limit_s, calibrates_gyro"),
-        ("opencr", {"path": "/dev/null"}, "'path' is no option: it is said outside"),
+        ("opencr", {"path": "/dev/null"}, "'path' is not an option: it has a key of its own outside"),
         ("mavlink-rover", {"signing": "key"}, "no option 'signing'; there is .*signing_key"),
     ],
 )

@@ -10,6 +10,7 @@ import pytest
 
 from robosc_bridge import driver_registry
 from robosc_bridge.driver_registry import (
+    PACK_3S_V,
     PANEL,
     Driver,
     DriverFeatures,
@@ -91,9 +92,11 @@ def test_a_plug_in_is_found_by_its_entry_point(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_what_a_drive_base_has_is_declared_by_its_driver(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert features_of("opencr") == DriverFeatures(PANEL, has_imu=True, needs_turtlebot3=True)
+    assert features_of("opencr") == DriverFeatures(
+        PANEL, has_imu=True, needs_turtlebot3=True, battery_v=PACK_3S_V, has_own_controls=True
+    )
     assert features_of("dynamixel") == DriverFeatures(needs_turtlebot3=True)
-    assert features_of("mavlink-rover") == DriverFeatures(has_imu=True, torque_on_s=8.0)
+    assert features_of("mavlink-rover") == DriverFeatures(has_imu=True, torque_on_s=8.0, astray_s=2.0, astray_m_s=0.1)
     assert features_of("plug") is None
     # A plug-in declares its own, or none.
     features = DriverFeatures(("button_9",))

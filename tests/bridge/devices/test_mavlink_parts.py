@@ -23,7 +23,7 @@ from robosc_bridge.protocol.mavlink_messages import (
 )
 from robosc_bridge.protocol.mavlink_signing import Signing, SigningError
 
-OWN = (255, 190)
+OWN = (254, 191)
 ROVER = Heartbeat(10, 3, False, 0)
 
 
@@ -49,7 +49,7 @@ def test_a_component_without_autopilot_is_no_stranger() -> None:
 
 
 def test_answers_to_others_are_none_of_ours() -> None:
-    state = _after(ROVER, Answer(400, 4, 254, 190), Answer(400, 4, 255, 1))
+    state = _after(ROVER, Answer(400, 4, 255, 191), Answer(400, 4, 254, 1))
     assert state.answers == {}
     assert _after(Answer(400, 0, 0, 0), state=state).answers[400].content.result == 0
 

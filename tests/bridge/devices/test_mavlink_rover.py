@@ -8,13 +8,14 @@ from robosc_bridge.devices.interface import (
     Velocity,
 )
 from robosc_bridge.devices.mavlink_odometry import estimate
-from robosc_bridge.driver_registry import make_drive_base
+from robosc_bridge.driver_registry import make_drive_base, make_range_scanner
 from robosc_bridge.errors import (
     DeviceError,
     DeviceSilentError,
     LineMissingError,
+    WrongDeviceError,
 )
-from support.rovers import BODY, FORWARD, POSE, Bench
+from support.rovers import BODY, FORWARD, POSE, Bench, rig
 
 
 def test_a_missing_port_is_told() -> None:
@@ -81,11 +82,50 @@ def test_a_driver_that_dies_stops_the_vehicle(bench: Bench) -> None:
 def test_our_heartbeat_goes_on_while_it_is_driven_and_never_without(bench: Bench) -> None:
     bench.base.open()
     # It was told when the vehicle was looked for; the next ones come once a second.
-    assert bench.rover.heartbeats == [(255, 190)]
+    assert bench.rover.heartbeats == [(254, 191)]
     bench.drive(FORWARD, 60.0)
-    assert bench.rover.heartbeats == [(255, 190)] * 60
+    assert bench.rover.heartbeats == [(254, 191)] * 60
     bench.host.sleep(60.0)
     assert len(bench.rover.heartbeats) == 60
+
+
+def test_it_is_no_ground_station_and_may_have_numbers_of_its_own() -> None:
+    """Ground stations are 255/190: a second one of these would share their answers and their failsafe."""
+    with rig(own_system=1, own_component=193) as bench:
+        bench.base.open()
+        assert bench.rover.heartbeats == [(1, 193)]
+        bench.base.set_torque(True)
+        assert bench.rover.is_armed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        ({"system": 7, "own_system": 7, "own_component": 1}, "own_system 7 and own_component 1 are the autopilot's"),
+        ({"own_system": 0}, "own_system must be from 1 to 255, not 0"),
+        ({"own_component": 256}, "own_component must be from 1 to 255, not 256"),
+        ({"system": 0}, "system must be from 1 to 255, not 0"),
+    ],
+)
+@pytest.mark.parametrize("kind", ["drive base", "scanner"])
+def test_numbers_that_cannot_be_are_refused_before_anything_is_opened(
+    kind: str, arguments: dict[str, int], problem: str
+) -> None:
+    with pytest.raises(ValueError, match=problem):
+        if kind == "scanner":
+            make_range_scanner("mavlink-rover", path="/dev/none", **arguments)
+        else:
+            make_drive_base("mavlink-rover", path="/dev/none", robot=BODY, **arguments)
+
+
+def test_a_rover_that_has_the_bridge_s_numbers_is_refused_before_it_is_told_anything() -> None:
+    with rig(own_system=1, own_component=1) as bench:
+        with pytest.raises(
+            WrongDeviceError, match=r"numbers 1 \(system\) and 1 \(component\), as the bridge; set own_"
+        ):
+            bench.base.open()
+        assert bench.rover.targets == []
+        assert not bench.rover.is_armed
 
 
 def test_silence_stops_it_and_is_told_when_its_last_estimate_has_grown_old(bench: Bench) -> None:

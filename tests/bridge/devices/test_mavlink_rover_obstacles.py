@@ -53,7 +53,7 @@ def test_obstacles_are_where_they_are(bench: Bench, obstacles: str) -> None:
         before, end_s = len(bench.rover.heartbeats), bench.host.monotonic() + 20.0
         while bench.host.monotonic() < end_s:
             scanner.receive(0.1)
-        assert set(bench.rover.heartbeats) == {(255, 190)}
+        assert set(bench.rover.heartbeats) == {(254, 191)}
         assert len(bench.rover.heartbeats) - before == pytest.approx(20, abs=1)
     finally:
         scanner.close()

@@ -42,7 +42,7 @@ def test_a_missing_camera_is_told(tmp_path: Path) -> None:
 def test_what_is_no_camera_is_told(tmp_path: Path) -> None:
     path = tmp_path / "text"
     path.write_text("no film")
-    with pytest.raises(LineError, match="it is no camera"):
+    with pytest.raises(LineError, match="it is not a camera"):
         VideoDevice(str(path))
 
 

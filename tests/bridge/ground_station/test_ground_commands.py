@@ -148,9 +148,9 @@ def test_set_points(mask: int, expected: Velocity, frame: int) -> None:
         (0x0DFF, 8, 0.1, 0.0, 0.0, "type mask"),
         (0x05E7, 1, 0.1, 0.0, 0.0, "frame"),
         (0x05E7, 8, 0.1, 0.1, 0.0, "sideways"),
-        (0x05E7, 8, math.nan, 0.0, 0.0, "no number"),
-        (0x05E7, 8, 0.1, math.inf, 0.0, "no number"),
-        (0x05E7, 8, 0.1, 0.0, -math.inf, "no number"),
+        (0x05E7, 8, math.nan, 0.0, 0.0, "not a number"),
+        (0x05E7, 8, 0.1, math.inf, 0.0, "not a number"),
+        (0x05E7, 8, 0.1, 0.0, -math.inf, "not a number"),
     ],
 )
 def test_other_set_points_are_refused(mask: int, frame: int, vx: float, vy: float, yaw_rate: float, why: str) -> None:

@@ -13,6 +13,7 @@ from robosc_bridge.protocol.mavlink_messages import (
     Answer,
     Attitude,
     BatteryState,
+    ChargeState,
     Heartbeat,
     LocalPosition,
     MavCommand,
@@ -135,6 +136,14 @@ def test_batteries() -> None:
     assert pack(0, 4000, 4100, 3900) == BatteryState(False, 12.0, 0.55)
     assert pack(0) == BatteryState(False, None, 0.55)
     assert pack(1, 4000) is None
+
+    def judged(state: int) -> Any:
+        voltages = [7400, *(65535,) * 9]
+        words = {"charge_state": state}
+        return _said(lambda codec: codec.battery_status_encode(0, 1, 1, 32767, voltages, -1, -1, -1, 55, **words))
+
+    for state in ChargeState:
+        assert judged(state) == BatteryState(False, 7.4, 0.55, state)
 
 
 def test_obstacles() -> None:

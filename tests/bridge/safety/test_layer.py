@@ -124,12 +124,21 @@ def test_a_command_of_long_ago_does_not_count() -> None:
     assert bench.layer.output(bench.now_s).reasons == (Reason.COMMAND_SILENT,)
 
 
-def test_a_time_without_readings_gives_no_acceleration() -> None:
-    bench = Bench(command_timeout_s=1.0, loop_timeout_s=2.0, motor_timeout_s=0.05)
-    bench.drive(0.01)
-    bench.layer.command(Velocity(0.2), bench.now_s + 0.5)
-    bench.layer.on_drive_reading(reading(bench.now_s + 0.5, wheels_m_s=(0.01, 0.01)))
-    assert bench.layer.output(bench.now_s + 0.5).velocity == near(0.06)
+def test_an_output_holds_for_a_while_and_motion_begins_anew_after_it() -> None:
+    bench = Bench(scan_timeout_s=None, loop_timeout_s=2.0, motor_timeout_s=0.0625)
+    bench.drive(0.1)
+
+    def next_output(after_s: float) -> Velocity:
+        bench.now_s += after_s
+        bench.layer.command(Velocity(0.2), bench.now_s)
+        bench.layer.on_drive_reading(reading(bench.now_s, wheels_m_s=(0.1, 0.1)))
+        return bench.layer.output(bench.now_s).velocity
+
+    assert bench.last.velocity.until_s == bench.now_s + 0.0625
+    # As long as it holds, the next one goes on from it.
+    assert next_output(0.0624) == near(0.1624)
+    assert next_output(0.0626) == STANDSTILL
+    assert next_output(0.03) == near(0.03)
 
 
 def again(bench: Bench) -> None:
@@ -205,7 +214,7 @@ def test_wheels_that_stood_still_before_do_not_count() -> None:
 
 
 def test_enabling_again_keeps_torque_that_is_still_on() -> None:
-    bench = Bench(astray_s=5.0)
+    bench = Bench(astray_s=5.0, unbidden_s=5.0)
     bench.drive()
     bench.wheels_m_s = (0.1, 0.1)
     bench.layer.disable()

@@ -9,7 +9,7 @@ import pytest
 from robosc_bridge.safety import SCAN_TIMEOUTS_S, SafetyLimits
 from support.safety import LIMITS
 
-NUMBERS = [each.name for each in fields(SafetyLimits) if not each.name.startswith("is_")]
+NUMBERS = [each.name for each in fields(SafetyLimits) if not each.name.startswith(("is_", "has_"))]
 LONGEST = {
     "command_timeout_s": 1.0,
     "scan_timeout_s": 2.0,
@@ -36,7 +36,7 @@ def test_a_number_that_is_none_is_refused(name: str, value: float) -> None:
         changed(name, value)
 
 
-def test_the_defaults_are_those_of_the_page() -> None:
+def test_the_defaults_are_these() -> None:
     assert SafetyLimits(
         linear_m_s=1, angular_rad_s=1, wheel_m_s=1, separation_m=1, scan_timeout_s=None
     ) == SafetyLimits(
@@ -47,25 +47,27 @@ def test_the_defaults_are_those_of_the_page() -> None:
         scan_timeout_s=None,
         linear_acceleration_m_s2=1.0,
         linear_deceleration_m_s2=2.5,
-        angular_acceleration_rad_s2=4.0,
+        angular_acceleration_rad_s2=6.0,
         angular_deceleration_rad_s2=10.0,
         command_timeout_s=0.3,
         motor_timeout_s=0.2,
         motor_failures=3,
-        loop_timeout_s=0.2,
+        loop_timeout_s=0.1,
         pause_s=0.5,
         operator_timeout_s=None,
-        battery_warn_v=11.5,
-        battery_stop_v=11.1,
+        battery_warn_v=None,
+        battery_stop_v=None,
         battery_mean_s=2.0,
         astray_m_s=0.02,
         astray_s=0.8,
+        unbidden_s=0.5,
         torque_on_s=2.0,
         torque_off_s=1.0,
         standstill_m_s=0.01,
         min_valid_share=0.05,
+        has_own_controls=False,
         is_torque_off_on_operator_stop=False,
-        is_stopped_when_blind=False,
+        is_stopped_when_blind=True,
     )
     assert SCAN_TIMEOUTS_S == {"lds01": 0.6, "lds02": 0.5, "lds03": 0.3}
 
@@ -74,8 +76,25 @@ def test_the_defaults_are_those_of_the_page() -> None:
 def test_a_time_has_a_longest_value(name: str, longest: float) -> None:
     assert getattr(changed(name, longest), name) == longest
     beyond = math.nextafter(longest, math.inf)
-    with pytest.raises(ValueError, match=f"^{name} must be at most {longest} s, not {beyond}$"):
+    with pytest.raises(ValueError, match=f"^{name} must be at most {longest:g}, not {beyond}$"):
         changed(name, beyond)
+
+
+@pytest.mark.parametrize(
+    ("name", "shortest"),
+    [
+        ("command_timeout_s", 0.02),
+        ("scan_timeout_s", 0.05),
+        ("motor_timeout_s", 0.06),
+        ("loop_timeout_s", 0.005),
+        ("operator_timeout_s", 0.1),
+    ],
+)
+def test_a_time_that_would_always_be_over_is_refused(name: str, shortest: float) -> None:
+    assert getattr(changed(name, shortest), name) == shortest
+    below = math.nextafter(shortest, 0)
+    with pytest.raises(ValueError, match=f"^{name} must be at least {shortest:g}, not {below}$"):
+        changed(name, below)
 
 
 def test_a_share_is_at_most_all() -> None:
@@ -101,13 +120,16 @@ def test_what_belongs_together_is_consistent(name: str, other: str) -> None:
         changed(name, below)
 
 
-def test_only_scanner_and_operator_may_be_missing() -> None:
+def test_only_scanner_operator_and_battery_may_be_missing() -> None:
     assert replace(LIMITS, scan_timeout_s=None, operator_timeout_s=None).scan_timeout_s is None
+    # Each of the two is free of the other.
+    assert replace(LIMITS, battery_warn_v=None).battery_stop_v == 11.1
+    assert replace(LIMITS, battery_stop_v=None, battery_warn_v=3.0).battery_warn_v == 3.0
     with pytest.raises(TypeError, match="scan_timeout_s"):
         SafetyLimits(linear_m_s=1, angular_rad_s=1, wheel_m_s=1, separation_m=1)  # type: ignore[call-arg]
 
 
 def test_all_problems_are_told_at_once() -> None:
     wrong: dict[str, Any] = {"linear_m_s": 0, "torque_off_s": 300, "battery_warn_v": 11, "min_valid_share": 5}
-    with pytest.raises(ValueError, match=r"^linear_m_s .*; torque_off_s .*; battery_warn_v .*; min_valid_share .*$"):
+    with pytest.raises(ValueError, match=r"^linear_m_s .*; torque_off_s .*; min_valid_share .*; battery_warn_v .*$"):
         replace(LIMITS, **wrong)

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import pytest
 
+from robosc_bridge.devices.interface import BatteryLevel
 from robosc_bridge.safety.monitors import BatteryMonitor, Freshness, ScanCoverageMonitor, WheelMonitor
-from support.safety import LIMITS
+from support.safety import LIMITS, reading
 
 # Powers of two: no rounding at the borders.
 EXACT = replace(LIMITS, battery_mean_s=2.0, astray_m_s=0.03125, astray_s=0.5)
@@ -130,6 +131,23 @@ def test_a_mean_takes_its_time() -> None:
     assert battery((1.0, 10.0), (1.0, 12.0)) == (True, True)
 
 
+@pytest.mark.parametrize(
+    ("level", "is_near_empty", "is_empty"),
+    [(BatteryLevel.SOUND, False, False), (BatteryLevel.LOW, True, False), (BatteryLevel.EMPTY, True, True)],
+)
+def test_what_a_drive_base_says_of_its_battery_counts_at_once(
+    level: BatteryLevel, is_near_empty: bool, is_empty: bool
+) -> None:
+    watch = BatteryMonitor(replace(EXACT, battery_warn_v=None, battery_stop_v=None))
+    watch.update(None, 10.0, level)
+    assert (watch.is_near_empty, watch.is_empty) == (is_near_empty, is_empty)
+    watch.update(1.0, 11.0)  # says nothing
+    watch.update(1.0, 13.0)
+    assert (watch.is_near_empty, watch.is_empty) == (is_near_empty, is_empty)
+    watch.update(None, 14.0, BatteryLevel.SOUND)
+    assert (watch.is_near_empty, watch.is_empty) == (False, False)
+
+
 def test_a_dip_is_no_empty_battery() -> None:
     heard = [(12.0, 10 + 0.25 * step) for step in range(9)]
     heard[3] = (9.0, 10.75)
@@ -190,28 +208,87 @@ GOOD, BAD = ((0.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (0.1, 0.0))
 )
 def test_how_far_off_a_wheel_may_be(sign: int, goal: float, speed: float, follows: bool) -> None:
     for goals, speeds in (((sign * goal, 0.0), (sign * speed, 0.0)), ((0.0, sign * goal), (0.0, sign * speed))):
-        watch = WheelMonitor(EXACT)
-        assert not watch.is_astray(goals, speeds, 10.0)
-        assert watch.is_astray(goals, speeds, 11.0) is not follows
+        assert astray((goals, speeds, 10.0), (goals, speeds, 11.0)) == [False, not follows]
+
+
+Read = tuple[tuple[float, float], tuple[float, float], float]
+
+
+def astray(*read: Read, acceleration_m_s2: float | None = None) -> list[bool]:
+    """Tell after each reading (goals, speeds, time) whether a wheel is astray."""
+    watch, found = WheelMonitor(EXACT), list[bool]()
+    for goals, speeds, time_s in read:
+        watch.update(goals, reading(time_s, wheels_m_s=speeds, acceleration_m_s2=acceleration_m_s2))
+        found.append(watch.is_astray)
+    return found
 
 
 def test_how_long_a_wheel_may_be_off() -> None:
+    beyond_s = math.nextafter(10.5, 11)
+    assert astray((*BAD, 10.0), (*BAD, 10.5), (*BAD, beyond_s), (*BAD, 10.75)) == [False, False, True, True]
+    assert astray((*BAD, 10.0), (*BAD, 10.75), (*GOOD, 11.0), (*BAD, 11.0), (*BAD, 11.5)) == [
+        False, True, False, False, False,
+    ]  # fmt: skip
     watch = WheelMonitor(EXACT)
-    assert not watch.is_astray(*BAD, 10.0)
-    assert not watch.is_astray(*BAD, 10.5)
-    assert watch.is_astray(*BAD, math.nextafter(10.5, 11))
-    assert watch.is_astray(*BAD, 10.75)
-    assert not watch.is_astray(*GOOD, 11.0)
-    assert not watch.is_astray(*BAD, 11.0)
-    assert not watch.is_astray(*BAD, 11.5)
+    for time_s in (10.0, 10.75):
+        watch.update(BAD[0], reading(time_s, wheels_m_s=BAD[1]))
     watch.forget()
-    assert not watch.is_astray(*BAD, 11.75)
-    assert watch.is_astray(*BAD, 12.5)
+    assert not watch.is_astray
+    watch.update(BAD[0], reading(11.0, wheels_m_s=BAD[1]))
+    assert not watch.is_astray
+
+
+def test_each_wheel_has_its_own_time() -> None:
+    left, right = ((0.125, 0.125), (0.0, 0.125)), ((0.125, 0.125), (0.125, 0.0))
+    assert astray((*left, 10.0), (*left, 10.5), (*right, 10.75), (*right, 11.25)) == [False] * 4
 
 
 def test_when_the_clock_goes_back_the_time_off_begins_anew() -> None:
-    watch = WheelMonitor(EXACT)
-    assert not watch.is_astray(*BAD, 10.0)
-    assert not watch.is_astray(*BAD, 5.0)
-    assert not watch.is_astray(*BAD, 5.5)
-    assert watch.is_astray(*BAD, 5.75)
+    assert astray((*BAD, 10.0), (*BAD, 5.0), (*BAD, 5.5), (*BAD, 5.75)) == [False, False, False, True]
+
+
+def test_a_wheel_is_compared_with_the_goal_as_its_motor_goes_there() -> None:
+    goals = (0.5, 0.5)
+    followed: list[Read] = [(goals, (0.125 * step / 8, 0.125 * step / 8), 10.0 + step / 8) for step in range(33)]
+    assert not any(astray(*followed, acceleration_m_s2=0.125))
+    assert any(astray(*followed))
+    held: list[Read] = [(goals, (0.0, 0.0), 10.0 + step / 8) for step in range(33)]
+    # 0.03125 m/s are reached after 0.25 s, and exceeded after 0.375 s.
+    assert astray(*held, acceleration_m_s2=0.125).index(True) == 3 + 5
+    # What brakes is slower than told as well, and one that does not brake is found.
+    braked: list[Read] = [((0.0, 0.0), (0.5 - step / 64, 0.5 - step / 64), 10.0 + step / 8) for step in range(33)]
+    assert not any(astray(*braked, acceleration_m_s2=0.125))
+    assert any(astray(*[(goals, (0.5, 0.5), time_s) for goals, _, time_s in braked], acceleration_m_s2=0.125))
+
+
+def unbidden(*read: Read) -> list[bool]:
+    watch, found = WheelMonitor(replace(EXACT, standstill_m_s=0.015625, unbidden_s=0.25)), list[bool]()
+    for goals, speeds, time_s in read:
+        watch.update(goals, reading(time_s, wheels_m_s=speeds))
+        found.append(watch.is_unbidden)
+    return found
+
+
+ZERO = (0.0, 0.0)
+
+
+@pytest.mark.parametrize("speeds", [(0.04, 0.0), (0.0, -0.04), (math.nan, 0.0), (1.0, 1.0)])
+def test_wheels_that_stood_still_may_not_rotate_by_themselves(speeds: tuple[float, float]) -> None:
+    rest: Read = (ZERO, (0.015625, -0.015625), 9.0)
+    moves: list[Read] = [(ZERO, speeds, time_s) for time_s in (10.0, 10.25, math.nextafter(10.25, 11), 11.0)]
+    assert unbidden(rest, *moves) == [False, False, False, True, True]
+    # What comes to rest between begins anew; so does a clock that goes back.
+    assert unbidden(rest, *moves[:2], rest, *moves[:2]) == [False] * 6
+    assert unbidden(rest, moves[3], *moves[:2]) == [False] * 4
+
+
+def test_wheels_that_have_not_stood_still_yet_are_none_that_begin_to_rotate() -> None:
+    moves: list[Read] = [(ZERO, (0.5, 0.5), 10.0 + step) for step in range(3)]
+    assert unbidden(*moves) == [False] * 3
+    told: Read = ((0.5, 0.5), (0.5, 0.5), 9.5)
+    assert unbidden((ZERO, ZERO, 9.0), told, *moves) == [False] * 5
+
+
+def test_slow_ones_do_not_count() -> None:
+    slow: list[Read] = [(ZERO, (0.03125, -0.03125), 10.0 + step) for step in range(3)]
+    assert unbidden((ZERO, ZERO, 9.0), *slow) == [False] * 4

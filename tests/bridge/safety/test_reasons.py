@@ -52,7 +52,7 @@ def restart(bench: Bench) -> None:
 
 
 def test_every_reason_is_a_sentence_and_either_latches_or_not() -> None:
-    told = {*LATCHED, Reason.WHEEL_ASTRAY, Reason.BATTERY_LOW}
+    told = {*LATCHED, Reason.WHEEL_ASTRAY, Reason.UNBIDDEN_MOTION, Reason.BATTERY_LOW}
     assert set(LATCHING) == told
     others = {reason for reason, _ in END_BY_THEMSELVES.values()}
     assert told | others | {Reason.STANDBY, Reason.CLOCK, Reason.TORQUE_AWAITED, Reason.SCAN_BLIND} == set(Reason)
@@ -190,6 +190,70 @@ def test_a_wheel_that_does_not_stop_loses_its_torque() -> None:
     assert bench.cycles(0.9).is_torque_wanted
     assert bench.layer.reset() == (Reason.WHEEL_ASTRAY,)
     assert not bench.cycles(0.14).is_torque_wanted
+
+
+def stopped(bench: Bench) -> tuple[Reason, ...]:
+    """Let an operator stop it, which holds."""
+    bench.layer.operator_stop()
+    return (Reason.OPERATOR_STOP,)
+
+
+def idle(bench: Bench) -> tuple[Reason, ...]:
+    """Let the supervisor want to stand still."""
+    bench.wanted = STANDSTILL
+    return ()
+
+
+@pytest.mark.parametrize("stands", [stopped, idle])
+def test_wheels_that_nobody_commands_lose_their_torque_at_once(
+    stands: Callable[[Bench], tuple[Reason, ...]],
+) -> None:
+    """A button of the board, or an RC-100, that acts while torque is on."""
+    bench = Bench()
+    bench.drive()
+    before = stands(bench)
+    assert bench.cycles(5.0).reasons == before
+    bench.wheels_m_s = (0.05, 0.05)
+    assert bench.cycles(0.5).reasons == before
+    assert bench.last.is_torque_wanted
+    bench.cycles(2 * STEP_S)
+    assert set(bench.last.reasons) == {*before, Reason.UNBIDDEN_MOTION}
+    assert not bench.last.is_torque_wanted
+    # A reset is allowed, as torque is off; and a start is another one.
+    bench.wheels_m_s = None
+    bench.cycle()
+    assert bench.layer.reset() == ()
+    bench.drive(0.05)
+
+
+def test_motors_with_a_slow_ramp_are_not_astray() -> None:
+    """At 1 rad/s2 a wheel takes 6 s to 0.2 m/s: one that goes there as it should is no fault, one that is held is."""
+    bench = Bench(linear_acceleration_m_s2=1.0)
+    bench.acceleration_m_s2 = 0.033
+    bench.wanted = Velocity(0.2)
+    bench.layer.enable()
+    for cycle in range(400):
+        bench.wheels_m_s = (min(0.2, cycle * STEP_S * 0.033),) * 2
+        assert bench.cycle().reasons in ((), (Reason.TORQUE_AWAITED,), (Reason.TORQUE_AWAITED, Reason.MOTOR_SILENT))
+    bench.wanted = STANDSTILL
+    for cycle in range(400):
+        bench.wheels_m_s = (max(0.0, 0.2 - cycle * STEP_S * 0.033),) * 2
+        assert bench.cycle().reasons == ()
+    bench.wanted = Velocity(0.2)
+    bench.wheels_m_s = (0.0, 0.0)
+    # It must be told 0.02 m/s first, and then be off for its time.
+    assert bench.until_still(0.02 / 0.033 + 0.8 + 3 * STEP_S)[1] is Reason.WHEEL_ASTRAY
+
+
+@pytest.mark.parametrize(("has_own_controls", "is_off"), [(True, False), (True, True), (False, False)])
+def test_whoever_stops_a_board_with_own_controls_is_told_that_it_holds(has_own_controls: bool, is_off: bool) -> None:
+    bench = Bench(has_own_controls=has_own_controls, is_torque_off_on_operator_stop=is_off)
+    bench.drive()
+    assert bench.last.warnings == ()
+    bench.layer.operator_stop()
+    bench.cycles(0.2)
+    assert bench.last.is_torque_wanted is not is_off
+    assert bench.last.warnings == ((Caution.TORQUE_HELD,) if has_own_controls and not is_off else ())
 
 
 def test_wheels_are_judged_anew_when_torque_comes_on() -> None:
@@ -364,7 +428,7 @@ AHEAD, BEHIND, NOWHERE = (
 
 @pytest.mark.parametrize(("blind", "speed_m_s"), [(BEHIND, 0.1), (AHEAD, -0.1), (NOWHERE, 0.1), (NOWHERE, -0.1)])
 def test_where_the_scanner_sees_nothing_a_person_is_told(blind: tuple[float, ...], speed_m_s: float) -> None:
-    bench = Bench()
+    bench = Bench(is_stopped_when_blind=False)
     bench.ranges_m = blind
     bench.drive(speed_m_s)
     assert bench.last.warnings == (Caution.SCAN_BLIND,)
@@ -384,8 +448,8 @@ def test_where_the_scanner_sees_nothing_a_person_is_told(blind: tuple[float, ...
     assert bench.cycle().warnings == ()
 
 
-def test_where_the_scanner_sees_nothing_the_robot_may_not_go_if_it_is_configured() -> None:
-    bench = Bench(is_stopped_when_blind=True)
+def test_where_the_scanner_sees_nothing_the_robot_may_not_go() -> None:
+    bench = Bench()
     bench.ranges_m = AHEAD
     bench.drive(0.1)
     bench.ranges_m = BEHIND
@@ -409,7 +473,7 @@ def test_where_the_scanner_sees_nothing_the_robot_may_not_go_if_it_is_configured
 
 
 def test_a_reset_forgets_where_it_was_to_go() -> None:
-    bench = Bench(is_stopped_when_blind=True)
+    bench = Bench()
     bench.ranges_m = AHEAD
     bench.drive(0.1)
     bench.layer.operator_stop()

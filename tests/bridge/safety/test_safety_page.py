@@ -5,8 +5,9 @@ from pathlib import Path
 
 from robosc_bridge.driver_registry import features_of
 from robosc_bridge.safety import LATCHING, SCAN_TIMEOUTS_S, TORQUE_OFF, Caution, Reason
-from support.safety import LIMITS
+from support.safety_numbers import shipped
 
+LIMITS = shipped()
 PAGE = (Path(__file__).parents[3] / "docs" / "bridge-safety.md").read_text(encoding="utf-8")
 ROWS = {
     cells[0].strip("`"): cells[1:]
@@ -26,17 +27,20 @@ def test_how_each_ends_and_whether_torque_goes() -> None:
     for reason in Reason:
         _, zero, torque, end = ROWS[reason.name]
         assert end.startswith("reset") is (reason in LATCHING), reason
-        assert torque.startswith("once") is (reason in TORQUE_OFF or reason is Reason.STANDBY), reason
+        is_off = reason in TORQUE_OFF or reason is Reason.STANDBY
+        at_once = reason is Reason.UNBIDDEN_MOTION
+        assert torque.startswith("once" if not at_once else "at once") is is_off, reason
         assert zero.startswith(("at once", "timeout and one call"))
 
 
-def test_its_numbers_are_the_defaults() -> None:
+def test_its_numbers_are_those_that_ship() -> None:
     told = {
         Reason.COMMAND_SILENT: LIMITS.command_timeout_s,
         Reason.MOTOR_SILENT: LIMITS.motor_timeout_s,
         Reason.LOOP_OVERRUN: LIMITS.loop_timeout_s,
         Reason.WHEEL_ASTRAY: LIMITS.astray_s,
         Reason.PAUSED: LIMITS.pause_s,
+        Reason.UNBIDDEN_MOTION: LIMITS.unbidden_s,
     }
     for reason, time_s in told.items():
         assert f"more than {time_s} s" in ROWS[reason.name][0]
@@ -46,9 +50,21 @@ def test_its_numbers_are_the_defaults() -> None:
     assert rover is not None
     told_s = f"within {LIMITS.torque_on_s:g} s ({rover.torque_on_s:g} s of a MAVLink rover)"
     assert told_s in ROWS["TORQUE_LOST"][0]
-    assert f"the mean of {LIMITS.battery_mean_s:g} s is at most {LIMITS.battery_stop_v} V" in ROWS["BATTERY_LOW"][0]
+    assert f"the mean of {LIMITS.battery_mean_s:g} s is at most the voltage" in ROWS["BATTERY_LOW"][0]
     assert f"{2 * LIMITS.battery_mean_s:g} s and two readings" in ROWS["BATTERY_LOW"][1]
-    assert f"mean of at most {LIMITS.battery_warn_v} V" in PAGE
+    for driver, robot, name in (
+        ("opencr", "burger", "`opencr`"),
+        ("dynamixel", "burger", "`dynamixel`, Burger (XL430-W250)"),
+        ("dynamixel", "waffle", "`dynamixel`, Waffle (XM430-W210)"),
+    ):
+        found = shipped(driver, robot=robot)
+        assert f"\n| {name} | {found.battery_warn_v:g} V | {found.battery_stop_v:g} V |" in PAGE
+    rover_limits = shipped("mavlink-rover")
+    assert (rover_limits.battery_warn_v, rover_limits.battery_stop_v) == (None, None)
     assert f"faster than {LIMITS.standstill_m_s} m/s; {LIMITS.torque_off_s:g} s" in PAGE
     assert f"more than {LIMITS.astray_m_s} m/s" in ROWS["WHEEL_ASTRAY"][0]
+    astray = f"for more than {LIMITS.astray_s} s ({rover.astray_m_s} m/s and {rover.astray_s:g} s of a MAVLink rover)"
+    assert astray in ROWS["WHEEL_ASTRAY"][0]
+    assert f"faster than {LIMITS.astray_m_s} m/s" in ROWS["UNBIDDEN_MOTION"][0]
+    assert f"lose their torque {LIMITS.unbidden_s} s later" in PAGE
     assert LIMITS.motor_failures == 3

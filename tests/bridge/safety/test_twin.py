@@ -8,7 +8,7 @@ import pytest
 from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
-from robosc_bridge.devices.interface import STANDSTILL, MotorFault, Velocity
+from robosc_bridge.devices.interface import STANDSTILL, BatteryLevel, MotorFault, Velocity
 from robosc_bridge.safety import LATCHING, Output, Reason, SafetyLayer
 from support.effort import examples
 from support.safety import LIMITS, STEP_S, reading
@@ -42,7 +42,7 @@ class Sequence(RuleBasedStateMachine):
     )
     def begin(self, is_off: bool, needs_all: bool, is_driving: bool, is_stopped: bool) -> None:
         changes: dict[str, Any] = {"is_torque_off_on_operator_stop": is_off, "is_stopped_when_blind": is_stopped}
-        changes |= {"battery_mean_s": 0.1, "astray_s": 0.1}
+        changes |= {"battery_mean_s": 0.1, "astray_s": 0.1, "unbidden_s": 0.05}
         if not needs_all:
             changes |= {"scan_timeout_s": None, "operator_timeout_s": None}
         self.limits = LIMITS.__class__(**{**LIMITS.__dict__, **changes})
@@ -92,6 +92,8 @@ class Sequence(RuleBasedStateMachine):
         is_obeying=st.sampled_from([True] * 9 + [False]),
         faults=FAULTS,
         battery_v=st.sampled_from([None, 12.0, 12.0, 11.6, 11.0, math.nan]),
+        acceleration_m_s2=st.sampled_from([None, None, None, 0.05, 0.5]),
+        level=st.sampled_from([None, None, None, *BatteryLevel]),
     )
     def drive(
         self,
@@ -100,8 +102,11 @@ class Sequence(RuleBasedStateMachine):
         is_obeying: bool,
         faults: frozenset[MotorFault],
         battery_v: float | None,
+        acceleration_m_s2: float | None,
+        level: BatteryLevel | None,
     ) -> None:
-        self._read(self.now_s + shift_s, wheels, self.last.is_torque_wanted is is_obeying, faults, battery_v)
+        is_torque_on = self.last.is_torque_wanted is is_obeying
+        self._read(self.now_s + shift_s, wheels, is_torque_on, faults, battery_v, acceleration_m_s2, level)
 
     def _read(
         self,
@@ -110,11 +115,19 @@ class Sequence(RuleBasedStateMachine):
         is_torque_on: bool = True,
         faults: frozenset[MotorFault] = frozenset(),
         battery_v: float | None = 12.0,
+        acceleration_m_s2: float | None = None,
+        level: BatteryLevel | None = None,
     ) -> None:
         turn = self.last.velocity.angular_rad_s * self.limits.separation_m / 2
         told = (self.last.velocity.linear_m_s - turn, self.last.velocity.linear_m_s + turn)
         found = reading(
-            time_s, wheels_m_s=wheels or told, is_torque_on=is_torque_on, faults=faults, battery_v=battery_v
+            time_s,
+            wheels_m_s=wheels or told,
+            is_torque_on=is_torque_on,
+            faults=faults,
+            battery_v=battery_v,
+            acceleration_m_s2=acceleration_m_s2,
+            battery_level=level,
         )
         self.layer.on_drive_reading(found)
         self.twin.tells(found)
@@ -149,6 +162,20 @@ class Sequence(RuleBasedStateMachine):
         assert remaining == self.twin.reset()
         if not remaining:
             self.stopped, self.is_enabled = set(), False
+
+    @rule(
+        cycles=st.integers(1, 12),
+        speed=st.sampled_from([0.0, 0.0, 0.015, 0.05, math.nan]),
+        acceleration_m_s2=st.sampled_from([None, 0.05, 0.5]),
+    )
+    def rotate(self, cycles: int, speed: float, acceleration_m_s2: float | None) -> None:
+        """The wheels rotate so, whatever they are told, and all else goes on."""
+        for _ in range(cycles):
+            self._read(self.now_s + STEP_S / 2, (speed, 0.0), acceleration_m_s2=acceleration_m_s2)
+            self.now_s += STEP_S
+            for name in ("scan", "loop", "operator"):
+                self._tell(name, self.now_s)
+            self._judge(self.now_s)
 
     @rule(cycles=st.integers(1, 8))
     def wait(self, cycles: int) -> None:

@@ -143,14 +143,14 @@ GOOD = '{"time":1,"world_s":1,"x_m":0,"y_m":0,"heading_rad":0,"linear_m_s":0,"an
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("{}\n", r":1: is no entry of a motion record: .*missing required field"),
-        (GOOD + GOOD.replace('"x_m":0', '"x_m":"a"'), r":2: is no entry"),
-        (GOOD + GOOD.replace('"x_m":0', '"x_m":1e999'), r":2: is no entry"),
-        (GOOD + GOOD.replace('"collisions":0', '"collisions":-1'), r":2: is no entry"),
+        ("{}\n", r":1: is not an entry of a motion record: .*missing required field"),
+        (GOOD + GOOD.replace('"x_m":0', '"x_m":"a"'), r":2: is not an entry"),
+        (GOOD + GOOD.replace('"x_m":0', '"x_m":1e999'), r":2: is not an entry"),
+        (GOOD + GOOD.replace('"collisions":0', '"collisions":-1'), r":2: is not an entry"),
         (GOOD + GOOD.replace('"world_s":1', '"world_s":0.5'), r":2: goes back in time"),
-        (GOOD + '{"time":1,"world_s":1,"happening":"party","x_m":0,"y_m":0}\n', r":2: is no entry"),
+        (GOOD + '{"time":1,"world_s":1,"happening":"party","x_m":0,"y_m":0}\n', r":2: is not an entry"),
         (GOOD + "x" * 5000 + "\n", r":2: is longer than 4096 bytes"),
-        (GOOD + "\xff\n", r":2: is no entry"),
+        (GOOD + "\xff\n", r":2: is not an entry"),
     ],
 )
 def test_what_is_no_record_is_told_with_its_line(text: str, problem: str, path: Path) -> None:
@@ -168,7 +168,7 @@ def test_a_record_that_was_cut_off_is_read_so_far(path: Path) -> None:
 def test_no_file_is_told(path: Path) -> None:
     with pytest.raises(MotionError, match="there is no such file"):
         read_motion(path)
-    with pytest.raises(MotionError, match="is no regular file"):
+    with pytest.raises(MotionError, match="is not a regular file"):
         read_motion(path.parent)
 
 

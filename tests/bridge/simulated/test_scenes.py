@@ -150,7 +150,7 @@ def test_a_maze_has_one_exit_and_its_goal_is_outside(columns: int, rows: int, se
         ("obstacles: {Box!: {x_m: 0, y_m: 0, radius_m: 1}}", 'obstacles["Box!"]'),
         ("obstacles: {box: {x_m: 0, y_m: 0, radius_m: -1}}", "obstacles.box.radius_m: is -1"),
         ("noise: {slip_share: 2}", "noise.slip_share: is 2"),
-        ("walls: [", "is no YAML"),
+        ("walls: [", "is not YAML"),
         ("start: &a {x_m: 1}", "aliases and anchors are not allowed"),
         ("start: !!python/object/apply:os.system [ls]", "tags are not allowed"),
         ("- 1", "must be a mapping"),

@@ -85,7 +85,7 @@ def played(file: Path, text: str = TANK_AND_BELT) -> str:
     return str(file)
 
 
-def model(text: str, name: str = "tank.cif") -> watched_model.MadeModel:
+def model(text: str, name: str = "tank.cif") -> watched_model.SynthesizedModel:
     return asyncio.run(synthesized_automata(arguments(name), text))
 
 
@@ -365,7 +365,7 @@ def test_edges_that_cannot_be_told_apart_are_not_told() -> None:
     assert numbers == [[0], [1], []]
 
 
-def automata_run(made: watched_model.MadeModel) -> Any:
+def automata_run(made: watched_model.SynthesizedModel) -> Any:
     from robosc.pipeline.system_runs import SystemRun
 
     assert isinstance(made.supervisor, SystemSupervisor)
@@ -417,7 +417,7 @@ def test_a_model_without_a_supervisor_and_one_with_errors(tmp_path: Path, capsys
         (["--bridge", "127.0.0.1:1", "--model", "tank.cif"], "a bridge tells its model itself"),
         (["tank.wmod", "--scene", "room"], "--scene: automata are nowhere"),
         (["tank.cif", "-L", "."], "-L: automata import no libraries"),
-        (["tank.cif", "--deployment", "layer"], "--deployment: automata are no node"),
+        (["tank.cif", "--deployment", "layer"], "--deployment: automata are not a node"),
         (["tank.cif"], "there is no file tank.cif"),
     ],
 )

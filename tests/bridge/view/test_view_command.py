@@ -100,7 +100,7 @@ def test_wrong_use(files: tuple[Path, Path], tmp_path: Path) -> None:
     assert "there is no scene" in why("--log", log, "--model", model, "--scene", "nowhere")
     assert "--motion goes with --log" in why(model, "--motion", log)
     assert "there is no such file" in why("--log", log, "--model", model, "--motion", str(tmp_path / "none"))
-    assert "no entry of a motion record" in why("--log", log, "--model", model, "--motion", log)
+    assert "not an entry of a motion record" in why("--log", log, "--model", model, "--motion", log)
     assert "other machines" in why("--log", log, "--model", model, "--address", "0.0.0.0:0")
     for words in (("--ros2", "--bridge", "127.0.0.1:1"), ("--bridge", "x:"), ("--ros2", "--address", "h:99999")):
         with pytest.raises(SystemExit):

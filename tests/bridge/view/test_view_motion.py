@@ -11,7 +11,7 @@ import pytest
 
 from robosc.event_logs import read_log
 from robosc.motion_record import Motion, Sample
-from robosc_view.motion import MOST_POINTS, SeenMotion
+from robosc_view.motion import MOST_POINTS, MotionTrace
 from robosc_view.replay import Recording, Replay
 from robosc_view.reports import Drive, Status
 from robosc_view.scene_map import scene_map, scene_start
@@ -29,7 +29,7 @@ def test_the_pose_is_that_of_the_last_sample() -> None:
     """The twin goes through all samples."""
     chance = Random(1)
     samples = tuple(sample(number * 0.05, float(number)) for number in range(100))
-    seen = SeenMotion(Motion(samples, ()))
+    seen = MotionTrace(Motion(samples, ()))
     for _ in range(200):
         time_s = BEGIN_S + chance.uniform(-0.5, 6.0)
         before = [each for each in samples if each.time <= time_s]
@@ -38,7 +38,7 @@ def test_the_pose_is_that_of_the_last_sample() -> None:
 
 
 def test_the_map_begins_where_the_scene_does() -> None:
-    seen = SeenMotion(
+    seen = MotionTrace(
         Motion((sample(0.0, 1.0, 2.0, math.pi / 2), sample(1.0, 1.0, 5.0, math.pi)), ()), (1.0, 2.0, math.pi / 2)
     )
     first, last = seen.drive(BEGIN_S), seen.drive(BEGIN_S + 1.0)
@@ -51,7 +51,7 @@ def test_the_map_begins_where_the_scene_does() -> None:
 
 def test_a_sample_at_the_start_of_a_scene_is_the_origin_of_its_map() -> None:
     x_m, y_m, heading_rad = scene_start("maze-rooms")
-    drive = SeenMotion(Motion((sample(0.0, x_m, y_m, heading_rad),), ()), (x_m, y_m, heading_rad)).drive(BEGIN_S)
+    drive = MotionTrace(Motion((sample(0.0, x_m, y_m, heading_rad),), ()), (x_m, y_m, heading_rad)).drive(BEGIN_S)
     assert drive is not None
     assert drive.pose == pytest.approx((0.0, 0.0, 0.0))
     assert scene_map("maze-rooms") is not None
@@ -59,7 +59,7 @@ def test_a_sample_at_the_start_of_a_scene_is_the_origin_of_its_map() -> None:
 
 
 def test_a_long_way_is_thinned_and_keeps_its_end() -> None:
-    way = SeenMotion(Motion(tuple(sample(number * 0.05, float(number)) for number in range(9000)), ())).way()
+    way = MotionTrace(Motion(tuple(sample(number * 0.05, float(number)) for number in range(9000)), ())).way()
     assert len(way) <= MOST_POINTS + 1
     assert (way[0], way[-1]) == ([0.0, 0.0], [8999.0, 0.0])
 
@@ -86,7 +86,7 @@ def test_a_replay_shows_the_robot_where_it_was(tmp_path: Path) -> None:
     log = tmp_path / "run.jsonl"
     entries = [{"time": BEGIN_S + time_s, "kind": "release", "identifier": "/x"} for time_s in (0.0, 2.0)]
     log.write_text("".join(json.dumps(entry) + "\n" for entry in entries), encoding="utf-8")
-    motion = SeenMotion(Motion((sample(0.0, 0.0), sample(1.0, 3.0)), ()))
+    motion = MotionTrace(Motion((sample(0.0, 0.0), sample(1.0, 3.0)), ()))
     replay, sink = Replay(Recording(read_log(log), supervisor, None, motion)), _Shown()
 
     async def go() -> None:

@@ -25,12 +25,12 @@ from robosc.supervisor import Supervisor, encode
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view import command, watched_model
 from robosc_view.model_changes import model_changes
-from robosc_view.playground import MAXIMUM_KEPT, KeptRun, KeptRuns, Playground, packed, playable, unpacked
+from robosc_view.playground import MAXIMUM_KEPT, Playground, StoredRun, StoredRuns, packed, playable, unpacked
 from robosc_view.replay import Recording, Replay
 from robosc_view.reports import SourceKind
 from robosc_view.requests import ROBOSC, parse_request
 from robosc_view.sources import Pause, RefusedError
-from robosc_view.watched_model import MadeModel, NoSupervisorError, WatchedModel, file_digest, read, synthesized
+from robosc_view.watched_model import NoSupervisorError, SynthesizedModel, WatchedModel, file_digest, read, synthesized
 from support.live import large_model, supervisor_without_synthesis
 from support.models import EXAMPLES
 from support.pages_open import opened, token_of
@@ -46,23 +46,23 @@ class Files:
 
     def __init__(self) -> None:
         self.content: str | NoSupervisorError = "first"
-        self.made: asyncio.Future[MadeModel] = asyncio.Future()
+        self.made: asyncio.Future[SynthesizedModel] = asyncio.Future()
         self.cancelled: list[str] = []
         self.begun: list[str] = []
         self._looks = asyncio.Semaphore(0)
         self._asked = asyncio.Event()
-        self.watched = WatchedModel(MadeModel(FIRST), "first", self._digest, self._make, pause=self._pause)
-        self.kept = KeptRuns()
+        self.watched = WatchedModel(SynthesizedModel(FIRST), "first", self._digest, self._make, pause=self._pause)
+        self.kept = StoredRuns()
         self.robot = playable(self.watched.made)
 
     def source(self) -> Playground:
         """The run of one more page."""
         return Playground(self.watched, self.kept, None, self._of_link)
 
-    async def _of_link(self, text: str, language: str) -> MadeModel:
+    async def _of_link(self, text: str, language: str) -> SynthesizedModel:
         assert language == ROBOSC
         self.begun.append(text)
-        return MadeModel(SECOND, (), text)
+        return SynthesizedModel(SECOND, (), text)
 
     async def look(self) -> None:
         """The source looks, and has done what follows."""
@@ -81,7 +81,7 @@ class Files:
             raise self.content
         return self.content
 
-    async def _make(self) -> MadeModel:
+    async def _make(self) -> SynthesizedModel:
         content = str(self.content)
         self.begun.append(content)
         self.made = asyncio.Future()
@@ -98,7 +98,7 @@ async def looking(files: Files) -> AsyncIterator[Any]:
         yield page
 
 
-def supervisor_in(made: MadeModel) -> Supervisor:
+def supervisor_in(made: SynthesizedModel) -> Supervisor:
     assert isinstance(made.supervisor, Supervisor)
     return made.supervisor
 
@@ -130,7 +130,7 @@ def test_a_change_is_shown_and_what_is_wrong_is_told() -> None:
             before = components(await page.told("update"))
             files.content = "second"
             await files.look()
-            files.made.set_result(MadeModel(SECOND))
+            files.made.set_result(SynthesizedModel(SECOND))
             await files.look()
             await page.told("definition")
             after = components(await page.told("update"))
@@ -147,7 +147,7 @@ def test_a_change_is_shown_and_what_is_wrong_is_told() -> None:
             assert files.begun[-1] == "it is gone"
             files.content = "third"
             await files.look()
-            files.made.set_result(MadeModel(FIRST))
+            files.made.set_result(SynthesizedModel(FIRST))
             await files.look()
             update = await page.until(lambda told: told["type"] == "update" and not told["warnings"])
             assert components(update) == before
@@ -311,10 +311,10 @@ GATE = """robot Gate {
 }"""
 
 
-def made_of(text: str, findings: tuple[str, ...] = ()) -> MadeModel:
+def playable_automata(text: str, findings: tuple[str, ...] = ()) -> SynthesizedModel:
     made = robosc.synthesize(robosc.load(text=text)).supervisor
     assert made is not None
-    return MadeModel(made, findings, text)
+    return SynthesizedModel(made, findings, text)
 
 
 class Playing(Files):
@@ -322,7 +322,7 @@ class Playing(Files):
 
     def __init__(self) -> None:
         super().__init__()
-        self.watched = WatchedModel(made_of(GATE), "first", self._digest, self._make, pause=self._pause)
+        self.watched = WatchedModel(playable_automata(GATE), "first", self._digest, self._make, pause=self._pause)
         self.robot = playable(self.watched.made)
 
 
@@ -384,7 +384,7 @@ def test_chance_and_trouble() -> None:
             told = await page.told("run")
             told = await done(page, "walk", steps=12, seed=3)
             assert (told["steps"], told["lines"]) == (12, ["12 events by chance, seed 3"])
-            twin = Run(supervisor_in(made_of(GATE)))
+            twin = Run(supervisor_in(playable_automata(GATE)))
             assert [entry["event"] for entry in page.entries() if entry["kind"] == "event"] == [
                 step.event for step in twin.walk(12, 3)
             ]
@@ -407,7 +407,7 @@ def test_a_run_is_kept_as_a_log_and_as_a_test() -> None:
             await page.told("run")
             await done(page, "event", line="light day")
             await done(page, "event", line="open")
-            twin = Run(supervisor_in(made_of(GATE)))
+            twin = Run(supervisor_in(playable_automata(GATE)))
             twin.step("light.response", "day")
             twin.step("open.request")
             await page.send(type="save", form="log")
@@ -451,7 +451,7 @@ def test_a_saved_file_says_what_has_changed_and_the_run_happens_again() -> None:
             changed = GATE.replace("needs Sensor.light = day", "needs Sensor.light = day and Sensor.people = 0")
             changed = changed.replace("requirement shut needs Sensor.people = 0", "requirement shut needs Gate.closed")
             changed = changed.replace("state opened", "marked state opened")
-            files.made.set_result(made_of(changed, ("warning: shut never happens [never-enabled]",)))
+            files.made.set_result(playable_automata(changed, ("warning: shut never happens [never-enabled]",)))
             await files.look()
             told = await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
             assert told["steps"] == 2
@@ -459,7 +459,9 @@ def test_a_saved_file_says_what_has_changed_and_the_run_happens_again() -> None:
             assert "new finding: warning: shut never happens [never-enabled]" in told["lines"]
             files.content = "third"
             await files.look()
-            files.made.set_result(made_of(changed.replace("needs Sensor.light = day and", "needs Gate.opened and")))
+            files.made.set_result(
+                playable_automata(changed.replace("needs Sensor.light = day and", "needs Gate.opened and"))
+            )
             await files.look()
             told = await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
             # An event that cannot happen any more ends it there.
@@ -530,11 +532,11 @@ def test_a_page_that_comes_back_goes_on_with_its_run() -> None:
                 await page.until(lambda message: message["type"] == "update" and components(message) != first)
 
     asyncio.run(run())
-    kept = KeptRuns()
+    kept = StoredRuns()
     for number in range(MAXIMUM_KEPT + 1):
-        kept.keep(str(number), KeptRun(MadeModel(FIRST)))
-    assert kept.of("0") == KeptRun()
-    assert kept.of("1") == KeptRun(MadeModel(FIRST))
+        kept.keep(str(number), StoredRun(SynthesizedModel(FIRST)))
+    assert kept.of("0") == StoredRun()
+    assert kept.of("1") == StoredRun(SynthesizedModel(FIRST))
 
 
 @pytest.mark.parametrize(
@@ -563,7 +565,7 @@ def test_requests_that_make_no_sense_are_refused(request_: dict[str, Any]) -> No
 
 def test_what_is_shown_live_is_not_led_by_hand() -> None:
     async def run() -> None:
-        made = made_of(GATE)
+        made = playable_automata(GATE)
         log = LoggedRun((LogEntry(1, 0.0, "restart", "", False, {}),))
         recording = Recording(log, supervisor_in(made))
         async with served(lambda: Replay(recording), is_shared=False) as server, opened(server.url) as page:
@@ -594,14 +596,14 @@ def test_changes_of_the_supervisor_are_told() -> None:
         requirement shut needs Lift.down
         requirement lower needs Gate.closed
     }"""
-    before = made_of(carrier)
-    after = made_of(carrier.replace("requirement shut needs Lift.down", ""))
+    before = playable_automata(carrier)
+    after = playable_automata(carrier.replace("requirement shut needs Lift.down", ""))
     told = model_changes(before, after)
     assert "4 states, which were 3" in told
     assert any(line.startswith("the supervisor adds nothing more to open.request (before: Lift.down") for line in told)
     assert model_changes(before, before) == ("nothing that the supervisor does has changed",)
     assert "gone: shut.request" in model_changes(
-        before, made_of(carrier.replace("shut with", "close with").replace("to shut", "to close")
+        before, playable_automata(carrier.replace("shut with", "close with").replace("to shut", "to close")
                         .replace("requirement shut", "requirement close"))
     )  # fmt: skip
 

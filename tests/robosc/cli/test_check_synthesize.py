@@ -86,9 +86,9 @@ def test_deployment_and_engine_are_those_of_the_synthesis(
     capsys: pytest.CaptureFixture[str], write: Any, engine: str
 ) -> None:
     # As a layer it needs to tell the two messages apart.
-    told_apart = LIGHTS.replace('"/light", type: none', '"/light", type: boolean')
-    told_apart = told_apart.replace("type: boolean", "type: boolean, when: value", 1)
-    model = write(told_apart)
+    recognized_by_data = LIGHTS.replace('"/light", type: none', '"/light", type: boolean')
+    recognized_by_data = recognized_by_data.replace("type: boolean", "type: boolean, when: value", 1)
+    model = write(recognized_by_data)
     for deployment, codes in (
         ("controller", ["competing-requests", "unused-requirement"]),
         ("layer", ["unused-requirement"]),

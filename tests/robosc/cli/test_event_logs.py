@@ -120,7 +120,11 @@ def test_a_log_is_converted(folder: Path, capsys: pytest.CaptureFixture[str]) ->
         (["convert-log", "maze.jsonl", "--layout", "maze.yaml"], 2, "maze.yaml: layouts of Foxglove are .json files"),
         (["convert-log", "maze.jsonl", "--layout", "no/maze.json"], 2, "cannot write no/maze.json: No such file"),
         (["convert-log", "maze.jsonl", "--motion", "none.jsonl"], 2, "none.jsonl: there is no such file"),
-        (["convert-log", "maze.jsonl", "--motion", "maze.jsonl"], 2, "maze.jsonl:1: is no entry of a motion record"),
+        (
+            ["convert-log", "maze.jsonl", "--motion", "maze.jsonl"],
+            2,
+            "maze.jsonl:1: is not an entry of a motion record",
+        ),
         (["check-log", "maze.jsonl", "--model", "none.rscd"], 2, "there is no file none.rscd"),
         (["check-log", "maze.jsonl", "--model", "none.rsup"], 2, "cannot read none.rsup"),
         (["check-log", "none.jsonl", "--model", "maze.rsup"], 2, "cannot read none.jsonl"),

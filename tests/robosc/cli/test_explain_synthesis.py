@@ -61,7 +61,7 @@ def test_one_event_in_a_state(capsys: pytest.CaptureFixture[str]) -> None:
     [
         (["--event", "nevigate"], "unknown event 'nevigate'; did you mean 'navigate'?"),
         (["--after", "navigate"], "'navigate.request' cannot happen in the initial state: "),
-        (["--state", "Navigator"], "'Navigator' is no condition"),
+        (["--state", "Navigator"], "'Navigator' is not a condition"),
         (["--engine", "abacus"], "unknown engine 'abacus'"),
     ],
 )

@@ -70,7 +70,7 @@ def test_a_changed_file_fails_with_and_without_its_model(folder: Path, capsys: p
         (["key", "new", "--comment", "a\nb"], 2, "the comment of a key must be one printable line"),
         (["sign", "maze.rsup", "--key", "none.key"], 2, "cannot read none.key: No such file or directory"),
         (["sign", "none.rsup", "--key", "ours.key"], 2, "cannot read none.rsup: No such file or directory"),
-        (["sign", "ours.pub", "--key", "ours.key"], 1, "the supervisor file is no UTF-8 JSON"),
+        (["sign", "ours.pub", "--key", "ours.key"], 1, "the supervisor file is not UTF-8 JSON"),
         (["sign", "maze.rsup", "--key", "ours.pub"], 1, "ours.pub: others may read this private key"),
         (["verify", "maze.rsup", "--signed-by", "none.pub"], 2, "cannot read none.pub"),
         (["verify", "maze.rsup", "--signed-by", "ours.pub"], 2, "cannot read maze.rsup.sig"),

@@ -161,7 +161,7 @@ def test_what_is_no_supervisor_fails(capsys: pytest.CaptureFixture[str], tmp_pat
     path.write_text("{}")
     capsys.readouterr()
     assert main(["verify", str(path), NAVIGATION]) == 1
-    assert "no supervisor file" in capsys.readouterr().err
+    assert "not a supervisor file" in capsys.readouterr().err
     status, document = _json(capsys, str(path), NAVIGATION)
     assert (status, document["status"]) == (1, "failed")
     broken = tmp_path / "broken.rscd"

@@ -76,7 +76,7 @@ def test_it_does_what_python_does_step_by_step(seed: int) -> None:
                 ("meets", (a, cube)),
                 ("meeting", (a, cube, dice.randrange(len(SIZES)))),
                 ("paths", (a,)),
-                *([("shortest_path", (a,)), ("around", (a,))] if a else []),
+                *([("shortest_path", (a,)), ("enclosing_cube", (a,))] if a else []),
             ]
         )
         answer = asked(plain, question, arguments)

@@ -277,7 +277,7 @@ def check_descriptions(domains: Domains, compared: tuple[Subject, ...], holds: P
         if not places:
             return
         wanted, forbidden = (space.of(diagram) for diagram in sets)
-        for description in relations.around(wanted, forbidden, places):
+        for description in relations.descriptions(wanted, forbidden, places):
             for values in product(*domains.values()):
                 if matters(*values):
                     assert is_described(relations, space, description, domains, values) is bool(holds(*values))

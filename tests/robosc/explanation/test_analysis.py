@@ -162,7 +162,7 @@ def test_what_would_follow_runs_into_trouble() -> None:
                 kinds = {item.kind for item in twin.analysis.hindrances(event.name, here)}
                 if HindranceKind.SUPERVISOR in kinds:
                     counterexample = twin.analysis.counterexample_after(
-                        twin.analysis.lost_after(event.name, here, twin.analysis.good)
+                        twin.analysis.bad_after(event.name, here, twin.analysis.good)
                     )
                     start = counterexample.run.states[0]
                     assert start in twin.semantics.targets(state, event.name)

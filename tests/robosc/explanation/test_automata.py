@@ -1,7 +1,10 @@
 """Tests of explanations of automata that are no model's, against explicit synthesis on random systems."""
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -19,14 +22,16 @@ from robosc.automata import (
     SystemPlaces,
 )
 from robosc.automata.state import Subject, subjects
+from robosc.cif import check_cif, load_cif
 from robosc.explanation import Explanation, RequestError, SystemWords, explain_synthesis, explanation_text
 from robosc.explanation.explanations import StateReport, StateValues
-from robosc.explanation.requests import SystemRequests
+from robosc.explanation.requests import SystemQuestionReader
 from robosc.explanation.requirement_automata import as_conditions
 from robosc.expressions import Binary, Constant, IntegerType, StateTest, Unary, VariableRead
 from robosc.source import Location
+from robosc.synthesis.fixed_point import FixedPoint
 from support.effort import seeds
-from support.random_systems import any_wide_systems, explicit_supervisor, wide_system
+from support.random_systems import any_wide_systems, explicit_supervisor, random_system, wide_system
 from support.systems import automaton
 
 EXAMPLES = 40
@@ -114,6 +119,49 @@ def test_explanations_agree_with_explicit_synthesis() -> None:
         ]
         _check_a_state(system, seed, met)
     assert all(met[name] for name in ("empty", "never", "restricted", "free", "can happen", "cannot happen")), met
+
+
+_SEARCHES: tuple[Callable[..., Any], ...] = (
+    lambda solver, backwards, onwards: (backwards(solver), None),
+    lambda solver, backwards, onwards: (None, onwards(solver)),
+)
+
+
+@pytest.mark.random
+def test_either_search_tells_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No explanation speaks of what is left out since nothing leads there."""
+    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    for seed in seeds(EXAMPLES):
+        for system in (random_system(seed), wide_system(seed)):
+            found = []
+            for search in _SEARCHES:
+                monkeypatch.setattr(FixedPoint, "_first_of", search)
+                found.append(explain_synthesis(SystemWords(system), engine="cudd"))
+            assert found[0] == found[1], seed
+
+
+@pytest.mark.parametrize("search", _SEARCHES)
+def test_a_step_that_never_happens_is_told_by_its_harmful_target(
+    search: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From b, which no run reaches, there is a way on: the trouble is c."""
+    monkeypatch.setattr(FixedPoint, "_first_of", search)
+    plant = automaton("P", ["a -go-> b", "a -go-> c", "b -stop-> a"], marked=["a"])
+    never = Unary("not", StateTest("P", "c"))
+    (go,) = explained(System("s", (GO, STOP), (plant,), invariants=(never,))).events
+    (reason,) = go.reasons
+    assert reason.trouble is not None
+    assert reason.trouble.way.state.components == {"P": "c"}
+    assert reason.trouble.kind == "bad"
+
+
+def test_states_that_no_run_reaches_do_not_hold_up_explanations() -> None:
+    # From the marked states backwards, the whole takes more than two minutes.
+    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+    found = check_cif(load_cif(Path(__file__).parents[2] / "models" / "wafer_handling.cif"))
+    assert found.system is not None
+    told = explain_synthesis(SystemWords(found.system), engine="cudd", event="load.c_on")
+    assert told.events[0].status == "restricted"
 
 
 def _check_a_state(system: System, seed: int, met: Counter[str]) -> None:
@@ -242,7 +290,7 @@ def test_no_initial_state_is_told() -> None:
 
 
 ODD = Automaton("odd = 1", ("< 2",), ("< 2",), frozenset(), frozenset(), ())
-ASKED = SystemRequests(System("s", (GO, STOP), (PLANT, ODD)))
+ASKED = SystemQuestionReader(System("s", (GO, STOP), (PLANT, ODD)))
 
 
 @pytest.mark.parametrize(
@@ -268,7 +316,7 @@ def test_states_are_asked_for_by_the_names_of_automata(text: str, condition: obj
         ("p.q = c", "unknown location of p.q 'c'; there is a, b"),
         ("p.q < a", "unknown location or variable 'p.q'; did you mean 'p.q.n'?"),
         ("p.q.n", "p.q.n needs a value: p.q.n = 0"),
-        ("p.q.n = x", "'x' is no value of p.q.n; there is a whole number"),
+        ("p.q.n = x", "'x' is not a value of p.q.n; there is a whole number"),
         ("", 'no state is asked for: write for instance "Door.closed, Lift.n = 2"'),
     ],
 )

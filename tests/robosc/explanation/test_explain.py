@@ -335,9 +335,9 @@ def test_of_the_states_that_fit_one_is_shown_in_which_the_event_cannot_happen() 
         ({"state": "Door.opend"}, "unknown state or synthesis variable of Door 'opend'; did you mean 'opened'?"),
         ({"state": "Door.opened = 3"}, "Door.opened is a state: it has no value to compare"),
         ({"state": "Lift.n"}, "Lift.n needs a value: Lift.n = 0"),
-        ({"state": "Lift.n = high"}, "'high' is no value of Lift.n; there is a whole number"),
+        ({"state": "Lift.n = high"}, "'high' is not a value of Lift.n; there is a whole number"),
         ({"state": "Lift.n > 7"}, "the controlled system is never in a state that fits 'Lift.n > 7'"),
-        ({"state": "Door"}, "'Door' is no condition such as Door.closed"),
+        ({"state": "Door"}, "'Door' is not a condition such as Door.closed"),
         ({"state": " , "}, "no state is asked for"),
         (
             {"state": "Lift.armed and Lift.n = 2"},

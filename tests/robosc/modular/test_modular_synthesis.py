@@ -46,7 +46,7 @@ def check(system: System, result: ModularResult) -> bool:
     """Compare with the supervisor of the whole; returns whether there is one."""
     expected = explicit_supervisor(system)
     assert expected is not None
-    assert (result.lost is not None) == expected.is_empty
+    assert (result.unsolved is not None) == expected.is_empty
     if expected.is_empty:
         return False
     validate_added(result.added, system)
@@ -211,7 +211,7 @@ def test_a_system_of_nothing_is_one_module() -> None:
 def test_the_module_to_blame_is_told() -> None:
     system = philosophers(3)
     never = replace(system, invariants=(Unary("not", StateTest("P1", "t")),))
-    lost = synthesize_modular(never, module_bits=0.0).lost
+    lost = synthesize_modular(never, module_bits=0.0).unsolved
     assert lost is not None
     assert "P1" in lost.automata
     assert len(lost.automata) < len(system.automata)

@@ -1,4 +1,4 @@
-"""Runs that are led by hand: against the reference interpreter's own interface, and what is refused."""
+"""Runs that are stepped by hand: against the reference interpreter's own interface, and what is refused."""
 
 from random import Random
 from typing import Any
@@ -201,7 +201,7 @@ def test_what_lies_outside_its_range_is_moved_into_it_and_told(run: robosc.Run) 
         ("scan.response", [{}], {"front": 1.0}, robosc.DataError, "given either as one value or as keywords"),
         ("scan.response", [], {"frnt": 1.0}, robosc.DataError, "no property 'frnt'; did you mean 'front'?"),
         ("scan.response", [], {"zzz": 1.0}, robosc.DataError, "no property 'zzz'; there are front, class, word, rest"),
-        ("scan.response", [], {"front": "fre"}, robosc.DataError, "is 'fre', which is no Way; did you mean 'free'?"),
+        ("scan.response", [], {"front": "fre"}, robosc.DataError, "is 'fre', which is not Way; did you mean 'free'?"),
         ("scan.response", [], {"front": []}, robosc.DataError, "is [], and must be double, or one of free, blocked"),
         ("scan.response", [], {"rest": "free"}, robosc.DataError, "value.rest of 'scan.response' is 'free', and must"),
         ("scan.response", [], {"rest": 3}, robosc.DataError, "value.rest of 'scan.response' is 3, and must be"),

@@ -172,8 +172,8 @@ def test_damaged_bytes(seed: int) -> None:
         (("system_supervisor", "system", "automata", 0, "edges", 0, "target"), "gone", "there is no location gone"),
         (("system_supervisor", "added", 0, "event"), "u_done", "no such controllable event"),
         (("system_supervisor", "added", 0, "event"), "x\n" * 200, "no such controllable event"),
-        (("system_supervisor", "added", 0, "condition", "root"), 9, "the root is no node"),
-        (("system_supervisor", "initial"), {"nodes": [], "root": 2}, "the root is no node"),
+        (("system_supervisor", "added", 0, "condition", "root"), 9, "the root is not a node"),
+        (("system_supervisor", "initial"), {"nodes": [], "root": 2}, "the root is not a node"),
         (("system_supervisor", "statistics", "states"), 0, "a figure of the synthesis is too small"),
     ],
 )

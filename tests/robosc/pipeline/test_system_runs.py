@@ -14,7 +14,7 @@ import robosc
 from robosc.automata import DiscreteVariable, EventCondition, InputVariable, Role, System, disables
 from robosc.automata.compile import State
 from robosc.expressions import Binary, Constant, EnumType, IntegerType, StateTest, Unary
-from robosc.pipeline.system_runs import beginnings
+from robosc.pipeline.system_runs import initial_states_in_words
 from robosc.pipeline.walking import TroubleKind
 from support.effort import examples
 from support.naive_system import NaiveSystem
@@ -79,7 +79,9 @@ def test_a_product_by_hand_enumerates_the_same_states_and_runs(seed: int) -> Non
             robosc.explore(supervisor, maximum_states=MAXIMUM_STATES).write("never.json")
         return
     first = naive.beginnings(supervisor.initial)
-    assert by_name(state.parts for state in beginnings(supervisor)) == by_name(parts(drawn, state) for state in first)
+    assert by_name(state.parts for state in initial_states_in_words(supervisor)) == by_name(
+        parts(drawn, state) for state in first
+    )
     reached: dict[State, dict[str, frozenset[State]]] = {}
     left = sorted(first)
     while left:
@@ -322,7 +324,7 @@ def test_ways_to_begin() -> None:
     with pytest.raises(robosc.ChoiceError, match="by hand cannot begin in a state with A = c; it can begin in: A = a"):
         robosc.simulate(supervisor, initial={"A": "c"})
     assert robosc.simulate(supervisor, initial={"A": "b"}).step("go").state.components == {"A": "a"}
-    assert [state.parts for state in beginnings(supervisor)] == [{"A": "a"}, {"A": "b"}]
+    assert [state.parts for state in initial_states_in_words(supervisor)] == [{"A": "a"}, {"A": "b"}]
     found = robosc.explore(supervisor)
     assert found.graph is not None
     assert (found.graph.initial_states, found.graph.initial) == ((0, 1), 0)

@@ -129,7 +129,7 @@ def test_a_synthesis_in_modules(tmp_path: Path) -> None:
     for change in ({"states": 0}, {"group": 0}, {"automata": ["M9"]}):
         document = json.loads(supervisor.encode())
         document["system_supervisor"]["modules"][1].update(change)
-        with pytest.raises(robosc.InvalidSupervisorError, match="a module is none of its automata"):
+        with pytest.raises(robosc.InvalidSupervisorError, match="a module names an automaton that it does not have"):
             decode_system(json.dumps(document).encode())
     # Modules that share nothing are counted.
     apart = robosc.synthesize(replace(row, automata=row.automata[:6]), is_modular=True).supervisor

@@ -211,11 +211,11 @@ def test_what_plain_automata_do_not_have_is_not_written() -> None:
     (first, *rest) = made.automata
     wide = replace(first, variables=(DiscreteVariable("n", IntegerType(0, 1), (0,)),))
     for write in WRITERS.values():
-        with pytest.raises(UnsupportedModelError, match="is no plain automaton"):
+        with pytest.raises(UnsupportedModelError, match="is not a plain automaton"):
             write(replace(made, automata=(wide, *rest)))
         with pytest.raises(UnsupportedModelError, match="has conditions beside its automata"):
             write(replace(made, invariants=(StateTest(first.name, first.locations[0]),)))
-    with pytest.raises(UnsupportedModelError, match="is no symbol of libFAUDES"):
+    with pytest.raises(UnsupportedModelError, match="is not a symbol of libFAUDES"):
         WRITERS[".gen"](replace(made, automata=(replace(first, name='A"\n<x>'), *rest)))
     hostile = replace(made, automata=(replace(first, name='A"><x y="&amp;'), *rest))
     assert system_in(WRITERS[".wmod"](hostile), ".wmod").automata[0].name == 'A"><x y="&amp;'

@@ -118,9 +118,9 @@ class TestMalformed:
     @pytest.mark.parametrize(
         ("data", "words"),
         [
-            (b"", "no UTF-8 JSON"),
-            (b"\xff", "no UTF-8 JSON"),
-            (b"\xef\xbb\xbf{}", "no UTF-8 JSON"),
+            (b"", "not UTF-8 JSON"),
+            (b"\xff", "not UTF-8 JSON"),
+            (b"\xef\xbb\xbf{}", "not UTF-8 JSON"),
             (b"null", "'format'"),
             (b"[]", "'format'"),
             (b"{}", "'format'"),
@@ -132,7 +132,7 @@ class TestMalformed:
             (b'{"format":"robosc-supervisor","version":1,"supervisor":{}}', "model"),
             (b'{"format":"x","format":"robosc-supervisor"}', "'format' stands twice"),
             (b'{"a":NaN}', "NaN"),
-            (b'{"a":' + b"1" * 5000 + b"}", "no UTF-8 JSON"),
+            (b'{"a":' + b"1" * 5000 + b"}", "not UTF-8 JSON"),
         ],
     )
     def test_document(self, data: Any, words: str) -> None:

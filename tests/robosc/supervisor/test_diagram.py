@@ -65,7 +65,7 @@ def node(variable: str | None, starts: tuple[int, ...], children: tuple[int, ...
         ([node("small", (0, 2, 2), (0, 1, 0))], 2, "ascend"),
         ([node("flag", (0, 2), (0, 1))], 2, "outside its domain of 2"),
         ([node("flag", (0, 1), (0, 2))], 2, "does not stand before it"),
-        ([node("flag", (0, 1), (0, 1))], 3, "the root is no node"),
+        ([node("flag", (0, 1), (0, 1))], 3, "the root is not a node"),
     ],
 )
 def test_broken_diagrams_are_refused(nodes: list[DecisionNode], root: int, words: str) -> None:

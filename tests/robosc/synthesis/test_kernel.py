@@ -147,6 +147,37 @@ def test_it_tells_as_python_does_whether_one_implies_another(seed: int) -> None:
         assert found.implies(left, right) == (left & ~right == manager.false)
 
 
+def told_apart_one_by_one(manager: Manager, one: Any, other: Any, groups: list[tuple[str, ...]]) -> tuple[Any, Any]:
+    for names in groups:
+        fewer = manager.exist(names, one), manager.exist(names, other)
+        if fewer[0] & fewer[1] == manager.false:
+            one, other = fewer
+    return one, other
+
+
+@settings(max_examples=examples(120))
+@given(seed=st.integers(0, 2**32), engine=st.sampled_from(["cudd", "autoref"]))
+def test_places_that_do_not_tell_sets_apart_are_left_out(seed: int, engine: str) -> None:
+    """The kernel tries by halves, and Python place by place: both leave out what can go first."""
+    dice = Random(seed)
+    manager = make_manager(engine)
+    manager.declare(*PLACES)
+    assert (kernel_of(manager) is not None) == (engine == "cudd")
+    one, other = (random_predicate(manager, dice, PLACES, 5) for _ in range(2))
+    one = one & ~other
+    names = dice.sample(PLACES, dice.randint(0, len(PLACES)))
+    groups: list[tuple[str, ...]] = []
+    while names:
+        count = dice.randint(1, 2)
+        groups.append(tuple(names[:count]))
+        names = names[count:]
+    cubes = [manager.cube(dict.fromkeys(group, True)) for group in groups]
+    found = nodes.told_apart(manager, one, other, cubes)
+    assert found == told_apart_one_by_one(manager, one, other, groups)
+    away = [name for group in groups for name in group]
+    assert nodes.without(manager, one, cubes) == (manager.exist(away, one) if away else one)
+
+
 def counter(manager: Manager, bits: int) -> tuple[dict[str, int], Step]:
     """Counts with some bits upwards: as many rounds as there are numbers."""
     names = tuple(f"x{place}" for place in range(bits))
@@ -198,6 +229,14 @@ def test_the_figures_tell_of_it() -> None:
     engines = (EngineOptions("cudd"), EngineOptions("autoref"), EngineOptions("cudd", is_reordering=True))
     found = [synthesize(system, engine=engine).statistics.closure for engine in engines]
     assert found == [Closure.COMPILED_SATURATION, Closure.SATURATION, Closure.CHAINING]
+
+
+def test_sets_that_are_told_apart_leave_nothing_behind(manager: Manager) -> None:
+    manager.declare("a", "b", "c")
+    a, b, c = map(manager.var, "abc")
+    found = nodes.told_apart(manager, a & b & c, ~a & b, [c, b, a])
+    assert found == (a, ~a)
+    assert nodes.without(manager, a & b, [a, c]) == b
 
 
 def test_it_stops_when_told(manager: Manager) -> None:

@@ -217,6 +217,35 @@ def test_when_the_time_is_over_conditions_are_right_all_the_same(monkeypatch: py
     assert lengths[0] > lengths[3] > lengths[-1] == length(system_, best)
 
 
+class Larger:
+    """A predicate that says that it is very large."""
+
+    dag_size = 10**9
+
+    def __init__(self, predicate: Any) -> None:
+        self._predicate = predicate
+
+
+@pytest.mark.parametrize("vain", [0, 3])
+def test_restricting_what_is_large_is_given_up_after_it_made_some_larger(
+    vain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All of it counts as large, and restricting always makes it larger: after three in a row it is not tried."""
+    calls: list[Any] = []
+
+    def enlarging(manager: Any, node: Any, care: Any) -> Any:
+        calls.append(node)
+        return Larger(restrict(manager, node, care))
+
+    monkeypatch.setattr(simplify, "MAXIMUM_NODES", 0)
+    monkeypatch.setattr(simplify, "MAXIMUM_VAIN", vain)
+    monkeypatch.setattr(simplify, "restrict", enlarging)
+    system_ = rooms(7, 0)
+    added = synthesize(system_).added
+    check_conditions(system_, added)
+    assert len(calls) == vain < len(added)
+
+
 def length(system: System, added: tuple[AddedCondition, ...]) -> int:
     formulas = Formulas(diagram_domains(system))
     found = [formulas.formula(item.condition) for item in added]

@@ -284,7 +284,7 @@ def test_where_the_system_may_not_begin(tmp_path: Path) -> None:
     exec(module, space)
     with pytest.raises(ValueError, match="may not begin so"):
         space["Supervisor"]({"hot": True})
-    for wrong, message in (({"hot": 1}, "1 is no value of hot"), ({"cold": True}, "there is no input 'cold'")):
+    for wrong, message in (({"hot": 1}, "1 is not a value of hot"), ({"cold": True}, "there is no input 'cold'")):
         with pytest.raises(ValueError, match=message):
             space["Supervisor"](wrong)
         with pytest.raises(ValueError, match=message):

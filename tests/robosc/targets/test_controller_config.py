@@ -95,7 +95,10 @@ def test_everything_that_it_may_say(tmp_path: Path) -> None:
         ({"stateMessage": ["json"]}, "'stateMessage' must be one of json, typed, both"),
         ({"maintainer": 3}, "'maintainer' must be a text"),
         ({"maintainer": "Jane"}, "'maintainer': the maintainer must be written as 'Jane Doe <jane@example.org>'"),
-        ({"maintainer": "Jane <jane>"}, "'maintainer': the maintainer's e-mail address 'jane' is none"),
+        (
+            {"maintainer": "Jane <jane>"},
+            "'maintainer': the maintainer's e-mail address 'jane' is not an e-mail address",
+        ),
         ({"license": " "}, "'license': the licence must be one line"),
         ({"license": "a\nb"}, "'license': the licence must be one line"),
         ({"version": "1.0"}, "'version': the version of the package must be three numbers, such as 1.0.0"),

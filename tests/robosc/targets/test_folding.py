@@ -78,7 +78,9 @@ def test_docstrings_keep_their_words_and_are_marked_once() -> None:
         r"a \"\"\"; f({}, [1, 2])",
     ],
 )
-@pytest.mark.parametrize("statement", ['"""{}."""', "found = f('''{}.''', [1, 2, 3], (4, 5))"])
+@pytest.mark.parametrize(
+    "statement", ['"""{}."""', "found = f('''{}.''', [1, 2, 3], (4, 5))", "found = f(f'''{}.''', [1, 2, 3])"]
+)
 def test_texts_that_look_like_code_stay_texts(words: str, statement: str) -> None:
     text = "def a():\n    " + statement.format(words.format("x" * 120)) + "\n    return {}\n"
     found = folded(text)

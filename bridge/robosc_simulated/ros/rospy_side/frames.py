@@ -82,5 +82,5 @@ def _head(text: bytes) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise FrameError("a frame's head is no JSON") from error
     if not isinstance(head, dict) or not isinstance(head.get("kind"), str):
-        raise FrameError("a frame's head is no object with a kind")
+        raise FrameError("a frame's head is not an object with a kind")
     return head

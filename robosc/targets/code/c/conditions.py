@@ -75,5 +75,5 @@ class CConditions(CDiagrams, Conditions):
         return self._unit.definition(head, body)
 
     def _definition(self, name: str, head: str, body: Block) -> list[str]:
-        with self._unit.uses_apart() as self._unit.uses[name]:
+        with self._unit.separate_uses() as self._unit.uses[name]:
             return self._unit.definition(head, body)

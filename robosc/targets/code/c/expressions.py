@@ -191,7 +191,7 @@ class CWriter(ExpressionWriter):
             return call("double_of", code, sort=Sort.DOUBLE, unknown=Unknown.NAN)
         return operation("double", code, sort=Sort.DOUBLE)
 
-    def _alike(self, left: Code, right: Code) -> tuple[Code, Code]:
+    def _in_one_type(self, left: Code, right: Code) -> tuple[Code, Code]:
         if left.sort is right.sort or Sort.DOUBLE not in (left.sort, right.sort):
             return left, right
         return self.as_double(left), self.as_double(right)

@@ -1,7 +1,8 @@
 """The generated header: numbers, names, types and functions of one robot, with their documentation."""
 
-import re
+from functools import cache
 from importlib import resources
+from itertools import groupby
 
 from robosc._version import __version__
 from robosc.automata.executable import CALLED_KINDS
@@ -39,17 +40,21 @@ def head(supervisor: Supervisor, begin: str = "/* ", rest: str = "   ", end: str
     )
 
 
-def runtime_text(layout: Layout, name: str) -> str:
-    """A file of the runtime with the robot's prefix in place of `robot_`."""
-    return with_prefix(
-        layout, resources.files("robosc.targets.code.c.runtime").joinpath(name).read_text(encoding="utf-8")
+def runtime_text(layout: Layout, name: str, package: str = "robosc.targets.code.c") -> str:
+    """A file of a package's runtime for one robot: its prefix in the place of `robot_`, and its deployment's parts."""
+    prefixes = {"robot_": f"{layout.prefix}_", "ROBOT_": f"{layout.upper}_"}
+    return "".join(
+        f"{prefixes[word[:6]]}{word[6:]}" if word[:6] in prefixes and word[6:] else word
+        for word in _words(package, name, layout.is_layer)
     )
 
 
-def with_prefix(layout: Layout, text: str) -> str:
-    """A text of a runtime with the robot's prefix in place of `robot_`."""
-    text = re.sub(r"\brobot_(?=[a-z])", f"{layout.prefix}_", text)
-    return re.sub(r"\bROBOT_(?=[A-Z])", f"{layout.upper}_", for_deployment(text, layout.is_layer))
+@cache
+def _words(package: str, name: str, is_layer: bool) -> tuple[str, ...]:
+    """A file of a package's runtime as the names in it, in code and in comments, and what stands between them."""
+    text = resources.files(f"{package}.runtime").joinpath(name).read_text(encoding="utf-8")
+    kept = for_deployment(text, is_layer)
+    return tuple("".join(run) for _, run in groupby(kept, key=lambda char: char == "_" or char.isalnum()))
 
 
 def for_deployment(text: str, is_layer: bool) -> str:
@@ -439,4 +444,4 @@ def _passed_on(layout: Layout) -> list[str]:
     return ["const void *message"] if layout.is_layer else []
 
 
-__all__ = ["batch", "counts", "head", "header_file", "receive_head", "reply_head", "runtime_text", "with_prefix"]
+__all__ = ["batch", "counts", "head", "header_file", "receive_head", "reply_head", "runtime_text"]

@@ -2,7 +2,7 @@
 
 from robosc.expressions import Type
 from robosc.model.structure import CommunicationKind
-from robosc.targets.code.c.layout import Layout, request_data, told_apart
+from robosc.targets.code.c.layout import Layout, recognized_by_data, request_data
 from robosc.targets.code.c.text import comment
 
 _SENT = "{prefix}_sent_t what"
@@ -11,7 +11,7 @@ _SENT = "{prefix}_sent_t what"
 def request_parameters(layout: Layout, identifier: str) -> dict[str, tuple[str, Type]]:
     """Parameter and type, by C type, of the data that the messages on an identifier are told apart by."""
     types: dict[str, Type] = {}
-    for item in told_apart(layout.model, identifier):
+    for item in recognized_by_data(layout.model, identifier):
         data = request_data(item)
         if data is not None:
             types.setdefault(layout.raw(data), data)

@@ -5,7 +5,7 @@ from robosc.expressions.text import expression_text
 from robosc.model.received import received_paths
 from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.targets.code.c.layer import call_head, cancel_head, goal_head, request_head, request_parameters
-from robosc.targets.code.c.layout import Layout, possible_messages, request_data, told_apart
+from robosc.targets.code.c.layout import Layout, possible_messages, recognized_by_data, request_data
 from robosc.targets.code.c.received import NO_NOTES, Reader
 from robosc.targets.code.c.statements import unused
 from robosc.targets.code.c.unit import Reading, Unit
@@ -19,7 +19,7 @@ def request_functions(unit: Unit) -> list[list[str]]:
     places = {item.name: place for place, item in enumerate(layout.requests)}
     result: list[list[str]] = []
     for identifier in layout.topics:
-        result += [_match_function(unit, item) for item in told_apart(layout.model, identifier)]
+        result += [_match_function(unit, item) for item in recognized_by_data(layout.model, identifier)]
         result += _recognition(layout, identifier, places)
         result.append(_request_function(layout, identifier, places))
     for item in layout.of_kind(CommunicationKind.SERVICE):

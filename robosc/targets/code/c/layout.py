@@ -247,7 +247,7 @@ def possible_messages(model: Model, identifier: str) -> tuple[Communication, ...
     return tuple(found)
 
 
-def told_apart(model: Model, identifier: str) -> tuple[Communication, ...]:
+def recognized_by_data(model: Model, identifier: str) -> tuple[Communication, ...]:
     """Those of them that are known by their data."""
     return tuple(item for item in possible_messages(model, identifier) if item.when is not None)
 
@@ -262,7 +262,7 @@ def data_that_comes(layout: Layout) -> tuple[Type, ...]:
     model = layout.model
     found = [event.received for event in layout.executable.events.values() if not event.is_issued]
     if layout.is_layer:
-        found += [request_data(item) for topic in layout.topics for item in told_apart(model, topic)]
+        found += [request_data(item) for topic in layout.topics for item in recognized_by_data(model, topic)]
     return tuple(type_ for type_ in found if type_ is not None)
 
 

@@ -79,7 +79,7 @@ def unknown_name(raw: str) -> str:
 
 def note_function(unit: Unit, type_: ArrayType) -> str | None:
     """The function that notes what is unknown in an array's elements, or None if nothing can be noted."""
-    with unit.uses_apart() as uses:
+    with unit.separate_uses() as uses:
         body = _notes_on(unit, Lvalue("array->items[k]"), type_.element)
     if not body:
         return None
@@ -123,6 +123,6 @@ def converter_head(unit: Unit, enum: EnumDefinition) -> str:
 
 def converter(unit: Unit, enum: EnumDefinition) -> list[str]:
     """The function that makes an enum out of received data, as a readable chain of conditions."""
-    with unit.uses_apart() as unit.uses[unit.layout.converters[enum.name]]:
+    with unit.separate_uses() as unit.uses[unit.layout.converters[enum.name]]:
         body = [*unused("data", "notes"), *Reader(unit, enum.source, "notes").conversion(enum)]
         return unit.definition(converter_head(unit, enum), body)

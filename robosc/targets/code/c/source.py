@@ -24,8 +24,8 @@ from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, double,
 from robosc.targets.code.steps import initial_state
 from robosc.targets.code.text import indent
 
-_ENGINE = tuple(f"{part}.c" for part in "log releases goals steps policies decisions rest time replies life".split())
-_LAYER_ENGINE = tuple(f"{part}.c" for part in "log releases goals steps rest callers time replies layer life".split())
+_ENGINE = "log releases goals steps policies decisions safe_stop time replies lifecycle".split()
+_LAYER_ENGINE = "log releases goals steps safe_stop callers time replies layer lifecycle".split()
 """The parts of the engines, each after those that it calls."""
 
 
@@ -46,7 +46,7 @@ def source_file(unit: Unit) -> str:
     held = [conditions.conjuncts_function(item.name) for item in messages]
     held += [conditions.requirements_function(item.name) for item in layout.of_kind(CommunicationKind.ACTION)]
     parts = _LAYER_ENGINE if layout.is_layer else _ENGINE
-    engine = [runtime_text(layout, part).rstrip().splitlines() for part in parts]
+    engine = [runtime_text(layout, f"{part}.c").rstrip().splitlines() for part in parts]
     asked = request_functions(unit) if layout.is_layer else []
     ends = [*engine, *happens, *asked, *_entries(layout), *_names(layout)]
     rest = [*allows, *steps, *provided, *held, *_dispatchers(unit), *ends]

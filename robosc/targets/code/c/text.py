@@ -1,6 +1,5 @@
 """Small helpers for writing C text."""
 
-import re
 import textwrap
 
 from robosc.targets.code.text import printable
@@ -14,8 +13,9 @@ _MAXIMUM_NESTING = 200
 def safe(text: str) -> str:
     """A text for a comment: printable ASCII that neither ends the comment nor is a trigraph or a spliced line."""
     shown = printable(text).replace("*/", "* /").replace("/*", "/ *")
-    # Each question mark that another one follows: of three in a row no two are left.
-    shown = re.sub(r"\?(?=\?)", "? ", shown)
+    # Of three question marks in a row the first time leaves two.
+    while "??" in shown:
+        shown = shown.replace("??", "? ?")
     return f"{shown} " if shown.endswith("\\") else shown
 
 

@@ -105,7 +105,7 @@ class Unit:
         return [head, "{", *indent(statement_lines(block)), "}"]
 
     @contextmanager
-    def uses_apart(self) -> Iterator[set[str]]:
+    def separate_uses(self) -> Iterator[set[str]]:
         """Note what is used inside apart from what all other code uses."""
         outside, self.used = self.used, set()
         try:
@@ -251,7 +251,7 @@ class Reading(CWriter):
                 uses,
             )
             return replace(call(name, array, sort=Sort.INTEGER, unknown=Unknown.VALUE), low=0)
-        with self.unit.uses_apart() as used:
+        with self.unit.separate_uses() as used:
             element = self.unit.text(self.unit.conversion(Lvalue("array->items[place]"), type_.element, "NULL"))
         sort = sort_of(type_.element)
         unknown, held = unknown_text(sort), c_type(sort)
@@ -308,7 +308,7 @@ class Reading(CWriter):
             arguments.append(variable(lvalue.address))
             elements.append((Lvalue(name, True), outer_type))
         inner = Reading(self.unit, received=codes.__getitem__, root=self.root, elements=tuple(elements))
-        with self.unit.uses_apart() as used:
+        with self.unit.separate_uses() as used:
             condition = self.unit.text(inner.value(expression.condition))
         ends = int(expression.word == "any")
         lines = [

@@ -55,7 +55,7 @@ def noted_write(place: Code, value: Code, bits: Mapping[str, int]) -> list[State
     return [when(differs, *noted_change(place, bits)), Assign(place, value)]
 
 
-def asked_lines(requests: Sequence[str], silent: Sequence[str], allows: Sequence[str]) -> list[str]:
+def question_lines(requests: Sequence[str], silent: Sequence[str], allows: Sequence[str]) -> list[str]:
     """Statements of the constructor: what the two methods below ask, by bit.
 
     Args:

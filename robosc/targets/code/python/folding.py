@@ -6,30 +6,49 @@ model, is marked: `# noqa: E501`.
 
 import ast
 import io
-import re
 import textwrap
 import tokenize
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from token import COMMENT, DEDENT, ENDMARKER, FSTRING_END, FSTRING_START, INDENT, NEWLINE, NL, OP, STRING
 
 from robosc.errors import InternalError
 from robosc.targets.code.python.bundle import WIDTH
 
-_TOKEN = re.compile(
-    r"""(?P<string>[A-Za-z]{0,2}'(?:[^'\\]|\\.)*'|[A-Za-z]{0,2}"(?:[^"\\]|\\.)*")|(?P<comment>\#.*)"""
-    r"""|(?P<open>[(\[{])|(?P<close>[)\]}])|(?P<text>\w+|\s+|.)"""
-)
-_STATEMENT = re.compile(r"(?P<head>return |if |elif |while |[\w.]+ = )(?P<value>.*[^:,(\[{])(?P<tail>:?)")
+_LAYOUT = frozenset((DEDENT, ENDMARKER, INDENT, NEWLINE, NL))
+_HEADS = frozenset(("return", "if", "elif", "while"))
 _OPERATORS = frozenset(("if", "else", "and", "or", "for"))
+_OPEN, _CLOSE = frozenset("([{"), frozenset(")]}")
 _LONG = ('"""', "'''")
 _MARK = "  # noqa: E501"
 
 
 @dataclass(frozen=True, slots=True)
 class _Token:
-    kind: str
+    """Part of a line: a token of Python, or the blanks between two.
+
+    Attributes:
+        kind: Its kind, as in `token`; of blanks it is that of an indentation.
+        text: Its characters.
+        depth: Number of the line's brackets, or of a part's of the line, that it stands in.
+    """
+
+    kind: int
     text: str
-    depth: int
+    depth: int = 0
+
+    @property
+    def opens(self) -> bool:
+        """Return True if it is an opening bracket."""
+        return self.kind == OP and self.text in _OPEN
+
+    @property
+    def closes(self) -> bool:
+        """Return True if it is a closing bracket."""
+        return self.kind == OP and self.text in _CLOSE
+
+
+_COMMA = _Token(OP, ",")
 
 
 def folded(text: str) -> str:
@@ -46,14 +65,21 @@ def folded(text: str) -> str:
         return text
     ends: dict[int, int] = {}
     depths: dict[int, int] = {}
-    depth = 0
-    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+    tokens: dict[int, list[_Token]] = {}
+    depth, place = 0, (0, 0)
+    for token in _read(text, lines):
+        row, column = token.start
         # Texts of several lines, or that could be: what stands in them is no code, whatever it looks like.
-        if token.type == tokenize.STRING and token.string.endswith(_LONG):
-            ends.update((row, token.end[0]) for row in range(token.start[0], token.end[0] + 1))
-        depths.setdefault(token.start[0], depth)
-        if token.type == tokenize.OP:
-            depth += (token.string in "([{") - (token.string in ")]}")
+        if token.type == STRING and token.string.endswith(_LONG):
+            ends.update((inner, token.end[0]) for inner in range(row, token.end[0] + 1))
+        depths.setdefault(row, depth)
+        if token.type == OP:
+            depth += (token.string in _OPEN) - (token.string in _CLOSE)
+        if token.type not in _LAYOUT:
+            before = lines[row - 1][place[1] : column] if row in tokens and place[0] == row else ""
+            blanks = [_Token(INDENT, before)] if before else []
+            tokens.setdefault(row, []).extend([*blanks, _Token(token.type, token.string)])
+            place = token.end
     marked = {ends[row] for row, line in enumerate(lines, 1) if row in ends and len(line) > WIDTH}
     marked -= {row for row in marked if lines[row - 1].endswith(_MARK)}
     found: list[str] = []
@@ -61,73 +87,96 @@ def folded(text: str) -> str:
         if row in ends:
             found.append(line + _MARK if row in marked else line)
         else:
-            found += _broken(line, is_inside=depths[row] > 0)
+            found += _broken(line, tokens.get(row, []), is_inside=depths[row] > 0)
     result = "\n".join(found) + "\n"
     if ast.dump(ast.parse(result)) != ast.dump(ast.parse(text)):
         raise InternalError("a generated module has another meaning with shorter lines")
     return result
 
 
-def _broken(line: str, is_inside: bool) -> Iterator[str]:
+def _read(text: str, lines: Sequence[str]) -> Iterator[tokenize.TokenInfo]:
+    """Tokens of a module; a formatted string is one of them, with all that stands in its braces."""
+    start, inside = (0, 0), 0
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type == FSTRING_START:
+            start = start if inside else token.start
+            inside += 1
+        if not inside:
+            yield token
+        if token.type == FSTRING_END:
+            inside -= 1
+            if not inside:
+                whole = [*lines[start[0] - 1 : token.end[0]]]
+                whole[-1] = whole[-1][: token.end[1]]
+                whole[0] = whole[0][start[1] :]
+                yield token._replace(type=STRING, string="\n".join(whole), start=start)
+
+
+def _broken(line: str, tokens: Sequence[_Token], is_inside: bool) -> Iterator[str]:
     """A line as several; `is_inside` tells that it stands between brackets."""
     if len(line) <= WIDTH or line.endswith(_MARK):
         yield line
         return
     indent = line[: len(line) - len(line.lstrip())]
-    tokens = _tokens(line.strip())
-    if tokens[0].kind == "comment":
-        start = indent + "# "
-        words = textwrap.TextWrapper(
-            WIDTH, initial_indent=start, subsequent_indent=start, break_long_words=False, break_on_hyphens=False
-        )
-        for part in words.wrap(tokens[0].text[2:]):
+    if tokens[-1].kind == COMMENT:
+        yield from _comment(indent, tokens[-1].text)
+    code = _stripped([token for token in tokens if token.kind != COMMENT])
+    if code:
+        for part in _folded(code, indent, is_inside):
             yield part if len(part) <= WIDTH else part + _MARK
-        return
-    if tokens[-1].kind == "comment":
-        yield from _broken(indent + tokens[-1].text, is_inside)
-        tokens = _tokens(line.rstrip()[: -len(tokens[-1].text)].strip())
-    for part in _folded(tokens, indent, is_inside):
-        yield part if len(part) <= WIDTH else part + _MARK
 
 
-def _tokens(text: str) -> list[_Token]:
-    """Tokens with the depth of the brackets of the text that they stand in; unmatched ones count for nothing."""
-    pairs: dict[int, int] = {}
-    opened: list[int] = []
-    found = list(_TOKEN.finditer(text))
-    for number, item in enumerate(found):
-        if item.lastgroup == "open":
-            opened.append(number)
-        elif item.lastgroup == "close" and opened:
-            pairs[opened.pop()] = number
-    closing = set(pairs.values())
-    depth = 0
-    tokens: list[_Token] = []
-    for number, item in enumerate(found):
-        depth -= number in closing
-        tokens.append(_Token(str(item.lastgroup), item[0], depth))
-        depth += number in pairs
-    return tokens
-
-
-def _folded(tokens: Sequence[_Token], indent: str, is_inside: bool) -> Iterator[str]:
-    text = "".join(token.text for token in tokens).strip()
+def _comment(indent: str, text: str) -> Iterator[str]:
+    """The lines of a comment, which has a line of its own."""
     if len(indent + text) <= WIDTH:
         yield indent + text
         return
-    tokens = _tokens(text)
+    start = indent + "# "
+    words = textwrap.TextWrapper(
+        WIDTH, initial_indent=start, subsequent_indent=start, break_long_words=False, break_on_hyphens=False
+    )
+    for part in words.wrap(text[2:]):
+        yield part if len(part) <= WIDTH else part + _MARK
+
+
+def _stripped(tokens: Sequence[_Token]) -> list[_Token]:
+    """Tokens without blanks around, with their depths among each other; unmatched brackets count for nothing."""
+    solid = [number for number, token in enumerate(tokens) if token.text.strip()]
+    kept = tokens[solid[0] : solid[-1] + 1] if solid else []
+    pairs: dict[int, int] = {}
+    opened: list[int] = []
+    for number, token in enumerate(kept):
+        if token.opens:
+            opened.append(number)
+        elif token.closes and opened:
+            pairs[opened.pop()] = number
+    closing = set(pairs.values())
+    depth = 0
+    found: list[_Token] = []
+    for number, token in enumerate(kept):
+        depth -= number in closing
+        found.append(replace(token, depth=depth))
+        depth += number in pairs
+    return found
+
+
+def _folded(tokens: Sequence[_Token], indent: str, is_inside: bool) -> Iterator[str]:
+    tokens = _stripped(tokens)
+    text = _text(tokens)
+    if len(indent + text) <= WIDTH:
+        yield indent + text
+        return
     if is_inside:
-        operators = [
-            number for number, token in enumerate(tokens) if number and token.depth == 0 and token.text in _OPERATORS
-        ]
+        operators = [number for number, token in enumerate(tokens) if number and _is_loose(token)]
         if operators:
             for start, end in zip([0, *operators], [*operators, len(tokens)], strict=True):
                 yield from _folded(tokens[start:end], indent, is_inside)
             return
-    elif (found := _STATEMENT.fullmatch(text)) is not None and _is_loose(found["value"]):
-        yield f"{indent}{found['head']}("
-        yield from _folded(_tokens(found["value"]), indent + "    ", True)
-        yield f"{indent}){found['tail']}"
+    elif (statement := _statement(tokens)) is not None and any(map(_is_loose, _stripped(statement[1]))):
+        head, value, tail = statement
+        yield f"{indent}{_text(head)} ("
+        yield from _folded(value, indent + "    ", True)
+        yield f"{indent}){_text(tail)}"
         return
     pair = _longest_pair(tokens)
     if pair is None:
@@ -139,14 +188,35 @@ def _folded(tokens: Sequence[_Token], indent: str, is_inside: bool) -> Iterator[
     # One item may be a generator, which has no comma at its end, or stand in brackets that make no tuple.
     for number, item in enumerate(items, 1):
         is_last = number == len(items)
-        comma = "" if is_last and len(items) == 1 else ","
-        yield from _folded([*item, _Token("text", comma, 0)], indent + "    ", True)
+        comma = [] if is_last and len(items) == 1 else [_COMMA]
+        yield from _folded([*item, *comma], indent + "    ", True)
     yield from _folded(tokens[closing:], indent, is_inside)
 
 
-def _is_loose(text: str) -> bool:
-    """Return True if an expression has an operator outside of brackets."""
-    return any(token.depth == 0 and token.text in _OPERATORS for token in _tokens(text))
+def _text(tokens: Sequence[_Token]) -> str:
+    return "".join(token.text for token in tokens)
+
+
+def _is_loose(token: _Token) -> bool:
+    """Return True if a token is an operator outside of brackets."""
+    return token.depth == 0 and token.text in _OPERATORS
+
+
+def _statement(tokens: Sequence[_Token]) -> tuple[Sequence[_Token], Sequence[_Token], Sequence[_Token]] | None:
+    """The parts of a whole statement: all that stands before its value, the value, and the colon after it."""
+    solid = [number for number, token in enumerate(tokens) if token.text.strip()]
+    if tokens[0].text in _HEADS:
+        start = 1
+    else:
+        # The names of a target, the dots between them, and `=` after a blank.
+        names = [number for number in solid if not (tokens[number].text.isidentifier() or tokens[number].text == ".")]
+        if not names or tokens[names[0]].text != "=" or not tokens[names[0] - 1].text.isspace():
+            return None
+        start = names[0] + 1
+    end = len(tokens) - (tokens[-1].text == ":")
+    if start >= end or not tokens[start].text.isspace() or tokens[end - 1].text in {":", ",", *_OPEN}:
+        return None
+    return tokens[:start], tokens[start:end], tokens[end:]
 
 
 def _longest_pair(tokens: Sequence[_Token]) -> tuple[int, int] | None:
@@ -154,9 +224,9 @@ def _longest_pair(tokens: Sequence[_Token]) -> tuple[int, int] | None:
     best, size = None, 0
     opening = None
     for number, token in enumerate(tokens):
-        if token.depth == 0 and token.kind == "open":
+        if token.depth == 0 and token.opens:
             opening = number
-        elif token.depth == 0 and token.kind == "close" and opening is not None:
+        elif token.depth == 0 and token.closes and opening is not None:
             length = sum(len(item.text) for item in tokens[opening + 1 : number])
             if length > size:
                 best, size = (opening, number), length
@@ -173,8 +243,8 @@ def _items(tokens: Sequence[_Token]) -> list[list[_Token]]:
             items.append([])
         else:
             items[-1].append(token)
-    if not "".join(token.text for token in items[-1]).strip():
+    if not _text(items[-1]).strip():
         items.pop()
         if len(items) == 1:
-            items[0].append(_Token("text", ",", 0))
+            items[0].append(_COMMA)
     return items

@@ -14,9 +14,9 @@ from robosc.supervisor import Supervisor
 from robosc.targets.code.expressions import Code
 from robosc.targets.code.python.bundle import WIDTH, bundle, section_title
 from robosc.targets.code.python.changes import (
-    asked_lines,
     enabled_requests_method,
     enabled_silent_method,
+    question_lines,
     restart_lines,
     stale_bits,
 )
@@ -206,7 +206,7 @@ def _constructor(writer: Writer, description: Description) -> list[str]:
             [f"    self._{purpose} = {{", *indent(entries, 2), "    }"] if entries else [f"    self._{purpose} = {{}}"]
         )
     requests, silent = _allow_names(writer, description)
-    lines += indent(asked_lines(requests, (*description.resets, *description.taus), silent))
+    lines += indent(question_lines(requests, (*description.resets, *description.taus), silent))
     return [*lines, "    self.changes = 0", "    self.restart()"]
 
 

@@ -54,7 +54,7 @@ class Step:
         return f"{self.event}: {self.state}"
 
 
-class LedRun(ABC):
+class ManualRun(ABC):
     """A run of a controlled system, from its initial state.
 
     Args:
@@ -133,7 +133,7 @@ class LedRun(ABC):
         Raises:
             UnknownEventError: There is no such event; the message names the nearest one.
         """
-        return self._known(name)
+        return self._require_event(name)
 
     @property
     def initial(self) -> StateInWords:
@@ -161,7 +161,7 @@ class LedRun(ABC):
         Raises:
             UnknownEventError: There is no such event; the message names the nearest one.
         """
-        return self._events[self._known(event)]
+        return self._events[self._require_event(event)]
 
     def hindrances(self) -> dict[str, tuple[str, ...]]:
         """Every event that cannot happen now, with the reasons why not, one sentence each."""
@@ -173,9 +173,9 @@ class LedRun(ABC):
         Raises:
             UnknownEventError: There is no such event; the message names the nearest one.
         """
-        return () if self._can_happen(self._known(event)) else self._why_not(event)
+        return () if self._can_happen(self._require_event(event)) else self._why_not(event)
 
-    def _known(self, event: str) -> str:
+    def _require_event(self, event: str) -> str:
         """The event, which there is.
 
         Raises:
@@ -309,17 +309,17 @@ class LedRun(ABC):
 
 def event_text(step: Step) -> str:
     """An event with the data that came with it: `level.response (value = 3)`."""
-    data = ", ".join(f"{name} = {_shown(value)}" for name, value in step.data.items())
+    data = ", ".join(f"{name} = {_value_text(value)}" for name, value in step.data.items())
     return f"{step.event} ({data})" if data else step.event
 
 
 def changes_text(before: StateInWords, after: StateInWords) -> str:
     """Changes between two states: `Base = driving, Base.charges = 2`."""
     old = before.parts
-    return ", ".join(f"{name} = {_shown(value)}" for name, value in after.parts.items() if old[name] != value)
+    return ", ".join(f"{name} = {_value_text(value)}" for name, value in after.parts.items() if old[name] != value)
 
 
-def _shown(value: object) -> str:
+def _value_text(value: object) -> str:
     if value is None:
         return "unknown"
     return str(value).lower() if isinstance(value, bool) else str(value)

@@ -11,7 +11,7 @@ from robosc.model.types import Types
 from robosc.model.units import Libraries, Part, Unit
 
 
-class Scopes:
+class RobotScopes:
     """The scopes of a robot: one for each of its files, shared by all behaviours in it.
 
     Args:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from robosc.supervisor import Supervisor
 
 
-def given_supervisor(arguments: argparse.Namespace, *, is_json: bool = False) -> "Supervisor | None":
+def supervisor_of_arguments(arguments: argparse.Namespace, *, is_json: bool = False) -> "Supervisor | None":
     """Read or synthesize the supervisor; None if there is none, which has been reported.
 
     Args:

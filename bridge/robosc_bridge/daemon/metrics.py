@@ -1,0 +1,163 @@
+"""Metrics of the bridge for Prometheus: its latest snapshot, over HTTP at /metrics, when it is asked for."""
+
+import logging
+import threading
+from collections.abc import Iterator
+from itertools import accumulate
+from typing import TYPE_CHECKING
+
+from prometheus_client import CollectorRegistry, GCCollector, PlatformCollector, ProcessCollector, start_http_server
+from prometheus_client.core import (
+    CounterMetricFamily,
+    GaugeMetricFamily,
+    HistogramMetricFamily,
+    InfoMetricFamily,
+    Metric,
+    StateSetMetricFamily,
+)
+from prometheus_client.registry import Collector
+
+from robosc._version import __version__
+from robosc_api.security import SecurityError, ServerSecurity, check_listening
+from robosc_api.security.addresses import split_address
+from robosc_bridge.daemon.feed import Feed, Snapshot
+from robosc_bridge.daemon.states import State
+from robosc_bridge.daemon.timing import BOUNDS_S, Latency
+from robosc_bridge.errors import BridgeError
+
+if TYPE_CHECKING:
+    from wsgiref.simple_server import WSGIServer
+
+_JOIN_S = 3.0
+_log = logging.getLogger(__name__)
+
+
+class MetricsError(BridgeError):
+    """The metrics cannot be served as configured; says why."""
+
+
+class MetricsEndpoint:
+    """Server of the metrics: an `Endpoint`. It only reads, and its end stops no robot.
+
+    Args:
+        feed: Feed that shows the daemon.
+        address: Address that it listens at, HOST:PORT.
+        is_open: True if other machines may read them.
+
+    Raises:
+        MetricsError: It may not listen there.
+    """
+
+    name = "metrics endpoint"
+
+    def __init__(self, feed: Feed, address: str, *, is_open: bool = False) -> None:
+        try:
+            check_listening(address, ServerSecurity(insecure_beyond_loopback=is_open))
+            self._host, self._port = split_address(address)
+        except (SecurityError, ValueError) as error:
+            raise MetricsError(f"remote.metrics_address: {error}") from error
+        self._registry = CollectorRegistry()
+        ProcessCollector(registry=self._registry)
+        PlatformCollector(registry=self._registry)
+        GCCollector(registry=self._registry)
+        self._registry.register(_SnapshotCollector(feed))
+        self._served: tuple[WSGIServer, threading.Thread] | None = None
+
+    @property
+    def address(self) -> str:
+        """Address at which it listens."""
+        return f"{self._host}:{self._port}"
+
+    @property
+    def is_alive(self) -> bool:
+        """True: a robot does not stop because nobody can measure it."""
+        return True
+
+    def start(self) -> None:
+        """Begin to serve.
+
+        Raises:
+            MetricsError: The address cannot be used.
+        """
+        try:
+            server, thread = start_http_server(self._port, self._host, self._registry)
+        except OSError as error:
+            raise MetricsError(f"remote.metrics_address: {self.address} cannot be used: {error.strerror}") from error
+        self._served = server, thread
+        self._port = server.server_port
+        _log.info("metrics at http://%s/metrics", self.address)
+
+    def stop(self) -> None:
+        """End serving."""
+        served, self._served = self._served, None
+        if served is not None:
+            server, thread = served
+            server.shutdown()
+            server.server_close()
+            thread.join(_JOIN_S)
+
+
+class _SnapshotCollector(Collector):
+    """Collector of metrics from the latest snapshot.
+
+    Args:
+        feed: Feed that shows the daemon.
+    """
+
+    def __init__(self, feed: Feed) -> None:
+        self._feed = feed
+
+    def collect(self) -> Iterator[Metric]:
+        """Yield the metrics."""
+        yield InfoMetricFamily("robosc_bridge", "Version of the bridge.", {"version": __version__})
+        subscription = self._feed.subscribe(lambda: None, 1)
+        try:
+            snapshot = subscription.take().snapshot
+        finally:
+            subscription.close()
+        if snapshot is not None:
+            yield from _metrics(snapshot)
+
+
+def _metrics(snapshot: Snapshot) -> Iterator[Metric]:
+    states = StateSetMetricFamily("robosc_bridge_state", "State of the bridge.", labels=[])
+    states.add_metric([], {str(state): snapshot.state is state for state in State})
+    yield states
+    # An age would need the clock of who asks: a time that stands still is that of a loop that hangs.
+    yield GaugeMetricFamily(
+        "robosc_bridge_snapshot_time_seconds", "Time of the latest snapshot since 1970.", snapshot.time_s
+    )
+    yield CounterMetricFamily(
+        "robosc_bridge_overruns",
+        "Decisions that were left out because the one before took too long.",
+        snapshot.overruns,
+    )
+    reasons = GaugeMetricFamily("robosc_bridge_stopped", "Reasons why nothing moves.", labels=["reason"])
+    for reason in snapshot.reasons:
+        reasons.add_metric([reason.name], 1.0)
+    yield reasons
+    devices = GaugeMetricFamily("robosc_bridge_device_up", "Devices: 1 works, 0 is not there.", labels=["device"])
+    for device, works in snapshot.devices.items():
+        devices.add_metric([str(device)], float(works))
+    yield devices
+    reading = snapshot.reading
+    if reading is not None and reading.battery_v is not None:
+        yield GaugeMetricFamily("robosc_bridge_battery_volts", "Voltage of the battery.", reading.battery_v)
+    latencies = HistogramMetricFamily(
+        "robosc_bridge_latency_seconds", "Times that the bridge measures of itself.", labels=["what"]
+    )
+    for latency in snapshot.timing.latencies:
+        latencies.add_metric([latency.name], list(_buckets(latency)), latency.sum_s)
+    yield latencies
+    lines = CounterMetricFamily(
+        "robosc_bridge_line", "Counts of a device's line since it was opened.", labels=["device", "what"]
+    )
+    for line, counts in snapshot.timing.lines.items():
+        for name, count in counts.items():
+            lines.add_metric([line, name], count)
+    yield lines
+
+
+def _buckets(latency: Latency) -> Iterator[tuple[str, float]]:
+    bounds = [*(f"{bound_s:g}" for bound_s in BOUNDS_S), "+Inf"]
+    return zip(bounds, map(float, accumulate(latency.counts)), strict=True)

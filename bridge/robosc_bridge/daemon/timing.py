@@ -1,0 +1,199 @@
+"""Times that the bridge measures of itself, as histograms.
+
+Each histogram is filled by one thread, and read by any: a reader may miss what is added at that moment, and nothing
+waits. Figures of share are the upper bounds of their buckets, a quarter wide: what they say is never too good.
+"""
+
+from bisect import bisect_left
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+_FIRST_S, _FACTOR, _COUNT = 0.00025, 1.25, 41
+
+BOUNDS_S = tuple(round(_FIRST_S * _FACTOR**index, 6) for index in range(_COUNT))
+"""Upper bounds of the buckets, 0.25 ms to 1.9 s; what is longer is in one more."""
+
+SHOWN_S = 1.0
+"""Time between figures that are worked out."""
+
+MEANINGS = {
+    "scan_to_wheel": "from the last byte of a revolution until the exchange is over that carries the new velocity "
+    "which was decided on it",
+    "scan_to_decision": "from the last byte of a revolution until the supervisor has decided on it",
+    "decision_period": "from one decision of the supervisor to the next",
+    "queueing": "from the last byte of a reading until the loop takes it up",
+    "exchange": "one exchange with the drive base",
+}
+"""Histograms by name, with what they measure."""
+
+
+@dataclass(frozen=True)
+class Latency:
+    """A histogram at one time.
+
+    Attributes:
+        name: Key of `MEANINGS`.
+        counts: Number of times in each bucket, the last of them without a bound.
+        sum_s: Sum of all.
+        max_s: Longest since the start.
+    """
+
+    name: str
+    counts: tuple[int, ...]
+    sum_s: float
+    max_s: float
+
+    @property
+    def count(self) -> int:
+        """Number of times that were measured."""
+        return sum(self.counts)
+
+    def share_s(self, share: float) -> float:
+        """Return the time within which a share of all were, as the upper bound of its bucket; 0: there are none."""
+        wanted, seen = share * self.count, 0
+        for count, bound_s in zip(self.counts, BOUNDS_S, strict=False):
+            seen += count
+            if seen and seen >= wanted:
+                return min(bound_s, self.max_s)
+        return self.max_s
+
+
+class Histogram:
+    """Histogram that one thread fills.
+
+    Args:
+        name: Key of `MEANINGS`.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._counts = [0] * (len(BOUNDS_S) + 1)
+        self._sum_s = self._max_s = 0.0
+
+    def observe(self, seconds: float) -> None:
+        """Add a time."""
+        self._counts[bisect_left(BOUNDS_S, seconds)] += 1
+        self._sum_s += seconds
+        self._max_s = max(self._max_s, seconds)
+
+    @property
+    def latency(self) -> Latency:
+        """The histogram now."""
+        return Latency(self.name, tuple(self._counts), self._sum_s, self._max_s)
+
+
+@dataclass(frozen=True)
+class TimingFigures:
+    """Figures of the bridge's times and lines.
+
+    Attributes:
+        latencies: Histograms.
+        lines: Counts of each device's line, by device and name, since it was opened.
+    """
+
+    latencies: tuple[Latency, ...] = ()
+    lines: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+
+
+class Timing:
+    """Measurement of the way of a scan through the loop to the wheels, and of the loop.
+
+    The loop says when it has taken up a scan, decides, and commands another velocity; the thread of the drive base says
+    when an exchange is over.
+
+    Args:
+        clock: Clock that returns the time, in seconds.
+        lines: Functions that return the counts of a device's line, by device.
+    """
+
+    def __init__(
+        self, clock: Callable[[], float], lines: Mapping[str, Callable[[], Mapping[str, int]]] | None = None
+    ) -> None:
+        self._clock = clock
+        self._lines = lines or {}
+        self._histograms = {name: Histogram(name) for name in MEANINGS}
+        # Of the loop: scan that no decision was made on yet, and whether one is being made.
+        self._scan_s: float | None = None
+        self._is_deciding = False
+        self._decided_s: float | None = None
+        # From the loop to the drive base's thread.
+        self._commanded_s: float | None = None
+        self._figures = TimingFigures()
+        self._due_s = clock()
+
+    def scan_taken(self, time_s: float) -> None:
+        """The loop takes up a scan of that time; with decisions at each event, it is decided on at once."""
+        self._scan_s = time_s
+        self._is_deciding = True
+
+    def scan_passed(self) -> None:
+        """The executor has the scan."""
+        self._is_deciding = False
+
+    def reading_taken(self, time_s: float) -> None:
+        """The loop has taken up a reading of that time."""
+        self._histograms["queueing"].observe(max(self._clock() - time_s, 0.0))
+
+    def deciding(self) -> None:
+        """The supervisor begins to decide."""
+        now_s = self._clock()
+        if self._decided_s is not None:
+            self._histograms["decision_period"].observe(now_s - self._decided_s)
+        self._decided_s = now_s
+        self._is_deciding = True
+
+    def decided(self) -> None:
+        """The supervisor has decided."""
+        self._is_deciding = False
+        if self._scan_s is not None:
+            self._histograms["scan_to_decision"].observe(max(self._clock() - self._scan_s, 0.0))
+            self._scan_s = None
+
+    def rested(self) -> None:
+        """The supervisor is not executed: what comes next follows nothing."""
+        self._decided_s = self._scan_s = None
+
+    def commanding(self) -> None:
+        """The loop is about to command another velocity."""
+        if self._is_deciding and self._scan_s is not None:
+            self._commanded_s = self._scan_s
+
+    def take_command(self) -> float | None:
+        """Return the time of the scan that the velocity about to be sent was decided on; None: it is on its way."""
+        commanded_s, self._commanded_s = self._commanded_s, None
+        return commanded_s
+
+    def put_back(self, scan_s: float | None) -> None:
+        """Take back the time that `take_command` has given: the exchange has failed, and will be made again."""
+        if self._commanded_s is None:
+            self._commanded_s = scan_s
+
+    def exchanged(self, began_s: float, scan_s: float | None) -> None:
+        """An exchange is over.
+
+        Args:
+            began_s: Time at which it began.
+            scan_s: Time that `take_command` has given for it.
+        """
+        now_s = self._clock()
+        self._histograms["exchange"].observe(now_s - began_s)
+        if scan_s is not None:
+            self._histograms["scan_to_wheel"].observe(max(now_s - scan_s, 0.0))
+
+    def figures(self) -> TimingFigures:
+        """Return the figures, at most `SHOWN_S` old; asked by the loop."""
+        now_s = self._clock()
+        if now_s >= self._due_s:
+            self._due_s = now_s + SHOWN_S
+            self._figures = TimingFigures(
+                tuple(histogram.latency for histogram in self._histograms.values()),
+                {device: dict(counts()) for device, counts in self._lines.items()},
+            )
+        return self._figures
+
+
+def shown(latencies: Sequence[Latency]) -> list[tuple[str, float, float, float]]:
+    """Return name, 50th and 99th percentile and maximum in milliseconds of those that were measured at all."""
+    return [
+        (one.name, one.share_s(0.5) * 1e3, one.share_s(0.99) * 1e3, one.max_s * 1e3) for one in latencies if one.count
+    ]

@@ -1,0 +1,303 @@
+"""Operators of CIF's expressions: type, static value and expression of a result, from those of the operands."""
+
+from collections.abc import Callable, Mapping
+from operator import add, mul, sub
+
+from robosc.cif import syntax
+from robosc.cif.terms import (
+    ERROR,
+    Problem,
+    Term,
+    broken,
+    conditional,
+    enum_comparison,
+    logic,
+    made,
+    negation,
+    number,
+    quotient,
+    remainder,
+    result_range,
+    static,
+    truth,
+    tuple_term,
+)
+from robosc.cif.types import (
+    BOOL,
+    REAL,
+    STRING,
+    UNKNOWN,
+    CifType,
+    integer,
+    is_compatible,
+    joined,
+)
+from robosc.expressions import MAXIMUM_INTEGER, MINIMUM_INTEGER, Binary, Unary
+from robosc.model.findings import Findings
+from robosc.source import Location
+
+MAXIMUM_ELEMENTS = 100_000
+"""Elements of a list or dictionary, or characters of a text, beyond which a constant is refused."""
+
+MAXIMUM_PARTS = 1000
+"""Types that a type may be made of."""
+
+_ARITHMETIC: Mapping[str, Callable[[int, int], int]] = {
+    "+": add, "-": sub, "*": mul, "div": quotient, "mod": remainder,
+}  # fmt: skip
+
+
+class Operators:
+    """Operators, which report operands that do not fit.
+
+    Args:
+        findings: Findings so far.
+    """
+
+    def __init__(self, findings: Findings) -> None:
+        self._findings = findings
+
+    def error(self, code: str, message: str, location: Location, fix: str) -> None:
+        """Report an error."""
+        self._findings.error(code, message, location, fix)
+
+    def mismatch(self, message: str, at: Location, fix: str = "") -> Term:
+        """Report that types do not fit; the term of an error."""
+        self.error("cif-type", message, at, fix or "Use an expression of a type that fits.")
+        return ERROR
+
+    def sized(self, type_: CifType, at: Location) -> CifType:
+        """Return a type unless it is too large to work with, which is reported."""
+        if type_.size <= MAXIMUM_PARTS:
+            return type_
+        self.error("cif-too-large", f"this type has more than {MAXIMUM_PARTS} parts", at, "Use a smaller type.")
+        return UNKNOWN
+
+    def unary(self, node: syntax.Unary, term: Term) -> Term:
+        """The term of an operator on one operand."""
+        if term.type.kind == "unknown":
+            return ERROR
+        if node.operator == "not":
+            if term.type.kind != "bool":
+                return self.mismatch(f"'not' needs a boolean; this is {of_type(term.type)}", node.at)
+            return negation(term)
+        if node.operator == "sample":
+            return broken(term.type.parts[0] if term.type.parts else UNKNOWN, term,
+                          problem=Problem("a distribution is sampled", node.at))  # fmt: skip
+        if not term.type.is_number:
+            return self.mismatch(f"'{node.operator}' needs a number; this is {of_type(term.type)}", node.at)
+        if node.operator == "+":
+            return term
+        if term.type.kind == "real":
+            return static(REAL, -term.value) if term.is_static else broken(REAL, term)
+        low, high = term.type.range
+        if low == MINIMUM_INTEGER:
+            if term.type.low is not None:
+                return self.mismatch("the result may leave 32 bits", node.at)
+            low += 1
+        type_ = integer(-high, -low)
+        if term.is_static:
+            return number(-term.value)
+        return made(type_, Unary("-", term.core), term) if term.is_usable else broken(type_, term)
+
+    def binary(self, node: syntax.Binary, left: Term, right: Term) -> Term:
+        """The term of an operator between two operands."""
+        operator = node.operator
+        if "unknown" in (left.type.kind, right.type.kind):
+            return ERROR
+        if operator in ("and", "or", "=>", "<=>"):
+            if left.type.kind == right.type.kind == "bool":
+                return logic(operator, left, right)
+            if operator in ("and", "or") and left.type.kind == right.type.kind == "set":
+                return self._sets(node, left, right)
+            return self._unfit(node, left, right)
+        if operator in ("=", "!="):
+            return self.equality(node, left, right)
+        if operator in ("in", "sub"):
+            return self._membership(node, left, right)
+        if left.type.is_number and right.type.is_number:
+            if operator in ("<", "<=", ">", ">="):
+                return self._order(node, left, right)
+            return self._arithmetic(node, left, right)
+        if operator in ("+", "-") and left.type.kind == right.type.kind:
+            return self._collections(node, left, right)
+        return self._unfit(node, left, right)
+
+    def _unfit(self, node: syntax.Binary, left: Term, right: Term) -> Term:
+        return self.mismatch(f"'{node.operator}' does not take {left.type} and {right.type}", node.at)
+
+    def equality(self, node: syntax.Binary, left: Term, right: Term) -> Term:
+        """The term of `=` or `!=` between two operands."""
+        if not is_compatible(left.type, right.type) or left.type.kind in ("automaton", "func", "dist"):
+            return self._unfit(node, left, right)
+        if left.is_static and right.is_static and left.type.kind in ("bool", "int", "enum"):
+            return truth((left.value == right.value) is (node.operator == "="))
+        if left.type.kind == "bool":
+            return logic(node.operator, left, right)
+        if left.type.kind not in ("int", "enum"):
+            return broken(BOOL, left, right, problem=Problem(f"values of type {left.type} are compared", node.at))
+        if not (left.is_usable and right.is_usable):
+            return broken(BOOL, left, right)
+        if left.type.kind == "enum":
+            return made(BOOL, enum_comparison(node.operator, left.core, right.core), left, right)
+        return made(BOOL, Binary("=" if node.operator == "=" else "!=", left.core, right.core), left, right)
+
+    def _order(self, node: syntax.Binary, left: Term, right: Term) -> Term:
+        if "real" in (left.type.kind, right.type.kind):
+            return broken(BOOL, left, right, problem=Problem("real numbers are compared", node.at))
+        if left.is_static and right.is_static:
+            a, b = left.value, right.value
+            return truth({"<": a < b, "<=": a <= b, ">": a > b, ">=": a >= b}[node.operator])
+        if not (left.is_usable and right.is_usable):
+            return broken(BOOL, left, right)
+        return made(BOOL, Binary(node.operator, left.core, right.core), left, right)  # type: ignore[arg-type]
+
+    def _arithmetic(self, node: syntax.Binary, left: Term, right: Term) -> Term:
+        operator = node.operator
+        if operator == "/" or (operator in ("+", "-", "*") and "real" in (left.type.kind, right.type.kind)):
+            return self._real(node, left, right)
+        if "real" in (left.type.kind, right.type.kind):
+            return self._unfit(node, left, right)
+        if operator in ("div", "mod") and right.is_static and right.value == 0:
+            return self.mismatch("this divides by zero", node.at)
+        low, high = result_range(operator, left.type.range, right.type.range)
+        is_ranged = left.type.low is not None and right.type.low is not None
+        if low < MINIMUM_INTEGER or high > MAXIMUM_INTEGER:
+            if is_ranged:
+                return self.mismatch("the result may leave 32 bits", node.at)
+            low, high = max(low, MINIMUM_INTEGER), min(high, MAXIMUM_INTEGER)
+        type_ = integer(low, high) if is_ranged else CifType("int")
+        if left.is_static and right.is_static:
+            a, b = left.value, right.value
+            return number(_ARITHMETIC[operator](a, b))
+        if not (left.is_usable and right.is_usable):
+            return broken(type_, left, right)
+        if operator in ("div", "mod") and not (right.is_static and right.value > 0):
+            problem = Problem(f"'{operator}' has a divisor that is not a constant above zero", node.at)
+            return broken(type_, left, right, problem=problem)
+        return made(type_, Binary(operator, left.core, right.core), left, right)  # type: ignore[arg-type]
+
+    def _real(self, node: syntax.Binary, left: Term, right: Term) -> Term:
+        if not (left.is_static and right.is_static):
+            return broken(REAL, left, right, problem=Problem("this computes with real numbers", node.at))
+        a, b = float(left.value), float(right.value)
+        try:
+            value = {"+": lambda: a + b, "-": lambda: a - b, "*": lambda: a * b, "/": lambda: a / b}[node.operator]()
+        except ZeroDivisionError:
+            return self.mismatch("this divides by zero", node.at)
+        return static(REAL, value)
+
+    def _sets(self, node: syntax.Binary, left: Term, right: Term) -> Term:
+        type_ = joined(left.type, right.type)
+        if type_ is None:
+            return self._unfit(node, left, right)
+        if not (left.is_static and right.is_static):
+            return broken(type_, left, right, problem=Problem("this computes with sets", node.at))
+        return static(type_, left.value & right.value if node.operator == "and" else left.value | right.value)
+
+    def _collections(self, node: syntax.Binary, left: Term, right: Term) -> Term:
+        """Join or subtract strings, lists, sets or dictionaries."""
+        kind = left.type.kind
+        type_ = joined(left.type, right.type)
+        is_known = kind in ("string", "list", "dict") if node.operator == "+" else kind in ("set", "dict")
+        if type_ is None or not is_known:
+            return self._unfit(node, left, right)
+        if not (left.is_static and right.is_static):
+            return broken(type_, left, right, problem=Problem(f"this computes with values of type {type_}", node.at))
+        if node.operator == "-":
+            return static(type_, left.value - right.value)
+        if len(left.value) + len(right.value) > MAXIMUM_ELEMENTS:
+            message = f"this has more than {MAXIMUM_ELEMENTS} elements"
+            self.error("cif-too-large", message, node.at, "Use fewer elements.")
+            return ERROR
+        if kind == "dict":
+            return static(type_, frozenset((dict(left.value) | dict(right.value)).items()))
+        value = left.value + right.value
+        if kind == "list":
+            type_ = CifType("list", len(value), len(value), type_.parts)
+        return static(type_, value)
+
+    def _membership(self, node: syntax.Binary, left: Term, right: Term) -> Term:
+        if node.operator == "sub":
+            if left.type.kind != "set" or not is_compatible(left.type, right.type):
+                return self._unfit(node, left, right)
+        elif right.type.kind not in ("list", "set", "dict") or not is_compatible(left.type, right.type.parts[0]):
+            return self._unfit(node, left, right)
+        if not (left.is_static and right.is_static):
+            return broken(BOOL, left, right, problem=Problem(f"'{node.operator}' has a value of a state", node.at))
+        if node.operator == "sub":
+            return truth(left.value <= right.value)
+        return truth(left.value in (dict(right.value) if right.type.kind == "dict" else right.value))
+
+    def choice(self, condition: Term, then: Term, otherwise: Term, at: Location) -> Term:
+        """`if condition: then else otherwise end`."""
+        if "unknown" in (condition.type.kind, then.type.kind, otherwise.type.kind):
+            return ERROR
+        type_ = joined(then.type, otherwise.type)
+        if type_ is None or type_.kind == "automaton":
+            return self.mismatch(f"the branches have types that do not fit: {then.type} and {otherwise.type}", at)
+        return conditional(condition, then, otherwise, type_)
+
+    def group(self, node: syntax.Group, items: list[Term]) -> Term:
+        """The term of a tuple, list, set or dictionary of elements."""
+        if any(item.type.kind == "unknown" for item in items):
+            return ERROR
+        if node.kind == "tuple":
+            whole = self.sized(CifType("tuple", parts=tuple(item.type for item in items)), node.at)
+            return ERROR if whole.kind == "unknown" else tuple_term(whole, tuple(items))
+        groups = [items[::2], items[1::2]] if node.kind == "dict" else [items]
+        parts = []
+        for group in groups:
+            part: CifType | None = UNKNOWN
+            for item in group:
+                part = joined(part, item.type) if part is not None else None
+            if part is None:
+                return self.mismatch("the elements have types that do not fit each other", node.at)
+            parts.append(part)
+        length = len(items) if node.kind == "list" else None
+        type_ = CifType(node.kind, length, length, tuple(parts))
+        if not all(item.is_static for item in items):
+            return broken(type_, *items, problem=Problem(f"this makes a {node.kind} of values of a state", node.at))
+        values = [item.value for item in items]
+        if node.kind == "dict":
+            return static(type_, frozenset(zip(values[::2], values[1::2], strict=True)))
+        return static(type_, tuple(values) if node.kind == "list" else frozenset(values))
+
+    def cast(self, node: syntax.Cast, type_: CifType, term: Term) -> Term:
+        """The term of a value that is cast to a type."""
+        if "unknown" in (term.type.kind, type_.kind):
+            return ERROR
+        if is_compatible(term.type, type_) and term.type.kind != "automaton":
+            return term
+        pairs = {("int", "real"), ("bool", "string"), ("int", "string"), ("real", "string"), ("automaton", "string"),
+                 ("string", "bool"), ("string", "int"), ("string", "real")}  # fmt: skip
+        if (term.type.kind, type_.kind) not in pairs:
+            return self.mismatch(f"{term.type} cannot be cast to {type_}", node.at)
+        if not term.is_static:
+            return broken(type_, term, problem=Problem(f"a value of a state is cast to {type_}", node.at))
+        try:
+            return _cast_value(term, type_)
+        except ValueError:
+            return self.mismatch(f"{term.value!r} is not {type_}", node.at)
+
+
+def of_type(type_: CifType) -> str:
+    """Return the words for a value's type in a message."""
+    return f"of type {type_}"
+
+
+def _cast_value(term: Term, type_: CifType) -> Term:
+    value = term.value
+    match type_.kind:
+        case "real":
+            return static(REAL, float(value))
+        case "string":
+            return static(STRING, str(value).lower() if isinstance(value, bool) else str(value))
+        case "bool":
+            if value not in ("true", "false"):
+                raise ValueError(value)
+            return truth(value == "true")
+    found = int(value)
+    if not MINIMUM_INTEGER <= found <= MAXIMUM_INTEGER:
+        raise ValueError(value)
+    return number(found)

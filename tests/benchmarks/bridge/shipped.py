@@ -1,0 +1,169 @@
+"""Benchmark of `robosc-bridge run` with the configuration that `init` writes, in a maze in real time.
+
+The bridge is a process as its unit of systemd runs it, and so is the simulated robot at the other end of real
+pseudo-terminals; both have priority over other programs where that is permitted. *Ready*: from the start of the process
+until it tells systemd that it is ready, and until the robot moves; the supervisor is made in between. *CPU*: user and
+system time of the whole process over the time that passed, in a maze. *Scan to wheel* and *to decision*: as the bridge
+itself tells them (`robosc-bridge status --json`), with and without a neighbour that keeps each processor busy.
+
+Usage: shipped.py [SECONDS]
+"""
+
+import argparse
+import json
+import os
+import re
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[3]
+sys.path[:0] = [str(Path(__file__).parent), str(ROOT / "tests" / "benchmarks")]
+
+from rig import LIMIT_S, Machine, Simulator, environment, simulated  # noqa: E402
+
+from figures import text_table  # noqa: E402  # found through the path above
+from support.real_time import preferred  # noqa: E402  # rig adds its folder to the path
+
+SECONDS = 60.0
+MODEL = ROOT / "examples" / "maze_solver" / "maze_solver.rscd"
+CASES = (("opencr", "lds02", False), ("dynamixel", "lds03", False), ("opencr", "lds02", True))
+"""Base, LiDAR, and whether there is a busy neighbour."""
+
+HEADER = [
+    "base, LiDAR, neighbour", "READY s", "moves s", "CPU", "scan to wheel ms", "to decision ms", "exchange ms",
+]  # fmt: skip
+
+
+@dataclass
+class Measured:
+    """Figures of one bridge."""
+
+    ready_s: float
+    moves_s: float
+    cpu: float
+    latencies: dict[str, Any]
+
+
+def _command(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "robosc_bridge.command", *arguments]
+
+
+def _configured(folder: Path, robot: Simulator, base: str, lidar: str, address: str) -> Path:
+    """The file of `init`, with the robot's ports and a remote endpoint."""
+    file = folder / "maze.yaml"
+    arguments = ["init", "--model", str(MODEL), "--drive", base, "--scanner", lidar, "-o", str(file)]
+    arguments += ["--drive-port", robot.base_path, "--scanner-port", robot.scanner_path]
+    subprocess.run(_command(*arguments), env=environment(), check=True, stdout=subprocess.DEVNULL)
+    text = file.read_text().replace("  grpc_address: null", f"  grpc_address: {address}")
+    file.write_text(text)
+    return file
+
+
+def _cpu_s(process: int) -> float:
+    """User and system time of a process."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def _status(address: str) -> dict[str, Any] | None:
+    told = subprocess.run(
+        _command("status", "--json", "--address", address),
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    found: dict[str, Any] | None = json.loads(told.stdout) if told.stdout else None
+    return found
+
+
+@contextmanager
+def _neighbours(count: int) -> Iterator[None]:
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+
+
+def _measure(base: str, lidar: str, is_busy: bool, seconds: float) -> Measured:
+    with tempfile.TemporaryDirectory() as name, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        folder = Path(name)
+        manager.bind(str(folder / "notify"))
+        manager.settimeout(LIMIT_S)
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            address = f"127.0.0.1:{server.getsockname()[1]}"
+        with preferred(), simulated("--base", base, "--lidar", lidar, "--scene", "maze-rooms") as robot:
+            file = _configured(folder, robot, base, lidar, address)
+            begin_s = time.monotonic()
+            with preferred():
+                bridge = subprocess.Popen(
+                    _command("run", "--model", str(MODEL), "--config", str(file)),
+                    env={**environment(), "NOTIFY_SOCKET": str(folder / "notify")},
+                    stderr=subprocess.DEVNULL,
+                )
+            try:
+                ready_s = moves_s = 0.0
+                while not moves_s:
+                    told = manager.recv(4096).decode()
+                    ready_s = time.monotonic() - begin_s if told == "READY=1" else ready_s
+                    moves_s = time.monotonic() - begin_s if told == "STATUS=running" else moves_s
+                with _neighbours((os.cpu_count() or 1) if is_busy else 0):
+                    before_cpu_s, before_s = _cpu_s(bridge.pid), time.monotonic()
+                    time.sleep(seconds)
+                    cpu = (_cpu_s(bridge.pid) - before_cpu_s) / (time.monotonic() - before_s)
+                snapshot = _status(address) or {}
+            finally:
+                bridge.terminate()
+                bridge.wait()
+    latencies = {item["name"]: item for item in snapshot.get("latencies", [])}
+    return Measured(ready_s, moves_s, cpu, latencies)
+
+
+def _spread(latency: dict[str, Any] | None) -> str:
+    if latency is None or "count" not in latency:
+        return "-"
+    times = "/".join(f"{1e3 * latency[name]:.1f}" for name in ("p50_s", "p99_s", "max_s"))
+    return f"{times} ({latency['count']})"
+
+
+def table(seconds: float = SECONDS) -> str:
+    """A row for each case."""
+    rows = []
+    machine = Machine()
+    with machine.watched():
+        for base, lidar, is_busy in CASES:
+            found = _measure(base, lidar, is_busy, seconds)
+            rows.append(
+                [
+                    f"{base}, {lidar}, {'busy' if is_busy else 'idle'}",
+                    f"{found.ready_s:.2f}",
+                    f"{found.moves_s:.2f}",
+                    f"{found.cpu:.1%}",
+                    *(_spread(found.latencies.get(name)) for name in ("scan_to_wheel", "scan_to_decision", "exchange")),
+                ]
+            )
+    title = f"The configuration of `init` in a maze for {seconds:g} s, p50/p99/max (count); {machine}"
+    return text_table(re.sub(r"\s+", " ", title), HEADER, rows)
+
+
+def main() -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("seconds", nargs="?", type=float, default=SECONDS)
+    sys.stdout.write(table(parser.parse_args().seconds) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -206,6 +206,7 @@ def _notice(item: Reason | Caution) -> pb.Notice:
 def _drive(reading: DriveReading) -> pb.DriveState:
     pose, velocity = reading.pose, reading.velocity
     left_m, right_m = reading.wheels_m or (None, None)
+    linear_variance, angular_variance = reading.velocity_variances or (None, None)
     return pb.DriveState(
         pose=pb.Pose(x_m=pose.x_m, y_m=pose.y_m, heading_rad=pose.heading_rad),
         velocity=pb.Twist(linear_m_s=velocity.linear_m_s, angular_rad_s=velocity.angular_rad_s),
@@ -222,6 +223,9 @@ def _drive(reading: DriveReading) -> pb.DriveState:
         left_wheel_m=left_m,
         right_wheel_m=right_m,
         wheel_radius_m=reading.wheel_radius_m,
+        pose_covariance=reading.pose_covariance,
+        linear_variance=linear_variance,
+        angular_variance=angular_variance,
     )
 
 

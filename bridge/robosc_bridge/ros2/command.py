@@ -6,6 +6,7 @@ import signal
 import sys
 import threading
 import time
+import traceback
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,6 +16,9 @@ from robosc_bridge.terminal.commands import DONE, REFUSED, WRONG, add_connection
 
 NAME = "ros2"
 """Name of the command."""
+
+FAILED = REFUSED
+"""Exit status after ROS 2 has failed."""
 
 RATE_HZ, LEAST_RATE_HZ, MOST_RATE_HZ = 30.0, 1.0, 100.0
 """Looks a second, by default and within bounds; the bridge shows up to 20 readings a second, and every scan."""
@@ -32,8 +36,8 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _EPILOG = (
     "It publishes odom, joint_states, imu, battery_state, scan, /tf, /tf_static and /diagnostics, and takes no "
     "velocities: the supervisor keeps command of the wheels. What stands after --ros-args is ROS's, such as "
-    "`--ros-args -r odom:=wheels/odometry`. exit status: 0 it was told to end; 1 the bridge refuses; 2 wrong use, no "
-    "ROS 2, or a bridge of an earlier version"
+    "`--ros-args -r odom:=wheels/odometry`. exit status: 0 it was told to end; 1 the bridge refuses, or ROS 2 has "
+    "failed; 2 wrong use, no ROS 2, or a bridge of an earlier version"
 )
 
 
@@ -214,6 +218,11 @@ class _Follower:
                     return
             except (NodeError, EarlierBridgeError) as error:
                 self._give_up(str(error), WRONG)
+                return
+            except Exception as error:
+                # A thread that ended without a word would look like a robot that stands still.
+                traceback.print_exc()
+                self._give_up(f"publishing failed: {type(error).__name__}: {error}", FAILED)
                 return
             if not self._over.is_set():
                 self._relay.lose(why)

@@ -26,7 +26,14 @@ NODE = "robosc_bridge"
 
 
 def odometry(drive: DriveState, stamp_ns: int, frames: Frames, pose_covariance: Iterable[float]) -> Any:
-    """Return a nav_msgs/Odometry."""
+    """Return a nav_msgs/Odometry.
+
+    Args:
+        drive: Reading as the bridge tells it.
+        stamp_ns: Time of the reading.
+        frames: Names of frames.
+        pose_covariance: Covariance of the pose, row by row.
+    """
     message = Odometry(child_frame_id=frames.of(frames.base))
     _set_header(message.header, stamp_ns, frames.of(frames.odom))
     pose, twist = message.pose.pose, message.twist.twist
@@ -34,7 +41,12 @@ def odometry(drive: DriveState, stamp_ns: int, frames: Frames, pose_covariance: 
     pose.orientation.z, pose.orientation.w = _turned(drive.pose.heading_rad)
     twist.linear.x, twist.angular.z = drive.velocity.linear_m_s, drive.velocity.angular_rad_s
     message.pose.covariance = list(pose_covariance)
-    message.twist.covariance = list(uncertainty.TWIST)
+    variances = {
+        name: value
+        for name, value in (("linear", drive.linear_variance), ("angular", drive.angular_variance))
+        if drive.HasField(f"{name}_variance") and math.isfinite(value)
+    }
+    message.twist.covariance = list(uncertainty.twist(**variances))
     return message
 
 

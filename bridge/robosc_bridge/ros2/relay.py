@@ -7,7 +7,7 @@ from typing import Protocol
 
 from robosc_bridge.ros2.clock_offset import ClockOffset, LocalClocks
 from robosc_bridge.ros2.diagnostics import Entry, Link, entries
-from robosc_bridge.ros2.uncertainty import PlanarPose, PoseUncertainty
+from robosc_bridge.ros2.uncertainty import PlanarPose, PoseUncertainty, told_pose
 from robosc_bridge.terminal.client import Definition, DriveState, Scan, Snapshot, WatchResponse
 
 STALE_S = 0.5
@@ -119,7 +119,8 @@ class Relay:
         stamp_ns = self._fresh("drive", drive.time_s)
         if stamp_ns is None:
             return
-        self._outlet.put_drive(drive, stamp_ns, self._uncertainty.covariance())
+        covariance = told_pose(drive.pose_covariance) or self._uncertainty.covariance()
+        self._outlet.put_drive(drive, stamp_ns, covariance)
         if drive.time_s - self._battery_s >= BATTERY_S:
             self._battery_s = drive.time_s
             self._outlet.put_battery(drive, stamp_ns)

@@ -1,4 +1,4 @@
-"""Covariances of what a bridge measures: assumed, since no device tells its own, and larger than a good robot's are.
+"""Covariances of what a bridge measures: those that it tells, else assumed, and larger than a good robot's are.
 
 That of the pose grows with the way, as dead reckoning does. The step is that of R. Siegwart, I. Nourbakhsh and
 D. Scaramuzza, "Introduction to Autonomous Mobile Robots", 2nd edition, 2011, section 5.2.4; that variances grow in
@@ -7,6 +7,7 @@ ICRA 1997.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,7 @@ HEADING_RAD2_PER_RAD = 1e-3
 """Variance of the heading, for each radian of rotation: 4.5 degrees after a full one."""
 
 INITIAL = 1e-6
-"""Variance of each part of the pose where the odometry begins: no filter takes zero for a variance."""
+"""Variance of each part of the pose where the odometry begins, and least of a velocity: no filter takes zero."""
 
 UNMEASURED = 1e6
 """Variance of what wheels say nothing about: height, roll and pitch."""
@@ -36,13 +37,6 @@ node for ROS 2 tells none."""
 
 UNKNOWN = (-1.0, *[0.0] * 8)
 """Covariance of sensor_msgs/Imu for what is not measured."""
-
-TWIST = tuple(
-    value if row == column else 0.0
-    for row, value in enumerate((LINEAR_M2_S2, LINEAR_M2_S2, UNMEASURED, UNMEASURED, UNMEASURED, ANGULAR_RAD2_S2))
-    for column in range(6)
-)
-"""Covariance of the velocity, row by row, of x, y, z and rotations about them."""
 
 _ROWS = (0, 1, 5)
 
@@ -95,6 +89,35 @@ class PoseUncertainty:
 
     def covariance(self) -> tuple[float, ...]:
         """Return the covariance of x, y, z and rotations about them, row by row."""
-        found = np.diag([0.0, 0.0, UNMEASURED, UNMEASURED, UNMEASURED, 0.0])
-        found[np.ix_(_ROWS, _ROWS)] = self._covariance
-        return tuple(found.flatten().tolist())
+        return _spatial(self._covariance)
+
+
+def told_pose(planar: Sequence[float]) -> tuple[float, ...] | None:
+    """Return the covariance of x, y, z and rotations about them, row by row, as a bridge tells it.
+
+    Args:
+        planar: Covariance of x, y and heading, row by row, from zero where the odometry began.
+
+    Returns:
+        None: it tells none.
+    """
+    if len(planar) != 9 or not all(map(math.isfinite, planar)):
+        return None
+    return _spatial(np.reshape(planar, (3, 3)) + INITIAL * np.eye(3))
+
+
+def twist(linear: float = LINEAR_M2_S2, angular: float = ANGULAR_RAD2_S2) -> tuple[float, ...]:
+    """Return the covariance of the velocity along x, y, z and of rotations about them, row by row.
+
+    Args:
+        linear: Variance forward, in m²/s²; sideways it is the assumed one, of slip.
+        angular: Variance of the rotation, in rad²/s².
+    """
+    diagonal = (max(linear, INITIAL), LINEAR_M2_S2, UNMEASURED, UNMEASURED, UNMEASURED, max(angular, INITIAL))
+    return tuple(np.diag(diagonal).flatten().tolist())
+
+
+def _spatial(planar: npt.NDArray[np.float64]) -> tuple[float, ...]:
+    found = np.diag([0.0, 0.0, UNMEASURED, UNMEASURED, UNMEASURED, 0.0])
+    found[np.ix_(_ROWS, _ROWS)] = planar
+    return tuple(found.flatten().tolist())

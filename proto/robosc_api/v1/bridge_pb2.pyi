@@ -235,7 +235,7 @@ class ComponentState(_message.Message):
     def __init__(self, name: _Optional[str] = ..., state: _Optional[str] = ..., variables: _Optional[_Union[_struct_pb2.Struct, _Mapping]] = ...) -> None: ...
 
 class DriveState(_message.Message):
-    __slots__ = ("age_s", "pose", "velocity", "left_wheel_m_s", "right_wheel_m_s", "is_torque_on", "faults", "battery_v", "battery_share", "temperature_c", "buttons", "time_s", "imu", "left_wheel_m", "right_wheel_m", "wheel_radius_m")
+    __slots__ = ("age_s", "pose", "velocity", "left_wheel_m_s", "right_wheel_m_s", "is_torque_on", "faults", "battery_v", "battery_share", "temperature_c", "buttons", "time_s", "imu", "left_wheel_m", "right_wheel_m", "wheel_radius_m", "pose_covariance", "linear_variance", "angular_variance")
     class ButtonsEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -266,6 +266,9 @@ class DriveState(_message.Message):
     LEFT_WHEEL_M_FIELD_NUMBER: _ClassVar[int]
     RIGHT_WHEEL_M_FIELD_NUMBER: _ClassVar[int]
     WHEEL_RADIUS_M_FIELD_NUMBER: _ClassVar[int]
+    POSE_COVARIANCE_FIELD_NUMBER: _ClassVar[int]
+    LINEAR_VARIANCE_FIELD_NUMBER: _ClassVar[int]
+    ANGULAR_VARIANCE_FIELD_NUMBER: _ClassVar[int]
     age_s: float
     pose: Pose
     velocity: Twist
@@ -282,7 +285,10 @@ class DriveState(_message.Message):
     left_wheel_m: float
     right_wheel_m: float
     wheel_radius_m: float
-    def __init__(self, age_s: _Optional[float] = ..., pose: _Optional[_Union[Pose, _Mapping]] = ..., velocity: _Optional[_Union[Twist, _Mapping]] = ..., left_wheel_m_s: _Optional[float] = ..., right_wheel_m_s: _Optional[float] = ..., is_torque_on: _Optional[bool] = ..., faults: _Optional[_Iterable[str]] = ..., battery_v: _Optional[float] = ..., battery_share: _Optional[float] = ..., temperature_c: _Optional[float] = ..., buttons: _Optional[_Mapping[str, bool]] = ..., time_s: _Optional[float] = ..., imu: _Optional[_Mapping[str, float]] = ..., left_wheel_m: _Optional[float] = ..., right_wheel_m: _Optional[float] = ..., wheel_radius_m: _Optional[float] = ...) -> None: ...
+    pose_covariance: _containers.RepeatedScalarFieldContainer[float]
+    linear_variance: float
+    angular_variance: float
+    def __init__(self, age_s: _Optional[float] = ..., pose: _Optional[_Union[Pose, _Mapping]] = ..., velocity: _Optional[_Union[Twist, _Mapping]] = ..., left_wheel_m_s: _Optional[float] = ..., right_wheel_m_s: _Optional[float] = ..., is_torque_on: _Optional[bool] = ..., faults: _Optional[_Iterable[str]] = ..., battery_v: _Optional[float] = ..., battery_share: _Optional[float] = ..., temperature_c: _Optional[float] = ..., buttons: _Optional[_Mapping[str, bool]] = ..., time_s: _Optional[float] = ..., imu: _Optional[_Mapping[str, float]] = ..., left_wheel_m: _Optional[float] = ..., right_wheel_m: _Optional[float] = ..., wheel_radius_m: _Optional[float] = ..., pose_covariance: _Optional[_Iterable[float]] = ..., linear_variance: _Optional[float] = ..., angular_variance: _Optional[float] = ...) -> None: ...
 
 class Pose(_message.Message):
     __slots__ = ("x_m", "y_m", "heading_rad")

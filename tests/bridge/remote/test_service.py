@@ -148,13 +148,19 @@ class TestStatus:
         daemon.show(reading=READING)
         drive = status(stub).snapshot.drive
         assert not any(drive.HasField(name) for name in ("left_wheel_m", "right_wheel_m", "wheel_radius_m"))
-        assert dict(drive.imu) == {}
+        assert not any(drive.HasField(name) for name in ("linear_variance", "angular_variance"))
+        assert (dict(drive.imu), list(drive.pose_covariance)) == ({}, [])
         imu = {"angular_velocity_z": -0.2}
         daemon.show(reading=replace(READING, time_s=12.5, imu=imu, wheels_m=(0.0, 0.75), wheel_radius_m=0.033))
         drive = status(stub).snapshot.drive
         assert (drive.time_s, dict(drive.imu)) == (12.5, imu)
         assert (drive.left_wheel_m, drive.right_wheel_m, drive.wheel_radius_m) == (0.0, 0.75, 0.033)
         assert drive.HasField("left_wheel_m")
+        told = replace(READING, pose_covariance=tuple(map(float, range(9))), velocity_variances=(0.0, 0.5))
+        daemon.show(reading=told)
+        drive = status(stub).snapshot.drive
+        assert list(drive.pose_covariance) == list(range(9))
+        assert (drive.HasField("linear_variance"), drive.linear_variance, drive.angular_variance) == (True, 0.0, 0.5)
 
     def test_times_are_by_one_clock(self, daemon: FakeDaemon, stub: Any) -> None:
         before_s = monotonic()

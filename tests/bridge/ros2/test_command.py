@@ -3,17 +3,19 @@
 import sys
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from robosc_api.security import Scope, ServerSecurity, make_token
+from robosc_bridge.host import monotonic
 from robosc_bridge.main import make_parser
 from robosc_bridge.remote import RemoteSettings, convert
 from robosc_bridge.ros2 import command, node
 from robosc_bridge.ros2.command import main
-from support.remote import FakeDaemon, served
+from support.remote import READING, FakeDaemon, served
 from support.waiting import PATIENCE_S
 
 NOWHERE = "127.0.0.1:1"
@@ -150,6 +152,23 @@ def test_an_earlier_bridge_ends_it(
     assert told.startswith("robosc-bridge: publishes what the bridge of Porter at 127.0.0.1:")
     assert "is of an earlier version" in error
     assert (outlet.made[-1]["sends_odom_tf"], outlet.made[-1]["sends_static_tf"]) == sends
+
+
+def test_a_failure_of_ros_ends_it(
+    outlet: type[Outlet], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def put_drive(*_: object) -> None:
+        raise RuntimeError("the publisher is gone")
+
+    monkeypatch.setattr(outlet, "put_drive", put_drive, raising=False)
+    with FakeDaemon() as daemon:
+        daemon.operations.turtlebot = "burger"
+        daemon.show(reading=replace(READING, time_s=monotonic()))
+        with served(daemon) as bridge:
+            assert status("--address", bridge.address) == 1
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        "robosc-bridge: publishing failed: RuntimeError: the publisher is gone"
+    )
 
 
 def test_a_bridge_that_goes_is_told_once_and_found_again(

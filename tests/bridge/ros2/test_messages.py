@@ -70,7 +70,17 @@ class TestOdometry:
         assert yaw(found.pose.pose.orientation) == pytest.approx(2.0)
         assert (found.twist.twist.linear.x, found.twist.twist.angular.z) == (0.1, -0.3)
         assert list(found.pose.covariance) == covariance
-        assert list(found.twist.covariance) == list(uncertainty.TWIST)
+        assert list(found.twist.covariance) == list(uncertainty.twist())
+
+    def test_variances_that_the_bridge_tells(self) -> None:
+        drive = pb.DriveState(linear_variance=0.25, angular_variance=0.5)
+        assert list(messages.odometry(drive, 0, FRAMES, [0.0] * 36).twist.covariance) == list(
+            uncertainty.twist(0.25, 0.5)
+        )
+        drive = pb.DriveState(linear_variance=math.nan, angular_variance=0.5)
+        assert list(messages.odometry(drive, 0, FRAMES, [0.0] * 36).twist.covariance) == list(
+            uncertainty.twist(angular=0.5)
+        )
 
     @given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-math.pi, math.pi))
     def test_the_transform_leads_where_the_odometry_says(self, x_m: float, y_m: float, heading_rad: float) -> None:

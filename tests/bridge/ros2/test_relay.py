@@ -176,6 +176,13 @@ def test_the_covariance_grows_with_the_way_also_while_nothing_is_published(bench
     assert bench.drives[1][2][0] == pytest.approx(1e-6 + 1e-4)
 
 
+def test_a_covariance_that_the_bridge_tells_goes_before_an_assumed_one(bench: Bench) -> None:
+    drive = pb.DriveState(time_s=99.9 + AHEAD_S, pose_covariance=[0.5, 0, 0, 0, 0.25, 0, 0, 0, 0.125])
+    bench.relay.take(pb.WatchResponse(sent_s=bench.now_s + AHEAD_S, snapshot=pb.Snapshot(drive=drive)))
+    covariance = bench.drives[0][2]
+    assert (covariance[0], covariance[7], covariance[35]) == (0.5 + 1e-6, 0.25 + 1e-6, 0.125 + 1e-6)
+
+
 def test_a_bridge_that_does_not_tell_its_times_is_refused(bench: Bench) -> None:
     with pytest.raises(EarlierBridgeError, match=r"robot:1 is of an earlier version \(1.2\)"):
         bench.relay.take(pb.WatchResponse(snapshot=pb.Snapshot()))

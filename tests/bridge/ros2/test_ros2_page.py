@@ -40,7 +40,7 @@ def test_covariances() -> None:
         f"| {uncertainty.UNMEASURED:.0e} |".replace("e+0", "e"),
         f"{uncertainty.ANGULAR_VELOCITY_RAD2_S2:g} rad²/s², {uncertainty.LINEAR_ACCELERATION_M2_S4:g} m²/s⁴, "
         f"{uncertainty.ORIENTATION_RAD2:g} rad²",
-        f"begins with {uncertainty.INITIAL:.0e}".replace("e-0", "e-"),
+        f"pose begins with {uncertainty.INITIAL:.0e}".replace("e-0", "e-"),
     ):
         assert text in PAGE
     assert uncertainty.HEADING_RAD2_PER_M == uncertainty.HEADING_RAD2_PER_RAD

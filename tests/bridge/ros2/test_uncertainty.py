@@ -81,6 +81,23 @@ def test_a_robot_at_rest_keeps_what_it_has() -> None:
 
 
 def test_a_velocity_is_told_by_what_wheels_measure() -> None:
-    found = np.array(uncertainty.TWIST).reshape(6, 6)
+    found = np.array(uncertainty.twist()).reshape(6, 6)
     assert np.array_equal(found, np.diag(np.diag(found)))
-    assert (found[0, 0], found[2, 2], found[5, 5]) == (1e-4, 1e6, 1e-3)
+    assert np.diag(found).tolist() == [1e-4, 1e-4, 1e6, 1e6, 1e6, 1e-3]
+    told = np.array(uncertainty.twist(0.25, 0.0)).reshape(6, 6)
+    assert np.diag(told).tolist() == [0.25, 1e-4, 1e6, 1e6, 1e6, 1e-6]
+
+
+def test_a_covariance_that_is_told() -> None:
+    planar = [0.1, 0.01, 0.02, 0.01, 0.2, 0.03, 0.02, 0.03, 0.3]
+    told = uncertainty.told_pose(planar)
+    assert told is not None
+    found = np.array(told).reshape(6, 6)
+    assert np.array_equal(found, found.T)
+    assert np.diag(found).tolist() == [0.1 + 1e-6, 0.2 + 1e-6, 1e6, 1e6, 1e6, 0.3 + 1e-6]
+    assert (found[0, 1], found[0, 5], found[1, 5]) == (0.01, 0.02, 0.03)
+
+
+@pytest.mark.parametrize("planar", [[], [0.0] * 8, [0.0] * 36, [math.nan] + [0.0] * 8])
+def test_a_covariance_that_is_none(planar: list[float]) -> None:
+    assert uncertainty.told_pose(planar) is None

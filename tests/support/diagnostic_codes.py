@@ -27,10 +27,10 @@ NO_CODES = frozenset(
 # The pages themselves, the models that a new robot begins with, and names of programs and packages.
 _ELSEWHERE = ("diagnostics", "starter", "doctor")
 
-REPORTERS = {"error": 0, "warning": 0, "note": 0, "_warning": 0, "Diagnostic": 1, "Remark": 0, "_shown": 0}
+REPORTERS = {"error": 0, "warning": 0, "note": 0, "_warning": 0, "Diagnostic": 1, "Remark": 0, "_remarks": 0}
 """Functions that take a code, and at which position."""
 
-_MAKERS = frozenset({"Diagnostic", "Remark", "_shown"})
+_MAKERS = frozenset({"Diagnostic", "Remark", "_remarks"})
 """Those of them that take nothing else: the names of others are those of a logger's methods, too."""
 
 

@@ -115,6 +115,7 @@ class AsyncClient:
     generate = _unary_method(operations.generate)
     explore = _unary_method(operations.explore)
     verify = _unary_method(operations.verify)
+    explain = _unary_method(operations.explain)
     format = _unary_method(operations.format_)
 
     list_targets = _unary_method(operations.list_targets)

@@ -22,6 +22,7 @@ from robosc_client.calls import JobPages, JobWatch, OnProgress, Operation, ignor
 from robosc_client.convert import jobs, response_fields
 from robosc_client.convert.requests import request_of, submit_request
 from robosc_client.convert.response_readers import (
+    ExplanationReader,
     ExplorationReader,
     GenerationReader,
     JobResultReader,
@@ -34,6 +35,7 @@ from robosc_client.convert.response_readers import (
 )
 from robosc_client.jobs import Job, JobState, Submission, TaskKind
 from robosc_client.results import (
+    Explained,
     Exploration,
     Formatted,
     Generation,
@@ -46,6 +48,7 @@ from robosc_client.tasks import (
     DEFAULT_GENERATION,
     DEFAULT_OPTIONS,
     Check,
+    Explain,
     Explore,
     Format,
     Generate,
@@ -173,6 +176,34 @@ def _content_of(supervisor: SupervisorLike) -> bytes:
     if isinstance(supervisor, str | os.PathLike):
         return read_bounded(given_path(supervisor), MAXIMUM_BYTES)
     return encode(supervisor)
+
+
+def explain(
+    bundle: ModelLike,
+    options: SynthesisOptions = DEFAULT_OPTIONS,
+    *,
+    event: str | None = None,
+    state: str | None = None,
+    after: str | None = None,
+    deadline_s: float | None = None,
+    on_progress: OnProgress = ignore_progress,
+) -> Operation[Explained]:
+    """Explain what synthesis does to a model: what restricts its events, or what is to blame for no supervisor.
+
+    Raises NotThereError if something that is asked about is not there.
+
+    Args:
+        bundle: The model and its libraries, or the path of a model.
+        options: Options for making the supervisor.
+        event: The event to explain; None: all of them, and warnings.
+        state: Description of a state in which to explain what can happen, such as `Door.closed, Lift.n = 2`.
+        after: Run after which to explain what can happen, such as `open, jam.response`.
+        deadline_s: See the class.
+        on_progress: See the class.
+    """
+    model = loaded(bundle)
+    task = Explain(bundle=model, options=options, event=event, state=state, after=after)
+    return _streaming_task("Explain", task, lambda: ExplanationReader(model), deadline_s, on_progress)
 
 
 def format_(file: SourceFile, *, deadline_s: float | None = None) -> Operation[Formatted]:

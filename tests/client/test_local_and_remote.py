@@ -10,9 +10,10 @@ import pytest
 
 import robosc
 import robosc_client
+from robosc.explanation import RequestError
 from robosc.source import SourceFile
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_client import Client, Verify
+from robosc_client import Client, NotThereError, Verify
 from robosc_client.convert.requests import request_of
 from support.models import EMPTY, EXAMPLES, UNSUPPORTED
 from support.service import served
@@ -118,6 +119,20 @@ def test_verify(client: Client, model: robosc.LoadedModel, tmp_path: Path) -> No
         assert str(remote)
 
 
+def test_explain(client: Client, model: robosc.LoadedModel) -> None:
+    questions: list[dict[str, Any]] = [{}, {"after": ""}, {"event": "nothing"}, {"state": ""}]
+    for question in questions:
+        try:
+            local = robosc.explain(model, **question)
+        except RequestError as error:
+            with pytest.raises(NotThereError) as refused:
+                client.explain(model, **question)
+            assert str(refused.value) == str(error)
+            continue
+        assert client.explain(model, **question) == local
+        assert str(client.explain(model, **question)) == str(local)
+
+
 def test_generate(client: Client, model: robosc.LoadedModel, tmp_path: Path) -> None:
     local, remote = robosc.generate(model, "all"), client.generate(model, "all")
     assert (local.status, local.reason, local.files) == (remote.status, remote.reason, remote.files)
@@ -150,7 +165,15 @@ def test_a_task_says_by_itself_what_is_to_be_verified(client: Client) -> None:
 
 def test_values_that_mean_the_same_are_the_same() -> None:
     for name in (
-        *("Generation", "Summary", "SynthesisOptions", "SynthesisStatus", "Verification", "VerificationStatus"),
+        *(
+            "Explained",
+            "Generation",
+            "Summary",
+            "SynthesisOptions",
+            "SynthesisStatus",
+            "Verification",
+            "VerificationStatus",
+        ),
     ):
         assert getattr(robosc, name) is getattr(robosc_client, name)
 

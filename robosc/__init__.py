@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from robosc.model.structure import Deployment
     from robosc.pipeline.checking import check
     from robosc.pipeline.conditions import Condition, Conditions
-    from robosc.pipeline.explaining import Explained, explain
+    from robosc.pipeline.explaining import explain
     from robosc.pipeline.exploring import Exploration, explore
     from robosc.pipeline.files import FileAccessError
     from robosc.pipeline.findings import Findings
@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from robosc.pipeline.options import SynthesisOptions
     from robosc.pipeline.received_data import DataError
     from robosc.pipeline.results import (
+        Explained,
         Generation,
         NoSupervisor,
         NothingGeneratedError,
@@ -77,7 +78,7 @@ _HOMES = {
     "Diagnostic": "errors",
     "DrawingUnavailableError": "graphviz",
     "EventNotPossibleError": "pipeline.manual_run",
-    "Explained": "pipeline.explaining",
+    "Explained": "pipeline.results",
     "Exploration": "pipeline.exploring",
     "FileAccessError": "pipeline.files",
     "Findings": "pipeline.findings",

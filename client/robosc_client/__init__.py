@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         CredentialsError,
         DeadlineError,
         JobError,
+        NotThereError,
         RequestRefusedError,
         ServerBusyError,
         ServerUnavailableError,
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     )
     from robosc_client.jobs import Job, JobFailure, JobState, Submission, TaskKind
     from robosc_client.results import (
+        Explained,
         Exploration,
         Formatted,
         Generation,
@@ -39,7 +41,17 @@ if TYPE_CHECKING:
         VerificationStatus,
     )
     from robosc_client.retry import NO_RETRIES, RetryPolicy
-    from robosc_client.tasks import Check, Explore, Format, Generate, SynthesisOptions, Synthesize, Task, Verify
+    from robosc_client.tasks import (
+        Check,
+        Explain,
+        Explore,
+        Format,
+        Generate,
+        SynthesisOptions,
+        Synthesize,
+        Task,
+        Verify,
+    )
 
 _HOMES = {
     "AsyncClient": "aio",
@@ -48,6 +60,8 @@ _HOMES = {
     "ClientError": "errors",
     "CredentialsError": "errors",
     "DeadlineError": "errors",
+    "Explain": "tasks",
+    "Explained": "results",
     "Exploration": "results",
     "Explore": "tasks",
     "Format": "tasks",
@@ -59,6 +73,7 @@ _HOMES = {
     "JobFailure": "jobs",
     "JobState": "jobs",
     "NO_RETRIES": "retry",
+    "NotThereError": "errors",
     "Progress": "results",
     "RequestRefusedError": "errors",
     "RetryPolicy": "retry",
@@ -92,6 +107,8 @@ __all__ = [
     "ClientError",
     "CredentialsError",
     "DeadlineError",
+    "Explain",
+    "Explained",
     "Exploration",
     "Explore",
     "Format",
@@ -102,6 +119,7 @@ __all__ = [
     "JobError",
     "JobFailure",
     "JobState",
+    "NotThereError",
     "Progress",
     "RequestRefusedError",
     "RetryPolicy",

@@ -1,7 +1,6 @@
 """Client for programs on asyncio, with the same methods as `robosc_client.client`."""
 
 import asyncio
-import threading
 from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Mapping
 from contextlib import aclosing, suppress
 from types import TracebackType
@@ -21,15 +20,9 @@ from robosc_client.errors import CredentialsError, malformed
 from robosc_client.jobs import Job
 from robosc_client.operations import LocalFunction, client_method
 from robosc_client.retry import DEFAULT_RETRIES, RetryPolicy
-from robosc_client.tasks import DEFAULT_OPTIONS, SynthesisOptions
 
 if TYPE_CHECKING:
-    from robosc.automata import System
-    from robosc.certification import Progress
-    from robosc.diagnostics import Page
-    from robosc.errors import Diagnostic
-    from robosc.pipeline.explaining import Explained
-    from robosc.pipeline.loading import ModelLike
+    pass
 
 
 def _unary_method[**P, Result](
@@ -126,6 +119,7 @@ class AsyncClient:
     generate = _unary_method(operations.generate)
     explore = _unary_method(operations.explore)
     verify = _unary_method(operations.verify)
+    explain = _unary_method(operations.explain)
     format = _unary_method(operations.format_)
 
     # The same nouns as in `robosc`: these need no server, and work here, on what one has made.
@@ -133,30 +127,6 @@ class AsyncClient:
         simulate = staticmethod(robosc.simulate)
     else:
         simulate = LocalFunction("simulate")
-
-    @staticmethod
-    async def explain(
-        model: "ModelLike | System | Diagnostic | None" = None,
-        options: SynthesisOptions = DEFAULT_OPTIONS,
-        *,
-        code: str | None = None,
-        event: str | None = None,
-        state: str | None = None,
-        after: str | None = None,
-        on_progress: "Callable[[Progress], None] | None" = None,
-    ) -> "Explained | Page":
-        """Explain as `robosc.explain` does, in a thread of this program; cancelling the waiting task ends it.
-
-        `on_progress` is called in that thread.
-        """
-        is_cancelled = threading.Event()
-        found: Any = robosc.explain
-        more = {} if on_progress is None else {"on_progress": on_progress}
-        asked = {"code": code, "event": event, "state": state, "after": after, **more}
-        try:
-            return await asyncio.to_thread(found, model, options, should_stop=is_cancelled.is_set, **asked)
-        finally:
-            is_cancelled.set()
 
     list_targets = _unary_method(operations.list_targets)
     get_version = _unary_method(operations.get_version)

@@ -110,14 +110,13 @@ class Client:
     generate = _unary_method(operations.generate)
     explore = _unary_method(operations.explore)
     verify = _unary_method(operations.verify)
+    explain = _unary_method(operations.explain)
     format = _unary_method(operations.format_)
 
     # The same nouns as in `robosc`: these need no server, and work here, on what one has made.
     if TYPE_CHECKING:
-        explain = staticmethod(robosc.explain)
         simulate = staticmethod(robosc.simulate)
     else:
-        explain = LocalFunction("explain")
         simulate = LocalFunction("simulate")
 
     list_targets = _unary_method(operations.list_targets)

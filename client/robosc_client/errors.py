@@ -5,7 +5,8 @@ ClientError
 |-- CredentialsError         a certificate, key or token cannot be used
 |-- DeadlineError            no result in time                 (also a TimeoutError)
 |-- RequestRefusedError      the server refuses the request: malformed, too large, not allowed, beyond its limits
-|   `-- ServerBusyError      the server may accept it later
+|   |-- ServerBusyError      the server may accept it later
+|   `-- NotThereError        an event, a state or a run that is asked about is not there  (also a LookupError)
 |-- JobError                 a job does not exist, has no result, or cannot be submitted
 `-- ServiceError             the server failed, or sent an invalid answer
 """
@@ -49,6 +50,10 @@ class ServerBusyError(RequestRefusedError):
     def __init__(self, message: str, reason: str = "", retry_after_s: float | None = None) -> None:
         super().__init__(message, reason)
         self.retry_after_s = retry_after_s
+
+
+class NotThereError(RequestRefusedError, LookupError):
+    """An event, a part of the model, a state or a run that an explanation is asked about is not there."""
 
 
 class JobError(ClientError):

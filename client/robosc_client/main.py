@@ -12,7 +12,7 @@ from robosc import __version__
 from robosc.cli.arguments import Parser
 from robosc.cli.main import guarded, parse
 from robosc.cli.output import CommandError, ExitCode, UsageError
-from robosc_client import ClientError, CredentialsError
+from robosc_client import ClientError, CredentialsError, NotThereError
 from robosc_client.commands import bench, health, jobs, profiles, server_info, tasks
 from robosc_client.commands.connection import EPILOG, connect
 
@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 return int(arguments.run_alone(arguments))
             with connect(arguments) as client:
                 return int(arguments.run(arguments, client))
-        except CredentialsError as error:
+        except (CredentialsError, NotThereError) as error:
             raise UsageError(str(error)) from error
         except ClientError as error:
             raise CommandError(str(error), ExitCode.SERVICE) from error

@@ -23,6 +23,7 @@ from robosc_client.calls import JobPages, JobWatch, OnProgress, Operation, ignor
 from robosc_client.convert import jobs, response_fields
 from robosc_client.convert.requests import request_of, submit_request
 from robosc_client.convert.response_readers import (
+    ExplanationReader,
     ExplorationReader,
     GenerationReader,
     JobResultReader,
@@ -35,6 +36,7 @@ from robosc_client.convert.response_readers import (
 )
 from robosc_client.jobs import Job, JobState, Submission, TaskKind
 from robosc_client.results import (
+    Explained,
     Exploration,
     Formatted,
     Generation,
@@ -47,6 +49,7 @@ from robosc_client.tasks import (
     DEFAULT_GENERATION,
     DEFAULT_OPTIONS,
     Check,
+    Explain,
     Explore,
     Format,
     Generate,
@@ -175,6 +178,34 @@ def _content_of(supervisor: SupervisorLike) -> bytes:
     if isinstance(supervisor, str | os.PathLike):
         return read_bounded(given_path(supervisor), MAXIMUM_BYTES)
     return encode(supervisor)
+
+
+def explain(
+    model: ModelLike,
+    options: SynthesisOptions = DEFAULT_OPTIONS,
+    *,
+    event: str | None = None,
+    state: str | None = None,
+    after: str | None = None,
+    deadline_s: float | None = None,
+    on_progress: OnProgress = ignore_progress,
+) -> Operation[Explained]:
+    """Explain what synthesis does to a model: what restricts its events, or what is to blame for no supervisor.
+
+    Raises NotThereError if something that is asked about is not there.
+
+    Args:
+        model: The model and its libraries, or the path of a model.
+        options: Options for making the supervisor.
+        event: The event to explain; None: all of them, and warnings.
+        state: Description of a state in which to explain what can happen, such as `Door.closed, Lift.n = 2`.
+        after: Run after which to explain what can happen, such as `open, jam.response`.
+        deadline_s: See the class.
+        on_progress: See the class.
+    """
+    bundle = loaded(model)
+    task = Explain(model=bundle, options=options, event=event, state=state, after=after)
+    return _streaming_task("Explain", task, lambda: ExplanationReader(bundle), deadline_s, on_progress)
 
 
 def format_(file: SourceFile, *, deadline_s: float | None = None) -> Operation[Formatted]:

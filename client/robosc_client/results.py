@@ -8,6 +8,7 @@ from robosc.errors import Diagnostic
 from robosc.explanation import EmptyExplanation
 from robosc.expressions import Value
 from robosc.pipeline.results import (
+    Explained,
     Generation,
     Outcome,
     Summary,
@@ -192,10 +193,11 @@ class ServerInfo:
     limits: ServerLimits
 
 
-type TaskResult = tuple[Diagnostic, ...] | Synthesis | Generation | Exploration | Verification | Formatted
+type TaskResult = tuple[Diagnostic, ...] | Synthesis | Generation | Exploration | Verification | Explained | Formatted
 """What a task's job gives: the findings for a check, else what the method of the client returns."""
 
 __all__ = [
+    "Explained",
     "Exploration",
     "Formatted",
     "Generation",

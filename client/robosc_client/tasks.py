@@ -91,6 +91,25 @@ class Verify:
     is_strict: bool = False
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Explain:
+    """Explain what synthesis does to a model; without `event`, `state` and `after`, to all of it.
+
+    Attributes:
+        model: The model and its libraries, or automata.
+        options: Options for making the supervisor.
+        event: The event to explain; None: none in particular.
+        state: Description of a state in which to explain what can happen, such as `Door.closed, Lift.n = 2`.
+        after: Run after which to explain what can happen, such as `open, jam.response`.
+    """
+
+    model: Bundle
+    options: SynthesisOptions = DEFAULT_OPTIONS
+    event: str | None = None
+    state: str | None = None
+    after: str | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class Format:
     """Put a text into its canonical layout."""
@@ -98,12 +117,13 @@ class Format:
     file: SourceFile
 
 
-type Task = Check | Synthesize | Generate | Explore | Verify | Format
+type Task = Check | Synthesize | Generate | Explore | Verify | Explain | Format
 
 __all__ = [
     "DEFAULT_GENERATION",
     "DEFAULT_OPTIONS",
     "Check",
+    "Explain",
     "Explore",
     "Format",
     "Generate",

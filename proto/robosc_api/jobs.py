@@ -11,6 +11,7 @@ class TaskKind(StrEnum):
     GENERATE = "generate"
     EXPLORE = "explore"
     VERIFY = "verify"
+    EXPLAIN = "explain"
     FORMAT = "format"
 
 

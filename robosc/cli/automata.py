@@ -213,7 +213,7 @@ def verify(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Ex
         blame = found.report["explanation"]
         explanation = from_text(json_text(blame)) if blame else None
         status = SynthesisStatus(found.report["status"])
-        return report_none(arguments, _None(status, found.diagnostics, found.reason, explanation), model)
+        return report_none(arguments, WithoutSupervisor(status, found.diagnostics, found.reason, explanation), model)
     if arguments.json:
         print_json(found.report)
     else:
@@ -288,21 +288,16 @@ def _require_beginning(model: "LoadedAutomata", initial: str) -> None:
         raise UsageError(f"--initial: {error}") from error
 
 
-def explain_synthesis(arguments: argparse.Namespace) -> ExitCode:
+def explain_synthesis(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> ExitCode:
     """Explain what synthesis did to automata; 0 with a supervisor, 1 without.
 
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
     """
     from robosc.explanation import Explanation, document, explanation_text
-    from robosc.pipeline.explaining import explain
 
     model, options = loaded(arguments), synthesis_options(arguments)
-    made = watched(
-        lambda told: explain(
-            model, options, event=arguments.event, state=arguments.state, after=arguments.after, on_progress=told
-        )
-    )
+    made = machine.explain(model, options, event=arguments.event, state=arguments.state, after=arguments.after)
     if not isinstance(made.explanation, Explanation):
         return report_none(arguments, made, model)
     is_empty = made.explanation.empty is not None
@@ -433,8 +428,8 @@ class _Outcome(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class _None:
-    """Outcome of a verification that had no supervisor to verify."""
+class WithoutSupervisor:
+    """Outcome of a command for which there is no supervisor."""
 
     status: "SynthesisStatus"
     diagnostics: tuple[Diagnostic, ...]

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from typing import TYPE_CHECKING
 
 from robosc.cli import automata, synth
 from robosc.cli.arguments import (
@@ -12,8 +13,15 @@ from robosc.cli.arguments import (
     read_bundle,
 )
 from robosc.cli.output import ExitCode, ProgressLine, print_json
+from robosc.errors import UnsupportedModelError
 from robosc.json_documents import diagnostics_json
 from robosc.model.structure import Deployment
+from robosc.source import Bundle
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robosc.pipeline.results import Explained
 
 _EPILOG = """\
 examples:
@@ -38,6 +46,14 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_model_arguments(parser)
+    add_question_arguments(parser)
+    add_deployment_argument(parser)
+    add_engine_options(parser)
+    parser.set_defaults(run=run)
+
+
+def add_question_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments for what is to be explained."""
     parser.add_argument(
         "--event",
         metavar="EVENT",
@@ -54,20 +70,52 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument(
         "--after", metavar="EVENTS", help="explain what can happen after this run: events separated by commas"
     )
-    add_deployment_argument(parser)
-    add_engine_options(parser)
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Synthesize and explain; 0 with a supervisor, 1 without."""
     if automata.is_given(arguments):
         return automata.explain_synthesis(arguments)
-    from robosc.certification import SynthesisOutcome
+    return run_with(arguments, lambda bundle: _explained(arguments, bundle))
+
+
+def run_with(arguments: argparse.Namespace, explain: "Callable[[Bundle], Explained]") -> ExitCode:
+    """Explain a robot with a given function, such as one that asks a server; 0 with a supervisor, 1 without.
+
+    Raises:
+        UnsupportedModelError: The model is outside what synthesis handles.
+    """
     from robosc.explanation import document, explanation_text
-    from robosc.pipeline.explaining import ExplanationSubject, explained
+    from robosc.pipeline.results import NoSupervisor, SynthesisStatus
 
     bundle = read_bundle(arguments)
+    found = explain(bundle)
+    if found.status is SynthesisStatus.UNSUPPORTED_MODEL:
+        raise UnsupportedModelError(found.reason)
+    if isinstance(found.explanation, NoSupervisor):
+        why = automata.WithoutSupervisor(found.status, found.diagnostics, found.reason, None)
+        if arguments.json:
+            print_json({"status": str(found.status), **synth.reasons_json(why), **diagnostics_json(found.diagnostics)})
+        else:
+            synth.report_problems(why, bundle)
+        return ExitCode.FAILED
+    is_empty = found.status is SynthesisStatus.EMPTY
+    if arguments.json:
+        explanation = document(found.explanation)
+        print_json({"status": str(found.status), "explanation": explanation, **diagnostics_json(found.diagnostics)})
+    else:
+        if is_empty:
+            sys.stdout.write(f"{bundle.main.name}: no supervisor exists\n")
+        sys.stdout.write(explanation_text(found.explanation))
+    return ExitCode.FAILED if is_empty else ExitCode.OK
+
+
+def _explained(arguments: argparse.Namespace, bundle: Bundle) -> "Explained":
+    from robosc.certification import SynthesisOutcome
+    from robosc.pipeline.explaining import ExplanationSubject, explained
+    from robosc.pipeline.findings import Findings
+    from robosc.pipeline.results import Explained, NoSupervisor, SynthesisStatus
+
     progress = ProgressLine()
     try:
         found = explained(
@@ -80,20 +128,9 @@ def run(arguments: argparse.Namespace) -> int:
     finally:
         progress.clear()
     if isinstance(found, SynthesisOutcome):
-        if arguments.json:
-            print_json(
-                {"status": str(found.status), **synth.reasons_json(found), **diagnostics_json(found.diagnostics)}
-            )
-        else:
-            synth.report_problems(found, bundle)
-        return ExitCode.FAILED
+        nothing = NoSupervisor(found.reason, found.diagnostics)
+        status = SynthesisStatus(str(found.status))
+        return Explained(status, Findings(found.diagnostics, bundle), found.reason, nothing)
     problem, explanation = found
-    is_empty = explanation.empty is not None
-    if arguments.json:
-        status = "empty" if is_empty else "supervisor"
-        print_json({"status": status, "explanation": document(explanation), **diagnostics_json(problem.diagnostics)})
-    else:
-        if is_empty:
-            sys.stdout.write(f"{bundle.main.name}: no supervisor exists\n")
-        sys.stdout.write(explanation_text(explanation))
-    return ExitCode.FAILED if is_empty else ExitCode.OK
+    status = SynthesisStatus.SUPERVISOR if explanation.empty is None else SynthesisStatus.EMPTY
+    return Explained(status, Findings(problem.diagnostics, bundle), "", explanation)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from robosc.pipeline.findings import Findings
     from robosc.pipeline.loading import LoadedAutomata
     from robosc.pipeline.options import SynthesisOptions
-    from robosc.pipeline.results import Generation, Verification
+    from robosc.pipeline.results import Explained, Generation, Verification
     from robosc.pipeline.synthesis import OnProgress
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
     from robosc.targets import GenerateOptions
@@ -55,6 +55,17 @@ class Machine(Protocol):
         initial: str | None,
     ) -> "Generation":
         """Generate the files of a target."""
+
+    def explain(
+        self,
+        model: "LoadedAutomata",
+        options: "SynthesisOptions",
+        *,
+        event: str | None,
+        state: str | None,
+        after: str | None,
+    ) -> "Explained":
+        """Explain what synthesis does to the automata."""
 
 
 class ThisMachine:
@@ -110,6 +121,20 @@ class ThisMachine:
         from robosc.pipeline.generating import generate
 
         return watched(lambda told: generate(model, target, generation, options, initial=initial, on_progress=told))
+
+    def explain(
+        self,
+        model: "LoadedAutomata",
+        options: "SynthesisOptions",
+        *,
+        event: str | None,
+        state: str | None,
+        after: str | None,
+    ) -> "Explained":
+        """Explain what synthesis does to the automata."""
+        from robosc.pipeline.explaining import explain
+
+        return watched(lambda told: explain(model, options, event=event, state=state, after=after, on_progress=told))
 
 
 def watched[T](work: "Callable[[OnProgress], T]") -> T:

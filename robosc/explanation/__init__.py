@@ -10,7 +10,14 @@ from robosc.named_on_use import named_on_use
 if TYPE_CHECKING:
     from robosc.explanation.blame import explain_empty
     from robosc.explanation.explain import explain_synthesis
-    from robosc.explanation.explanations import EmptyExplanation, Explanation, document, from_text, to_text
+    from robosc.explanation.explanations import (
+        EmptyExplanation,
+        Explanation,
+        document,
+        from_text,
+        to_text,
+        whole_from_text,
+    )
     from robosc.explanation.requests import RequestError
     from robosc.explanation.text import empty_text, explanation_text
     from robosc.explanation.words import ModelWords, SystemWords
@@ -28,6 +35,7 @@ _HOMES = {
     "explanation_text": "text",
     "from_text": "explanations",
     "to_text": "explanations",
+    "whole_from_text": "explanations",
 }
 
 __all__ = [
@@ -43,6 +51,7 @@ __all__ = [
     "explanation_text",
     "from_text",
     "to_text",
+    "whole_from_text",
 ]
 
 

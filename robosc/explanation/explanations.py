@@ -270,8 +270,8 @@ def document(explanation: Explanation | EmptyExplanation) -> dict[str, Any]:
     return result
 
 
-def to_text(explanation: EmptyExplanation) -> str:
-    """An explanation as one JSON text, which `from_text` reads."""
+def to_text(explanation: Explanation | EmptyExplanation) -> str:
+    """An explanation as one JSON text, which `whole_from_text` reads, or `from_text` where it is of no supervisor."""
     return msgspec.json.encode(explanation).decode()
 
 
@@ -281,7 +281,20 @@ def from_text(text: str) -> EmptyExplanation:
     Raises:
         ValueError: It holds none.
     """
+    return _from_text(text, EmptyExplanation)
+
+
+def whole_from_text(text: str) -> Explanation:
+    """The explanation of what synthesis did that a text holds, validated.
+
+    Raises:
+        ValueError: It holds none.
+    """
+    return _from_text(text, Explanation)
+
+
+def _from_text[Kind](text: str, kind: type[Kind]) -> Kind:
     try:
-        return msgspec.json.decode(text, type=EmptyExplanation)
+        return msgspec.json.decode(text, type=kind)
     except (msgspec.MsgspecError, RecursionError) as error:
         raise ValueError(f"no explanation: {error}") from error

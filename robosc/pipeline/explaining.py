@@ -18,30 +18,10 @@ from robosc.pipeline.automata_models import checked_automata
 from robosc.pipeline.findings import Findings
 from robosc.pipeline.loading import LoadedAutomata, ModelLike, loaded
 from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
-from robosc.pipeline.results import NoSupervisor, Outcome, SynthesisStatus
+from robosc.pipeline.results import Explained, NoSupervisor, SynthesisStatus
 from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, never
 from robosc.source import Bundle
 from robosc.synthesis import EngineOptions
-
-
-@dataclass(frozen=True, slots=True, repr=False)
-class Explained(Outcome):
-    """Result of an explanation.
-
-    Attributes:
-        status: Outcome of the synthesis.
-        diagnostics: Every finding about the model, sorted by place.
-        reason: Reason why there is no explanation, in one sentence; empty where there is one.
-        explanation: The explanation; of a model that has errors or cannot be handled, what says so.
-    """
-
-    status: SynthesisStatus
-    diagnostics: Findings
-    reason: str
-    explanation: Explanation | NoSupervisor
-
-    def _product(self) -> object:
-        return self.explanation if isinstance(self.explanation, Explanation) else None
 
 
 @overload

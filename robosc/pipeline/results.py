@@ -13,7 +13,7 @@ from robosc.source import visible
 from robosc.tables import html_table, html_text
 
 if TYPE_CHECKING:
-    from robosc.explanation import EmptyExplanation
+    from robosc.explanation import EmptyExplanation, Explanation
     from robosc.targets import GeneratedFiles, Written
 
 
@@ -180,6 +180,26 @@ class Generation(Outcome):
 
     def _product(self) -> object:
         return self.files
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Explained(Outcome):
+    """Result of an explanation.
+
+    Attributes:
+        status: Outcome of the synthesis.
+        diagnostics: Every finding about the model, sorted by place.
+        reason: Reason why there is no explanation, in one sentence; empty where there is one.
+        explanation: The explanation; of a model that has errors or cannot be handled, what says so.
+    """
+
+    status: SynthesisStatus
+    diagnostics: Findings
+    reason: str
+    explanation: "Explanation | NoSupervisor"
+
+    def _made(self) -> object:
+        return None if isinstance(self.explanation, NoSupervisor) else self.explanation
 
 
 @dataclass(frozen=True, slots=True, repr=False)

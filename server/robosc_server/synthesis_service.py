@@ -35,6 +35,7 @@ _STREAMS = {
     "Generate": TaskKind.GENERATE,
     "Explore": TaskKind.EXPLORE,
     "Verify": TaskKind.VERIFY,
+    "Explain": TaskKind.EXPLAIN,
 }
 
 

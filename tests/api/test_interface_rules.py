@@ -16,7 +16,8 @@ METHODS = {
     "BridgeService": ["GetDefinition", "GetStatus", "Stop", "Command", "Watch", "Attach"],
     "JobService": ["SubmitJob", "GetJob", "WatchJob", "CancelJob", "ListJobs", "GetJobResult"],
     "SynthesisService": [
-        "Check", "Synthesize", "Generate", "Explore", "Verify", "Format", "ListTargets", "GetVersion",
+        "Check", "Synthesize", "Generate", "Explore", "Verify", "Explain", "Format", "ListTargets",
+        "GetVersion",
     ],
 }  # fmt: skip
 

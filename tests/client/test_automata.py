@@ -44,6 +44,10 @@ COMMANDS = {
     "explore": ["explore"],
     "explore --dot": ["explore", "--dot"],
     "explore --limit": ["explore", "--limit", "1"],
+    "explain-synthesis": ["explain-synthesis"],
+    "explain-synthesis --event": ["explain-synthesis", "--event", "tank.c_fill"],
+    "explain-synthesis --state": ["explain-synthesis", "--state", "tank.level = 1"],
+    "explain-synthesis --after": ["explain-synthesis", "--after", ""],
     "verify": ["verify"],
     "verify --strict": ["verify", "--strict", "--limit", "10"],
     "verify --quiet": ["verify", "--quiet"],
@@ -173,6 +177,8 @@ class TestCommands:
             ["check", "-L", "."],
             ["check", "-I", "."],
             ["explore", "--deployment", "layer"],
+            ["explain-synthesis", "--deployment", "layer"],
+            ["explain-synthesis", "--event", "nothing"],
             ["verify", "--property", "invariant true"],
             ["verify", "--signed-by", "x.pub"],
             ["generate", "--target", "all", "-o", "out"],
@@ -273,6 +279,15 @@ class TestJobs:
         )
         assert remote("get", generated, "-o", "code")[0] == 0
         assert Path("code/several_supervisor.py").exists()
+        explained = self.submitted(remote, "explain-synthesis", "models/tank.cif", "--event", "tank.c_fill")
+        assert remote("get", explained, "-o", "explanation.json")[0] == 0
+        document = json.loads(Path("explanation.json").read_text())
+        assert local_main(["explain-synthesis", "models/tank.cif", "--event", "tank.c_fill", "--json"]) == 0
+        assert document["explanation"]["events"][0]["event"] == "tank.c_fill"
+        nowhere = self.submitted(remote, "explain-synthesis", "models/tank.cif", "--event", "nothing")
+        status, _, err = remote("get", nowhere, "--result")
+        assert (status, "unknown event 'nothing'" in err) == (2, True)
+        assert remote("list", "--kind", "explain-synthesis")[1].count("explain") == 2
         checked = self.submitted(remote, "check", "models/wrong.cif")
         assert remote("get", checked, "--result")[0] == 1
 
@@ -298,6 +313,7 @@ class TestPython:
         assert local.supervisor.modules == decode_system(remote.supervisor).modules
         assert client.verify(model, is_strict=True).report == robosc.verify(model, is_strict=True).report
         assert client.generate(model, "c99") == robosc.generate(model, "c99")
+        assert client.explain(model) == robosc.explain(model)
         graph, explored = robosc.explore(model).graph, client.explore(model).graph
         assert graph is not None
         assert explored is not None

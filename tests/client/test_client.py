@@ -49,6 +49,7 @@ from robosc_client import (
 from robosc_client.convert.requests import request_of
 from support.answers import (
     enveloped,
+    explanation,
     exploration,
     generation,
     job,
@@ -79,10 +80,11 @@ def connect(request: Any) -> Any:
 
 def test_public_names() -> None:
     assert sorted(robosc_client.__all__) == [
-        "AsyncClient", "Check", "Client", "ClientError", "CredentialsError", "DeadlineError", "Exploration", "Explore",
-        "Format", "Formatted", "Generate", "Generation", "Job", "JobError", "JobFailure", "JobState", "NO_RETRIES",
-        "Progress", "RequestRefusedError", "RetryPolicy", "ServerBusyError", "ServerInfo", "ServerLimits",
-        "ServerUnavailableError", "ServiceError", "StateGraph", "StateValues", "Statistics", "Submission", "Summary",
+        "AsyncClient", "Check", "Client", "ClientError", "CredentialsError", "DeadlineError", "Explain",
+        "Explained", "Exploration", "Explore", "Format", "Formatted", "Generate", "Generation", "Job", "JobError",
+        "JobFailure", "JobState", "NO_RETRIES", "NotThereError", "Progress", "RequestRefusedError", "RetryPolicy",
+        "ServerBusyError", "ServerInfo", "ServerLimits", "ServerUnavailableError",
+        "ServiceError", "StateGraph", "StateValues", "Statistics", "Submission", "Summary",
         "Synthesis", "SynthesisOptions", "SynthesisStatus", "Synthesize", "Task", "TaskKind", "TaskResult",
         "Verification", "VerificationStatus", "Verify",
     ]  # fmt: skip
@@ -143,6 +145,7 @@ TASKS: dict[str, Any] = {
     "Generate": (lambda client: client.generate(BUNDLE, "ros2"), generation()),
     "Explore": (lambda client: client.explore(BUNDLE), exploration()),
     "Verify": (lambda client: client.verify(Verify(model=BUNDLE, properties=("AG a",))), [verification()]),
+    "Explain": (lambda client: client.explain(BUNDLE), [progress(), explanation()]),
     "Format": (lambda client: client.format(BUNDLE.main), [pb.FormatResponse(text="robot R {\n}\n")]),
     "ListTargets": (lambda client: client.list_targets(), [pb.ListTargetsResponse()]),
     "GetVersion": (lambda client: client.get_version(), [pb.GetVersionResponse(version="1")]),

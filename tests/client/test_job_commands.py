@@ -26,6 +26,7 @@ from robosc_client.main import main
 from robosc_server.jobs import convert
 from support.answers import (
     enveloped,
+    explanation,
     exploration,
     generation,
     job,
@@ -50,6 +51,7 @@ class TestSubmit:
             (["generate", MODEL, "--target", "ros2", "--package", "p"], "generate"),
             (["explore", MODEL, "--limit", "7"], "explore"),
             (["verify", MODEL, "--property", "EF true"], "verify"),
+            (["explain-synthesis", MODEL, "--event", "stop", "--after", ""], "explain"),
             (["format", MODEL], "format"),
         ],
     )
@@ -68,6 +70,10 @@ class TestSubmit:
             assert (chosen.options.deployment, chosen.options.maximum_nodes) == (pb.DEPLOYMENT_LAYER, 9)
         if kind == "explore":
             assert chosen.maximum_states == 7
+        if kind == "explain":
+            assert (chosen.event, chosen.after, chosen.HasField("after"), chosen.HasField("state")) == (
+                "stop", "", True, False
+            )  # fmt: skip
         if kind == "verify":
             assert (list(chosen.properties), chosen.strict, chosen.maximum_states) == (["EF true"], False, 0)
         if kind == "generate":
@@ -106,6 +112,7 @@ class TestSubmit:
             (["check", MODEL, "--keep", "inf"], "above 0 and below 1,000,000,000"),
             (["explore", MODEL, "--limit", "0"], "a number from 1 to 1,000,000,000"),
             (["explore", MODEL, "--allow-livelock"], "unrecognized arguments"),
+            (["explain-synthesis", MODEL, "--allow-livelock"], "unrecognized arguments"),
             (["format", MODEL, "-L", "."], "unrecognized arguments"),
         ],
     )
@@ -251,6 +258,7 @@ class TestGet:
             ("generate", generation(), 0, "a/one.py"),
             ("explore", exploration(), 0, '"transitions"'),
             ("verify", [verification()], 0, '"holds"'),
+            ("explain", [explanation()], 0, '"remarks"'),
             ("format", [pb.FormatResponse(text="robot R { }\n")], 0, "robot R { }"),
         ],
     )
@@ -296,6 +304,11 @@ class TestGet:
                 ["robosc-client: more than 7 states"],
             ),
             ("format", [pb.FormatResponse(diagnostics=[FINDING])], ["error: bad [x]", "1 error"]),
+            (
+                "explain",
+                [explanation("", pb.EXPLANATION_STATUS_UNSUPPORTED_MODEL, "too strange")],
+                ["robot.rscd: too strange"],
+            ),
             (
                 "verify",
                 [
@@ -417,7 +430,10 @@ class TestListAndCancel:
         [
             (["--most", "0"], "must be a number from 1 to 1,000,000"),
             (["--most", "x"], "must be a number from 1 to 1,000,000"),
-            (["--kind", "fly"], "'fly' is not one of check, synthesize, generate, explore, verify, format, synth"),
+            (
+                ["--kind", "fly"],
+                "'fly' is not one of check, synthesize, generate, explore, verify, explain, format, synth",
+            ),
             (["--state", "idle"], "'idle' is not one of queued, running, succeeded, failed, cancelled"),
             (["--deadline", "inf"], "above 0 and below 1,000,000,000"),
             (["--deadline", "soon"], "above 0 and below 1,000,000,000"),

@@ -1,10 +1,7 @@
 """The same nouns here and on a server: what is asked of `robosc` and of a client gives results that are alike."""
 
-import asyncio
 import inspect
-import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -13,11 +10,11 @@ import pytest
 
 import robosc
 import robosc_client
+from robosc.explanation import RequestError
 from robosc.source import SourceFile
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_client import AsyncClient, Client, Verify
+from robosc_client import AsyncClient, Client, NotThereError, Verify
 from robosc_client.convert.requests import request_of
-from support.both_clients import KINDS, client_of
 from support.models import EMPTY, EXAMPLES, UNSUPPORTED
 from support.service import served
 
@@ -29,7 +26,7 @@ TEXTS = {
     "wrong": WRONG,
     "unsupported": UNSUPPORTED,
 }
-METHODS = ("check", "synthesize", "explore", "verify", "generate")
+METHODS = ("check", "synthesize", "explore", "verify", "explain", "generate")
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +119,20 @@ def test_verify(client: Client, model: robosc.LoadedModel, tmp_path: Path) -> No
         assert str(remote)
 
 
+def test_explain(client: Client, model: robosc.LoadedModel) -> None:
+    questions: list[dict[str, Any]] = [{}, {"after": ""}, {"event": "nothing"}, {"state": ""}]
+    for question in questions:
+        try:
+            local = robosc.explain(model, **question)
+        except RequestError as error:
+            with pytest.raises(NotThereError) as refused:
+                client.explain(model, **question)
+            assert str(refused.value) == str(error)
+            continue
+        assert client.explain(model, **question) == local
+        assert str(client.explain(model, **question)) == str(local)
+
+
 def test_generate(client: Client, model: robosc.LoadedModel, tmp_path: Path) -> None:
     local, remote = robosc.generate(model, "all"), client.generate(model, "all")
     assert (local.status, local.reason, local.files) == (remote.status, remote.reason, remote.files)
@@ -154,7 +165,15 @@ def test_a_task_says_by_itself_what_is_to_be_verified(client: Client) -> None:
 
 def test_values_that_mean_the_same_are_the_same() -> None:
     for name in (
-        *("Generation", "Summary", "SynthesisOptions", "SynthesisStatus", "Verification", "VerificationStatus"),
+        *(
+            "Explained",
+            "Generation",
+            "Summary",
+            "SynthesisOptions",
+            "SynthesisStatus",
+            "Verification",
+            "VerificationStatus",
+        ),
     ):
         assert getattr(robosc, name) is getattr(robosc_client, name)
 
@@ -163,47 +182,10 @@ def test_values_that_mean_the_same_are_the_same() -> None:
 def test_parameters_have_the_same_names(name: str) -> None:
     local = list(inspect.signature(getattr(robosc, name)).parameters)
     remote = list(inspect.signature(getattr(Client, name)).parameters)[1:]
-    # Work here is stopped by a function, and there by a deadline.
-    assert [item for item in local if item not in ("should_stop", "on_progress")] == [
+    # Work here is stopped by a function, and there by a deadline; pages of findings are here alone.
+    assert [item for item in local if item not in ("should_stop", "on_progress", "code")] == [
         item for item in remote if item not in ("deadline_s", "on_progress")
     ]
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_explaining_needs_no_server(kind: str) -> None:
-    event = "navigate.request"
-    with client_of(kind, "localhost:1") as service:
-        assert service.explain(NAVIGATION, event=event) == robosc.explain(NAVIGATION, event=event)
-        assert service.explain(code="unknown-name") == robosc.explain(code="unknown-name")
-        with pytest.raises(robosc.RequestError):
-            service.explain(NAVIGATION, event="nothing.request")
-
-
-@pytest.mark.parametrize("kind", [Client, AsyncClient])
-def test_explaining_takes_the_same_parameters(kind: type[Client | AsyncClient]) -> None:
-    local, remote = (list(inspect.signature(function).parameters) for function in (robosc.explain, kind.explain))
-    assert [name for name in local if name != "should_stop"] == [name for name in remote if name != "should_stop"]
-
-
-def test_cancelling_an_explanation_ends_its_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    begun, ended = threading.Event(), threading.Event()
-
-    def explain(*_: object, should_stop: Callable[[], bool], **__: object) -> None:
-        begun.set()
-        while not should_stop():
-            time.sleep(0.01)
-        ended.set()
-
-    async def cancel() -> None:
-        work = asyncio.create_task(AsyncClient.explain(NAVIGATION))
-        await asyncio.to_thread(begun.wait)
-        work.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await work
-        await asyncio.to_thread(ended.wait)
-
-    monkeypatch.setattr(robosc, "explain", explain)
-    asyncio.run(cancel())
 
 
 @pytest.mark.parametrize("kind", [Client, AsyncClient])

@@ -254,6 +254,31 @@ class TestSameAsHere:
         assert here[0] == (1 if "--limit" in how else 0)
 
     @pytest.mark.parametrize(
+        ("name", "how", "status"),
+        [
+            ("navigation", [], 0),
+            ("navigation", ["--json"], 0),
+            ("navigation", ["--deployment", "layer"], 0),
+            ("navigation", ["--after", "", "--json"], 0),
+            ("navigation", ["--event", "nothing"], 2),
+            ("navigation", ["--event", "nothing", "--json"], 2),
+            ("navigation", ["--state", "nothing"], 2),
+        ],
+    )
+    def test_explain_synthesis(self, both: Any, name: str, how: Any, status: int) -> None:
+        model = next(path for path in EXAMPLES if path.stem == name)
+        here, there = both("explain-synthesis", model, *how)
+        assert here == there
+        assert here[0] == status
+
+    @pytest.mark.parametrize("text", ["robot R {", "library L { }", EMPTY, UNSUPPORTED])
+    @pytest.mark.parametrize("how", [[], ["--json"]])
+    def test_explain_synthesis_without_a_supervisor(self, both: Any, tmp_path: Path, text: str, how: Any) -> None:
+        here, there = both("explain-synthesis", write(tmp_path, text), *how)
+        assert here == there
+        assert here[0] == 1
+
+    @pytest.mark.parametrize(
         ("which", "how", "status"),
         [
             ("right", [], 0),

@@ -9,13 +9,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import robosc
+from robosc.explanation import Explanation, to_text
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_client import ServiceError, SynthesisStatus, VerificationStatus
+from robosc_client import NotThereError, ServiceError, SynthesisStatus, VerificationStatus
 from robosc_client.calls import JobPages
 from robosc_client.convert import response_readers
 from robosc_client.convert.response_fields import server_info_of, targets_of
 from robosc_client.convert.response_readers import (
+    ExplanationReader,
     ExplorationReader,
     GenerationReader,
     JobResultReader,
@@ -30,6 +33,7 @@ from support.answers import (
     GRAPH,
     chunks,
     enveloped,
+    explanation,
     exploration,
     files_digest,
     generation,
@@ -286,6 +290,38 @@ class TestExploration:
     )
     def test_refused(self, messages: Any, words: str) -> None:
         refused(ExplorationReader(), messages, words)
+
+
+class TestExplanation:
+    def test_result(self) -> None:
+        found = assembled(ExplanationReader(), [explanation(to_text(Explanation(is_of_automata=True)))])
+        assert (found.status, found.explanation) == (SynthesisStatus.SUPERVISOR, Explanation(is_of_automata=True))
+        found = assembled(ExplanationReader(), [explanation("", pb.EXPLANATION_STATUS_MODEL_ERRORS, "why\n")])
+        assert str(found.explanation) == found.reason == "why\\n"
+        with pytest.raises(NotThereError, match="no event"):
+            assembled(ExplanationReader(), [explanation("", pb.EXPLANATION_STATUS_NOT_THERE, "no event")])
+
+    @pytest.mark.parametrize(
+        ("message", "words"),
+        [
+            (explanation(""), "no explanation"),
+            (explanation("[" * 100_000), "no explanation"),
+            (explanation('{"events": [{}]}'), "no explanation"),
+            (explanation("{}", pb.EXPLANATION_STATUS_EMPTY), "contradicts"),
+            (explanation("{}", pb.EXPLANATION_STATUS_MODEL_ERRORS), "contradicts"),
+            (explanation("{}", pb.EXPLANATION_STATUS_UNSUPPORTED_MODEL), "contradicts"),
+            (explanation("{}", 0), "status"),
+            (explanation("{}", 77), "status"),
+        ],
+    )
+    def test_refused(self, message: Any, words: str) -> None:
+        refused(ExplanationReader(), [message], words)
+
+    def test_of_another_language(self) -> None:
+        robot = robosc.load(text="robot R { }")
+        refused(ExplanationReader(robot), [explanation('{"is_of_automata": true}')], "another language")
+        automata = robosc.load(text="plant p: location: initial; marked; end", name="p.cif")
+        refused(ExplanationReader(automata), [explanation()], "another language")
 
 
 class TestOthers:

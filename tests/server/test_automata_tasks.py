@@ -26,7 +26,7 @@ from support.waiting import PATIENCE_S
 STUB: Any = synthesis_pb2_grpc.SynthesisServiceStub
 JOBS: Any = jobs_pb2_grpc.JobServiceStub
 LIMITS = TaskLimits()
-MAKING = (TaskKind.SYNTHESIZE, TaskKind.GENERATE, TaskKind.EXPLORE, TaskKind.VERIFY)
+MAKING = (TaskKind.SYNTHESIZE, TaskKind.GENERATE, TaskKind.EXPLORE, TaskKind.VERIFY, TaskKind.EXPLAIN)
 
 
 def cif(text: str = TANK, **imported: str) -> pb.Bundle:

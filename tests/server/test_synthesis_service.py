@@ -137,7 +137,7 @@ class TestRequests:
         assert (reason, error.code()) == ("MALFORMED_REQUEST", grpc.StatusCode.INVALID_ARGUMENT)
         assert details == "the request is not a valid message of this service"
 
-    @pytest.mark.parametrize("name", ["Synthesize", "Generate", "Explore", "Verify"])
+    @pytest.mark.parametrize("name", ["Synthesize", "Generate", "Explore", "Verify", "Explain"])
     def test_bytes_that_are_no_message_of_a_stream(self, fake: Any, name: str) -> None:
         call = fake.unary_stream(f"/robosc_api.v1.SynthesisService/{name}")
         assert refusal(lambda: call(b"\xff", timeout=PATIENCE_S), streams=True)[0] == "MALFORMED_REQUEST"

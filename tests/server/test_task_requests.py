@@ -308,6 +308,9 @@ REQUESTS = st.fixed_dictionaries(
         "properties": st.lists(TEXTS, max_size=2),
         "property_files": st.lists(st.tuples(NAMES, TEXTS), max_size=2),
         "strict": st.booleans(),
+        "asked": st.fixed_dictionaries(
+            {}, optional=dict.fromkeys(("event", "state", "after"), st.sampled_from(["", "a", "a, b"]))
+        ),
     }
 )
 
@@ -337,6 +340,8 @@ def message_of(kind: TaskKind, given_: dict[str, Any], seed: int) -> Any:
     options = pb.SynthesisOptions(**given_["options"])
     if kind is TaskKind.SYNTHESIZE:
         return pb.SynthesizeRequest(bundle=bundle, options=options)
+    if kind is TaskKind.EXPLAIN:
+        return pb.ExplainRequest(bundle=bundle, options=options, **given_["asked"])
     if kind is TaskKind.EXPLORE:
         return pb.ExploreRequest(bundle=bundle, options=options, maximum_states=given_["maximum_states"])
     if kind is TaskKind.GENERATE:
@@ -371,6 +376,8 @@ def meaning_of(kind: TaskKind, given_: dict[str, Any]) -> Any:
         options.get("allow_reordering", False),
         min(options.get("maximum_nodes", 0) or LIMITS.nodes, LIMITS.nodes),
     ]
+    if kind is TaskKind.EXPLAIN:
+        return kind, bundle, how, given_["asked"]
     if not is_given:
         how.append(options.get("verified_states", DEFAULT_STATES))
     if kind in (TaskKind.SYNTHESIZE, TaskKind.GENERATE):

@@ -79,6 +79,11 @@ def exploration(graph: Any = None, piece: int = 50, **fields: Any) -> list[Any]:
     return [head, *(pb.ExploreResponse(chunk=item) for item in pieces)]
 
 
+def explanation(text: str = "{}", status: Any = pb.EXPLANATION_STATUS_SUPERVISOR, reason: str = "") -> Any:
+    """An explanation; the text is the document."""
+    return pb.ExplainResponse(result=pb.ExplanationResult(status=status, explanation=text, reason=reason))
+
+
 def verification(report: str = '{"status": "holds"}', status: Any = pb.VERIFICATION_STATUS_PASSED) -> Any:
     """A verification."""
     return pb.VerifyResponse(result=pb.VerificationResult(status=status, report=report))

@@ -59,6 +59,7 @@ _REQUESTS: dict[TaskKind, Any] = {
     TaskKind.GENERATE: pb.GenerateRequest,
     TaskKind.EXPLORE: pb.ExploreRequest,
     TaskKind.VERIFY: pb.VerifyRequest,
+    TaskKind.EXPLAIN: pb.ExplainRequest,
     TaskKind.FORMAT: pb.FormatRequest,
 }
 
@@ -188,6 +189,10 @@ def _response(kind: TaskKind, text: str) -> Any:
         case TaskKind.VERIFY:
             return pb.VerifyResponse(
                 result=pb.VerificationResult(status=pb.VERIFICATION_STATUS_NO_SUPERVISOR, reason=text)
+            )
+        case TaskKind.EXPLAIN:
+            return pb.ExplainResponse(
+                result=pb.ExplanationResult(status=pb.EXPLANATION_STATUS_MODEL_ERRORS, reason=text)
             )
         case TaskKind.FORMAT:
             return pb.FormatResponse(text=text)

@@ -14,6 +14,7 @@ MESSAGES: dict[TaskKind, Any] = {
     TaskKind.GENERATE: pb.GenerateRequest,
     TaskKind.EXPLORE: pb.ExploreRequest,
     TaskKind.VERIFY: pb.VerifyRequest,
+    TaskKind.EXPLAIN: pb.ExplainRequest,
     TaskKind.FORMAT: pb.FormatRequest,
 }
 RESPONSES: dict[TaskKind, Any] = {
@@ -22,6 +23,7 @@ RESPONSES: dict[TaskKind, Any] = {
     TaskKind.GENERATE: pb.GenerateResponse,
     TaskKind.EXPLORE: pb.ExploreResponse,
     TaskKind.VERIFY: pb.VerifyResponse,
+    TaskKind.EXPLAIN: pb.ExplainResponse,
     TaskKind.FORMAT: pb.FormatResponse,
 }
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from robosc.cli import automata
 from robosc.cli.output import UsageError
 from robosc.pipeline.options import SynthesisOptions
-from robosc_client import Check, Client, Explore, Generate, Synthesis, Synthesize, Task, Verify
+from robosc_client import Check, Client, Explain, Explore, Generate, Synthesis, Synthesize, Task, Verify
 from robosc_client.commands.numbers import checked_number
 from robosc_client.commands.progress_line import ProgressLine
 from robosc_client.commands.signature_checks import require_signature
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from robosc.pipeline.exploring import Exploration
     from robosc.pipeline.findings import Findings
     from robosc.pipeline.loading import LoadedAutomata
-    from robosc.pipeline.results import Generation, Verification
+    from robosc.pipeline.results import Explained, Generation, Verification
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
     from robosc.signatures import PublicKey
     from robosc.targets import GenerateOptions
@@ -124,6 +124,27 @@ class Server:
                 on_progress=line.report,
             )
 
+    def explain(
+        self,
+        model: "LoadedAutomata",
+        options: SynthesisOptions,
+        *,
+        event: str | None,
+        state: str | None,
+        after: str | None,
+    ) -> "Explained":
+        """Explain what synthesis does to the automata."""
+        with ProgressLine() as line:
+            return self._client.explain(
+                model,
+                _sendable(options),
+                event=event,
+                state=state,
+                after=after,
+                deadline_s=self._deadline_s,
+                on_progress=line.report,
+            )
+
 
 def task_of(arguments: argparse.Namespace, package: str | None) -> Task:
     """Return the task that the arguments of `submit` ask for.
@@ -148,6 +169,14 @@ def task_of(arguments: argparse.Namespace, package: str | None) -> Task:
             return Generate(model, arguments.target, GenerateOptions(package=package), options, arguments.initial)
         case "explore":
             return Explore(automata.loaded(arguments), options, arguments.limit)
+        case "explain-synthesis":
+            return Explain(
+                model=automata.loaded(arguments),
+                options=options,
+                event=arguments.event,
+                state=arguments.state,
+                after=arguments.after,
+            )
         case _:
             automata.refuse(arguments.supervisor is not None, automata.NO_FILE)
             return Verify(

@@ -19,6 +19,7 @@ from robosc.cli.arguments import (
     read_bundle,
     suggest,
 )
+from robosc.cli.explain_synthesis import add_question_arguments
 from robosc.cli.generate import add_initial_argument, refuse_initial
 from robosc.cli.output import CommandError, ExitCode, UsageError, print_diagnostics, print_json, write_bytes
 from robosc.cli.properties import add_arguments as add_property_arguments
@@ -30,12 +31,15 @@ from robosc.json_documents import diagnostics_json, json_text
 from robosc.model.structure import Deployment
 from robosc.pipeline.automata_files import is_automata
 from robosc.pipeline.options import FOREIGN_STATES
+from robosc.pipeline.results import NoSupervisor
 from robosc.source import Bundle, SourceFile, visible
 from robosc.targets import ControllerConfigError, GenerateOptions, read_controller_config, write_files
 from robosc_client import (
     Check,
     Client,
     ClientError,
+    Explain,
+    Explained,
     Exploration,
     Explore,
     Format,
@@ -84,7 +88,7 @@ a restart of the server. Use 'watch' to follow it and 'get' to fetch its result.
 
 _GET = """\
 Print the state of a job. With --result, print its result; with -o, write it: a supervisor (with its signature in a
-second file), a graph, a report or a text to a file, or generated files to a folder.
+second file), a graph, a report, an explanation or a text to a file, or generated files to a folder.
 """
 
 _EPILOG = exit_statuses("done")
@@ -142,9 +146,9 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     suggest(state, lambda: JobState)
     kind = listing.add_argument(
         "--kind",
-        type=_one_of(TaskKind, {"synth": TaskKind.SYNTHESIZE}),
+        type=_one_of(TaskKind, {"synth": TaskKind.SYNTHESIZE, "explain-synthesis": TaskKind.EXPLAIN}),
         metavar="KIND",
-        help=f"list only jobs of this kind: {', '.join(TaskKind)} (or synth)",
+        help=f"list only jobs of this kind: {', '.join(TaskKind)} (or synth, explain-synthesis)",
     )
     suggest(kind, lambda: TaskKind)
     listing.add_argument(
@@ -198,6 +202,7 @@ def _add_tasks(submit: argparse.ArgumentParser) -> None:
         ("generate", "generate a package that runs the supervisor"),
         ("explore", "list the controlled system's states and transitions"),
         ("verify", "check a supervisor file, or verify properties"),
+        ("explain-synthesis", "explain what synthesis does to a model"),
         ("format", "put a text into its canonical layout"),
     ):
         parser = tasks.add_parser(name, help=what)
@@ -208,9 +213,11 @@ def _add_tasks(submit: argparse.ArgumentParser) -> None:
             parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
         else:
             add_model_arguments(parser)
-        if name in ("synth", "generate", "explore"):
-            # A graph contains all enabled events, livelocks included.
-            add_synthesis_arguments(parser, has_choice=name != "explore")
+        if name in ("synth", "generate", "explore", "explain-synthesis"):
+            # A graph contains all enabled events, livelocks included; an explanation says nothing of them.
+            add_synthesis_arguments(parser, has_choice=name in ("synth", "generate"))
+        if name == "explain-synthesis":
+            add_question_arguments(parser)
         if name == "synth":
             add_verify_limit_argument(parser, "--verify-limit", SYNTHESIS_STATES)
             add_modular_argument(parser)
@@ -293,6 +300,14 @@ def _task(arguments: argparse.Namespace) -> Task | None:
         case "generate":
             refuse_initial(arguments)
             return Generate(bundle, arguments.target, _generation(arguments), synthesis_options(arguments))
+        case "explain-synthesis":
+            return Explain(
+                model=bundle,
+                options=synthesis_options(arguments),
+                event=arguments.event,
+                state=arguments.state,
+                after=arguments.after,
+            )
         case _:
             return Explore(bundle, synthesis_options(arguments), arguments.limit)
 
@@ -394,11 +409,13 @@ def _report_no_result(arguments: argparse.Namespace, job: Job) -> int:
     return ExitCode.FAILED
 
 
-def _report_nothing(job: Job, found: Synthesis | Generation | Exploration | Verification | Formatted) -> None:
+def _report_nothing(
+    job: Job, found: Synthesis | Generation | Exploration | Verification | Explained | Formatted
+) -> None:
     """Report why there is nothing to write, like the corresponding command."""
-    if isinstance(found, Verification | Formatted):
+    if isinstance(found, Verification | Explained | Formatted):
         print_diagnostics(found.diagnostics, None)
-        if isinstance(found, Verification) and found.reason:
+        if not isinstance(found, Formatted) and found.reason:
             sys.stderr.write(f"{job.main_file}: {visible(found.reason)}\n")
         return
     from robosc_client.outcomes import outcome_from_response
@@ -523,6 +540,8 @@ def result_json(found: TaskResult) -> dict[str, Any]:
     """Return the result of a job, as JSON values; anything that is no text is left to -o."""
     import msgspec
 
+    from robosc.explanation import document
+
     match found:
         case tuple():
             return diagnostics_json(found)
@@ -530,6 +549,10 @@ def result_json(found: TaskResult) -> dict[str, Any]:
             return dict(found.report) or {"status": str(found.status), "reason": found.reason}
         case Formatted():
             return {"text": found.text, **diagnostics_json(found.diagnostics)}
+        case Explained():
+            explanation = None if isinstance(found.explanation, NoSupervisor) else document(found.explanation)
+            told = {"status": str(found.status), "reason": found.reason, "explanation": explanation}
+            return {**told, **diagnostics_json(found.diagnostics)}
     result = {"status": str(found.status), **reasons_json(found), **diagnostics_json(found.diagnostics)}
     match found:
         case Synthesis():
@@ -596,6 +619,8 @@ def _write(arguments: argparse.Namespace, found: TaskResult, supervisor: "System
             write_bytes(arguments.output, json_text(msgspec.to_builtins(found.graph)).encode("utf-8"))
         case Verification() if found.report:
             write_bytes(arguments.output, json_text(found.report).encode("utf-8"))
+        case Explained() if not isinstance(found.explanation, NoSupervisor):
+            write_bytes(arguments.output, json_text(result_json(found)).encode("utf-8"))
         case Formatted() if found.text is not None:
             write_bytes(arguments.output, found.text.encode("utf-8"))
         case _:

@@ -1,4 +1,4 @@
-"""The commands `check`, `synth`, `generate`, `explore`, `verify` and `format` on a server.
+"""The commands `check`, `synth`, `generate`, `explore`, `verify`, `explain-synthesis` and `format` on a server.
 
 They print and write the same as the commands of `robosc`.
 """
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from robosc.cli import automata, properties, synth
 from robosc.cli import check as check_here
+from robosc.cli import explain_synthesis as explain_here
 from robosc.cli import explore as explore_here
 from robosc.cli import format as format_here
 from robosc.cli import verify as verify_here
@@ -45,7 +46,7 @@ from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedMode
 from robosc.json_documents import diagnostics_json
 from robosc.model.structure import Deployment
 from robosc.source import Bundle, SourceFile, visible
-from robosc_client import Client, SynthesisOptions, Verification, VerificationStatus, Verify
+from robosc_client import Client, Explained, SynthesisOptions, Verification, VerificationStatus, Verify
 from robosc_client.commands.automata import Server
 from robosc_client.commands.connection import SERVICE, SIGNED_SERVICE, add_connection_arguments, exit_statuses
 from robosc_client.commands.numbers import checked_number
@@ -77,13 +78,19 @@ def add_parsers(commands: Commands) -> None:
     add_synthesis_arguments(generate)
     generate.set_defaults(run=_generate)
 
-    for module, run in ((check_here, _check), (explore_here, _explore), (verify_here, _verify), (format_here, _format)):
+    for module, run in (
+        (check_here, _check),
+        (explore_here, _explore),
+        (verify_here, _verify),
+        (explain_here, _explain_synthesis),
+        (format_here, _format),
+    ):
         module.add_parser(commands)
-        name = module.__name__.rpartition(".")[2]
+        name = module.__name__.rpartition(".")[2].replace("_", "-")
         commands.choices[name].set_defaults(run=run)
     usage = commands.choices["verify"].usage or ""
     commands.choices["verify"].usage = usage.replace("robosc verify", "robosc-client verify")
-    for name in ("check", "synth", "generate", "explore", "verify", "format"):
+    for name in ("check", "synth", "generate", "explore", "verify", "explain-synthesis", "format"):
         add_connection_arguments(commands.choices[name])
     commands.choices["verify"].epilog = f"{properties.EPILOG}  3  {SERVICE}\n  130  Ctrl-C\n"
     generate.epilog = exit_statuses(WRITTEN, NOT_WRITTEN)
@@ -347,6 +354,25 @@ def _report_verdicts(
     if (status is ExitCode.OK) != (found.status is VerificationStatus.PASSED):
         raise malformed("its status contradicts its verdicts")
     return status
+
+
+def _explain_synthesis(arguments: argparse.Namespace, client: Client) -> int:
+    if automata.is_given(arguments):
+        return automata.explain_synthesis(arguments, Server(client, arguments.deadline))
+
+    def explain(bundle: Bundle) -> Explained:
+        with ProgressLine() as line:
+            return client.explain(
+                bundle,
+                synthesis_options(arguments),
+                event=arguments.event,
+                state=arguments.state,
+                after=arguments.after,
+                deadline_s=arguments.deadline,
+                on_progress=line.report,
+            )
+
+    return explain_here.run_with(arguments, explain)
 
 
 def _format(arguments: argparse.Namespace, client: Client) -> int:

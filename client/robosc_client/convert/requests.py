@@ -9,7 +9,7 @@ from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc, synthesis_pb2_grpc
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.errors import RequestRefusedError
 from robosc_client.jobs import JobState, TaskKind
-from robosc_client.tasks import Check, Explore, Format, Generate, SynthesisOptions, Synthesize, Task, Verify
+from robosc_client.tasks import Check, Explain, Explore, Format, Generate, SynthesisOptions, Synthesize, Task, Verify
 
 SynthesisStub = synthesis_pb2_grpc.SynthesisServiceStub
 JobStub = jobs_pb2_grpc.JobServiceStub
@@ -20,6 +20,7 @@ type Request = (
     | pb.GenerateRequest
     | pb.ExploreRequest
     | pb.VerifyRequest
+    | pb.ExplainRequest
     | pb.FormatRequest
 )
 
@@ -45,6 +46,7 @@ _KINDS = {
     TaskKind.GENERATE: jobs_pb2.TASK_KIND_GENERATE,
     TaskKind.EXPLORE: jobs_pb2.TASK_KIND_EXPLORE,
     TaskKind.VERIFY: jobs_pb2.TASK_KIND_VERIFY,
+    TaskKind.EXPLAIN: jobs_pb2.TASK_KIND_EXPLAIN,
     TaskKind.FORMAT: jobs_pb2.TASK_KIND_FORMAT,
 }
 
@@ -87,6 +89,14 @@ def _request(task: Task) -> Request:
             )
         case Verify():
             return _verify_request(task)
+        case Explain():
+            return pb.ExplainRequest(
+                bundle=_bundle(task.model),
+                options=_options(task.options),
+                event=task.event,
+                state=task.state,
+                after=task.after,
+            )
         case Format():
             return pb.FormatRequest(file=_file(task.file))
 
@@ -128,6 +138,8 @@ def _task(request: Request) -> jobs_pb2.Task:
             return jobs_pb2.Task(explore=request)
         case pb.VerifyRequest():
             return jobs_pb2.Task(verify=request)
+        case pb.ExplainRequest():
+            return jobs_pb2.Task(explain=request)
         case pb.FormatRequest():
             return jobs_pb2.Task(format=request)
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
-from robosc.explanation import EmptyExplanation, from_text
+from robosc.explanation import EmptyExplanation, Explanation, from_text, whole_from_text
 from robosc.pipeline.findings import Findings
 from robosc.source import Bundle, Location, visible
 from robosc.targets import TargetInfo
@@ -47,6 +47,12 @@ _VERDICTS = {
     pb.VERIFICATION_STATUS_PROPERTY_ERRORS: VerificationStatus.PROPERTY_ERRORS,
     pb.VERIFICATION_STATUS_NO_SUPERVISOR: VerificationStatus.NO_SUPERVISOR,
     pb.VERIFICATION_STATUS_UNSUPPORTED_MODEL: VerificationStatus.UNSUPPORTED_MODEL,
+}
+_EXPLAINED = {
+    pb.EXPLANATION_STATUS_SUPERVISOR: SynthesisStatus.SUPERVISOR,
+    pb.EXPLANATION_STATUS_EMPTY: SynthesisStatus.EMPTY,
+    pb.EXPLANATION_STATUS_MODEL_ERRORS: SynthesisStatus.MODEL_ERRORS,
+    pb.EXPLANATION_STATUS_UNSUPPORTED_MODEL: SynthesisStatus.UNSUPPORTED_MODEL,
 }
 
 
@@ -96,6 +102,31 @@ def verification_status_of(number: pb.VerificationStatus) -> VerificationStatus:
     if number not in _VERDICTS:
         raise malformed(f"unknown status {number}")
     return _VERDICTS[number]
+
+
+def explanation_status_of(number: pb.ExplanationStatus) -> SynthesisStatus | None:
+    """Return the status with which a synthesis ended that was to be explained; None: what is asked about is not there.
+
+    Raises:
+        ServiceError: The number is unknown.
+    """
+    if number == pb.EXPLANATION_STATUS_NOT_THERE:
+        return None
+    if number not in _EXPLAINED:
+        raise malformed(f"unknown status {number}")
+    return _EXPLAINED[number]
+
+
+def whole_explanation_of(text: str) -> Explanation:
+    """Return the explanation of what synthesis did.
+
+    Raises:
+        ServiceError: The text is no such document.
+    """
+    try:
+        return whole_from_text(text)
+    except ValueError as error:
+        raise malformed(str(error)) from error
 
 
 def explanation_of(text: str) -> EmptyExplanation | None:

@@ -12,24 +12,29 @@ import msgspec
 
 from robosc.language.tokens import tokenize
 from robosc.pipeline.findings import Findings
+from robosc.pipeline.loading import LoadedAutomata
+from robosc.pipeline.results import NoSupervisor
 from robosc.signatures import MAXIMUM_SIGNATURE_BYTES
-from robosc.source import Bundle
+from robosc.source import Bundle, visible
 from robosc.targets import GeneratedFiles
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.convert.response_fields import (
     diagnostics_of,
     explanation_of,
+    explanation_status_of,
     progress_of,
     statistics_of,
     status_of,
     summary_of,
     verification_status_of,
+    whole_explanation_of,
 )
-from robosc_client.errors import malformed
+from robosc_client.errors import NotThereError, malformed
 from robosc_client.jobs import TaskKind
 from robosc_client.paths import paths_problem
 from robosc_client.results import (
+    Explained,
     Exploration,
     Formatted,
     Generation,
@@ -334,6 +339,51 @@ class VerificationReader(_StreamReader):
         return self._found
 
 
+class ExplanationReader(_StreamReader):
+    """ResponseReader of the answer to Explain.
+
+    Args:
+        bundle: Texts that were sent; None: they are not at hand.
+    """
+
+    _found: Explained | None
+    _problem: str
+
+    def __init__(self, bundle: Bundle | None = None) -> None:
+        super().__init__()
+        self._bundle = bundle
+
+    def _take_result(self, message: pb.ExplanationResult) -> None:
+        self._problem, self._found = visible(message.reason), None
+        status = explanation_status_of(message.status)
+        if status is None:
+            return
+        diagnostics = diagnostics_of(message.diagnostics, self._bundle)
+        if status not in (SynthesisStatus.SUPERVISOR, SynthesisStatus.EMPTY):
+            if message.explanation:
+                raise malformed("its status contradicts its explanation")
+            nothing = NoSupervisor(self._problem, diagnostics)
+            self._found = Explained(status, diagnostics, self._problem, nothing)
+            return
+        explanation = whole_explanation_of(message.explanation)
+        if (status is SynthesisStatus.EMPTY) != (explanation.empty is not None):
+            raise malformed("its status contradicts its explanation")
+        if self._bundle is not None and explanation.is_of_automata != isinstance(self._bundle, LoadedAutomata):
+            raise malformed("the explanation is of a model in another language")
+        self._found = Explained(status, diagnostics, self._problem, explanation)
+
+    def result(self) -> Explained:
+        """Return the outcome of the explanation.
+
+        Raises:
+            NotThereError: Something that is asked about is not there.
+        """
+        self._require_result()
+        if self._found is None:
+            raise NotThereError(self._problem)
+        return self._found
+
+
 def check_reader(bundle: Bundle | None = None) -> UnaryReader[pb.CheckResponse, Findings]:
     """Return the reader of the response to Check.
 
@@ -416,5 +466,7 @@ def reader_for(kind: TaskKind) -> ResponseReader[TaskResult]:
             return ExplorationReader()
         case TaskKind.VERIFY:
             return VerificationReader()
+        case TaskKind.EXPLAIN:
+            return ExplanationReader()
         case TaskKind.FORMAT:
             return format_reader(None)

@@ -27,47 +27,47 @@ from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__
 from robosc_api.v1 import synthesis_pb2 as robosc__api_dot_v1_dot_synthesis__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x18robosc_api/v1/jobs.proto\x12\rrobosc_api.v1\x1a\x1egoogle/protobuf/duration.proto\x1a\x1fgoogle/protobuf/timestamp.proto\x1a\x1drobosc_api/v1/synthesis.proto\"\xbd\x02\n\x04Task\x12,\n\x05\x63heck\x18\x01 \x01(\x0b\x32\x1b.robosc_api.v1.CheckRequestH\x00\x12\x36\n\nsynthesize\x18\x02 \x01(\x0b\x32 .robosc_api.v1.SynthesizeRequestH\x00\x12\x32\n\x08generate\x18\x03 \x01(\x0b\x32\x1e.robosc_api.v1.GenerateRequestH\x00\x12\x30\n\x07\x65xplore\x18\x04 \x01(\x0b\x32\x1d.robosc_api.v1.ExploreRequestH\x00\x12.\n\x06verify\x18\x05 \x01(\x0b\x32\x1c.robosc_api.v1.VerifyRequestH\x00\x12.\n\x06\x66ormat\x18\x06 \x01(\x0b\x32\x1c.robosc_api.v1.FormatRequestH\x00\x42\t\n\x07request\"8\n\x07\x46\x61ilure\x12\x0c\n\x04\x63ode\x18\x01 \x01(\r\x12\x0e\n\x06reason\x18\x02 \x01(\t\x12\x0f\n\x07message\x18\x03 \x01(\t\"\xf5\x03\n\x03Job\x12\n\n\x02id\x18\x01 \x01(\t\x12\r\n\x05owner\x18\x02 \x01(\t\x12%\n\x04kind\x18\x03 \x01(\x0e\x32\x17.robosc_api.v1.TaskKind\x12&\n\x05state\x18\x04 \x01(\x0e\x32\x17.robosc_api.v1.JobState\x12\x10\n\x08revision\x18\x05 \x01(\x04\x12\x11\n\tmain_file\x18\x06 \x01(\t\x12\r\n\x05label\x18\x07 \x01(\t\x12/\n\x0b\x63reate_time\x18\x08 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12.\n\nstart_time\x18\t \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12,\n\x08\x65nd_time\x18\n \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12/\n\x0b\x65xpire_time\x18\x0b \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x10\n\x08\x61ttempts\x18\x0c \x01(\r\x12)\n\x08progress\x18\r \x01(\x0b\x32\x17.robosc_api.v1.Progress\x12\'\n\x07\x66\x61ilure\x18\x0e \x01(\x0b\x32\x16.robosc_api.v1.Failure\x12\x12\n\nfrom_store\x18\x0f \x01(\x08\x12\x16\n\x0ewaiting_before\x18\x10 \x01(\r\"\x8b\x01\n\x10SubmitJobRequest\x12!\n\x04task\x18\x01 \x01(\x0b\x32\x13.robosc_api.v1.Task\x12\x17\n\x0fidempotency_key\x18\x02 \x01(\t\x12\r\n\x05label\x18\x03 \x01(\t\x12,\n\tretention\x18\x04 \x01(\x0b\x32\x19.google.protobuf.Duration\"E\n\x11SubmitJobResponse\x12\x1f\n\x03job\x18\x01 \x01(\x0b\x32\x12.robosc_api.v1.Job\x12\x0f\n\x07\x65xisted\x18\x02 \x01(\x08\"\x1b\n\rGetJobRequest\x12\n\n\x02id\x18\x01 \x01(\t\"1\n\x0eGetJobResponse\x12\x1f\n\x03job\x18\x01 \x01(\x0b\x32\x12.robosc_api.v1.Job\"5\n\x0fWatchJobRequest\x12\n\n\x02id\x18\x01 \x01(\t\x12\x16\n\x0e\x61\x66ter_revision\x18\x02 \x01(\x04\"3\n\x10WatchJobResponse\x12\x1f\n\x03job\x18\x01 \x01(\x0b\x32\x12.robosc_api.v1.Job\"\x1e\n\x10\x43\x61ncelJobRequest\x12\n\n\x02id\x18\x01 \x01(\t\"4\n\x11\x43\x61ncelJobResponse\x12\x1f\n\x03job\x18\x01 \x01(\x0b\x32\x12.robosc_api.v1.Job\"\x9c\x01\n\x0fListJobsRequest\x12\x11\n\tpage_size\x18\x01 \x01(\r\x12\x12\n\npage_token\x18\x02 \x01(\t\x12\'\n\x06states\x18\x03 \x03(\x0e\x32\x17.robosc_api.v1.JobState\x12%\n\x04kind\x18\x04 \x01(\x0e\x32\x17.robosc_api.v1.TaskKind\x12\x12\n\nall_owners\x18\x05 \x01(\x08\"M\n\x10ListJobsResponse\x12 \n\x04jobs\x18\x01 \x03(\x0b\x32\x12.robosc_api.v1.Job\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"!\n\x13GetJobResultRequest\x12\n\n\x02id\x18\x01 \x01(\t\"\xd4\x02\n\x14GetJobResultResponse\x12-\n\x05\x63heck\x18\x01 \x01(\x0b\x32\x1c.robosc_api.v1.CheckResponseH\x00\x12\x37\n\nsynthesize\x18\x02 \x01(\x0b\x32!.robosc_api.v1.SynthesizeResponseH\x00\x12\x33\n\x08generate\x18\x03 \x01(\x0b\x32\x1f.robosc_api.v1.GenerateResponseH\x00\x12\x31\n\x07\x65xplore\x18\x04 \x01(\x0b\x32\x1e.robosc_api.v1.ExploreResponseH\x00\x12/\n\x06verify\x18\x05 \x01(\x0b\x32\x1d.robosc_api.v1.VerifyResponseH\x00\x12/\n\x06\x66ormat\x18\x06 \x01(\x0b\x32\x1d.robosc_api.v1.FormatResponseH\x00\x42\n\n\x08response*\x9a\x01\n\x08JobState\x12\x19\n\x15JOB_STATE_UNSPECIFIED\x10\x00\x12\x14\n\x10JOB_STATE_QUEUED\x10\x01\x12\x15\n\x11JOB_STATE_RUNNING\x10\x02\x12\x17\n\x13JOB_STATE_SUCCEEDED\x10\x03\x12\x14\n\x10JOB_STATE_FAILED\x10\x04\x12\x17\n\x13JOB_STATE_CANCELLED\x10\x05*\xaf\x01\n\x08TaskKind\x12\x19\n\x15TASK_KIND_UNSPECIFIED\x10\x00\x12\x13\n\x0fTASK_KIND_CHECK\x10\x01\x12\x18\n\x14TASK_KIND_SYNTHESIZE\x10\x02\x12\x16\n\x12TASK_KIND_GENERATE\x10\x03\x12\x15\n\x11TASK_KIND_EXPLORE\x10\x04\x12\x14\n\x10TASK_KIND_VERIFY\x10\x05\x12\x14\n\x10TASK_KIND_FORMAT\x10\x06\x32\xea\x03\n\nJobService\x12N\n\tSubmitJob\x12\x1f.robosc_api.v1.SubmitJobRequest\x1a .robosc_api.v1.SubmitJobResponse\x12\x45\n\x06GetJob\x12\x1c.robosc_api.v1.GetJobRequest\x1a\x1d.robosc_api.v1.GetJobResponse\x12M\n\x08WatchJob\x12\x1e.robosc_api.v1.WatchJobRequest\x1a\x1f.robosc_api.v1.WatchJobResponse0\x01\x12N\n\tCancelJob\x12\x1f.robosc_api.v1.CancelJobRequest\x1a .robosc_api.v1.CancelJobResponse\x12K\n\x08ListJobs\x12\x1e.robosc_api.v1.ListJobsRequest\x1a\x1f.robosc_api.v1.ListJobsResponse\x12Y\n\x0cGetJobResult\x12\".robosc_api.v1.GetJobResultRequest\x1a#.robosc_api.v1.GetJobResultResponse0\x01\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x18robosc_api/v1/jobs.proto\x12\rrobosc_api.v1\x1a\x1egoogle/protobuf/duration.proto\x1a\x1fgoogle/protobuf/timestamp.proto\x1a\x1drobosc_api/v1/synthesis.proto\"\xef\x02\n\x04Task\x12,\n\x05\x63heck\x18\x01 \x01(\x0b\x32\x1b.robosc_api.v1.CheckRequestH\x00\x12\x36\n\nsynthesize\x18\x02 \x01(\x0b\x32 .robosc_api.v1.SynthesizeRequestH\x00\x12\x32\n\x08generate\x18\x03 \x01(\x0b\x32\x1e.robosc_api.v1.GenerateRequestH\x00\x12\x30\n\x07\x65xplore\x18\x04 \x01(\x0b\x32\x1d.robosc_api.v1.ExploreRequestH\x00\x12.\n\x06verify\x18\x05 \x01(\x0b\x32\x1c.robosc_api.v1.VerifyRequestH\x00\x12.\n\x06\x66ormat\x18\x06 \x01(\x0b\x32\x1c.robosc_api.v1.FormatRequestH\x00\x12\x30\n\x07\x65xplain\x18\x07 \x01(\x0b\x32\x1d.robosc_api.v1.ExplainRequestH\x00\x42\t\n\x07request\"8\n\x07\x46\x61ilure\x12\x0c\n\x04\x63ode\x18\x01 \x01(\r\x12\x0e\n\x06reason\x18\x02 \x01(\t\x12\x0f\n\x07message\x18\x03 \x01(\t\"\xf5\x03\n\x03Job\x12\n\n\x02id\x18\x01 \x01(\t\x12\r\n\x05owner\x18\x02 \x01(\t\x12%\n\x04kind\x18\x03 \x01(\x0e\x32\x17.robosc_api.v1.TaskKind\x12&\n\x05state\x18\x04 \x01(\x0e\x32\x17.robosc_api.v1.JobState\x12\x10\n\x08revision\x18\x05 \x01(\x04\x12\x11\n\tmain_file\x18\x06 \x01(\t\x12\r\n\x05label\x18\x07 \x01(\t\x12/\n\x0b\x63reate_time\x18\x08 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12.\n\nstart_time\x18\t \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12,\n\x08\x65nd_time\x18\n \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12/\n\x0b\x65xpire_time\x18\x0b \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x10\n\x08\x61ttempts\x18\x0c \x01(\r\x12)\n\x08progress\x18\r \x01(\x0b\x32\x17.robosc_api.v1.Progress\x12\'\n\x07\x66\x61ilure\x18\x0e \x01(\x0b\x32\x16.robosc_api.v1.Failure\x12\x12\n\nfrom_store\x18\x0f \x01(\x08\x12\x16\n\x0ewaiting_before\x18\x10 \x01(\r\"\x8b\x01\n\x10SubmitJobRequest\x12!\n\x04task\x18\x01 \x01(\x0b\x32\x13.robosc_api.v1.Task\x12\x17\n\x0fidempotency_key\x18\x02 \x01(\t\x12\r\n\x05label\x18\x03 \x01(\t\x12,\n\tretention\x18\x04 \x01(\x0b\x32\x19.google.protobuf.Duration\"E\n\x11SubmitJobResponse\x12\x1f\n\x03job\x18\x01 \x01(\x0b\x32\x12.robosc_api.v1.Job\x12\x0f\n\x07\x65xisted\x18\x02 \x01(\x08\"\x1b\n\rGetJobRequest\x12\n\n\x02id\x18\x01 \x01(\t\"1\n\x0eGetJobResponse\x12\x1f\n\x03job\x18\x01 \x01(\x0b\x32\x12.robosc_api.v1.Job\"5\n\x0fWatchJobRequest\x12\n\n\x02id\x18\x01 \x01(\t\x12\x16\n\x0e\x61\x66ter_revision\x18\x02 \x01(\x04\"3\n\x10WatchJobResponse\x12\x1f\n\x03job\x18\x01 \x01(\x0b\x32\x12.robosc_api.v1.Job\"\x1e\n\x10\x43\x61ncelJobRequest\x12\n\n\x02id\x18\x01 \x01(\t\"4\n\x11\x43\x61ncelJobResponse\x12\x1f\n\x03job\x18\x01 \x01(\x0b\x32\x12.robosc_api.v1.Job\"\x9c\x01\n\x0fListJobsRequest\x12\x11\n\tpage_size\x18\x01 \x01(\r\x12\x12\n\npage_token\x18\x02 \x01(\t\x12\'\n\x06states\x18\x03 \x03(\x0e\x32\x17.robosc_api.v1.JobState\x12%\n\x04kind\x18\x04 \x01(\x0e\x32\x17.robosc_api.v1.TaskKind\x12\x12\n\nall_owners\x18\x05 \x01(\x08\"M\n\x10ListJobsResponse\x12 \n\x04jobs\x18\x01 \x03(\x0b\x32\x12.robosc_api.v1.Job\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"!\n\x13GetJobResultRequest\x12\n\n\x02id\x18\x01 \x01(\t\"\x87\x03\n\x14GetJobResultResponse\x12-\n\x05\x63heck\x18\x01 \x01(\x0b\x32\x1c.robosc_api.v1.CheckResponseH\x00\x12\x37\n\nsynthesize\x18\x02 \x01(\x0b\x32!.robosc_api.v1.SynthesizeResponseH\x00\x12\x33\n\x08generate\x18\x03 \x01(\x0b\x32\x1f.robosc_api.v1.GenerateResponseH\x00\x12\x31\n\x07\x65xplore\x18\x04 \x01(\x0b\x32\x1e.robosc_api.v1.ExploreResponseH\x00\x12/\n\x06verify\x18\x05 \x01(\x0b\x32\x1d.robosc_api.v1.VerifyResponseH\x00\x12/\n\x06\x66ormat\x18\x06 \x01(\x0b\x32\x1d.robosc_api.v1.FormatResponseH\x00\x12\x31\n\x07\x65xplain\x18\x07 \x01(\x0b\x32\x1e.robosc_api.v1.ExplainResponseH\x00\x42\n\n\x08response*\x9a\x01\n\x08JobState\x12\x19\n\x15JOB_STATE_UNSPECIFIED\x10\x00\x12\x14\n\x10JOB_STATE_QUEUED\x10\x01\x12\x15\n\x11JOB_STATE_RUNNING\x10\x02\x12\x17\n\x13JOB_STATE_SUCCEEDED\x10\x03\x12\x14\n\x10JOB_STATE_FAILED\x10\x04\x12\x17\n\x13JOB_STATE_CANCELLED\x10\x05*\xc6\x01\n\x08TaskKind\x12\x19\n\x15TASK_KIND_UNSPECIFIED\x10\x00\x12\x13\n\x0fTASK_KIND_CHECK\x10\x01\x12\x18\n\x14TASK_KIND_SYNTHESIZE\x10\x02\x12\x16\n\x12TASK_KIND_GENERATE\x10\x03\x12\x15\n\x11TASK_KIND_EXPLORE\x10\x04\x12\x14\n\x10TASK_KIND_VERIFY\x10\x05\x12\x14\n\x10TASK_KIND_FORMAT\x10\x06\x12\x15\n\x11TASK_KIND_EXPLAIN\x10\x07\x32\xea\x03\n\nJobService\x12N\n\tSubmitJob\x12\x1f.robosc_api.v1.SubmitJobRequest\x1a .robosc_api.v1.SubmitJobResponse\x12\x45\n\x06GetJob\x12\x1c.robosc_api.v1.GetJobRequest\x1a\x1d.robosc_api.v1.GetJobResponse\x12M\n\x08WatchJob\x12\x1e.robosc_api.v1.WatchJobRequest\x1a\x1f.robosc_api.v1.WatchJobResponse0\x01\x12N\n\tCancelJob\x12\x1f.robosc_api.v1.CancelJobRequest\x1a .robosc_api.v1.CancelJobResponse\x12K\n\x08ListJobs\x12\x1e.robosc_api.v1.ListJobsRequest\x1a\x1f.robosc_api.v1.ListJobsResponse\x12Y\n\x0cGetJobResult\x12\".robosc_api.v1.GetJobResultRequest\x1a#.robosc_api.v1.GetJobResultResponse0\x01\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'robosc_api.v1.jobs_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_JOBSTATE']._serialized_start=2125
-  _globals['_JOBSTATE']._serialized_end=2279
-  _globals['_TASKKIND']._serialized_start=2282
-  _globals['_TASKKIND']._serialized_end=2457
+  _globals['_JOBSTATE']._serialized_start=2226
+  _globals['_JOBSTATE']._serialized_end=2380
+  _globals['_TASKKIND']._serialized_start=2383
+  _globals['_TASKKIND']._serialized_end=2581
   _globals['_TASK']._serialized_start=140
-  _globals['_TASK']._serialized_end=457
-  _globals['_FAILURE']._serialized_start=459
-  _globals['_FAILURE']._serialized_end=515
-  _globals['_JOB']._serialized_start=518
-  _globals['_JOB']._serialized_end=1019
-  _globals['_SUBMITJOBREQUEST']._serialized_start=1022
-  _globals['_SUBMITJOBREQUEST']._serialized_end=1161
-  _globals['_SUBMITJOBRESPONSE']._serialized_start=1163
-  _globals['_SUBMITJOBRESPONSE']._serialized_end=1232
-  _globals['_GETJOBREQUEST']._serialized_start=1234
-  _globals['_GETJOBREQUEST']._serialized_end=1261
-  _globals['_GETJOBRESPONSE']._serialized_start=1263
-  _globals['_GETJOBRESPONSE']._serialized_end=1312
-  _globals['_WATCHJOBREQUEST']._serialized_start=1314
-  _globals['_WATCHJOBREQUEST']._serialized_end=1367
-  _globals['_WATCHJOBRESPONSE']._serialized_start=1369
-  _globals['_WATCHJOBRESPONSE']._serialized_end=1420
-  _globals['_CANCELJOBREQUEST']._serialized_start=1422
-  _globals['_CANCELJOBREQUEST']._serialized_end=1452
-  _globals['_CANCELJOBRESPONSE']._serialized_start=1454
-  _globals['_CANCELJOBRESPONSE']._serialized_end=1506
-  _globals['_LISTJOBSREQUEST']._serialized_start=1509
-  _globals['_LISTJOBSREQUEST']._serialized_end=1665
-  _globals['_LISTJOBSRESPONSE']._serialized_start=1667
-  _globals['_LISTJOBSRESPONSE']._serialized_end=1744
-  _globals['_GETJOBRESULTREQUEST']._serialized_start=1746
-  _globals['_GETJOBRESULTREQUEST']._serialized_end=1779
-  _globals['_GETJOBRESULTRESPONSE']._serialized_start=1782
-  _globals['_GETJOBRESULTRESPONSE']._serialized_end=2122
-  _globals['_JOBSERVICE']._serialized_start=2460
-  _globals['_JOBSERVICE']._serialized_end=2950
+  _globals['_TASK']._serialized_end=507
+  _globals['_FAILURE']._serialized_start=509
+  _globals['_FAILURE']._serialized_end=565
+  _globals['_JOB']._serialized_start=568
+  _globals['_JOB']._serialized_end=1069
+  _globals['_SUBMITJOBREQUEST']._serialized_start=1072
+  _globals['_SUBMITJOBREQUEST']._serialized_end=1211
+  _globals['_SUBMITJOBRESPONSE']._serialized_start=1213
+  _globals['_SUBMITJOBRESPONSE']._serialized_end=1282
+  _globals['_GETJOBREQUEST']._serialized_start=1284
+  _globals['_GETJOBREQUEST']._serialized_end=1311
+  _globals['_GETJOBRESPONSE']._serialized_start=1313
+  _globals['_GETJOBRESPONSE']._serialized_end=1362
+  _globals['_WATCHJOBREQUEST']._serialized_start=1364
+  _globals['_WATCHJOBREQUEST']._serialized_end=1417
+  _globals['_WATCHJOBRESPONSE']._serialized_start=1419
+  _globals['_WATCHJOBRESPONSE']._serialized_end=1470
+  _globals['_CANCELJOBREQUEST']._serialized_start=1472
+  _globals['_CANCELJOBREQUEST']._serialized_end=1502
+  _globals['_CANCELJOBRESPONSE']._serialized_start=1504
+  _globals['_CANCELJOBRESPONSE']._serialized_end=1556
+  _globals['_LISTJOBSREQUEST']._serialized_start=1559
+  _globals['_LISTJOBSREQUEST']._serialized_end=1715
+  _globals['_LISTJOBSRESPONSE']._serialized_start=1717
+  _globals['_LISTJOBSRESPONSE']._serialized_end=1794
+  _globals['_GETJOBRESULTREQUEST']._serialized_start=1796
+  _globals['_GETJOBRESULTREQUEST']._serialized_end=1829
+  _globals['_GETJOBRESULTRESPONSE']._serialized_start=1832
+  _globals['_GETJOBRESULTRESPONSE']._serialized_end=2223
+  _globals['_JOBSERVICE']._serialized_start=2584
+  _globals['_JOBSERVICE']._serialized_end=3074
 # @@protoc_insertion_point(module_scope)

@@ -30,6 +30,7 @@ class TaskKind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     TASK_KIND_EXPLORE: _ClassVar[TaskKind]
     TASK_KIND_VERIFY: _ClassVar[TaskKind]
     TASK_KIND_FORMAT: _ClassVar[TaskKind]
+    TASK_KIND_EXPLAIN: _ClassVar[TaskKind]
 JOB_STATE_UNSPECIFIED: JobState
 JOB_STATE_QUEUED: JobState
 JOB_STATE_RUNNING: JobState
@@ -43,22 +44,25 @@ TASK_KIND_GENERATE: TaskKind
 TASK_KIND_EXPLORE: TaskKind
 TASK_KIND_VERIFY: TaskKind
 TASK_KIND_FORMAT: TaskKind
+TASK_KIND_EXPLAIN: TaskKind
 
 class Task(_message.Message):
-    __slots__ = ("check", "synthesize", "generate", "explore", "verify", "format")
+    __slots__ = ("check", "synthesize", "generate", "explore", "verify", "format", "explain")
     CHECK_FIELD_NUMBER: _ClassVar[int]
     SYNTHESIZE_FIELD_NUMBER: _ClassVar[int]
     GENERATE_FIELD_NUMBER: _ClassVar[int]
     EXPLORE_FIELD_NUMBER: _ClassVar[int]
     VERIFY_FIELD_NUMBER: _ClassVar[int]
     FORMAT_FIELD_NUMBER: _ClassVar[int]
+    EXPLAIN_FIELD_NUMBER: _ClassVar[int]
     check: _synthesis_pb2.CheckRequest
     synthesize: _synthesis_pb2.SynthesizeRequest
     generate: _synthesis_pb2.GenerateRequest
     explore: _synthesis_pb2.ExploreRequest
     verify: _synthesis_pb2.VerifyRequest
     format: _synthesis_pb2.FormatRequest
-    def __init__(self, check: _Optional[_Union[_synthesis_pb2.CheckRequest, _Mapping]] = ..., synthesize: _Optional[_Union[_synthesis_pb2.SynthesizeRequest, _Mapping]] = ..., generate: _Optional[_Union[_synthesis_pb2.GenerateRequest, _Mapping]] = ..., explore: _Optional[_Union[_synthesis_pb2.ExploreRequest, _Mapping]] = ..., verify: _Optional[_Union[_synthesis_pb2.VerifyRequest, _Mapping]] = ..., format: _Optional[_Union[_synthesis_pb2.FormatRequest, _Mapping]] = ...) -> None: ...
+    explain: _synthesis_pb2.ExplainRequest
+    def __init__(self, check: _Optional[_Union[_synthesis_pb2.CheckRequest, _Mapping]] = ..., synthesize: _Optional[_Union[_synthesis_pb2.SynthesizeRequest, _Mapping]] = ..., generate: _Optional[_Union[_synthesis_pb2.GenerateRequest, _Mapping]] = ..., explore: _Optional[_Union[_synthesis_pb2.ExploreRequest, _Mapping]] = ..., verify: _Optional[_Union[_synthesis_pb2.VerifyRequest, _Mapping]] = ..., format: _Optional[_Union[_synthesis_pb2.FormatRequest, _Mapping]] = ..., explain: _Optional[_Union[_synthesis_pb2.ExplainRequest, _Mapping]] = ...) -> None: ...
 
 class Failure(_message.Message):
     __slots__ = ("code", "reason", "message")
@@ -193,17 +197,19 @@ class GetJobResultRequest(_message.Message):
     def __init__(self, id: _Optional[str] = ...) -> None: ...
 
 class GetJobResultResponse(_message.Message):
-    __slots__ = ("check", "synthesize", "generate", "explore", "verify", "format")
+    __slots__ = ("check", "synthesize", "generate", "explore", "verify", "format", "explain")
     CHECK_FIELD_NUMBER: _ClassVar[int]
     SYNTHESIZE_FIELD_NUMBER: _ClassVar[int]
     GENERATE_FIELD_NUMBER: _ClassVar[int]
     EXPLORE_FIELD_NUMBER: _ClassVar[int]
     VERIFY_FIELD_NUMBER: _ClassVar[int]
     FORMAT_FIELD_NUMBER: _ClassVar[int]
+    EXPLAIN_FIELD_NUMBER: _ClassVar[int]
     check: _synthesis_pb2.CheckResponse
     synthesize: _synthesis_pb2.SynthesizeResponse
     generate: _synthesis_pb2.GenerateResponse
     explore: _synthesis_pb2.ExploreResponse
     verify: _synthesis_pb2.VerifyResponse
     format: _synthesis_pb2.FormatResponse
-    def __init__(self, check: _Optional[_Union[_synthesis_pb2.CheckResponse, _Mapping]] = ..., synthesize: _Optional[_Union[_synthesis_pb2.SynthesizeResponse, _Mapping]] = ..., generate: _Optional[_Union[_synthesis_pb2.GenerateResponse, _Mapping]] = ..., explore: _Optional[_Union[_synthesis_pb2.ExploreResponse, _Mapping]] = ..., verify: _Optional[_Union[_synthesis_pb2.VerifyResponse, _Mapping]] = ..., format: _Optional[_Union[_synthesis_pb2.FormatResponse, _Mapping]] = ...) -> None: ...
+    explain: _synthesis_pb2.ExplainResponse
+    def __init__(self, check: _Optional[_Union[_synthesis_pb2.CheckResponse, _Mapping]] = ..., synthesize: _Optional[_Union[_synthesis_pb2.SynthesizeResponse, _Mapping]] = ..., generate: _Optional[_Union[_synthesis_pb2.GenerateResponse, _Mapping]] = ..., explore: _Optional[_Union[_synthesis_pb2.ExploreResponse, _Mapping]] = ..., verify: _Optional[_Union[_synthesis_pb2.VerifyResponse, _Mapping]] = ..., format: _Optional[_Union[_synthesis_pb2.FormatResponse, _Mapping]] = ..., explain: _Optional[_Union[_synthesis_pb2.ExplainResponse, _Mapping]] = ...) -> None: ...

@@ -45,6 +45,15 @@ class VerificationStatus(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
     VERIFICATION_STATUS_PROPERTY_ERRORS: _ClassVar[VerificationStatus]
     VERIFICATION_STATUS_NO_SUPERVISOR: _ClassVar[VerificationStatus]
     VERIFICATION_STATUS_UNSUPPORTED_MODEL: _ClassVar[VerificationStatus]
+
+class ExplanationStatus(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+    __slots__ = ()
+    EXPLANATION_STATUS_UNSPECIFIED: _ClassVar[ExplanationStatus]
+    EXPLANATION_STATUS_SUPERVISOR: _ClassVar[ExplanationStatus]
+    EXPLANATION_STATUS_EMPTY: _ClassVar[ExplanationStatus]
+    EXPLANATION_STATUS_MODEL_ERRORS: _ClassVar[ExplanationStatus]
+    EXPLANATION_STATUS_UNSUPPORTED_MODEL: _ClassVar[ExplanationStatus]
+    EXPLANATION_STATUS_NOT_THERE: _ClassVar[ExplanationStatus]
 LANGUAGE_UNSPECIFIED: Language
 LANGUAGE_ROBOSC: Language
 LANGUAGE_CIF: Language
@@ -69,6 +78,12 @@ VERIFICATION_STATUS_NOT_CHECKED: VerificationStatus
 VERIFICATION_STATUS_PROPERTY_ERRORS: VerificationStatus
 VERIFICATION_STATUS_NO_SUPERVISOR: VerificationStatus
 VERIFICATION_STATUS_UNSUPPORTED_MODEL: VerificationStatus
+EXPLANATION_STATUS_UNSPECIFIED: ExplanationStatus
+EXPLANATION_STATUS_SUPERVISOR: ExplanationStatus
+EXPLANATION_STATUS_EMPTY: ExplanationStatus
+EXPLANATION_STATUS_MODEL_ERRORS: ExplanationStatus
+EXPLANATION_STATUS_UNSUPPORTED_MODEL: ExplanationStatus
+EXPLANATION_STATUS_NOT_THERE: ExplanationStatus
 
 class SourceFile(_message.Message):
     __slots__ = ("name", "text")
@@ -419,6 +434,40 @@ class VerificationResult(_message.Message):
     reason: str
     report: str
     def __init__(self, status: _Optional[_Union[VerificationStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., report: _Optional[str] = ...) -> None: ...
+
+class ExplainRequest(_message.Message):
+    __slots__ = ("bundle", "options", "event", "state", "after")
+    BUNDLE_FIELD_NUMBER: _ClassVar[int]
+    OPTIONS_FIELD_NUMBER: _ClassVar[int]
+    EVENT_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
+    AFTER_FIELD_NUMBER: _ClassVar[int]
+    bundle: Bundle
+    options: SynthesisOptions
+    event: str
+    state: str
+    after: str
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., event: _Optional[str] = ..., state: _Optional[str] = ..., after: _Optional[str] = ...) -> None: ...
+
+class ExplainResponse(_message.Message):
+    __slots__ = ("progress", "result")
+    PROGRESS_FIELD_NUMBER: _ClassVar[int]
+    RESULT_FIELD_NUMBER: _ClassVar[int]
+    progress: Progress
+    result: ExplanationResult
+    def __init__(self, progress: _Optional[_Union[Progress, _Mapping]] = ..., result: _Optional[_Union[ExplanationResult, _Mapping]] = ...) -> None: ...
+
+class ExplanationResult(_message.Message):
+    __slots__ = ("status", "diagnostics", "reason", "explanation")
+    STATUS_FIELD_NUMBER: _ClassVar[int]
+    DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    EXPLANATION_FIELD_NUMBER: _ClassVar[int]
+    status: ExplanationStatus
+    diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
+    reason: str
+    explanation: str
+    def __init__(self, status: _Optional[_Union[ExplanationStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., explanation: _Optional[str] = ...) -> None: ...
 
 class FormatRequest(_message.Message):
     __slots__ = ("file",)

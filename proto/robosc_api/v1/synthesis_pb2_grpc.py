@@ -60,6 +60,11 @@ class SynthesisServiceStub:
                 request_serializer=robosc__api_dot_v1_dot_synthesis__pb2.VerifyRequest.SerializeToString,
                 response_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.VerifyResponse.FromString,
                 _registered_method=True)
+        self.Explain = channel.unary_stream(
+                '/robosc_api.v1.SynthesisService/Explain',
+                request_serializer=robosc__api_dot_v1_dot_synthesis__pb2.ExplainRequest.SerializeToString,
+                response_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.ExplainResponse.FromString,
+                _registered_method=True)
         self.Format = channel.unary_unary(
                 '/robosc_api.v1.SynthesisService/Format',
                 request_serializer=robosc__api_dot_v1_dot_synthesis__pb2.FormatRequest.SerializeToString,
@@ -121,6 +126,14 @@ class SynthesisServiceServicer:
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def Explain(self, request, context):
+        """Synthesizes a supervisor and explains what synthesis did to a model, or why there is no supervisor: any number of
+        progress reports, then exactly one result.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def Format(self, request, context):
         """Puts a text into its canonical layout.
         """
@@ -169,6 +182,11 @@ def add_SynthesisServiceServicer_to_server(servicer, server):
                     servicer.Verify,
                     request_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.VerifyRequest.FromString,
                     response_serializer=robosc__api_dot_v1_dot_synthesis__pb2.VerifyResponse.SerializeToString,
+            ),
+            'Explain': grpc.unary_stream_rpc_method_handler(
+                    servicer.Explain,
+                    request_deserializer=robosc__api_dot_v1_dot_synthesis__pb2.ExplainRequest.FromString,
+                    response_serializer=robosc__api_dot_v1_dot_synthesis__pb2.ExplainResponse.SerializeToString,
             ),
             'Format': grpc.unary_unary_rpc_method_handler(
                     servicer.Format,
@@ -322,6 +340,33 @@ class SynthesisService:
             '/robosc_api.v1.SynthesisService/Verify',
             robosc__api_dot_v1_dot_synthesis__pb2.VerifyRequest.SerializeToString,
             robosc__api_dot_v1_dot_synthesis__pb2.VerifyResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def Explain(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_stream(
+            request,
+            target,
+            '/robosc_api.v1.SynthesisService/Explain',
+            robosc__api_dot_v1_dot_synthesis__pb2.ExplainRequest.SerializeToString,
+            robosc__api_dot_v1_dot_synthesis__pb2.ExplainResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -44,7 +44,7 @@ class Automata:
         self, model: LoadedAutomata, options: pb.SynthesisOptions, maximum_nodes: int, on_report: OnReport
     ) -> None:
         self._model = model
-        self._options = from_proto.automata_options(options, maximum_nodes)
+        self._options = from_proto.synthesis_options(options, maximum_nodes)
         self._on_report = on_report
 
     def synthesis(self, *, is_modular: bool) -> pb.SynthesisResult:

@@ -439,6 +439,16 @@ def _verify(message: Any, reader: _RequestReader) -> object:
     )
 
 
+def _explain(message: Any, reader: _RequestReader) -> object:
+    bundle = reader.bundle(message.bundle)
+    # Silent steps are allowed, and nothing is verified, whatever the options say of them.
+    deployment, engine, _, *rest, _ = reader.options(message.options)
+    asked = [
+        reader.text(getattr(message, name)) if message.HasField(name) else None for name in ("event", "state", "after")
+    ]
+    return bundle, deployment, engine, rest, asked
+
+
 def _format(message: Any, reader: _RequestReader) -> object:
     if not message.HasField("file"):
         raise _malformed("the request has no file")
@@ -453,6 +463,7 @@ _REQUESTS: dict[TaskKind, tuple[Any, Callable[[Any, _RequestReader], object]]] =
     TaskKind.GENERATE: (pb.GenerateRequest, _generate),
     TaskKind.EXPLORE: (pb.ExploreRequest, _explore),
     TaskKind.VERIFY: (pb.VerifyRequest, _verify),
+    TaskKind.EXPLAIN: (pb.ExplainRequest, _explain),
     TaskKind.FORMAT: (pb.FormatRequest, _format),
 }
 _KINDS: dict[TaskKind, tuple[Callable[[bytes], Any], Callable[[Any, _RequestReader], object], Nested]] = {

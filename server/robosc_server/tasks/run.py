@@ -35,6 +35,7 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.clock import monotonic
 from robosc_server.tasks.automata import Automata
 from robosc_server.tasks.convert import chunks, from_proto, to_proto
+from robosc_server.tasks.explain import explanation
 from robosc_server.tasks.synthesis_attempt import OnReport, SynthesisAttempt
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
 from robosc_server.tasks.verify import DEFAULT_STATES, NoPropertyError, verification
@@ -288,6 +289,11 @@ def _verify(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator
     yield pb.VerifyResponse(result=result)
 
 
+def _explain(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.ExplainResponse]:
+    request = pb.ExplainRequest.FromString(content)
+    yield pb.ExplainResponse(result=explanation(request, limits.nodes, on_report))
+
+
 def _format(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[pb.FormatResponse]:
     request = pb.FormatRequest.FromString(content)
     try:
@@ -302,5 +308,6 @@ _WORK: dict[TaskKind, Callable[[bytes, TaskLimits, OnReport], Iterator[Any]]] = 
     TaskKind.GENERATE: _generate,
     TaskKind.EXPLORE: _explore,
     TaskKind.VERIFY: _verify,
+    TaskKind.EXPLAIN: _explain,
     TaskKind.FORMAT: _format,
 }

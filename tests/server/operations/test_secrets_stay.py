@@ -32,8 +32,8 @@ RIGHT = f"""robot {MARKER} {{
 }}
 """
 TEXTS = (RIGHT, f"robot {MARKER} {{ {MARKER} ", f'import "{MARKER}"', "", f"{MARKER}\0{MARKER}", "robot R { }")
-KINDS = ("check", "synthesize", "generate", "explore", "verify", "format")
-METHODS = ("Check", "Synthesize", "Generate", "Explore", "Verify", "Format")
+KINDS = ("check", "synthesize", "generate", "explore", "verify", "explain", "format")
+METHODS = ("Check", "Synthesize", "Generate", "Explore", "Verify", "Explain", "Format")
 
 
 @contextmanager

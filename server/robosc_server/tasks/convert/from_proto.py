@@ -58,10 +58,15 @@ def engine(options: pb.SynthesisOptions, maximum_nodes: int) -> EngineOptions:
     return EngineOptions(engine_name(options), options.allow_reordering, nodes)
 
 
-def automata_options(options: pb.SynthesisOptions, maximum_nodes: int) -> SynthesisOptions:
-    """Return the options for the synthesis of automata, with no more nodes than `maximum_nodes`."""
+def synthesis_options(options: pb.SynthesisOptions, maximum_nodes: int) -> SynthesisOptions:
+    """Return the options for a synthesis by the Python API, with no more nodes than `maximum_nodes`."""
     nodes = min(options.maximum_nodes or maximum_nodes, maximum_nodes)
-    return SynthesisOptions(engine=engine_name(options), allow_reordering=options.allow_reordering, maximum_nodes=nodes)
+    return SynthesisOptions(
+        deployment=deployment(options) or Deployment.CONTROLLER,
+        engine=engine_name(options),
+        allow_reordering=options.allow_reordering,
+        maximum_nodes=nodes,
+    )
 
 
 def verified_states(options: pb.SynthesisOptions) -> int:

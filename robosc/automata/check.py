@@ -7,7 +7,15 @@ from robosc.automata.structure import Automaton, Edge, System
 from robosc.errors import Diagnostic, InvalidExpressionError, InvalidSystemError
 from robosc.expressions import BooleanType, EnumType, Expression, IntegerType, PathStep, Type, is_finite, type_text
 from robosc.expressions.inference import Scope, has_type, is_assignable
+from robosc.expressions.tree import levels
+from robosc.recursion import allow_depth
 from robosc.source import Location
+
+MAXIMUM_LEVELS = 5_000
+"""Operators that may stand in each other in one expression, as those of a long list that is joined one by one do."""
+
+_FRAMES_PER_LEVEL = 6
+"""Python frames that the greediest walk through expressions has open for each level."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +51,39 @@ class CheckedSystem:
 
 
 def check_system(system: System) -> None:
-    """Do nothing if every part of a system fits every other.
+    """Do nothing if every part of a system fits every other, and let Python walk through its expressions.
 
     Raises:
         InvalidSystemError: Some do not; one line for each.
     """
+    depths = [(levels(expression), place) for expression, place in _expressions(system)]
+    problems = [
+        f"{place}: it is nested {depth} operators deep, and at most {MAXIMUM_LEVELS} are possible: give parts of it to "
+        "conditions or invariants of their own, or keep them in variables"
+        for depth, place in depths
+        if depth > MAXIMUM_LEVELS
+    ]
+    if problems:
+        raise InvalidSystemError("\n".join(f"{system.name}: {problem}" for problem in problems))
+    allow_depth(max(depth for depth, _ in depths), _FRAMES_PER_LEVEL)
     problems = list(dict.fromkeys(_Checker(system).problems()))
     if problems:
         raise InvalidSystemError("\n".join(f"{system.name}: {problem}" for problem in problems))
+
+
+def _expressions(system: System) -> Iterator[tuple[Expression, str]]:
+    """Yield the expressions of a system, each with its place in words."""
+    for automaton in system.automata:
+        for edge in automaton.edges:
+            place = f"{automaton.name}: {edge.source} -{edge.event}-> {edge.target}"
+            yield edge.guard, f"{place}: the guard"
+            yield from ((update.expression, f"{place}: {update.variable}") for update in edge.updates)
+    for condition in (*system.conditions, *system.plant_conditions):
+        yield condition.condition, f"a condition on {condition.event}"
+    for what, invariants in (("invariant", system.invariants), ("plant invariant", system.plant_invariants)):
+        yield from ((invariant, f"{what} {number}") for number, invariant in enumerate(invariants, start=1))
+    yield system.initial, "the initial condition"
+    yield system.marker, "the marker condition"
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,7 +79,8 @@ def compile_expression(expression: Expression, places: Mapping[Subject, int]) ->
     first = _compile_operand(node, places)
     if not spine:
         return first
-    steps = tuple((BINARY[item.operator], compile_expression(item.right, places)) for item in reversed(spine))
+    # No generators here and below: each of those that are open within each other takes a part of C's stack.
+    steps = [(BINARY[item.operator], compile_expression(item.right, places)) for item in reversed(spine)]
 
     def fold(state: State, data: Data) -> Value | None:
         value = first(state, data)
@@ -106,11 +107,11 @@ def _compile_operand(expression: Expression, places: Mapping[Subject, int]) -> F
             function, inner = UNARY[operator], compile_expression(operand, places)
             return lambda state, data: function(inner(state, data))
         case Conditional(condition=condition, then=then, otherwise=otherwise):
-            test, yes, no = (compile_expression(item, places) for item in (condition, then, otherwise))
+            test, yes, no = [compile_expression(item, places) for item in (condition, then, otherwise)]
             return lambda state, data: conditional(test(state, data), yes(state, data), no(state, data))
         case Call(function=name, arguments=arguments):
             apply, inners = CALL[name], [compile_expression(item, places) for item in arguments]
-            return lambda state, data: apply(*(inner(state, data) for inner in inners))
+            return lambda state, data: apply(*[inner(state, data) for inner in inners])
         case Binary():
             return compile_expression(expression, places)
         case Element() | Reduction() | Quantifier():

@@ -100,8 +100,9 @@ class Scope:
             case Binary():
                 return self._chain_type(expression, received, elements)
             case Conditional(condition=condition, then=then, otherwise=otherwise):
-                parts = (self.infer(part, received, elements) for part in (condition, then, otherwise))
-                return _conditional_type(*parts)
+                # No generator: each of those that are open within each other takes a part of C's stack.
+                parts = [self.infer(part, received, elements) for part in (condition, then, otherwise)]
+                return _conditional_type(parts[0], parts[1], parts[2])
             case Call(function=function, arguments=arguments):
                 return _call_type(function, [self.infer(item, received, elements) for item in arguments])
             case Element(level=level, path=path):

@@ -99,14 +99,15 @@ class _Printer:
             case Element(level=level, path=path):
                 return f"x{depth - level}{_steps(path)}", _OPERAND
             case Call(function=function, arguments=arguments):
-                return f"{function}({', '.join(self.print(item, depth)[0] for item in arguments)})", _OPERAND
+                return f"{function}({', '.join([self.print(item, depth)[0] for item in arguments])})", _OPERAND
             case Reduction(function=function, part=part):
                 return f"{function}({self._part(part, depth)})", _OPERAND
             case Quantifier(word=word, part=part, condition=condition):
                 inside = self.print(condition, depth + 1)[0]
                 return f"{word}(x{depth + 1} in {self._part(part, depth)}: {inside})", _OPERAND
             case Conditional(condition=condition, then=then, otherwise=otherwise):
-                parts = (self.print(item, depth)[0] for item in (condition, then, otherwise))
+                # No generator here: each of those that are open within each other takes a part of C's stack.
+                parts = [self.print(item, depth)[0] for item in (condition, then, otherwise)]
                 return "if {} then {} else {}".format(*parts), _CONDITIONAL
             case Unary(operator="holds", operand=operand):
                 return f"holds({self.print(operand, depth)[0]})", _OPERAND

@@ -195,6 +195,15 @@ def children(expression: Expression) -> tuple[Expression, ...]:
             return ()
 
 
+def levels(expression: Expression) -> int:
+    """Return the number of operators that stand in each other, and one more for the innermost operand."""
+    level, found = [expression], 0
+    while level:
+        found += 1
+        level = list({id(child): child for node in level for child in children(node)}.values())
+    return found
+
+
 def leaves(expression: Expression) -> tuple[Expression, ...]:
     """Every leaf, left to right; the array that a reduction or quantifier looks at is one."""
     stack, result = [expression], []

@@ -43,6 +43,7 @@ static struct {
     DdNode *(*one)(DdManager *);
     DdNode *(*variable)(DdManager *, int);
     int (*size)(DdManager *);
+    int (*dag_size)(DdNode *);
 } cudd;
 
 static const struct {
@@ -65,6 +66,7 @@ static const struct {
     {"Cudd_ReadOne", &cudd.one},
     {"Cudd_bddIthVar", &cudd.variable},
     {"Cudd_ReadSize", &cudd.size},
+    {"Cudd_DagSize", &cudd.dag_size},
 };
 
 /* Nodes */
@@ -652,32 +654,33 @@ static DdNode *product(DdManager *manager, DdNode **cubes, Py_ssize_t first, Py_
     return found;
 }
 
-/* Leave out of two sets, which are replaced, each place from one up to another that can go, earlier ones first. Where
- * all can go together, each can; else they are tried by halves.
+/* Leave out of two sets that share no state each place from one up to another that can go, earlier ones first. Where all
+ * can go together, each can; else they are tried by halves. One set, which is replaced, is looked at without them; the
+ * other one need not be: what is left of both shares a state where the whole other one shares one with what is left of
+ * this one. The product of what goes is replaced, too.
  */
-static int leave_out(DdManager *manager, DdNode **sets, DdNode **cubes, Py_ssize_t first, Py_ssize_t end) {
-    DdNode *cube = product(manager, cubes, first, end), *fewer[2] = {NULL, NULL};
-    if (cube != NULL) {
-        fewer[0] = without(manager, sets[0], cube);
-        fewer[1] = fewer[0] == NULL ? NULL : without(manager, sets[1], cube);
-    }
-    drop(manager, cube);
-    if (fewer[1] == NULL) {
-        drop(manager, fewer[0]);
+static int leave_out(DdManager *manager, DdNode *whole, DdNode **left, DdNode **gone, DdNode **cubes, Py_ssize_t first,
+                     Py_ssize_t end) {
+    DdNode *cube = product(manager, cubes, first, end);
+    DdNode *fewer = cube == NULL ? NULL : without(manager, *left, cube);
+    if (fewer == NULL) {
+        drop(manager, cube);
         return 0;
     }
-    if (cudd.leq(manager, fewer[0], negation(fewer[1]))) {
-        sets[0] = instead(manager, sets[0], fewer[0]);
-        sets[1] = instead(manager, sets[1], fewer[1]);
-        return 1;
+    if (cudd.leq(manager, whole, negation(fewer))) {
+        *left = instead(manager, *left, fewer);
+        *gone = instead(manager, *gone, conjunction(manager, *gone, cube));
+        drop(manager, cube);
+        return *gone != NULL;
     }
-    drop(manager, fewer[0]);
-    drop(manager, fewer[1]);
+    drop(manager, cube);
+    drop(manager, fewer);
     if (end - first < 2) {
         return 1;
     }
     Py_ssize_t middle = first + (end - first) / 2;
-    return leave_out(manager, sets, cubes, first, middle) && leave_out(manager, sets, cubes, middle, end);
+    return leave_out(manager, whole, left, gone, cubes, first, middle) &&
+           leave_out(manager, whole, left, gone, cubes, middle, end);
 }
 
 /* The variables of places, each the product of its own, borrowed from a tuple of them. */
@@ -730,14 +733,20 @@ PyObject *diagram_told_apart(PyObject *module, PyObject *arguments) {
         return NULL;
     }
     DdManager *manager = manager_of(bdd);
-    DdNode *sets[2] = {owned((DdNode *)(uintptr_t)one), owned((DdNode *)(uintptr_t)other)};
-    int is_done = count == 0 || leave_out(manager, sets, cubes, 0, count);
+    DdNode *sets[2] = {(DdNode *)(uintptr_t)one, (DdNode *)(uintptr_t)other};
+    int smaller = cudd.dag_size(sets[1]) <= cudd.dag_size(sets[0]);
+    DdNode *left = owned(sets[smaller]), *gone = owned(cudd.one(manager)), *rest = NULL;
+    if (count == 0 || leave_out(manager, sets[1 - smaller], &left, &gone, cubes, 0, count)) {
+        rest = without(manager, sets[1 - smaller], gone);
+    }
     PyMem_Free(cubes);
-    if (!is_done) {
-        drop(manager, sets[0]);
-        drop(manager, sets[1]);
+    drop(manager, gone);
+    if (rest == NULL) {
+        drop(manager, left);
         return passed(NULL);
     }
+    sets[smaller] = left;
+    sets[1 - smaller] = rest;
     return Py_BuildValue("KK", (unsigned long long)(uintptr_t)sets[0], (unsigned long long)(uintptr_t)sets[1]);
 }
 

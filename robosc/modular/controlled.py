@@ -9,7 +9,7 @@ from robosc.automata.controlled import ControlledGraph, controlled_graph
 from robosc.automata.semantics import Semantics
 from robosc.automata.state import subjects
 from robosc.automata.structure import System
-from robosc.modular.nonconflict import SILENT, Edges, Graph, Label
+from robosc.modular.graphs import SILENT, Edges, Graph, Label
 from robosc.modular.partition import Module, Partition
 from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.supervisor.predicates import state_predicate, state_predicates

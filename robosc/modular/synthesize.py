@@ -19,7 +19,8 @@ from robosc.conditions.multivalued import Effort, EffortExceededError, space_of
 from robosc.errors import UnsupportedModelError
 from robosc.modular.clusters import MAXIMUM_BITS, modules_of
 from robosc.modular.controlled import ControlledModule, controlled_module, graphs_of
-from robosc.modular.nonconflict import TooLargeError, is_nonconflicting
+from robosc.modular.graphs import TooLargeError
+from robosc.modular.nonconflict import is_nonconflicting
 from robosc.modular.partition import Groups, Module, Partition, partition
 from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.supervisor.diagram import diagram_domains

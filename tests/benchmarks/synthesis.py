@@ -33,6 +33,7 @@ IN_MODULES = "in modules"
 MODULAR_SIZES: dict[str, tuple[int, ...]] = {
     "machines in a row": (10, 50, 100, 200, 500, 1000),
     "assembly tree": (15, 63, 127, 255, 511, 1023),
+    "inspection tree": (15, 63, 127, 255, 511, 1023),
 }
 
 HEADER = ("family, size", "engine", "states", "rounds", "peak nodes", "adds to", "time, s", "grows as", "memory, MB")

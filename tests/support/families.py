@@ -8,6 +8,7 @@ Lennartson and M. Fabian, "Symbolic computation and representation of supervisor
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import product
 from random import Random
 
 from robosc.automata import Automaton, DiscreteVariable, Edge, Event, EventCondition, Role, System
@@ -184,6 +185,42 @@ def assembly_tree(count: int) -> System:
     return _machines(count, {number: (number - 1) // 2 for number in range(1, count)})
 
 
+def inspection_tree(count: int) -> System:
+    """Machines in a binary tree, each of which takes a part of either machine below: its own is good if both are.
+
+    Parts of the lowest machines are found to be good or bad; behind each machine a buffer, a requirement, knows what it
+    holds. A branch knows long before it tells what it will deliver one after the other.
+    """
+    kinds = ("good", "bad")
+    automata = []
+    for number in range(count):
+        below = [child for child in (2 * number + 1, 2 * number + 2) if child < count]
+        if below:
+            moves = [f"idle -take{number}_{pair}-> {_of_both(pair)}" for pair in _pairs(len(below))]
+            moves += [f"{kind} -u_{kind}{number}-> idle" for kind in kinds]
+        else:
+            moves = [f"idle -start{number}-> busy", *(f"busy -u_{kind}{number}-> idle" for kind in kinds)]
+        automata.append(automaton(f"M{number}", moves, marked=["idle"]))
+        for place, child in enumerate(below):
+            moves = [f"empty -u_{kind}{child}-> {kind}" for kind in kinds]
+            moves += [
+                f"{kind} -take{number}_{pair}-> empty"
+                for kind in kinds
+                for pair in _pairs(len(below))
+                if pair.split("_")[place] == kind
+            ]
+            automata.append(replace(automaton(f"B{child}", moves, marked=["empty"]), role=Role.REQUIREMENT))
+    return _of(automata)
+
+
+def _pairs(count: int) -> list[str]:
+    return ["_".join(kinds) for kinds in product(("good", "bad"), repeat=count)]
+
+
+def _of_both(pair: str) -> str:
+    return "bad" if "bad" in pair.split("_") else "good"
+
+
 def _machines(count: int, following: Mapping[int, int]) -> System:
     """Machines, and behind each that another one follows a buffer, a requirement, which that one empties."""
     automata = [
@@ -213,5 +250,6 @@ FAMILIES: dict[str, Callable[[int], System]] = {
     "random robot": random_robot,
     "machines in a row": machines_in_a_row,
     "assembly tree": assembly_tree,
+    "inspection tree": inspection_tree,
 }
 """Systems by family; the argument is how large."""

@@ -203,7 +203,7 @@ class _Writer:
                 cases = [(self._text(condition, scope), self._text(then, scope))]
                 return chosen(cases, self._text(otherwise, scope))
             case Call(function="abs" | "min" | "max" as function, arguments=arguments):
-                return Text(f"{function}({', '.join(str(self._text(item, scope)) for item in arguments)})")
+                return Text(f"{function}({', '.join([str(self._text(item, scope)) for item in arguments])})")
             case Binary(operator=operator, left=left, right=right):
                 return _joined(operator, self._text(left, scope), self._text(right, scope))
         raise UnsupportedModelError("target cif: an expression reads what no CIF model for synthesis has")

@@ -28,6 +28,7 @@ from robosc.expressions import (
     VariableRead,
     conjunction,
 )
+from robosc.modular import abstraction
 from robosc.modular.clusters import MAXIMUM_BITS, modules_of
 from robosc.modular.partition import partition
 from robosc.modular.synthesize import ModularResult, synthesize_modular
@@ -223,6 +224,21 @@ def test_families_in_modules(family: str) -> None:
     result = synthesize_modular(system, module_bits=0.0)
     assert check(system, result)
     assert len(result.modules) == len(result.groups[0]) == 3
+
+
+def test_inspection_trees_in_modules() -> None:
+    system = FAMILIES["inspection tree"](5)
+    result = synthesize_modular(system, module_bits=0.0)
+    assert check(system, result)
+    assert len(result.modules) == len(result.groups[0]) == 4
+
+
+def test_what_branches_know_early_takes_the_rules_beyond_bisimulation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Branches that hold other parts are not weakly bisimilar; as long as these are not told they block the same."""
+    system = FAMILIES["inspection tree"](31)
+    assert len(synthesize_modular(system, limit=300).modules) == 16
+    monkeypatch.setattr(abstraction, "RULES", (abstraction.weak_bisimulation,))
+    assert len(synthesize_modular(system, limit=300).modules) == 1
 
 
 @pytest.mark.random

@@ -6,61 +6,33 @@ from random import Random
 import pytest
 
 from robosc.errors import SynthesisCancelled
-from robosc.modular import nonconflict
+from robosc.modular import abstraction, nonconflict
 from robosc.modular.clusters import _inflated, clusters
-from robosc.modular.nonconflict import SILENT, Graph, Label, TooLargeError, composed, is_nonconflicting, reduced
+from robosc.modular.graphs import Graph, Label, TooLargeError, composed
+from robosc.modular.nonconflict import is_nonconflicting
 from support.effort import seeds
-
-LIMIT = 100_000
-
-
-def drawn(random: Random, labels: list[str]) -> Graph:
-    """An automaton of 1 to 5 states, with silent steps now and then."""
-    count = random.randint(1, 5)
-    mine = random.sample(labels, random.randint(1, min(3, len(labels))))
-    edges: list[list[tuple[Label, int]]] = [
-        [
-            (random.choice([*mine, SILENT]) if random.random() < 0.3 else random.choice(mine), random.randrange(count))
-            for _ in range(random.randint(0, 3))
-        ]
-        for _ in range(count)
-    ]
-    marked = {state for state in range(count) if random.random() < 0.5} or {0}
-    return Graph(frozenset(mine), [0] if random.random() < 0.8 else [0, count - 1], edges, marked)
-
-
-def is_nonblocking(graphs: list[Graph]) -> bool:
-    """Look at every state of the composition."""
-    whole = graphs[0]
-    for graph in graphs[1:]:
-        whole = composed(whole, graph, LIMIT)
-    reached, waiting = set(whole.initial), list(whole.initial)
-    while waiting:
-        for _, target in whole.edges[waiting.pop()]:
-            if target not in reached:
-                reached.add(target)
-                waiting.append(target)
-    good = set(whole.marked)
-    while more := {state for state in reached - good if any(target in good for _, target in whole.edges[state])}:
-        good |= more
-    return reached <= good
+from support.graphs import LIMIT, cycle, drawn, is_nonblocking
 
 
 @pytest.mark.random
-@pytest.mark.parametrize("work", [nonconflict.MAXIMUM_WORK, 10])
-def test_abstractions_tell_what_the_whole_composition_tells(work: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With little work allowed, most are left as they are, and the answers are the same."""
-    monkeypatch.setattr(nonconflict, "MAXIMUM_WORK", work)
+@pytest.mark.parametrize(
+    ("work", "limits"),
+    [(abstraction.MAXIMUM_WORK, nonconflict.SMALL_LIMITS), (10, (1_000,)), (abstraction.MAXIMUM_WORK, (1, 3))],
+)
+def test_abstractions_tell_what_the_whole_composition_tells(
+    work: int, limits: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With little work allowed, most are left as they are; with few states, larger ones are tried in the end."""
+    monkeypatch.setattr(abstraction, "MAXIMUM_WORK", work)
+    monkeypatch.setattr(nonconflict, "SMALL_LIMITS", limits)
     met: Counter[bool] = Counter()
-    for seed in seeds(300):
+    for seed in seeds(400):
         random = Random(seed)
-        labels = [f"e{number}" for number in range(random.randint(1, 6))]
-        graphs = [drawn(random, labels) for _ in range(random.randint(1, 5))]
+        labels = [f"e{number}" for number in range(random.randint(1, 5))]
+        draw = random.choice((drawn, cycle))
+        graphs = [draw(random, labels, states=random.randint(1, 5)) for _ in range(random.randint(1, 6))]
         expected = is_nonblocking(graphs)
-        copies = [
-            Graph(item.labels, item.initial, [list(steps) for steps in item.edges], item.marked) for item in graphs
-        ]
-        assert is_nonconflicting(copies, limit=LIMIT) == expected
+        assert is_nonconflicting(graphs, limit=LIMIT) == expected, seed
         met[expected] += 1
     assert min(met[True], met[False]) > 30, met
 
@@ -86,19 +58,62 @@ def test_what_is_local_is_forgotten_on_the_way(is_broken: bool) -> None:
 
 
 def test_a_composition_that_grows_too_large_is_given_up() -> None:
+    """Two that go round in step have three states together."""
+    cells = [graph(["abc"], [(0, "a", 1), (1, "b", 2), (2, "c", 0)]) for _ in range(2)]
+    cells[1].edges[0].append(("b", 2))
     with pytest.raises(TooLargeError):
-        is_nonconflicting(chain(3, is_broken=False), limit=1)
+        is_nonconflicting(cells, limit=1)
     with pytest.raises(SynthesisCancelled):
-        is_nonconflicting(chain(3, is_broken=False), limit=50, should_stop=lambda: True)
+        is_nonconflicting(cells, limit=50, should_stop=lambda: True)
+    assert is_nonconflicting(cells, limit=50)
 
 
-def test_weakly_bisimilar_states_become_one() -> None:
-    edges: list[list[tuple[Label, int]]] = [[(SILENT, 1), (SILENT, 2)], [("a", 3)], [("a", 4)], [], [(SILENT, 3)]]
-    found = reduced(Graph(frozenset({"a"}), [0], edges, {3}))
-    assert (len(found.edges), found.marked) == (2, {1})
-    # A choice that is made in silence is kept.
-    edges = [[(SILENT, 1), (SILENT, 2)], [("a", 0)], [("b", 0)]]
-    assert len(reduced(Graph(frozenset({"a", "b"}), [0], edges, {0})).edges) == 3
+def graph(labels: list[str], moves: list[tuple[int, str, int]], marked: frozenset[int] = frozenset({0})) -> Graph:
+    """An automaton that begins in its first state."""
+    count = 1 + max((max(begin, end) for begin, _, end in moves), default=0)
+    edges: list[list[tuple[Label, int]]] = [[] for _ in range(count)]
+    for begin, label, end in moves:
+        edges[begin].append((label, end))
+    return Graph(frozenset("".join(labels)), [0], edges, set(marked))
+
+
+def compositions(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The sizes of all compositions from now on."""
+    sizes: list[int] = []
+
+    def counted(one: Graph, other: Graph, limit: int) -> Graph:
+        whole = composed(one, other, limit)
+        sizes.append(len(whole.edges))
+        return whole
+
+    monkeypatch.setattr(nonconflict, "composed", counted)
+    return sizes
+
+
+def test_an_event_that_one_never_allows_is_dropped_by_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes = compositions(monkeypatch)
+    waits = graph(["x"], [(0, "x", 1)], frozenset({1}))
+    never = graph(["x"], [])
+    free = graph(["x"], [(0, "x", 1), (1, "x", 0)], frozenset({0, 1}))
+    assert not is_nonconflicting([waits, never, free], limit=50)
+    assert is_nonconflicting([free, never], limit=50)
+    assert not sizes
+
+
+def test_an_event_that_changes_nothing_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes = compositions(monkeypatch)
+    lamps = [graph(["x"], [(0, "x", 0)]), graph(["x"], [(0, "x", 0)])]
+    assert is_nonconflicting(lamps, limit=50)
+    # Who always lets it happen, and does not care, is not asked; a state that is blocked anyway does not count.
+    careless = graph(["xy"], [(0, "x", 0), (0, "y", 1)])
+    moving = graph(["x"], [(0, "x", 1), (1, "x", 0)])
+    assert not is_nonconflicting([careless, moving], limit=50)
+    assert is_nonconflicting([careless, moving, graph(["y"], [])], limit=50)
+    assert not sizes
+    # One that lets it happen now and then is: after y, x cannot happen any more.
+    careful = graph(["xy"], [(0, "x", 0), (0, "y", 1)], frozenset({0, 1}))
+    assert not is_nonconflicting([careful, graph(["x"], [(0, "x", 1), (1, "x", 0)], frozenset({1}))], limit=50)
+    assert sizes
 
 
 def test_clusters_are_where_flow_stays() -> None:

@@ -27,7 +27,7 @@ from robosc_bridge.captures.commands import add_recording, make_recorder
 from robosc_bridge.captures.recorder import RecordingHost
 from robosc_bridge.configuration import init, load, map_channels, schema
 from robosc_bridge.configuration.structure import TURTLEBOTS
-from robosc_bridge.configuration.template import UDEV_RULES, DriveDriver, ScannerDriver
+from robosc_bridge.configuration.template import PORTS, UDEV_RULES, DriveDriver, ScannerDriver
 from robosc_bridge.daemon.assembly import assemble, check_settings, safety_limits
 from robosc_bridge.daemon.endpoints import make_endpoints
 from robosc_bridge.daemon.keyboard import Keyboard
@@ -45,6 +45,8 @@ from robosc_bridge.daemon.supervisors import (
 from robosc_bridge.daemon.view_settings import ADDRESS as VIEW_ADDRESS
 from robosc_bridge.driver_registry import Kind, available_drivers
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.first_drive.commands import add_commands as add_first_drive_commands
+from robosc_bridge.first_drive.ports import stable_name
 from robosc_bridge.health_check import add_command as add_health_command
 from robosc_bridge.ros2.command import add_command as add_ros2_command
 from robosc_bridge.terminal.commands import add_commands
@@ -113,6 +115,12 @@ def make_parser() -> Parser:
         help="serve the live view, a web page (default: view.address of the configuration; without a value "
         f"{VIEW_ADDRESS})",
     )
+    run.add_argument(
+        "--dry",
+        action="store_true",
+        help="everything but motion: torque stays off, and the velocities are told instead; the supervisor is shown "
+        "the motion that would have been",
+    )
     add_recording(run)
     run.add_argument("--verbose", action="store_true", help="tell more")
     run.set_defaults(run=_run)
@@ -133,7 +141,7 @@ def make_parser() -> Parser:
             f"--{name}-port",
             metavar="PATH",
             help=f"serial port of the {what} (default: its name by the udev rules of deploy/udev where these are "
-            "installed, else the kernel's usual one)",
+            "installed, else that below /dev/serial/by-id of the kernel's usual one, else this)",
         )
     first.add_argument(
         "-o", "--output", metavar="FILE", type=Path, help="file to write; standard output if it is left out"
@@ -147,6 +155,7 @@ def make_parser() -> Parser:
     drivers.add_argument("--json", action="store_true", help="for programs")
     drivers.set_defaults(run=_drivers)
     add_capture_commands(commands)
+    add_first_drive_commands(commands)
     add_health_command(commands)
     add_commands(commands)
     add_ros2_command(commands)
@@ -211,9 +220,9 @@ def _init(arguments: argparse.Namespace) -> int:
         arguments.drive,
         arguments.scanner,
         _model(arguments.model),
-        drive_port=arguments.drive_port,
-        scanner_port=arguments.scanner_port,
-        has_udev_names=any((folder / UDEV_RULES).is_file() for folder in UDEV_FOLDERS),
+        drive_port=arguments.drive_port or _usual_port(arguments.drive),
+        scanner_port=arguments.scanner_port or _usual_port(arguments.scanner),
+        has_udev_names=_has_udev_names(),
     )
     if arguments.output is None:
         sys.stdout.write(text)
@@ -222,6 +231,17 @@ def _init(arguments: argparse.Namespace) -> int:
             stream.write(text)
         sys.stdout.write(f"{arguments.output}\n")
     return OK
+
+
+def _has_udev_names() -> bool:
+    return any((folder / UDEV_RULES).is_file() for folder in UDEV_FOLDERS)
+
+
+def _usual_port(driver: str) -> str | None:
+    """Return the name by its id of the port that a device usually has; None: there is none, or a better one."""
+    port = PORTS[driver]
+    stable = stable_name(port)
+    return None if _has_udev_names() or stable == port else stable
 
 
 def _schema(arguments: argparse.Namespace) -> int:
@@ -267,7 +287,14 @@ def _run(arguments: argparse.Namespace) -> int:
     host = SYSTEM_HOST if recorder is None else RecordingHost(SYSTEM_HOST, recorder)
     try:
         machine = assemble(
-            configuration, mapping, supervisor, log, deployment, starts_itself=not arguments.standby, host=host
+            configuration,
+            mapping,
+            supervisor,
+            log,
+            deployment,
+            starts_itself=not arguments.standby,
+            host=host,
+            is_dry=arguments.dry,
         )
         endpoints = make_endpoints(configuration, machine.operations, safety_limits(configuration))
         for number in _SIGNALS:

@@ -49,6 +49,7 @@ from robosc_bridge.driver_registry import (
     make_range_scanner,
 )
 from robosc_bridge.errors import BridgeError
+from robosc_bridge.first_drive.dry_base import DryBase
 from robosc_bridge.host import Host
 from robosc_bridge.protocol.mavlink_signing import SigningError
 from robosc_bridge.remote import settings_of
@@ -346,6 +347,7 @@ def assemble(
     *,
     starts_itself: bool,
     host: Host = SYSTEM_HOST,
+    is_dry: bool = False,
 ) -> Machine:
     """Make everything; nothing is opened yet.
 
@@ -357,6 +359,7 @@ def assemble(
         deployment: Deployment of the supervisor: it decides itself, or lets requests of programs through.
         starts_itself: True if it starts as soon as the devices are there.
         host: Host that it runs on.
+        is_dry: True if the wheels are to stay at rest, with torque off, whatever is commanded.
 
     Raises:
         AssemblyError: A device or number does not fit, or the supervisor has another deployment.
@@ -388,6 +391,8 @@ def assemble(
     stop = EmergencyStop(configuration.skills.emergency_stop)
     feed = Feed()
     base = drive_base(configuration, host)
+    if is_dry:
+        base = DryBase(base, limits.separation_m, host.monotonic)
     lidar = None if configuration.scanner is None else range_scanner(configuration.scanner, host)
     timing = Timing(host.monotonic, _line_counts(base, lidar))
     try:

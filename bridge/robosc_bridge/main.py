@@ -48,6 +48,7 @@ from robosc_bridge.errors import BridgeError
 from robosc_bridge.first_drive.commands import add_commands as add_first_drive_commands
 from robosc_bridge.first_drive.ports import stable_name
 from robosc_bridge.health_check import add_command as add_health_command
+from robosc_bridge.ros2.command import add_command as add_ros2_command
 from robosc_bridge.terminal.commands import add_commands
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 
@@ -156,6 +157,7 @@ def make_parser() -> Parser:
     add_capture_commands(commands)
     add_first_drive_commands(commands)
     add_health_command(commands)
+    add_ros2_command(commands)
     add_commands(commands)
     return parser
 

@@ -215,6 +215,7 @@ def _drive(reading: DriveReading) -> pb.DriveState:
         battery_share=reading.battery_share,
         temperature_c=reading.temperature_c,
         buttons=dict(reading.buttons),
+        imu=dict(reading.imu),
     )
 
 
@@ -222,6 +223,7 @@ def put_scan(target: pb.Scan, scan: Scan) -> None:
     """Fill a message with a revolution of the LiDAR."""
     target.age_s = max(monotonic() - scan.time_s, 0.0)
     target.turns_per_s = scan.revolutions_per_s
+    target.min_m, target.max_m = scan.min_m, scan.max_m
     target.ranges_m.extend(scan.ranges_m)
 
 

@@ -42,6 +42,7 @@ _PATIENCE_S = 2.0
 
 Snapshot = pb.Snapshot
 DriveState = pb.DriveState
+Scan = pb.Scan
 WatchResponse = pb.WatchResponse
 
 

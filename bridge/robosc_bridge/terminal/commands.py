@@ -10,6 +10,7 @@ from typing import Any
 
 from robosc.cli.starting import interrupts_as_such
 from robosc_api.security import (
+    Credentials,
     Scope,
     SecurityError,
     add_client_arguments,
@@ -71,6 +72,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _finish(parser: argparse.ArgumentParser, work: Callable[[Any, argparse.Namespace], int]) -> None:
+    add_address(parser)
+    parser.set_defaults(run=lambda arguments: _connected(arguments, work))
+
+
+def add_address(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments that say which bridge is meant, and how it is reached."""
     parser.add_argument(
         "--address",
         type=_address,
@@ -79,7 +86,15 @@ def _finish(parser: argparse.ArgumentParser, work: Callable[[Any, argparse.Names
         help=f"address of the bridge (default: ${ADDRESS_VARIABLE}, or {ADDRESS}; default port: {BRIDGE_PORT})",
     )
     add_client_arguments(parser)
-    parser.set_defaults(run=lambda arguments: _connected(arguments, work))
+
+
+def client_credentials(arguments: argparse.Namespace) -> Credentials:
+    """Return the credentials that these arguments name.
+
+    Raises:
+        SecurityError: They cannot be read.
+    """
+    return credentials_of(arguments)
 
 
 def _address(text: str) -> str:

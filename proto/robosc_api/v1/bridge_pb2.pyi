@@ -233,7 +233,7 @@ class ComponentState(_message.Message):
     def __init__(self, name: _Optional[str] = ..., state: _Optional[str] = ..., variables: _Optional[_Union[_struct_pb2.Struct, _Mapping]] = ...) -> None: ...
 
 class DriveState(_message.Message):
-    __slots__ = ("age_s", "pose", "velocity", "left_wheel_m_s", "right_wheel_m_s", "is_torque_on", "faults", "battery_v", "battery_share", "temperature_c", "buttons")
+    __slots__ = ("age_s", "pose", "velocity", "left_wheel_m_s", "right_wheel_m_s", "is_torque_on", "faults", "battery_v", "battery_share", "temperature_c", "buttons", "imu")
     class ButtonsEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -241,6 +241,13 @@ class DriveState(_message.Message):
         key: str
         value: bool
         def __init__(self, key: _Optional[str] = ..., value: _Optional[bool] = ...) -> None: ...
+    class ImuEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: float
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[float] = ...) -> None: ...
     AGE_S_FIELD_NUMBER: _ClassVar[int]
     POSE_FIELD_NUMBER: _ClassVar[int]
     VELOCITY_FIELD_NUMBER: _ClassVar[int]
@@ -252,6 +259,7 @@ class DriveState(_message.Message):
     BATTERY_SHARE_FIELD_NUMBER: _ClassVar[int]
     TEMPERATURE_C_FIELD_NUMBER: _ClassVar[int]
     BUTTONS_FIELD_NUMBER: _ClassVar[int]
+    IMU_FIELD_NUMBER: _ClassVar[int]
     age_s: float
     pose: Pose
     velocity: Twist
@@ -263,7 +271,8 @@ class DriveState(_message.Message):
     battery_share: float
     temperature_c: float
     buttons: _containers.ScalarMap[str, bool]
-    def __init__(self, age_s: _Optional[float] = ..., pose: _Optional[_Union[Pose, _Mapping]] = ..., velocity: _Optional[_Union[Twist, _Mapping]] = ..., left_wheel_m_s: _Optional[float] = ..., right_wheel_m_s: _Optional[float] = ..., is_torque_on: _Optional[bool] = ..., faults: _Optional[_Iterable[str]] = ..., battery_v: _Optional[float] = ..., battery_share: _Optional[float] = ..., temperature_c: _Optional[float] = ..., buttons: _Optional[_Mapping[str, bool]] = ...) -> None: ...
+    imu: _containers.ScalarMap[str, float]
+    def __init__(self, age_s: _Optional[float] = ..., pose: _Optional[_Union[Pose, _Mapping]] = ..., velocity: _Optional[_Union[Twist, _Mapping]] = ..., left_wheel_m_s: _Optional[float] = ..., right_wheel_m_s: _Optional[float] = ..., is_torque_on: _Optional[bool] = ..., faults: _Optional[_Iterable[str]] = ..., battery_v: _Optional[float] = ..., battery_share: _Optional[float] = ..., temperature_c: _Optional[float] = ..., buttons: _Optional[_Mapping[str, bool]] = ..., imu: _Optional[_Mapping[str, float]] = ...) -> None: ...
 
 class Pose(_message.Message):
     __slots__ = ("x_m", "y_m", "heading_rad")
@@ -284,14 +293,18 @@ class Twist(_message.Message):
     def __init__(self, linear_m_s: _Optional[float] = ..., angular_rad_s: _Optional[float] = ...) -> None: ...
 
 class Scan(_message.Message):
-    __slots__ = ("age_s", "ranges_m", "turns_per_s")
+    __slots__ = ("age_s", "ranges_m", "turns_per_s", "min_m", "max_m")
     AGE_S_FIELD_NUMBER: _ClassVar[int]
     RANGES_M_FIELD_NUMBER: _ClassVar[int]
     TURNS_PER_S_FIELD_NUMBER: _ClassVar[int]
+    MIN_M_FIELD_NUMBER: _ClassVar[int]
+    MAX_M_FIELD_NUMBER: _ClassVar[int]
     age_s: float
     ranges_m: _containers.RepeatedScalarFieldContainer[float]
     turns_per_s: float
-    def __init__(self, age_s: _Optional[float] = ..., ranges_m: _Optional[_Iterable[float]] = ..., turns_per_s: _Optional[float] = ...) -> None: ...
+    min_m: float
+    max_m: float
+    def __init__(self, age_s: _Optional[float] = ..., ranges_m: _Optional[_Iterable[float]] = ..., turns_per_s: _Optional[float] = ..., min_m: _Optional[float] = ..., max_m: _Optional[float] = ...) -> None: ...
 
 class StopRequest(_message.Message):
     __slots__ = ()

@@ -68,6 +68,9 @@ class DriveReading:
         wheels_m_s: Speed of the left and the right wheel.
         goals_m_s: Speeds that the left and the right wheel were told in this exchange, as the device rounds them;
             None: they were told none, or the driver does not say.
+        pose_covariance: Covariance of x, y and heading of the pose, row by row, in m², m rad and rad²; it grows from
+            zero where the odometry began. Empty: it is not known.
+        velocity_variances: Variances of the linear and the angular velocity; None: they are not known.
         is_torque_on: True if the motors hold and obey.
         faults: Faults of any motor.
         battery_v: Voltage of the battery, in volts; None: it is not reported.
@@ -89,6 +92,8 @@ class DriveReading:
     buttons: Mapping[str, bool] = field(default_factory=dict)
     imu: Mapping[str, float] = field(default_factory=dict)
     goals_m_s: tuple[float, float] | None = None
+    pose_covariance: tuple[float, ...] = ()
+    velocity_variances: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

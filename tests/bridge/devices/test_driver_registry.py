@@ -92,7 +92,7 @@ def test_a_plug_in_is_found_by_its_entry_point(monkeypatch: pytest.MonkeyPatch) 
 
 def test_what_a_drive_base_has_is_declared_by_its_driver(monkeypatch: pytest.MonkeyPatch) -> None:
     assert features_of("opencr") == DriverFeatures(PANEL, has_imu=True, needs_turtlebot3=True)
-    assert features_of("dynamixel") == DriverFeatures(needs_turtlebot3=True)
+    assert features_of("dynamixel") == DriverFeatures(knows_turtlebot3=True)
     assert features_of("mavlink-rover") == DriverFeatures(has_imu=True, torque_on_s=8.0)
     assert features_of("plug") is None
     # A plug-in declares its own, or none.

@@ -48,6 +48,8 @@ class DriverFeatures:
         has_imu: True if its readings report accelerations and yaw rates.
         needs_turtlebot3: True if its argument `robot` is a `devices.robots.Robot`, whose motors or board it drives;
             else it is a `devices.robots.Body`, and the robot may be any.
+        knows_turtlebot3: True if its argument `robot` is a `devices.robots.Robot` for a TurtleBot3, and a `Body` for
+            any other robot, of which its options say the rest.
         revolution_s: Time that a revolution of a range scanner takes, in seconds; None: that is not known.
         torque_on_s: Time within which motors that are told to hold do so and report it, in seconds; None: as the
             safety layer has it.
@@ -62,6 +64,7 @@ class DriverFeatures:
     buttons: tuple[str, ...] = ()
     has_imu: bool = False
     needs_turtlebot3: bool = False
+    knows_turtlebot3: bool = False
     revolution_s: float | None = None
     torque_on_s: float | None = None
     astray_s: float | None = None
@@ -112,9 +115,9 @@ class UnknownDriverError(BridgeError, LookupError):
 _BUILT_IN: dict[Kind, dict[str, tuple[str, str, DriverFeatures | None]]] = {
     Kind.DRIVE_BASE: {
         "dynamixel": (
-            "two Dynamixel X wheels (XL430-W250, XM430-W210) on a U2D2 or another half-duplex adapter",
+            "two Dynamixel X wheels of a TurtleBot3 or any other robot, on a U2D2 or another half-duplex adapter",
             "robosc_bridge.devices.dynamixel:DynamixelBase",
-            DriverFeatures(needs_turtlebot3=True),
+            DriverFeatures(knows_turtlebot3=True),
         ),
         "mavlink-rover": (
             "a MAVLink rover: ArduPilot Rover, driven in its mode GUIDED over a serial line, UDP or TCP",

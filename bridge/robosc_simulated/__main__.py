@@ -167,7 +167,12 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m robosc_simulated",
         description="Serve a simulated TurtleBot3 on two pseudo-terminals until interrupted.",
     )
-    parser.add_argument("--robot", choices=sorted(BODIES), default="burger", help="default: %(default)s")
+    parser.add_argument(
+        "--robot",
+        default="burger",
+        metavar="NAME|FILE",
+        help=f"{', '.join(sorted(BODIES))}, or a YAML file of another one; default: %(default)s",
+    )
     parser.add_argument("--base", choices=BASES, default="opencr", help="default: %(default)s")
     parser.add_argument("--lidar", choices=sorted(LIDARS), default="lds02", help="default: %(default)s")
     place = parser.add_mutually_exclusive_group()

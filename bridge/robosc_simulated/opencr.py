@@ -506,7 +506,9 @@ class OpenCr:
         """Update the readings of the inertial sensors: they feel the body on the floor, whatever the wheels do."""
         world = self._world
         speed_m_s, yaw_rate_rad_s = world.floor_speed_m_s, world.floor_yaw_rate_rad_s
-        yaw_rad = world.heading_rad - self._start_heading_rad
+        drift_rad_s = world.profile.yaw_drift_rad_s
+        yaw_rad = world.heading_rad - self._start_heading_rad + drift_rad_s * world.lived_s
+        yaw_rate_rad_s += drift_rad_s
         since_s = world.lived_s - self._sensed_s
         if since_s > 0.0:
             self._forward_m_s2 = (speed_m_s - self._last_speed_m_s) / since_s

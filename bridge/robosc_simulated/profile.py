@@ -53,6 +53,7 @@ class Profile:
         charge: Share of the battery's charge at the start; None: its voltage stays 12 V.
         resistance_ohm: Inner resistance of the battery and its cables.
         lidar_share: Standard deviation of a distance, as a share of it, beside that in metres.
+        yaw_drift_rad_s: Drift of the yaw of OpenCR's inertial sensor.
         dropout_share: Share of a LiDAR's beams that return nothing.
         spin_up_s: Time until a LiDAR's motor has its speed, in seconds.
         stall_every_s: Mean time between two stalls of that motor, in seconds; 0: it never stalls.
@@ -76,6 +77,7 @@ class Profile:
     charge: float | None = None
     resistance_ohm: float = 0.0
     lidar_share: float = 0.0
+    yaw_drift_rad_s: float = 0.0
     dropout_share: float = 0.0
     spin_up_s: float = 0.0
     stall_every_s: float = 0.0
@@ -110,6 +112,7 @@ TYPICAL = Profile(
     charge=0.95,
     resistance_ohm=0.08,
     lidar_share=0.005,
+    yaw_drift_rad_s=0.0002,
     dropout_share=0.004,
     spin_up_s=1.0,
     sees_glass=0.25,
@@ -131,6 +134,7 @@ BAD_DAY = Profile(
     charge=0.75,
     resistance_ohm=0.15,
     lidar_share=0.02,
+    yaw_drift_rad_s=0.001,
     dropout_share=0.03,
     spin_up_s=2.5,
     stall_every_s=60.0,

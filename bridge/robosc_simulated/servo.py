@@ -91,6 +91,7 @@ class Servo:
         self.time = world.time
         self._wheel = wheel
         self._direction = -1 if is_mirrored else 1
+        self._gear = world.body.gear_ratio
         self._has_power = True
         self._silent_until_s = -math.inf
         self._heard_s = self.time.now_s()
@@ -336,14 +337,17 @@ class Servo:
                 wanted_rad_s = table["goal pwm"] / 885 * fastest_rad_s
             case _:
                 wanted_rad_s = 0.0
-        goal_rad_s = self._sign() * max(-fastest_rad_s, min(fastest_rad_s, wanted_rad_s))
+        goal_rad_s = self._sign() * max(-fastest_rad_s, min(fastest_rad_s, wanted_rad_s)) / self._gear
+        fastest_rad_s /= self._gear
         profile = table["profile acceleration"]
         if not profile:
             wheel.acceleration_rad_s2 = math.inf
         elif table["drive mode"] & _TIME_BASED:
-            wheel.acceleration_rad_s2 = max(abs(goal_rad_s - wheel.speed_rad_s), RAW_RAD_S) / (profile / 1000)
+            wheel.acceleration_rad_s2 = max(abs(goal_rad_s - wheel.speed_rad_s), RAW_RAD_S / self._gear) / (
+                profile / 1000
+            )
         else:
-            wheel.acceleration_rad_s2 = profile * _ACCELERATION_RAD_S2
+            wheel.acceleration_rad_s2 = profile * _ACCELERATION_RAD_S2 / self._gear
         wheel.fastest_rad_s, wheel.goal_rad_s = fastest_rad_s, goal_rad_s
 
     def _release(self) -> None:
@@ -363,7 +367,7 @@ class Servo:
             self._release()
 
     def _position(self) -> int:
-        turned = math.floor(self._wheel.angle_rad / (2 * math.pi) * TICKS)
+        turned = math.floor(self._wheel.angle_rad * self._gear / (2 * math.pi) * TICKS)
         # Unbounded: the register wraps.
         return self._base_ticks + self._sign() * turned
 
@@ -375,8 +379,8 @@ class Servo:
     def _measure(self) -> None:
         self._world.catch_up()
         table, wheel = self.table, self._wheel
-        velocity = round(self._sign() * wheel.speed_rad_s / RAW_RAD_S)
-        goal = round(self._sign() * wheel.goal_rad_s / RAW_RAD_S) if wheel.is_driven else 0
+        velocity = round(self._sign() * wheel.speed_rad_s * self._gear / RAW_RAD_S)
+        goal = round(self._sign() * wheel.goal_rad_s * self._gear / RAW_RAD_S) if wheel.is_driven else 0
         position = self._position()
         if wheel.is_driven and wheel.is_blocked and goal:
             load = int(math.copysign(table.model.strongest_load, goal))

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from robosc_simulated.line import Sending
 from robosc_simulated.packets import BROADCAST_ID, Error, Instruction, Request, RequestParser, status
+from robosc_simulated.robots import BAUDS
 from robosc_simulated.servo import Servo
 
-_BAUDS = (9600, 57600, 115200, 1000000, 2000000, 3000000, 4000000, 4500000)
 _CLEAR = bytes.fromhex("0144584c22")
 _ALL_BUT = {0xFF: frozenset[str](), 0x01: frozenset({"id"}), 0x02: frozenset({"id", "baud rate"})}
 
@@ -52,7 +52,7 @@ class ServoBus:
         found: list[Sending] = []
         for request in self._parser.feed(data, self.servos[0].time.now_s()):
             self.update()
-            listening = [servo for servo in self.servos if servo.answers and _BAUDS[servo.table["baud rate"]] == baud]
+            listening = [servo for servo in self.servos if servo.answers and BAUDS[servo.table["baud rate"]] == baud]
             # A bus takes its time for bytes (ten bits each), and an adapter hands on what is complete.
             byte_s = 10 / baud if baud else 0.0
             after_s = byte_s * len(data)

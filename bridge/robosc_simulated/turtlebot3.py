@@ -16,7 +16,7 @@ from robosc_simulated.line import Faults, SimulatedLine
 from robosc_simulated.opencr import OpenCr
 from robosc_simulated.profile import IDEAL, find_profile
 from robosc_simulated.recorder import Recorder
-from robosc_simulated.robots import BODIES
+from robosc_simulated.robots import BODIES, Body, find_body
 from robosc_simulated.rover import Rover
 from robosc_simulated.scene import Scene
 from robosc_simulated.servo import Servo
@@ -26,21 +26,35 @@ from robosc_simulated.walls import Walls, room
 from robosc_simulated.world import World
 
 BASES = ("opencr", "dynamixel", "mavlink-rover")
-# As the set-up of a TurtleBot3 leaves its motors: 1 Mbps, velocity mode, the right one reversed.
-_SET_UP = {"baud rate": 3, "operating mode": 1}
+# As the set-up of a TurtleBot3 leaves its motors.
+_VELOCITY_MODE = 1
 
 
 def wheel_servos(world: World, battery: Battery | None = None) -> tuple[Servo, Servo]:
-    """The left and the right servo of a robot, set up as a TurtleBot3's are.
+    """The left and the right servo of a robot, set up as its body says.
 
     Args:
         world: World that they move in.
         battery: Battery that they live from; None: 12 V.
     """
-    model = world.body.servo_model
-    left = Servo(model, world, world.left, 1, settings=_SET_UP, battery=battery)
-    settings = {**_SET_UP, "drive mode": 1}
-    right = Servo(model, world, world.right, 2, is_mirrored=True, settings=settings, battery=battery)
+    body = world.body
+    settings = {"baud rate": body.baud_code, "operating mode": _VELOCITY_MODE}
+    if body.velocity_limit is not None:
+        settings["velocity limit"] = body.velocity_limit
+    left, right = (
+        Servo(
+            body.servo_model,
+            world,
+            wheel,
+            device_id,
+            is_mirrored=is_mirrored,
+            settings={**settings, "drive mode": int(is_reversed)},
+            battery=battery,
+        )
+        for wheel, device_id, is_mirrored, is_reversed in zip(
+            (world.left, world.right), body.ids, body.are_mirrored, body.are_reversed, strict=True
+        )
+    )
     return left, right
 
 
@@ -48,7 +62,7 @@ class SimulatedTurtleBot3:
     """A robot whose devices are served until it is closed.
 
     Args:
-        robot: Key of `BODIES`.
+        robot: Key of `BODIES`, a file of a body, or the body itself.
         base: `opencr`, `dynamixel` for two servos behind an adapter, or `mavlink-rover`.
         lidar: Key of `LIDARS`.
         scene: Scene that it is in; None: there are `walls` and a `line` alone.
@@ -90,7 +104,7 @@ class SimulatedTurtleBot3:
 
     def __init__(
         self,
-        robot: str = "burger",
+        robot: str | Body = "burger",
         base: str = "opencr",
         lidar: str = "lds01",
         *,
@@ -111,7 +125,10 @@ class SimulatedTurtleBot3:
         patience_s: float | None = None,
         profile: str | None = None,
     ) -> None:
-        for kind, name, known in (("robot", robot, BODIES), ("base", base, BASES), ("LiDAR", lidar, LIDARS)):
+        body = robot if isinstance(robot, Body) else find_body(robot)
+        if body.name not in BODIES and base == "opencr":
+            raise ValueError("OpenCR's firmware knows the TurtleBot3s alone: another robot has the base dynamixel")
+        for kind, name, known in (("base", base, BASES), ("LiDAR", lidar, LIDARS)):
             if name not in known:
                 raise ValueError(f"there is no {kind} {name!r}; there are {', '.join(known)}")
         if scene is None:
@@ -120,7 +137,7 @@ class SimulatedTurtleBot3:
             raise ValueError("a scene has its own walls and its own line")
         self.time = Timebase(clock, factor, patience_s)
         self.profile = find_profile(profile or scene.profile or IDEAL.name)
-        self.world = World(BODIES[robot], scene, self.time, pose, seed, self.profile)
+        self.world = World(body, scene, self.time, pose, seed, self.profile)
         self.battery: Battery | None = None
         if self.profile.charge is not None and base != "mavlink-rover":
             self.battery = Battery(self.world, self.profile.charge, self.profile.resistance_ohm)

@@ -160,7 +160,7 @@ class World:
         self._sweep = Sweep(self.walls)
         self.time = time
         self.x_m, self.y_m, self.heading_rad = self.scene.start if pose is None else pose
-        fastest_rad_s = MODELS[body.servo_model].no_load_rpm * math.tau / 60
+        fastest_rad_s = MODELS[body.servo_model].no_load_rpm * math.tau / 60 / body.gear_ratio
         self.left, self.right = (
             Wheel(fastest_rad_s, lag_s=profile.lag_s, dead_band_rad_s=profile.dead_band_rad_s) for _ in range(2)
         )

@@ -50,7 +50,7 @@ class ScannerChannel(_Channel, frozen=True, tag="scanner"):
 
 
 class OdometryChannel(_Channel, frozen=True, tag="odometry"):
-    """Pose since the start and velocity, as the wheels measure them."""
+    """Pose since the start and velocity, as the drive measures them, with covariances."""
 
 
 class ImuChannel(_Channel, frozen=True, tag="imu"):
@@ -187,8 +187,8 @@ _SCAN = Fields(
 )
 _ODOMETRY = Fields(
     {
-        "pose": Fields({"pose": Fields({"position": _VECTOR, "orientation": _QUATERNION})}),
-        "twist": Fields({"twist": _TWIST}),
+        "pose": Fields({"pose": Fields({"position": _VECTOR, "orientation": _QUATERNION}), "covariance": Array(_N)}),
+        "twist": Fields({"twist": _TWIST, "covariance": Array(_N)}),
     }
 )
 _IMU = Fields({"angular_velocity": _VECTOR, "linear_acceleration": _VECTOR, "orientation": _QUATERNION})

@@ -217,7 +217,8 @@ def _robot(configuration: Configuration) -> Robot | Body:
     chosen, features = configuration.robot, features_of(configuration.drive.driver)
     if isinstance(chosen, str):
         known = ROBOTS[chosen]
-        return known if features is not None and features.needs_turtlebot3 else known.body
+        knows = features is not None and (features.needs_turtlebot3 or features.knows_turtlebot3)
+        return known if knows else known.body
     return Body(chosen.linear_m_s, chosen.angular_rad_s, chosen.wheel_separation_m)
 
 

@@ -1,6 +1,7 @@
 """Data of the devices, as the data of the channels: the content of a ROS message of the same meaning."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from robosc.expressions import NoneType, ObjectType
@@ -8,6 +9,8 @@ from robosc.model.structure import Communication
 from robosc_bridge.devices.interface import BINS, DriveReading, Pose, Scan
 
 _STEP_RAD = math.tau / BINS
+# Axes of a covariance of ROS, and those of a robot on a floor among them.
+_AXES, _PLANAR = 6, (0, 1, 5)
 _PRESENT_V = 7.0
 """Below this voltage there is no battery, but only a cable."""
 
@@ -30,14 +33,38 @@ def odometry_data(reading: DriveReading) -> dict[str, Any]:
     pose, velocity = reading.pose, reading.velocity
     position = {"x": pose.x_m, "y": pose.y_m, "z": 0.0}
     return {
-        "pose": {"pose": {"position": position, "orientation": _orientation(pose)}},
+        "pose": {
+            "pose": {"position": position, "orientation": _orientation(pose)},
+            "covariance": _covariance(reading.pose_covariance),
+        },
         "twist": {
             "twist": {
                 "linear": {"x": velocity.linear_m_s, "y": 0.0, "z": 0.0},
                 "angular": {"x": 0.0, "y": 0.0, "z": velocity.angular_rad_s},
-            }
+            },
+            "covariance": _covariance(_velocity_covariance(reading)),
         },
     }
+
+
+def _velocity_covariance(reading: DriveReading) -> tuple[float, ...]:
+    if reading.velocity_variances is None:
+        return ()
+    linear, angular = reading.velocity_variances
+    return linear, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, angular
+
+
+def _covariance(planar: Sequence[float]) -> list[float]:
+    """Return a covariance of x, y, z and the rotations about them, row by row, as ROS has it.
+
+    Args:
+        planar: Covariance of x, y and the rotation about z; empty: it is not known, which ROS says with zeros.
+    """
+    found = [0.0] * _AXES**2
+    for index, value in enumerate(planar):
+        row, column = divmod(index, len(_PLANAR))
+        found[_PLANAR[row] * _AXES + _PLANAR[column]] = value
+    return found
 
 
 def _orientation(pose: Pose) -> dict[str, float]:

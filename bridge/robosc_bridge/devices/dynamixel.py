@@ -10,15 +10,16 @@ Source: ROBOTIS e-Manual, pages XL430-W250, XM430-W210 and "DYNAMIXEL Protocol 2
 import contextlib
 import logging
 from collections.abc import Sequence
+from typing import Literal
 
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, BusCounters, DynamixelBus, exchange_limit_s
 from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFault, Velocity
 from robosc_bridge.devices.kinematics import body_velocity, wheel_goals
-from robosc_bridge.devices.odometry import Odometry
-from robosc_bridge.devices.robots import ACCELERATION_RAW_RAD_S2, Robot
+from robosc_bridge.devices.odometry import Odometry, velocity_variances
+from robosc_bridge.devices.robots import ACCELERATION_RAW_RAD_S2, SERVOS, Body, Robot, Wheels
 from robosc_bridge.devices.servo_pair import ServoPair
 from robosc_bridge.devices.wheel_following import FOLLOWING_LIMIT_S, FollowingMonitor
-from robosc_bridge.errors import BridgeError, DeviceError, DeviceSilentError
+from robosc_bridge.errors import BridgeError, DeviceError, DeviceSilentError, WrongDeviceError
 from robosc_bridge.host import Host, Port
 from robosc_bridge.protocol import servo
 from robosc_bridge.protocol.servo import Measurement
@@ -30,6 +31,11 @@ FACTORY_BAUD = 57_600
 CHECK_PERIOD_S = 0.1
 """Time between checks of the motors' torque and of tripped watchdogs, in seconds, beside every exchange."""
 
+DriveMode = Literal["normal", "reverse"]
+_MODES: dict[DriveMode, int] = {"normal": 0, "reverse": servo.REVERSE}
+# A limit that was rounded to three digits is kept.
+_ROUNDED = 1.001
+
 _log = logging.getLogger(__name__)
 
 
@@ -38,9 +44,15 @@ class DynamixelBase:
 
     Args:
         path: Path of the adapter's port.
-        robot: Robot that the wheels belong to.
-        motors: Ids of the left and the right one; the right one is mounted the other way round.
+        robot: Robot that the wheels belong to: a TurtleBot3, or a body whose wheels the following say.
+        motors: Ids of the left and the right one.
         bauds: Speeds to look for them at, in this order.
+        wheel_radius_m: Radius of the wheels; None: that of the TurtleBot3.
+        gear_ratio: Revolutions of a motor for one of its wheel.
+        mirrored: For the left and the right one, True if its own positive direction turns its wheel backward; a drive
+            mode of reverse, which it has or is given, turns that round.
+        drive_modes: Drive mode that each is to have, `normal` or `reverse`, kept in its EEPROM; None: as they are.
+        model: Name of the model that they must be of; None: any that can be driven.
         acceleration_rad_s2: Acceleration of a wheel; None: as fast as it can.
         watchdog_s: Time without a request after which the motors stop by themselves, in seconds, at least three
             exchanges.
@@ -54,9 +66,14 @@ class DynamixelBase:
     def __init__(
         self,
         path: str,
-        robot: Robot,
+        robot: Robot | Body,
         motors: tuple[int, int] = (1, 2),
         bauds: Sequence[int] = (1_000_000,),
+        wheel_radius_m: float | None = None,
+        gear_ratio: float = 1.0,
+        mirrored: tuple[bool, bool] = (False, True),
+        drive_modes: tuple[DriveMode, DriveMode] | None = None,
+        model: str | None = None,
         acceleration_rad_s2: float | None = None,
         watchdog_s: float = 0.5,
         answer_limit_s: float = ANSWER_LIMIT_S,
@@ -68,16 +85,25 @@ class DynamixelBase:
             raise ValueError("there must be a speed to look for the motors at")
         self._path = path
         self._robot = robot
+        self._wheels = _wheels_of(robot, wheel_radius_m, gear_ratio)
+        self._mirrored = mirrored
+        self._drive_modes = None if drive_modes is None else (_MODES[drive_modes[0]], _MODES[drive_modes[1]])
+        if model is not None and model not in SERVOS.values():
+            raise ValueError(f"there is no model '{model}' that can be driven; there is {', '.join(SERVOS.values())}")
+        self._model = model
         self._names = {motors[0]: f"{path}: motor {motors[0]} (left)", motors[1]: f"{path}: motor {motors[1]} (right)"}
         self._bauds = tuple(bauds)
-        self._acceleration_raw, ramp_s = _profile(robot, acceleration_rad_s2)
+        self._acceleration_raw, ramp_s = _profile(robot, self._wheels, acceleration_rad_s2)
+        unit_rad_s2 = ACCELERATION_RAW_RAD_S2 / self._wheels.gear_ratio
+        # None where the motors go to a goal as fast as they can.
+        self._acceleration_m_s2 = self._acceleration_raw * unit_rad_s2 * self._wheels.radius_m or None
         self._watchdog = round(watchdog_s / servo.WATCHDOG_S)
         if not 1 <= self._watchdog <= servo.WATCHDOG_MOST:
             raise ValueError(f"the bus watchdog must be within {servo.WATCHDOG_MOST * servo.WATCHDOG_S:.2f} s")
         self._answer_limit_s = answer_limit_s
         self._exchange_limit_s = exchange_limit_s(answer_limit_s)
-        self._limits = robot.limits(robot.motor.velocity_limit_raw)
-        self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m)
+        self._limits = robot.limits if isinstance(robot, Body) else robot.limits(robot.motor.velocity_limit_raw)
+        self._odometry = Odometry(self._wheels.tick_m, self._wheels.separation_m)
         self._following = FollowingMonitor(FOLLOWING_LIMIT_S + ramp_s)
         self._host = host
         self._line: Port | None = None
@@ -123,14 +149,36 @@ class DynamixelBase:
             self._line = self._host.open_port(self._path, self._bauds[0])
             self._bus = DynamixelBus(self._line, self._names.__getitem__, self._answer_limit_s, self._host)
             self._find(self._line, self._bus)
-            self._pair = ServoPair(self._bus, self._names, self._exchange_limit_s, self._host)
-            limits_raw = [settings.velocity_limit_raw for settings in self._pair.settings.values()]
-            self._limits = self._robot.limits(min(limits_raw))
+            self._pair = ServoPair(
+                self._bus, self._names, self._mirrored, self._exchange_limit_s, self._host, self._drive_modes
+            )
+            self._check_model(self._pair)
+            self._limits = self._limits_of(self._pair)
             self._pair.release_torque()
             self._pair.set_up()
         except BaseException:
             self._release()
             raise
+
+    def _check_model(self, pair: ServoPair) -> None:
+        settings = next(iter(pair.settings.values()))
+        found = SERVOS[settings.model_number]
+        if self._model is not None and found != self._model:
+            raise WrongDeviceError(f"{self._path}: the motors are of model {found}, not {self._model}")
+
+    def _limits_of(self, pair: ServoPair) -> DriveLimits:
+        most_raw = min(settings.velocity_limit_raw for settings in pair.settings.values())
+        if isinstance(self._robot, Robot):
+            return self._robot.limits(most_raw)
+        wheel_m_s, limits = most_raw * self._wheels.raw_m_s, self._robot.limits
+        rotation_m_s = limits.angular_rad_s * self._wheels.separation_m / 2
+        if max(limits.linear_m_s, rotation_m_s) > wheel_m_s * _ROUNDED:
+            raise WrongDeviceError(
+                f"{self._path}: the motors turn the wheels with {wheel_m_s:.3f} m/s at most (velocity limit {most_raw} "
+                f"at address {servo.VELOCITY_LIMIT}), and robot.linear_m_s and robot.angular_rad_s need "
+                f"{max(limits.linear_m_s, rotation_m_s):.3f} m/s; make these smaller, or the limit larger"
+            )
+        return DriveLimits(limits.linear_m_s, limits.angular_rad_s, min(limits.wheel_m_s, wheel_m_s))
 
     def set_torque(self, is_on: bool) -> None:
         """Torque on and watchdogs armed, from a standstill; or both off, after a stop.
@@ -238,7 +286,7 @@ class DynamixelBase:
         goals = (0, 0)
         if self._is_torque_wanted:
             if not self._stops:
-                goals = wheel_goals(velocity, self._limits, self._robot.wheel_separation_m, self._robot.raw_m_s)
+                goals = wheel_goals(velocity, self._limits, self._wheels.separation_m, self._wheels.raw_m_s)
             if self._host.monotonic() > velocity.until_s:
                 goals = (0, 0)
             pair.command(goals)
@@ -305,28 +353,54 @@ class DynamixelBase:
             self._following.forget()
         elif self._following.is_blocked(goals, velocities_raw, time_s):
             faults |= {MotorFault.BLOCKED}
-        left_m_s, right_m_s = (raw * self._robot.raw_m_s for raw in velocities_raw)
+        left_m_s, right_m_s = (raw * self._wheels.raw_m_s for raw in velocities_raw)
         return DriveReading(
             time_s=time_s,
             pose=self._odometry.pose,
-            velocity=body_velocity(left_m_s, right_m_s, self._robot.wheel_separation_m),
+            velocity=body_velocity(left_m_s, right_m_s, self._wheels.separation_m),
             wheels_m_s=(left_m_s, right_m_s),
             is_torque_on=self._is_torque_on,
             faults=faults,
-            acceleration_m_s2=self._acceleration_raw * ACCELERATION_RAW_RAD_S2 * self._robot.wheel_radius_m or None,
+            acceleration_m_s2=self._acceleration_m_s2,
             battery_v=min(one.voltage_v for one in measured),
             temperature_c=max(one.temperature_c for one in measured),
             goals_m_s=self._goals_m_s(goals) if self._is_torque_wanted else None,
             wheels_m=self._odometry.wheels_m,
-            wheel_radius_m=self._robot.wheel_radius_m,
+            wheel_radius_m=self._wheels.radius_m,
+            pose_covariance=self._odometry.covariance,
+            velocity_variances=velocity_variances(left_m_s, right_m_s, self._wheels.raw_m_s, self._wheels.separation_m),
         )
 
     def _goals_m_s(self, goals: tuple[int, int]) -> tuple[float, float]:
         left, right = goals
-        return left * self._robot.raw_m_s, right * self._robot.raw_m_s
+        return left * self._wheels.raw_m_s, right * self._wheels.raw_m_s
 
 
-def _profile(robot: Robot, acceleration_rad_s2: float | None) -> tuple[int, float]:
+def _wheels_of(robot: Robot | Body, radius_m: float | None, gear_ratio: float) -> Wheels:
+    """The wheels of a robot.
+
+    Raises:
+        ValueError: They are not known, or impossible.
+    """
+    for name, value, least, most in (
+        ("wheel_radius_m", radius_m, 0.005, 1.0),
+        ("gear_ratio", gear_ratio, 0.01, 100.0),
+    ):
+        if value is not None and not least <= value <= most:
+            raise ValueError(f"{name} must be from {least:g} to {most:g}, and is {value:g}")
+    if isinstance(robot, Robot):
+        if radius_m is not None or gear_ratio != 1.0:
+            raise ValueError(
+                f"wheel_radius_m and gear_ratio are for a robot of one's own; those of a {robot.name} are known "
+                "(write wheel_separation_m, linear_m_s and angular_rad_s below 'robot')"
+            )
+        return robot.wheels
+    if radius_m is None:
+        raise ValueError("wheel_radius_m is missing: the radius of the wheels of a robot of one's own, in metres")
+    return Wheels(radius_m, robot.wheel_separation_m, gear_ratio)
+
+
+def _profile(robot: Robot | Body, wheels: Wheels, acceleration_rad_s2: float | None) -> tuple[int, float]:
     """The profile acceleration, and how long a wheel takes with it from one full speed to the other.
 
     Raises:
@@ -334,11 +408,12 @@ def _profile(robot: Robot, acceleration_rad_s2: float | None) -> tuple[int, floa
     """
     if acceleration_rad_s2 is None:
         return 0, 0.0
-    raw = round(acceleration_rad_s2 / ACCELERATION_RAW_RAD_S2)
+    unit_rad_s2 = ACCELERATION_RAW_RAD_S2 / wheels.gear_ratio
+    raw = round(acceleration_rad_s2 / unit_rad_s2)
     if not 1 <= raw <= servo.PROFILE_MOST:
         raise ValueError(
-            f"the acceleration of a wheel must be between {ACCELERATION_RAW_RAD_S2:.2f} "
-            f"and {servo.PROFILE_MOST * ACCELERATION_RAW_RAD_S2:.0f} rad/s2"
+            f"the acceleration of a wheel must be between {unit_rad_s2:.2f} "
+            f"and {servo.PROFILE_MOST * unit_rad_s2:.0f} rad/s2"
         )
-    fastest_rad_s = robot.linear_m_s / robot.wheel_radius_m
-    return raw, 2 * fastest_rad_s / (raw * ACCELERATION_RAW_RAD_S2)
+    fastest_rad_s = robot.linear_m_s / wheels.radius_m
+    return raw, 2 * fastest_rad_s / (raw * unit_rad_s2)

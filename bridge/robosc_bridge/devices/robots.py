@@ -37,7 +37,14 @@ class Motor:
 
 XL430_W250 = Motor("XL430-W250", 1060, 265, 6.5)
 XM430_W210 = Motor("XM430-W210", 1030, 330, 10.0)
-MOTORS = {motor.model_number: motor for motor in (XL430_W250, XM430_W210)}
+SERVOS = {
+    1000: "XH430-W350", 1001: "XD430-T350", 1010: "XH430-W210", 1011: "XD430-T210", 1020: "XM430-W350",
+    1030: "XM430-W210", 1040: "XH430-V350", 1050: "XH430-V210", 1060: "XL430-W250", 1070: "XC430-W150",
+    1080: "XC430-W240", 1090: "2XL430-W250", 1100: "XH540-W270", 1110: "XH540-W150", 1120: "XM540-W270",
+    1130: "XM540-W150", 1160: "2XC430-W250",
+}  # fmt: skip
+"""Servos that can be wheels, by model number: those of the X series whose control tables have what is needed in one
+place and one unit (dynamixel-sdk 4.1.0, `control_table/*.model`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +86,31 @@ class Body:
 
 
 @dataclass(frozen=True, slots=True)
+class Wheels:
+    """Two wheels, each driven by a servo.
+
+    Attributes:
+        radius_m: Radius of both, in metres.
+        separation_m: Distance between their middles, in metres.
+        gear_ratio: Revolutions of a servo for one of its wheel.
+    """
+
+    radius_m: float
+    separation_m: float
+    gear_ratio: float = 1.0
+
+    @property
+    def raw_m_s(self) -> float:
+        """Speed of a wheel in one unit of its servo's velocity."""
+        return RAW_RPM * 2 * math.pi / 60 * self.radius_m / self.gear_ratio
+
+    @property
+    def tick_m(self) -> float:
+        """Way of a wheel in one tick of its servo's encoder."""
+        return 2 * math.pi / TICKS_PER_TURN * self.radius_m / self.gear_ratio
+
+
+@dataclass(frozen=True, slots=True)
 class Robot:
     """A differential-drive robot.
 
@@ -115,6 +147,11 @@ class Robot:
     def tick_m(self) -> float:
         """Way of a wheel in one tick of its encoder."""
         return 2 * math.pi / TICKS_PER_TURN * self.wheel_radius_m
+
+    @property
+    def wheels(self) -> "Wheels":
+        """Wheels of the robot."""
+        return Wheels(self.wheel_radius_m, self.wheel_separation_m)
 
     @property
     def body(self) -> Body:

@@ -34,8 +34,10 @@ class ServoPair:
     Args:
         bus: Bus that they are on.
         names: Name of each in messages, by id: the left one, then the right one.
+        are_mirrored: For each, True if it is mounted so that its own positive direction is backward.
         exchange_limit_s: Longest time for a few requests.
         host: Host whose time it uses.
+        drive_modes: Drive mode that each is to have, written where it has another one; None: as they are.
 
     Attributes:
         motors: Ids of the left and the right one.
@@ -48,15 +50,26 @@ class ServoPair:
         WrongDeviceError: They are no such motors, not alike, or set to what cannot be driven.
     """
 
-    def __init__(self, bus: DynamixelBus, names: Mapping[int, str], exchange_limit_s: float, host: Host) -> None:
+    def __init__(
+        self,
+        bus: DynamixelBus,
+        names: Mapping[int, str],
+        are_mirrored: tuple[bool, bool],
+        exchange_limit_s: float,
+        host: Host,
+        drive_modes: tuple[int, int] | None = None,
+    ) -> None:
         self._bus = bus
         self._host = host
         self._names = names
         self._limit_s = exchange_limit_s
         self.motors: tuple[int, ...] = tuple(names)
         self.hardware: dict[int, frozenset[MotorFault]] = {motor: frozenset() for motor in names}
+        if drive_modes is not None:
+            self._write_modes(drive_modes)
         self.settings: dict[int, ServoSettings] = {
-            motor: read_settings(bus, motor, names[motor], motor == self.motors[1], exchange_limit_s) for motor in names
+            motor: read_settings(bus, motor, names[motor], is_mirrored, exchange_limit_s)
+            for motor, is_mirrored in zip(names, are_mirrored, strict=True)
         }
         left, right = self.settings.values()
         if left.model_number != right.model_number:
@@ -64,6 +77,16 @@ class ServoPair:
                 f"{names[self.motors[0]]} is of model {left.model_number}, {names[self.motors[1]]} of "
                 f"{right.model_number}; they must be alike"
             )
+
+    def _write_modes(self, drive_modes: tuple[int, int]) -> None:
+        for motor, mode in zip(self.motors, drive_modes, strict=True):
+            self._bus.begin(self._limit_s)
+            # What came before may have been an answer to another session.
+            self._bus.settle(motor)
+            if self._bus.read(motor, servo.DRIVE_MODE, 1).data[0] != mode:
+                # It lets nothing of its EEPROM be written while it has torque, and must not drive meanwhile.
+                self._bus.write(motor, servo.TORQUE, b"\0")
+                self._bus.write(motor, servo.DRIVE_MODE, bytes((mode,)))
 
     def set_up(self) -> None:
         """Do what can be done with torque off, and lasts until they restart.

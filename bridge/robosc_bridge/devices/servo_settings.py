@@ -4,7 +4,7 @@ import contextlib
 from dataclasses import dataclass
 
 from robosc_bridge.devices.dynamixel_bus import DynamixelBus, RefusedError
-from robosc_bridge.devices.robots import MOTORS
+from robosc_bridge.devices.robots import SERVOS
 from robosc_bridge.errors import WrongDeviceError
 from robosc_bridge.protocol import servo
 
@@ -17,7 +17,7 @@ class ServoSettings:
     """Settings that a servo reported.
 
     Attributes:
-        model_number: A key of `MOTORS`.
+        model_number: A key of `SERVOS`.
         sign: Sign of the robot's forward direction, in what the servo calls positive.
         operating_mode: `VELOCITY_MODE` or another, which must be changed.
         velocity_limit_raw: Limit of its goal velocity.
@@ -38,7 +38,7 @@ def read_settings(bus: DynamixelBus, device: int, name: str, is_mirrored: bool, 
         bus: Bus that it is on.
         device: Its id.
         name: Name of it in messages.
-        is_mirrored: True if it is mounted the other way round, so that the factory has set it to reverse.
+        is_mirrored: True if it is mounted so that its own positive direction is backward.
         limit_s: Longest time for each half of it.
 
     Raises:
@@ -50,8 +50,8 @@ def read_settings(bus: DynamixelBus, device: int, name: str, is_mirrored: bool, 
     model_number, firmware = bus.ping(device)
     # What came before may have been an answer to another session.
     bus.settle(device)
-    if model_number not in MOTORS:
-        known = ", ".join(f"{motor.name} ({number})" for number, motor in sorted(MOTORS.items()))
+    if model_number not in SERVOS:
+        known = ", ".join(f"{model} ({number})" for number, model in sorted(SERVOS.items()))
         raise WrongDeviceError(f"{name} is of model {model_number}; what can be driven is {known}")
     if firmware < servo.WATCHDOG_FIRMWARE:
         raise WrongDeviceError(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from dynamixel_sdk import BROADCAST_ID, INST_PING
 
 from robosc_bridge.devices.dynamixel_bus import DynamixelBus, RefusedError
-from robosc_bridge.devices.robots import MOTORS
+from robosc_bridge.devices.robots import SERVOS
 from robosc_bridge.devices.servo_settings import read_settings
 from robosc_bridge.errors import DeviceError, WrongDeviceError
 from robosc_bridge.host import Host, Port
@@ -53,8 +53,7 @@ class FoundServo:
     @property
     def name(self) -> str:
         """Name of the model."""
-        motor = MOTORS.get(self.model_number)
-        return f"model {self.model_number}" if motor is None else motor.name
+        return SERVOS.get(self.model_number, f"model {self.model_number}")
 
 
 def broadcast_ping(line: Port, host: Host) -> list[tuple[int, int, int]]:

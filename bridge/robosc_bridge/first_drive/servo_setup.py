@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from robosc_bridge.devices.dynamixel_bus import DynamixelBus
-from robosc_bridge.devices.robots import MOTORS
+from robosc_bridge.devices.robots import SERVOS
 from robosc_bridge.errors import DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
 from robosc_bridge.first_drive.servo_bus import BAUD, BAUD_NUMBERS, BAUDS, ID, LIMIT_S, broadcast_ping
 from robosc_bridge.host import Host, Port
@@ -95,7 +95,7 @@ class ServoSetup:
             if len(wanted) > 1:
                 ids = ", ".join(map(str, wanted))
                 raise WrongDeviceError(f"{self._path}: servos {ids} answer; name one with --id, or unplug the others")
-            if models[wanted[0]] not in MOTORS:
+            if models[wanted[0]] not in SERVOS:
                 raise WrongDeviceError(f"{self._path}: servo {wanted[0]} is of model {models[wanted[0]]}, no wheel")
             self._bus = self._new_bus()
             self.device, self._others = wanted[0], frozenset(models) - {wanted[0]}

@@ -95,7 +95,7 @@ def test_what_a_drive_base_has_is_declared_by_its_driver(monkeypatch: pytest.Mon
     assert features_of("opencr") == DriverFeatures(
         PANEL, has_imu=True, needs_turtlebot3=True, battery_v=PACK_3S_V, has_own_controls=True
     )
-    assert features_of("dynamixel") == DriverFeatures(needs_turtlebot3=True)
+    assert features_of("dynamixel") == DriverFeatures(knows_turtlebot3=True)
     assert features_of("mavlink-rover") == DriverFeatures(has_imu=True, torque_on_s=8.0, astray_s=2.0, astray_m_s=0.1)
     assert features_of("plug") is None
     # A plug-in declares its own, or none.

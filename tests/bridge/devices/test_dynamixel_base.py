@@ -113,7 +113,7 @@ def test_drive_modes_other_than_the_factorys_are_respected(modes: tuple[int, int
         ("startup configuration", 1, r"motor 1 \(left\) would switch torque on by itself, .* set address 60 to 0"),
         ("startup configuration", 2, r"motor 1 \(left\) would .* restore an old goal, .* set address 60 to 0"),
         ("shutdown", 0, r"motor 1 \(left\) would not protect itself .* set address 63 to 52"),
-        ("model number", 1200, r"motor 1 \(left\) is of model 1200; what can be driven is XM430-W210 \(1030\), XL430"),
+        ("model number", 1200, r"motor 1 \(left\) is of model 1200; what can be driven is XH430.*XL430-W250 \(1060\)"),
         ("model number", 1030, r"motor 1 \(left\) is of model 1030, .*motor 2 \(right\) of 1060; they must be alike"),
         ("firmware version", 37, r"motor 1 \(left\) has firmware 37, without a bus watchdog"),
     ],

@@ -2,11 +2,12 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc_bridge.devices.odometry import Odometry
+from robosc_bridge.devices.odometry import Odometry, Rotation, velocity_variances
 from robosc_bridge.devices.robots import BURGER
 
 STEPS = st.lists(st.tuples(st.integers(-400, 400), st.integers(-400, 400)), max_size=30)
@@ -103,3 +104,62 @@ def test_the_ways_of_the_wheels_are_what_they_have_rolled(steps: list[tuple[int,
     assert found.wheels_m == pytest.approx((at[0] * BURGER.tick_m, at[1] * BURGER.tick_m), abs=1e-9)
     # A motor that has restarted counts anew, and has not rolled.
     assert found.rebased().advanced(7, 7).wheels_m == found.wheels_m
+
+
+def _twin(steps: list[tuple[int, int]]) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """Covariance by matrices of numerical derivatives: of x, y and heading after a step, by these and by both ways."""
+    covariance, place = np.zeros((3, 3)), np.zeros(3)
+
+    def moved(values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        x_m, y_m, heading_rad, left_m, right_m = values
+        way_m, rotation_rad = (left_m + right_m) / 2, (right_m - left_m) / BURGER.wheel_separation_m
+        middle_rad = heading_rad + rotation_rad / 2
+        cosine, sine = np.cos(middle_rad), np.sin(middle_rad)
+        return np.array([x_m + way_m * cosine, y_m + way_m * sine, heading_rad + rotation_rad])
+
+    for step in steps:
+        ways_m = np.array(step) * BURGER.tick_m
+        values = np.concatenate((place, ways_m))
+        derivatives = np.array(
+            [(moved(values + change) - moved(values - change)) / 2e-6 for change in np.eye(5) * 1e-6]
+        ).T
+        before = np.zeros((5, 5))
+        before[:3, :3] = covariance
+        before[3:, 3:] = np.diag(2e-4 * np.abs(ways_m))
+        covariance = derivatives @ before @ derivatives.T
+        place = moved(values)
+    return covariance
+
+
+@given(STEPS)
+def test_the_covariance_is_that_of_its_slow_twin(steps: list[tuple[int, int]]) -> None:
+    found, at = _odometry().advanced(0, 0), [0, 0]
+    for step in steps:
+        at = [before + change for before, change in zip(at, step, strict=True)]
+        found = found.advanced(at[0], at[1])
+    assert np.array(found.covariance).reshape(3, 3) == pytest.approx(_twin(steps), rel=1e-4, abs=1e-9)
+
+
+def test_the_rotation_is_the_mean_weighed_by_the_variances() -> None:
+    wheels_rad = 200 * BURGER.tick_m / BURGER.wheel_separation_m
+    wheels_rad2 = 2e-4 * 200 * BURGER.tick_m / BURGER.wheel_separation_m**2
+    start = _odometry().advanced(0, 0)
+    for variance in (0.0, wheels_rad2 / 9, wheels_rad2, 1e9):
+        found = start.advanced(-100, 100, Rotation(0.02, variance))
+        weight = wheels_rad2 / (wheels_rad2 + variance)
+        assert found.pose.heading_rad == pytest.approx(weight * 0.02 + (1 - weight) * wheels_rad)
+        # That of the mean of two independent measurements.
+        assert found.covariance[8] == pytest.approx(wheels_rad2 * (1 - weight), abs=1e-15)
+    assert start.advanced(-100, 100).pose.heading_rad == pytest.approx(wheels_rad)
+
+
+def test_where_the_wheels_stand_no_rotation_is_believed() -> None:
+    found = _odometry().advanced(0, 0).advanced(0, 0, Rotation(0.3, 1e-12))
+    assert found.pose.heading_rad == 0.0
+    assert found.covariance == (0.0,) * 9
+
+
+def test_velocities_vary_by_a_unit_at_least_and_by_their_speed() -> None:
+    still, fast = velocity_variances(0.0, 0.0, 0.001, 0.2), velocity_variances(0.2, -0.2, 0.001, 0.2)
+    assert still == pytest.approx((5e-7, 5e-5))
+    assert fast == pytest.approx((5e-7 + 4e-6, 5e-5 + 4e-4))

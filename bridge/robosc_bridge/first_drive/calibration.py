@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robosc_bridge.devices.interface import BINS, STANDSTILL, DriveBase, Pose, RangeScanner
+from robosc_bridge.devices.interface import BINS, STANDSTILL, DriveBase, RangeScanner
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.host import Host
 
 LEAST_WAY_M = 0.3
 LEAST_ROTATION_RAD = math.radians(300.0)
 MOST_CHANGE = 0.25
-"""Share by which a measured figure may differ from the one that the robot has by its name; more is a slip."""
+"""Share by which a measured figure may differ from the one that the robot is configured with; more is a slip."""
 
 _PERIOD_S = 0.02
 _STRAIGHT_RAD = math.radians(10.0)
@@ -36,7 +36,7 @@ class CalibrationError(BridgeError):
 
 @dataclass(frozen=True)
 class Way:
-    """A way that the odometry has seen.
+    """A way as the wheels have rolled it, whatever an inertial sensor says.
 
     Attributes:
         forward_m: Distance, backward below zero.
@@ -46,30 +46,30 @@ class Way:
     forward_m: float = 0.0
     rotation_rad: float = 0.0
 
-    def after(self, before: Pose, now: Pose) -> "Way":
-        """Return the way with another step."""
-        heading_rad = before.heading_rad
-        step_m = (now.x_m - before.x_m) * math.cos(heading_rad) + (now.y_m - before.y_m) * math.sin(heading_rad)
-        rotation_rad = math.remainder(now.heading_rad - heading_rad, 2 * math.pi)
-        return Way(self.forward_m + step_m, self.rotation_rad + rotation_rad)
 
-
-def follow(base: DriveBase, host: Host, is_over: Callable[[], bool]) -> Way:
+def follow(base: DriveBase, host: Host, is_over: Callable[[], bool], separation_m: float) -> Way:
     """Return the way on which a robot is moved by hand until something is over; its torque is off.
 
+    Args:
+        base: Drive base of the robot, open.
+        host: Host whose time is used.
+        is_over: Function that returns whether the way is over.
+        separation_m: Distance between the wheels that rotations go by.
+
     Raises:
-        BridgeError: The drive base is lost, or its torque is on.
+        BridgeError: The drive base is lost, does not report the ways of its wheels, or its torque is on.
     """
-    way, before = Way(), None
+    begin: tuple[float, float] | None = None
     while True:
         reading = base.exchange(STANDSTILL)
         if reading.is_torque_on:
             raise CalibrationError("the motors hold: torque must be off")
-        if before is not None:
-            way = way.after(before, reading.pose)
-        before = reading.pose
+        if reading.wheels_m is None:
+            raise CalibrationError("the drive base does not report the ways of its wheels")
+        begin = begin or reading.wheels_m
         if is_over():
-            return way
+            left_m, right_m = (now_m - before_m for now_m, before_m in zip(reading.wheels_m, begin, strict=True))
+            return Way((left_m + right_m) / 2, (right_m - left_m) / separation_m)
         host.sleep(_PERIOD_S)
 
 
@@ -77,7 +77,7 @@ def wheel_radius_m(way: Way, measured_m: float, radius_m: float) -> float:
     """Return the radius of the wheels.
 
     Args:
-        way: Way as the odometry has seen it, with the radius below.
+        way: Way as the wheels have rolled it, with the radius below.
         measured_m: The same as it was measured.
         radius_m: Radius that the odometry went by.
 
@@ -96,7 +96,7 @@ def wheel_separation_m(way: Way, revolutions: int, separation_m: float, radius_f
     """Return the distance between the wheels.
 
     Args:
-        way: Way as the odometry has seen it.
+        way: Way as the wheels have rolled it.
         revolutions: Number of revolutions that it was turned by, back to the mark.
         separation_m: Distance that the odometry went by.
         radius_factor: Measured radius of the wheels by the one that the odometry went by.
@@ -115,8 +115,8 @@ def wheel_separation_m(way: Way, revolutions: int, separation_m: float, radius_f
 def _plausible(found_m: float, usual_m: float, name: str) -> float:
     if abs(found_m / usual_m - 1) > MOST_CHANGE:
         raise CalibrationError(
-            f"the {name} would be {found_m:.4f} m, and is {usual_m:.4f} m by the robot's name: measure again, and look "
-            "whether both wheels were turned"
+            f"the {name} would be {found_m:.4f} m, and is {usual_m:.4f} m by its configuration: measure again, and "
+            "see whether both wheels were turned"
         )
     return found_m
 

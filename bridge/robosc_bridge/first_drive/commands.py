@@ -213,10 +213,7 @@ def _calibrate(arguments: argparse.Namespace, host: Host = SYSTEM_HOST, ask: Ask
 
 def _by_hand(configuration: Configuration, host: Host, ask: Ask, begin: str, end: str) -> calibration.Way:
     """The way on which a person moves the robot between two answers."""
-    if configuration.drive.driver not in ("opencr", "dynamixel"):
-        raise CalibrationError(
-            "only the wheels of `opencr` and `dynamixel` are measured; a rover's autopilot has its own"
-        )
+    _, separation_m = _wheels(configuration)
     base = drive_base(configuration, host)
     base.open()
     try:
@@ -229,7 +226,7 @@ def _by_hand(configuration: Configuration, host: Host, ask: Ask, begin: str, end
 
         waiting = host.thread(wait, "person")
         waiting.start()
-        way = calibration.follow(base, host, is_over.is_set)
+        way = calibration.follow(base, host, is_over.is_set, separation_m)
         waiting.join()
         return way
     finally:
@@ -249,10 +246,17 @@ def _number(ask: Ask, question: str) -> float:
 
 def _wheels(configuration: Configuration) -> tuple[float, float]:
     """Radius of the wheels and distance between them, as the odometry goes by."""
-    known = ROBOTS[configuration.robot] if isinstance(configuration.robot, str) else None
-    if known is None:
-        raise CalibrationError("a robot with a name is needed: the odometry must go by known figures")
-    return known.wheel_radius_m, known.wheel_separation_m
+    if configuration.drive.driver not in ("opencr", "dynamixel"):
+        raise CalibrationError(
+            "only the wheels of `opencr` and `dynamixel` are measured; a rover's autopilot has its own"
+        )
+    robot = configuration.robot
+    if isinstance(robot, str):
+        return ROBOTS[robot].wheel_radius_m, ROBOTS[robot].wheel_separation_m
+    radius_m = configuration.drive.options.get("wheel_radius_m")
+    if not isinstance(radius_m, int | float):
+        raise CalibrationError("drive.options.wheel_radius_m is missing: write what the wheels measure about")
+    return float(radius_m), robot.wheel_separation_m
 
 
 def _radius(configuration: Configuration, host: Host, ask: Ask, factor: float) -> dict[str, float]:

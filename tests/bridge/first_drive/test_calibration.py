@@ -4,14 +4,13 @@ import json
 import math
 from argparse import Namespace
 from collections.abc import Callable, Iterator
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc_bridge.devices.interface import BINS, Pose
+from robosc_bridge.devices.interface import BINS
 from robosc_bridge.first_drive import commands
 from robosc_bridge.first_drive.calibration import (
     CalibrationError,
@@ -163,13 +162,19 @@ def test_a_rotation_that_says_nothing_of_the_wheels_is_refused(way: Way, problem
         wheel_separation_m(way, 5, SEPARATION_M)
 
 
-def test_a_way_is_followed_across_the_seam_of_headings_and_backward() -> None:
-    way = Way()
-    poses = [Pose(0.0, 0.0, 3.0), Pose(-0.1, 0.014, 3.1), Pose(-0.2, 0.02, -3.1), Pose(-0.1, 0.02, -3.1)]
-    for before, now in pairwise(poses):
-        way = way.after(before, now)
-    assert way.rotation_rad == pytest.approx(2 * math.pi - 6.1)
-    assert way.forward_m == pytest.approx(0.1, abs=0.01)
+def test_a_robot_of_ones_own_goes_by_its_options(
+    host: VirtualHost, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with SimulatedTurtleBot3("burger", "dynamixel", clock=host) as robot:
+        person = Person(host, robot, -2.0 / 0.032, -2.0 / 0.032, "2")
+        file = tmp_path / "bridge.yaml"
+        file.write_text(
+            "robot: {linear_m_s: 0.2, angular_rad_s: 1, wheel_separation_m: 0.16}\n"
+            f"drive: {{driver: dynamixel, port: {robot.base_path}, options: {{wheel_radius_m: 0.033}}}}\n"
+            "channels: {}\n"
+        )
+        assert calibrated("wheel-radius", file, host, person) == 0
+    assert json.loads(capsys.readouterr().out)["wheel_radius_m"] == pytest.approx(0.032, abs=2e-5)
 
 
 @pytest.mark.parametrize(
@@ -181,12 +186,12 @@ def test_a_way_is_followed_across_the_seam_of_headings_and_backward() -> None:
         ),
         (
             "robot: {linear_m_s: 1, angular_rad_s: 1, wheel_separation_m: 0.3}\n"
-            "drive: {driver: mavlink-rover, port: /dev/x}\nchannels: {}\n",
-            "a robot with a name is needed",
+            "drive: {driver: dynamixel, port: /dev/x}\nchannels: {}\n",
+            "drive.options.wheel_radius_m is missing",
         ),
     ],
 )
-def test_robots_whose_odometry_is_another_s_are_refused(
+def test_robots_whose_wheels_are_not_known_are_refused(
     text: str, problem: str, host: VirtualHost, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "bridge.yaml"

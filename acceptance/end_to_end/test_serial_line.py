@@ -7,6 +7,8 @@ import pytest
 
 from robosc.event_logs import read_log
 from robosc_experiments.line import run_line
+from robosc_simulated import load_scene
+from robosc_simulated import scene as scene_module
 
 pytestmark = pytest.mark.real_time
 
@@ -30,3 +32,14 @@ def test_it_keeps_to_the_line_and_stands_still_whenever_it_must(
     for what in ("for the box on the line", "after the stop button", "after the operator's stop"):
         assert any(text.startswith(f"stands {what}") for text in said), what
     record_property(f"most off the line of {scene}", f"{outcome.figures['aside_most_m'] * 1e3:.0f} mm")
+
+
+def test_it_does_so_on_a_bad_day(tmp_path: Path) -> None:
+    oval = (Path(scene_module.__file__).parent / "scenes" / "line-oval.yaml").read_text(encoding="utf-8")
+    scene = tmp_path / "oval.yaml"
+    scene.write_text(f"{oval}\nprofile: bad-day\n", encoding="utf-8")
+    assert load_scene(scene).profile == "bad-day"
+    outcome = run_line(tmp_path / "run", scene, speed=2.0, say=lambda text: None)
+    assert outcome.faults == ()
+    assert outcome.figures["aside_most_m"] < 0.03
+    assert outcome.figures["collisions"] == 0

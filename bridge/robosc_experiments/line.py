@@ -5,6 +5,7 @@ operator stops it from elsewhere. Each time it must stand still until that has e
 """
 
 import math
+import time
 from pathlib import Path
 
 from robosc.model.structure import Deployment
@@ -31,6 +32,7 @@ CHANNELS = {
     "/emergency_stop/resume": "{channel: emergency_stop, event: resume}",
     "/cmd_vel": "{channel: drive}",
 }
+_PRESSED_S = 0.3
 SKILLS = {"emergency_stop": "stop_buttons: [button_1], resume_buttons: [button_2]", "line": "timeout_s: 0.5"}
 
 BOX = "box"
@@ -87,13 +89,19 @@ def _play(rig: Rig, watch: Watch) -> None:
         tell(f"obstacle {BOX} back")
         watch.stand("for the box on the line", lambda: tell(f"obstacle {BOX} away"), is_told=False)
         watch.drive("without the box")
-        tell("press button_1")
-        watch.stand("after the stop button", lambda: (tell("let button_1"), tell("press button_2")))
+        _click(rig, "button_1")
+        watch.stand("after the stop button", lambda: _click(rig, "button_2"))
         watch.drive("after the other button")
-        tell("let button_2")
         operator.stop()
         watch.stand("after the operator's stop", lambda: operator.request(RequestedCommand.RESUME))
         watch.drive("when the operator lets it go on")
+
+
+def _click(rig: Rig, button: str) -> None:
+    """Press a button and let it go: held for three seconds, it lets OpenCR drive by itself."""
+    rig.simulator.tell(f"press {button}")
+    time.sleep(_PRESSED_S)
+    rig.simulator.tell(f"let {button}")
 
 
 def line_figures(scene: Scene, motion: Motion) -> dict[str, float]:

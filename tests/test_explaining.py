@@ -1,14 +1,12 @@
 """The page about explanations, played as a reader plays it; and every key that it should name."""
 
-import os
-import sys
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import pytest
 
 from robosc.explanation import explanations
-from support.tutorial import Shell, play, read_chapters
+from support.tutorial import play_page
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = (DOCS / "explaining.md").read_text(encoding="utf-8")
@@ -16,15 +14,7 @@ PAGE = (DOCS / "explaining.md").read_text(encoding="utf-8")
 
 def test_the_page_is_true(tmp_path: Path) -> None:
     pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
-    folder = tmp_path / "robots"
-    folder.mkdir()
-    inherited = {name: os.environ[name] for name in ("PYTHONPATH", "TMPDIR") if name in os.environ}
-    shell = Shell(tmp_path / "home", folder, {**inherited, "PATH": path, "LANG": "C.UTF-8"})
-    steps = [step for chapter in read_chapters(PAGE) for step in chapter.steps]
-    assert len(steps) > 5
-    for step in steps:
-        play(step, shell)
+    assert play_page(PAGE, tmp_path) > 5
 
 
 def test_every_key_is_explained() -> None:

@@ -1,6 +1,6 @@
 """Conversion of responses to the values of the core, so that client and `robosc` print and write the same."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -67,12 +67,9 @@ def decoded(content: bytes) -> Supervisor:
     """The supervisor in a file that a server has made.
 
     Raises:
-        ServiceError: It is no valid one.
+        ServiceError: It is not valid.
     """
-    try:
-        return decode(content)
-    except InvalidSupervisorError as error:
-        raise ServiceError(f"the server's supervisor is refused: {error}") from error
+    return _decoded(content, decode)
 
 
 def automata_synthesis_of(found: Synthesis, model: LoadedAutomata) -> SystemSynthesis:
@@ -93,10 +90,14 @@ def automata_supervisor_of(content: bytes) -> SystemSupervisor:
     """The supervisor of automata in a file that a server has made.
 
     Raises:
-        ServiceError: It is no valid one.
+        ServiceError: It is not valid.
     """
+    return _decoded(content, decode_system)
+
+
+def _decoded[S](content: bytes, decoder: Callable[[bytes], S]) -> S:
     try:
-        return decode_system(content)
+        return decoder(content)
     except InvalidSupervisorError as error:
         raise ServiceError(f"the server's supervisor is refused: {error}") from error
 

@@ -87,14 +87,18 @@ def is_compatible(one: CifType, other: CifType) -> bool:
     return all(is_compatible(a, b) for a, b in zip(one.parts, other.parts, strict=True))
 
 
+def _related(value: CifType, target: CifType) -> bool | None:
+    """Return True if a value may stand for another whatever the ranges, False if never; None: the ranges decide."""
+    if (value.kind, target.kind) == ("int", "real") or "unknown" in (value.kind, target.kind):
+        return True
+    return None if is_compatible(value, target) else False
+
+
 def fits(value: CifType, target: CifType) -> bool:
     """Return True if every value of a type is one of another: what constants and arguments need."""
-    if target.kind == "real" and value.kind == "int":
-        return True
-    if "unknown" in (value.kind, target.kind):
-        return True
-    if not is_compatible(value, target):
-        return False
+    related = _related(value, target)
+    if related is not None:
+        return related
     if value.kind in ("int", "list") and target.low is not None:
         if value.kind == "int" or value.low is not None:
             low, high = value.range
@@ -107,12 +111,9 @@ def fits(value: CifType, target: CifType) -> bool:
 
 def overlaps(value: CifType, target: CifType) -> bool:
     """Return True if an expression of one type may be assigned to a variable of another."""
-    if target.kind == "real" and value.kind == "int":
-        return True
-    if "unknown" in (value.kind, target.kind):
-        return True
-    if not is_compatible(value, target):
-        return False
+    related = _related(value, target)
+    if related is not None:
+        return related
     if value.kind == "int":
         return max(value.range[0], target.range[0]) <= min(value.range[1], target.range[1])
     return all(overlaps(a, b) for a, b in zip(value.parts, target.parts, strict=True))

@@ -30,6 +30,12 @@ def given_path(text: str) -> Path:
     return Path(text)
 
 
+def add_log_arguments(parser: argparse.ArgumentParser, output_help: str) -> None:
+    """Add the event log that a command reads, and the file that it writes."""
+    parser.add_argument("log", type=given_path, metavar="LOG", help="the event log, a file of JSON Lines")
+    parser.add_argument("-o", "--output", type=given_path, metavar="FILE", help=output_help)
+
+
 def suggest(action: argparse.Action, values: Callable[[], Iterable[str]]) -> None:
     """Tell what a shell offers for the value of an argument that takes other values, too.
 

@@ -5,7 +5,7 @@ import json
 import sys
 from pathlib import Path
 
-from robosc.cli.arguments import given_path
+from robosc.cli.arguments import add_log_arguments, given_path
 from robosc.cli.output import ExitCode, UsageError, print_json
 from robosc.source import visible
 
@@ -22,14 +22,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser = commands.add_parser(
         "convert-log", help="convert an event log for Foxglove and ros2 bag (MCAP)", description=_DESCRIPTION
     )
-    parser.add_argument("log", type=given_path, metavar="LOG", help="the event log, a file of JSON Lines")
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=given_path,
-        metavar="FILE",
-        help="output file, .mcap (default: the log's name with .mcap, beside it)",
-    )
+    add_log_arguments(parser, "output file, .mcap (default: the log's name with .mcap, beside it)")
     parser.add_argument(
         "--motion",
         type=given_path,

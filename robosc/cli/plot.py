@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robosc.cli.arguments import given_path
+from robosc.cli.arguments import add_log_arguments, given_path
 from robosc.cli.output import ExitCode, UsageError, print_json
 from robosc.source import visible
 
@@ -27,13 +27,9 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser = commands.add_parser(
         "plot", help="draw an event log: states, events, variables over time", description=_DESCRIPTION
     )
-    parser.add_argument("log", type=given_path, metavar="LOG", help="the event log, a file of JSON Lines")
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=given_path,
-        metavar="FILE",
-        help="output file: .png or .svg for a picture, .html for a page that can be zoomed and needs no network "
+    add_log_arguments(
+        parser,
+        "output file: .png or .svg for a picture, .html for a page that can be zoomed and needs no network "
         "(default: the log's name with .png, beside it)",
     )
     parser.add_argument(

@@ -4,8 +4,7 @@ It reads files and starts programs with a time limit; it opens no serial line, s
 beyond Python's own library.
 """
 
-from robosc.doctor.checks import Purpose, examine, is_ready
-from robosc.doctor.findings import Finding, Grade
+from robosc.doctor.checks import Finding, Grade, Purpose, examine, is_ready
 from robosc.doctor.machine import Machine, Output
 
 __all__ = ["Finding", "Grade", "Machine", "Output", "Purpose", "examine", "is_ready"]

@@ -2,10 +2,10 @@
 
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from enum import StrEnum
 
 from robosc.dd_modules import has_cudd
-from robosc.doctor.findings import Finding, Grade
 from robosc.doctor.machine import Machine
 from robosc.kernel import kernel_problem
 from robosc.python_versions import FIX, unsupported
@@ -16,6 +16,33 @@ _SERVER_S = 20.0
 _APT = "sudo apt install "
 _IMPORT_RCLPY = "import rclpy; from rclpy.utilities import get_rmw_implementation_identifier as rmw; print(rmw())"
 _CONNECT = "import socket, sys; socket.create_connection((sys.argv[1], int(sys.argv[2])), 5).close()"
+
+
+class Grade(StrEnum):
+    """Meaning of a finding."""
+
+    OK = "ok"
+    NOTE = "note"
+    """A part that is not needed is missing, or a remark is worth knowing."""
+    MISSING = "missing"
+    """A part that the purpose needs is missing or does not work."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Finding about one part of a machine.
+
+    Attributes:
+        part: Short name of the part.
+        grade: Its grade.
+        message: One sentence about what is there, or what is not.
+        fix: Command or instruction that puts it right; empty: none is needed.
+    """
+
+    part: str
+    grade: Grade
+    message: str
+    fix: str = ""
 
 
 class Purpose(StrEnum):

@@ -16,7 +16,6 @@ from robosc.model.behaviour import (
     partial_updates,
     uses_of,
 )
-from robosc.model.bindings import Bindings
 from robosc.model.communications import (
     CommunicationTree,
     build_communication,
@@ -26,7 +25,7 @@ from robosc.model.communications import (
 )
 from robosc.model.constants import Constants
 from robosc.model.expression_checker import ExpressionChecker
-from robosc.model.findings import Findings
+from robosc.model.findings import Bindings, Findings
 from robosc.model.interfaces import InterfaceChecker
 from robosc.model.own_requests import OwnRequests
 from robosc.model.places import Places

@@ -4,8 +4,8 @@ import re
 from collections.abc import Collection, Iterable
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
+from robosc.language import syntax
 from robosc.language.words import spelled
-from robosc.model.bindings import Bindings
 from robosc.source import Location, SourceFile
 
 _MAXIMUM_COMPARISONS = 20_000
@@ -18,6 +18,28 @@ MAXIMUM_CHOICES = 6
 """Names that are all told where none is near."""
 
 _WORD = re.compile("[A-Za-z_][A-Za-z_0-9]*+")
+
+
+class Bindings:
+    """Names and their definitions, noted by the checks while they resolve them.
+
+    Attributes:
+        uses: Place of a definition, by each place that names it; the definition itself is no use of it.
+        communications: Place where each communication of the robot is defined, by name.
+    """
+
+    def __init__(self) -> None:
+        self.uses: dict[Location, Location] = {}
+        self.communications: dict[str, Location] = {}
+
+    def bind(self, name: syntax.Name, definition: Location | None) -> None:
+        """Note what a name means; None where nothing is defined that it could mean."""
+        if definition is not None and definition != name.location:
+            self.uses[name.location] = definition
+
+    def bind_communication(self, name: syntax.Name) -> None:
+        """Note that a name is a communication's."""
+        self.bind(name, self.communications.get(name.text))
 
 
 class Findings:

@@ -22,39 +22,23 @@ def test_a_model_that_is_not_there_is_one_clear_error(name: str, tmp_path: Path)
     assert result.stderr.splitlines()[-1] == f"{name}: error: there is no file no.rscd"
 
 
-def test_a_scene_that_is_not_there_is_one_clear_error(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("option", "value", "status", "message"),
+    [
+        ("--scene", "no-maze", 1, "demo: there is no scene and no file 'no-maze'; there are "),
+        ("--speed", "1000", 1, "demo: the speed must be from 0.5 to 25, and is 1000"),
+        ("--seed", "-1", 2, "demo.py: error: argument --seed: a whole number from 0 to 2147483647 is needed, not '-1'"),
+    ],
+)
+def test_what_cannot_be_is_one_clear_error(option: str, value: str, status: int, message: str, tmp_path: Path) -> None:
     result = subprocess.run(
-        [sys.executable, str(DEMO / "demo.py"), "--scene", "no-maze", "--output", str(tmp_path / "out")],
+        [sys.executable, str(DEMO / "demo.py"), option, value, "--output", str(tmp_path / "out")],
         cwd=tmp_path,
         capture_output=True,
         text=True,
         timeout=60,
     )
-    assert (result.returncode, result.stdout) == (1, "")
-    assert result.stderr.startswith("demo: there is no scene and no file 'no-maze'; there are ")
-
-
-def test_a_speed_that_cannot_be_is_one_clear_error(tmp_path: Path) -> None:
-    result = subprocess.run(
-        [sys.executable, str(DEMO / "demo.py"), "--speed", "1000", "--output", str(tmp_path / "out")],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert result.returncode == 1
-    assert result.stderr == "demo: the speed must be from 0.5 to 25, and is 1000\n"
-
-
-def test_a_seed_that_cannot_be_is_one_clear_error(tmp_path: Path) -> None:
-    result = subprocess.run(
-        [sys.executable, str(DEMO / "demo.py"), "--seed", "-1", "--output", str(tmp_path / "out")],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert result.returncode == 2
-    assert result.stderr.splitlines()[-1] == (
-        "demo.py: error: argument --seed: a whole number from 0 to 2147483647 is needed, not '-1'"
-    )
+    assert result.returncode == status
+    assert result.stderr.splitlines()[-1].startswith(message)
+    # A speed is looked at only when the scene has been read, which is told.
+    assert option == "--speed" or result.stdout == ""

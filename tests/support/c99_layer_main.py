@@ -8,7 +8,7 @@ from robosc.supervisor import Supervisor
 from robosc.targets.code.c.header import receive_head, reply_head
 from robosc.targets.code.c.layer import call_head, cancel_head, goal_head, request_head, request_parameters
 from robosc.targets.code.c.layout import Layout, event_data
-from support.c99_main import _TOP, _Program, batch_types, events_back
+from support.c99_main import _TOP, BEGIN, LOG, _Program, batch_types, events_back
 
 TOKENS = 4096
 """Messages are told apart by their address in an array of this length."""
@@ -64,19 +64,9 @@ _SIGNATURES: dict[str, tuple[str, ...]] = {
     "end": (_COMMUNICATION, _CALLER, "@p@_end_t end", _MESSAGE),
 }
 
-_MAIN = """
-static void do_log(void *context, @p@_log_t kind, int what)
-{
-    static const char *const kinds[]
-        = {"event", "unexpected", "unknown", "release", "fault", "stop", "resume", "restart", "blocked"};
-    (void)context;
-    if (kind == @P@_LOG_FAULT || kind == @P@_LOG_STOP || kind == @P@_LOG_RESTART || kind == @P@_LOG_RESUME) {
-        printf("log %s\\n", kinds[kind]);
-    } else {
-        printf("log %s %d\\n", kinds[kind], what);
-    }
-}
-
+_MAIN = (
+    LOG
+    + """
 static void do_new(void)
 {
     static const @p@_callbacks_t callbacks = {NULL, @callbacks@, do_log};
@@ -87,32 +77,9 @@ static void do_new(void)
     settings.service_timeout_us = read_time();
     settings.action_timeout_us = read_time();
     settings.command_timeout_us = read_time();
-    for (int k = 0; k < @P@_COMMUNICATION_COUNT; k++) {
-        settings.max_age_us[k] = read_time();
-    }
-    for (int k = 0; k < @P@_TOPIC_COUNT; k++) {
-        settings.releases[k] = read_integer() != 0;
-    }
-    if (!@p@_init(&r, &settings, &callbacks)) {
-        printf("refused\\n");
-    }
-}
-
-int main(void)
-{
-    for (;;) {
-        const char command = next_word()[0];
-        const uint64_t now_us = command == 'n' || command == 'x' ? 0 : read_time();
-        word_count = 0;
-        reset_pools();
-        switch (command) {
-        case 'n': do_new(); break;
-        case 'x': failing = (int)read_integer(); break;
-        case 's': @p@_start(&r, now_us); break;
-        case 'w': @p@_watch(&r, now_us); break;
-        case 'S': @p@_stop(&r, now_us, read_integer() != 0); break;
-        case 'R': @p@_restart(&r, now_us); break;
-        case 'm': {
+"""
+    + BEGIN
+    + """        case 'm': {
             const int source = (int)read_integer();
             do_receive(source, now_us, read_message());
             break;
@@ -148,6 +115,7 @@ int main(void)
     }
 }
 """
+)
 
 
 class _LayerProgram(_Program):

@@ -78,7 +78,51 @@ static void print_text(const char *text)
 static @p@_t r;
 """
 
-_CALLBACKS = """
+LOG = """static void do_log(void *context, @p@_log_t kind, int what)
+{
+    static const char *const kinds[]
+        = {"event", "unexpected", "unknown", "release", "fault", "stop", "resume", "restart", "blocked"};
+    (void)context;
+    if (kind == @P@_LOG_FAULT || kind == @P@_LOG_STOP || kind == @P@_LOG_RESTART || kind == @P@_LOG_RESUME) {
+        printf("log %s\\n", kinds[kind]);
+    } else {
+        printf("log %s %d\\n", kinds[kind], what);
+    }
+}
+"""
+"""The callback `log` of either deployment."""
+
+BEGIN = """    for (int k = 0; k < @P@_COMMUNICATION_COUNT; k++) {
+        settings.max_age_us[k] = read_time();
+    }
+    for (int k = 0; k < @P@_TOPIC_COUNT; k++) {
+        settings.releases[k] = read_integer() != 0;
+    }
+    if (!@p@_init(&r, &settings, &callbacks)) {
+        printf("refused\\n");
+    }
+}
+
+int main(void)
+{
+    for (;;) {
+        const char command = next_word()[0];
+        const uint64_t now_us = command == 'n' || command == 'x' ? 0 : read_time();
+        word_count = 0;
+        reset_pools();
+        switch (command) {
+        case 'n': do_new(); break;
+        case 'x': failing = (int)read_integer(); break;
+        case 's': @p@_start(&r, now_us); break;
+        case 'w': @p@_watch(&r, now_us); break;
+        case 'S': @p@_stop(&r, now_us, read_integer() != 0); break;
+        case 'R': @p@_restart(&r, now_us); break;
+"""
+"""Common part of the program: the last settings, and commands of either deployment."""
+
+_CALLBACKS = (
+    LOG
+    + """
 static bool do_publish(void *context, const @p@_request_t *request)
 {
     (void)context;
@@ -138,18 +182,6 @@ static bool do_fits(void *context, const @p@_request_t *request)
     return !(failing & 32) || (int)request->communication % 2 == 0;
 }
 
-static void do_log(void *context, @p@_log_t kind, int what)
-{
-    static const char *const kinds[]
-        = {"event", "unexpected", "unknown", "release", "fault", "stop", "resume", "restart"};
-    (void)context;
-    if (kind == @P@_LOG_FAULT || kind == @P@_LOG_STOP || kind == @P@_LOG_RESTART || kind == @P@_LOG_RESUME) {
-        printf("log %s\\n", kinds[kind]);
-    } else {
-        printf("log %s %d\\n", kinds[kind], what);
-    }
-}
-
 static void do_new(void)
 {
     static const @p@_callbacks_t callbacks
@@ -167,32 +199,9 @@ static void do_new(void)
     settings.on_unknown = (@p@_on_unknown_t)read_integer();
     settings.service_timeout_us = read_time();
     settings.action_timeout_us = read_time();
-    for (int k = 0; k < @P@_COMMUNICATION_COUNT; k++) {
-        settings.max_age_us[k] = read_time();
-    }
-    for (int k = 0; k < @P@_TOPIC_COUNT; k++) {
-        settings.releases[k] = read_integer() != 0;
-    }
-    if (!@p@_init(&r, &settings, &callbacks)) {
-        printf("refused\\n");
-    }
-}
-
-int main(void)
-{
-    for (;;) {
-        const char command = next_word()[0];
-        const uint64_t now_us = command == 'n' || command == 'x' ? 0 : read_time();
-        word_count = 0;
-        reset_pools();
-        switch (command) {
-        case 'n': do_new(); break;
-        case 'x': failing = (int)read_integer(); break;
-        case 's': @p@_start(&r, now_us); break;
-        case 't': @p@_tick(&r, now_us); break;
-        case 'w': @p@_watch(&r, now_us); break;
-        case 'S': @p@_stop(&r, now_us, read_integer() != 0); break;
-        case 'R': @p@_restart(&r, now_us); break;
+"""
+    + BEGIN
+    + """        case 't': @p@_tick(&r, now_us); break;
         case 'm': do_receive((int)read_integer(), now_us); break;
         case 'b': {
             const int event = (int)read_integer();
@@ -218,6 +227,7 @@ int main(void)
     }
 }
 """
+)
 
 
 class _Program:

@@ -4,7 +4,7 @@ An edge is written `idle -go-> busy`. Events whose names start with `u_` are unc
 """
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from robosc.automata import (
@@ -116,3 +116,18 @@ def state(system_: System, **values: Value) -> State:
         assert subject in initial, subject
         initial[subject] = value
     return tuple(initial.values())
+
+
+def replay(made: System, added: Mapping[str, Callable[[State], bool]], trace: Sequence[str]) -> set[State]:
+    """The states that a trace can lead to in the controlled system."""
+    semantics = Semantics(made)
+    states = {semantics.initial}
+    for name in trace:
+        states = {
+            target
+            for at in states
+            if name not in added or added[name](at)
+            if not made.event(name).is_controllable or semantics.condition(at, name)
+            for target in semantics.targets(at, name)
+        }
+    return states

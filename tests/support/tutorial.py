@@ -20,6 +20,7 @@ import re
 import shlex
 import signal
 import subprocess
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -285,6 +286,23 @@ def _end(process: "subprocess.Popen[str]") -> None:
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
+
+
+def play_page(page: str, folder: Path) -> int:
+    """Do what all steps of a page say, as a user with an empty home, and return their number.
+
+    Raises:
+        TutorialError: As `play`.
+    """
+    robots = folder / "robots"
+    robots.mkdir()
+    inherited = {name: os.environ[name] for name in ("PYTHONPATH", "TMPDIR") if name in os.environ}
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    shell = Shell(folder / "home", robots, {**inherited, "PATH": path, "LANG": "C.UTF-8"})
+    steps = [step for chapter in read_chapters(page) for step in chapter.steps]
+    for step in steps:
+        play(step, shell)
+    return len(steps)
 
 
 def play(step: Step, shell: Shell, limit_s: float = 60.0) -> None:

@@ -9,7 +9,7 @@ from robosc.cli import automata
 from robosc.cli.output import UsageError
 from robosc.pipeline.options import SynthesisOptions
 from robosc_client import Check, Client, Explain, Explore, Generate, Synthesis, Synthesize, Task, Verify
-from robosc_client.commands.numbers import checked_number
+from robosc_client.commands.connection import checked_number
 from robosc_client.commands.progress_line import ProgressLine
 from robosc_client.commands.signature_checks import require_signature
 from robosc_client.commands.supervisor_file import write_supervisor

@@ -45,6 +45,8 @@ ADDRESS, ADDRESS_HELP = "HOST[:PORT]", f"address of the server (default port: {S
 
 _ENDLESS_S = 1e9
 
+_MAXIMUM_SENDABLE = 2**64 - 1
+
 _FIELDS = ("ca", "certificate", "key", "token_file")
 
 
@@ -145,3 +147,14 @@ def number_up_to(most: int) -> Callable[[str], int]:
         return number
 
     return read
+
+
+def checked_number(number: int | None, option: str) -> int | None:
+    """Return a number of an option, if a request can contain it.
+
+    Raises:
+        UsageError: It cannot.
+    """
+    if number is not None and number > _MAXIMUM_SENDABLE:
+        raise UsageError(f"{option} must be at most {_MAXIMUM_SENDABLE}")
+    return number

@@ -48,8 +48,13 @@ from robosc.model.structure import Deployment
 from robosc.source import Bundle, SourceFile, visible
 from robosc_client import Client, Explained, SynthesisOptions, Verification, VerificationStatus, Verify
 from robosc_client.commands.automata import Server
-from robosc_client.commands.connection import SERVICE, SIGNED_SERVICE, add_connection_arguments, exit_statuses
-from robosc_client.commands.numbers import checked_number
+from robosc_client.commands.connection import (
+    SERVICE,
+    SIGNED_SERVICE,
+    add_connection_arguments,
+    checked_number,
+    exit_statuses,
+)
 from robosc_client.commands.progress_line import ProgressLine
 from robosc_client.commands.signature_checks import require_signature, trusted_keys
 from robosc_client.commands.supervisor_file import write_supervisor

@@ -25,6 +25,7 @@ from robosc.targets import (
     targets_left_out,
 )
 from robosc.targets.registry import Target
+from support.generated import example_supervisor
 from support.models import bundle_of
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
@@ -111,6 +112,13 @@ def test_every_target_tells_every_requirement(name: str) -> None:
     for page in pages:
         shown = {line.strip(" /*#") for line in page.splitlines()}
         assert [text for text in requirements if text not in shown] == []
+
+
+@pytest.mark.parametrize("name", [info.name for info in available_targets()])
+@pytest.mark.parametrize("robot", ["maze_solver/maze_solver", "line_follower/line_follower"])
+def test_the_same_supervisor_gives_the_same_bytes(name: str, robot: str) -> None:
+    again = example_supervisor.__wrapped__(robot, Deployment.CONTROLLER)
+    assert generate(example_supervisor(robot), name) == generate(again, name)
 
 
 def test_what_refuses_is_left_out_and_told() -> None:

@@ -268,12 +268,6 @@ def test_all_files_are_python_3_8_and_depend_on_nothing(name: str) -> None:
                 assert node.level or not (node.module or "").startswith("robosc"), path
 
 
-def test_the_same_supervisor_gives_the_same_bytes() -> None:
-    first = example_supervisor("maze_solver/maze_solver")
-    second = example_supervisor.__wrapped__("maze_solver/maze_solver", Deployment.CONTROLLER)
-    assert generate(first, "python") == generate(second, "python")
-
-
 def test_every_file_says_where_it_comes_from() -> None:
     supervisor = example_supervisor("line_follower/line_follower")
     for path, text in generate(supervisor, "python").items():

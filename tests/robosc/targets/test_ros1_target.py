@@ -42,11 +42,6 @@ def test_python_files_run_on_3_8_and_name_nothing_undefined(name: str, tmp_path:
     require_sound_python(tmp_path)
 
 
-def test_the_same_supervisor_gives_the_same_bytes(files: GeneratedFiles) -> None:
-    again = example_supervisor.__wrapped__(FOLLOWER, Deployment.CONTROLLER)
-    assert generate(again, "ros1") == files
-
-
 def test_package_xml(files: GeneratedFiles) -> None:
     root = ElementTree.fromstring(files["package.xml"])
     assert (root.get("format"), root.findtext("name")) == ("2", PACKAGE)

@@ -1,6 +1,6 @@
 """The verifier accepts right supervisors and catches each kind of wrong one, with a trace that replays."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from itertools import islice
 
 import pytest
@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from robosc.automata import DiscreteVariable, Semantics, System, to_automata
 from robosc.automata.compile import State
-from robosc.automata.controlled import Added
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import IntegerType, StateTest
 from robosc.model.structure import Deployment
@@ -17,7 +16,7 @@ from robosc.verification import CheckOutcome, ExplicitSupervisor, Failure, Verif
 from support.effort import examples
 from support.models import EXAMPLE_NAMES, example_model
 from support.random_systems import disables_something, explicit_supervisor, systems
-from support.systems import automaton, edge, operation, read, system
+from support.systems import automaton, edge, operation, read, replay, system
 
 PASSED, FAILED, NOT_CHECKED = CheckOutcome.PASSED, CheckOutcome.FAILED, CheckOutcome.NOT_CHECKED
 
@@ -46,21 +45,6 @@ def _failure(found: Verification, property_: str) -> Failure:
     return next(item for item in found.failures if item.property == property_)
 
 
-def _replay(made: System, added: Added, trace: Sequence[str]) -> set[State]:
-    """The states that a trace can lead to in the controlled system."""
-    semantics = Semantics(made)
-    states = {semantics.initial}
-    for name in trace:
-        states = {
-            target
-            for at in states
-            if name not in added or added[name](at)
-            if not made.event(name).is_controllable or semantics.condition(at, name)
-            for target in semantics.targets(at, name)
-        }
-    return states
-
-
 def test_a_right_supervisor_passes() -> None:
     found = verify_explicitly(WALK, RIGHT)
     assert _outcomes(found) == (PASSED, PASSED, PASSED, PASSED)
@@ -75,7 +59,7 @@ def test_a_forbidden_request_that_is_allowed_blocks(event: str, trace: tuple[str
     assert found.nonblocking is FAILED
     assert found.safe is PASSED
     failure = _failure(found, "nonblocking")
-    assert _replay(WALK, added, failure.trace) == {failure.state}
+    assert replay(WALK, added, failure.trace) == {failure.state}
     assert failure.trace == trace[: len(failure.trace)]
 
 
@@ -219,7 +203,7 @@ def test_every_mutant_is_caught_with_a_trace_that_replays(drawn: System, data: s
     else:
         assert FAILED in (found.safe, found.nonblocking)
     for failure in found.failures:
-        assert failure.state in _replay(drawn, added, failure.trace)
+        assert failure.state in replay(drawn, added, failure.trace)
 
 
 @pytest.mark.parametrize("name", EXAMPLE_NAMES)

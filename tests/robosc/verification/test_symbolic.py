@@ -1,14 +1,13 @@
 """The symbolic check agrees with the explicit one, on right supervisors and on wrong ones."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from random import Random
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robosc.automata import DiscreteVariable, InputVariable, Semantics, System, decision
-from robosc.automata.compile import State
+from robosc.automata import DiscreteVariable, InputVariable, System, decision
 from robosc.automata.decision import Decision, index_in
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.errors import SynthesisCancelled
@@ -36,28 +35,13 @@ from support.effort import examples
 from support.families import FAMILIES
 from support.random_supervisors import random_diagram
 from support.random_systems import systems
-from support.systems import automaton, edge, operation, read, received, system
+from support.systems import automaton, edge, operation, read, received, replay, system
 
 PASSED, FAILED, NOT_CHECKED = CheckOutcome.PASSED, CheckOutcome.FAILED, CheckOutcome.NOT_CHECKED
 
 
 def _three(found: Verification) -> tuple[CheckOutcome, CheckOutcome, CheckOutcome]:
     return found.safe, found.controllable, found.nonblocking
-
-
-def replay(made: System, added: Mapping[str, Decision], trace: Sequence[str]) -> set[State]:
-    """The states that a trace can lead to in the controlled system."""
-    semantics = Semantics(made)
-    states = {semantics.initial}
-    for name in trace:
-        states = {
-            target
-            for at in states
-            if name not in added or added[name](at)
-            if not made.event(name).is_controllable or semantics.condition(at, name)
-            for target in semantics.targets(at, name)
-        }
-    return states
 
 
 def _agrees(made: System, added: Mapping[str, Decision], engine: str = "cudd") -> Verification:

@@ -461,12 +461,6 @@ def test_nothing_allocates_and_nothing_is_global(tmp_path: Path) -> None:
     assert all(name.startswith("navigation_supervisor_") for name, kind in kinds.items() if kind == "T")
 
 
-def test_the_same_supervisor_gives_the_same_bytes() -> None:
-    first = example_supervisor("maze_solver/maze_solver")
-    second = example_supervisor.__wrapped__("maze_solver/maze_solver", Deployment.CONTROLLER)
-    assert generate(first, "c99") == generate(second, "c99")
-
-
 def test_every_file_says_where_it_comes_from() -> None:
     supervisor = example_supervisor("line_follower/line_follower")
     files = generate(supervisor, "c99")

@@ -1,13 +1,17 @@
 """The work of each kind against the command line on the same files: the same bytes, the same documents."""
 
+import errno
 import hashlib
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from google.protobuf.message import DecodeError, EncodeError
 
 import robosc_server.tasks.run as run_module
 from robosc.certification import make_supervisor
@@ -439,6 +443,66 @@ class TestFailures:
 
         monkeypatch.setattr(run_module, "check", greedy)
         assert failure(TaskKind.CHECK, small_request(TaskKind.CHECK)).reason is Reason.MEMORY_LIMIT
+
+    @pytest.mark.parametrize(
+        ("error", "reason"),
+        [
+            (EncodeError("Failed to serialize proto"), Reason.MEMORY_LIMIT),
+            (DecodeError("Error parsing message"), Reason.MEMORY_LIMIT),
+            (OSError(errno.ENOMEM, "Cannot allocate memory"), Reason.MEMORY_LIMIT),
+            (OSError(errno.ENOENT, "No such file"), Reason.INTERNAL_FAULT),
+            (RuntimeError("can't start new thread"), Reason.INTERNAL_FAULT),
+        ],
+    )
+    @pytest.mark.parametrize("depth", range(3))
+    def test_no_memory_in_other_words(
+        self, error: Exception, reason: Reason, depth: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Libraries in C have errors of their own for it, and others may follow from those."""
+
+        def greedy(*_: Any) -> Any:
+            try:
+                raise error
+            except Exception as cause:
+                if depth == 1:
+                    raise KeyError("name") from cause
+                if depth == 2:
+                    raise KeyError("name")  # noqa: B904 - while the other one is handled
+                raise
+
+        monkeypatch.setattr(run_module, "check", greedy)
+        assert failure(TaskKind.CHECK, small_request(TaskKind.CHECK)).reason is reason
+
+    @pytest.mark.parametrize("last", ["yield answer", "raise SystemError('no reason')"])
+    def test_a_result_that_no_memory_is_left_for(self, last: str) -> None:
+        """The limit of memory is the reason wherever the task ends that has used it all."""
+        program = f"""if True:
+            import resource
+            from robosc_api.v1 import synthesis_pb2 as pb
+            from robosc_server.tasks import run
+            from robosc_server.tasks.task import TaskKind, TaskLimits
+            from robosc_server.workers import confinement
+
+            def greedy(content, limits, on_report):
+                answer = pb.ExploreResponse(chunk=bytes(65536))
+                kept, size = [], 2**22
+                while size >= 1024:
+                    try:
+                        kept.append(bytearray(size))
+                    except MemoryError:
+                        size //= 2
+                {last}
+                yield answer
+
+            run._WORK[TaskKind.EXPLORE] = greedy
+            limit = confinement.address_space_bytes() + 40 * 2**20
+            resource.setrlimit(resource.RLIMIT_AS, (limit, limit + 2**26))
+            found = run.run_task(TaskKind.EXPLORE, b"", TaskLimits(), lambda report: None)
+            confinement.raise_memory_limit()
+            print(found.reason)
+        """
+        told = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+        assert told.stdout == "MEMORY_LIMIT\n"
 
     def test_a_fault_tells_places_and_nothing_of_the_model(self, monkeypatch: pytest.MonkeyPatch) -> None:
         def faulty(*_: Any) -> Any:

@@ -36,6 +36,7 @@ from robosc_server.clock import monotonic
 from robosc_server.tasks.automata import Automata
 from robosc_server.tasks.convert import chunks, from_proto, to_proto
 from robosc_server.tasks.explain import explanation
+from robosc_server.tasks.memory import is_lack_of_memory
 from robosc_server.tasks.synthesis_attempt import OnReport, SynthesisAttempt
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
 from robosc_server.tasks.verify import DEFAULT_STATES, NoPropertyError, verification
@@ -101,8 +102,6 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
         return Result(_bounded(_WORK[kind](request, limits, ThrottledReports(on_report)), limits.result_bytes))
     except NodeLimitError as error:
         return Failure(Reason.NODE_LIMIT, f"{error}, up to {limits.nodes} on this server")
-    except MemoryError:
-        return Failure(Reason.MEMORY_LIMIT, f"the task needs more than {limits.memory_bytes} bytes of memory")
     except _ResultTooLargeError:
         return Failure(Reason.RESULT_TOO_LARGE, f"the result has more than {limits.result_bytes} bytes")
     except (UnknownTargetError, UnknownEngineError, from_proto.OptionError, NoPropertyError) as error:
@@ -111,6 +110,8 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
         # Its sentence names parts of the model.
         return Failure(Reason.MALFORMED_REQUEST, "initial names what the automata do not have")
     except Exception as error:  # The boundary of the worker: the server logs any error and continues.
+        if is_lack_of_memory(error):
+            return Failure(Reason.MEMORY_LIMIT, f"the task needs more than {limits.memory_bytes} bytes of memory")
         return Failure(Reason.INTERNAL_FAULT, "the server has an internal error", _code_locations(error))
 
 

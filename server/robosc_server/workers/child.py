@@ -7,6 +7,7 @@ import socket
 import traceback
 from collections.abc import Callable
 
+from robosc_server.tasks.memory import is_lack_of_memory
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, TaskKind, TaskLimits
 from robosc_server.workers import confinement
 from robosc_server.workers.frames import (
@@ -67,11 +68,14 @@ def _answer(
         outcome = function(kind, request, limits, lambda report: connection.sendall(report_frame(report)))
     except ConnectionError:
         raise  # The server has closed the connection.
-    except MemoryError:
-        outcome = Failure(Reason.MEMORY_LIMIT, OUT_OF_MEMORY)
-    except BaseException:  # The boundary of the worker: the server logs any error and continues.
+    except BaseException as error:  # The boundary of the worker: the server logs any error and continues.
+        is_short = is_lack_of_memory(error)
+        # The failure needs memory, too, while what the task has made is still there.
         confinement.raise_memory_limit()
-        outcome = Failure(Reason.INTERNAL_FAULT, "the server has an internal error", traceback.format_exc())
+        if is_short:
+            outcome = Failure(Reason.MEMORY_LIMIT, OUT_OF_MEMORY)
+        else:
+            outcome = Failure(Reason.INTERNAL_FAULT, "the server has an internal error", traceback.format_exc())
     confinement.raise_memory_limit()
     _send(connection, outcome, limits)
 

@@ -7,10 +7,9 @@ whole revolutions, back to a mark on the floor; a straight way knows nothing of 
 """
 
 import math
+import statistics
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from robosc_bridge.devices.interface import BINS, STANDSTILL, DriveBase, RangeScanner
 from robosc_bridge.errors import BridgeError
@@ -130,6 +129,9 @@ def wall_angle_rad(ranges_m: Sequence[float]) -> float:
     Raises:
         CalibrationError: No wall is ahead.
     """
+    # A bridge that runs has no use for it, and is to start soon.
+    import numpy as np
+
     angles_deg = range(-_AHEAD_DEG, _AHEAD_DEG + 1)
     ahead = [(math.radians(angle), ranges_m[angle % BINS]) for angle in angles_deg]
     seen = [(angle, range_m) for angle, range_m in ahead if math.isfinite(range_m)]
@@ -164,4 +166,4 @@ def lidar_front_rad(scanner: RangeScanner, host: Host, front_rad: float) -> floa
             found.append(wall_angle_rad(scan.ranges_m))
     if len(found) < _SCANS:
         raise CalibrationError(f"the LiDAR has made {len(found)} revolutions in {_LIMIT_S:g} s: does it rotate?")
-    return math.remainder(front_rad - float(np.median(found)), 2 * math.pi)
+    return math.remainder(front_rad - statistics.median(found), 2 * math.pi)

@@ -6,6 +6,7 @@
 decoders: both sides stand on the manuals alone.
 """
 
+from robosc_simulated.battery import Battery
 from robosc_simulated.camera import SimulatedCamera
 from robosc_simulated.datagram_line import DatagramFaults, DatagramLine
 from robosc_simulated.floor import Track, oval, parse_track, spline
@@ -14,10 +15,11 @@ from robosc_simulated.line import Faults, SimulatedLine
 from robosc_simulated.motion import Motion, MotionError, MotionRecorder, read_motion
 from robosc_simulated.opencr import OpenCr
 from robosc_simulated.pinhole_camera import Mount, PinholeCamera
+from robosc_simulated.profile import BAD_DAY, IDEAL, PROFILES, TYPICAL, Profile
 from robosc_simulated.recorder import Record, Recorder, Tap, read_records
 from robosc_simulated.robots import BODIES, Body
 from robosc_simulated.rover import Rover
-from robosc_simulated.scene import Goal, Noise, Obstacle, Scene, SceneError, load_scene, maze_scene, scene_names
+from robosc_simulated.scene import Goal, Look, Noise, Obstacle, Scene, SceneError, load_scene, maze_scene, scene_names
 from robosc_simulated.servo import HardwareError, Servo
 from robosc_simulated.servo_bus import ServoBus
 from robosc_simulated.textures import Texture
@@ -28,9 +30,14 @@ from robosc_simulated.walls import Walls, maze, open_maze, parse_walls, room
 from robosc_simulated.world import Wheel, World
 
 __all__ = [
+    "BAD_DAY",
     "BASES",
     "BODIES",
+    "IDEAL",
     "LIDARS",
+    "PROFILES",
+    "TYPICAL",
+    "Battery",
     "Body",
     "DatagramFaults",
     "DatagramLine",
@@ -41,6 +48,7 @@ __all__ = [
     "Lds02",
     "Lds03",
     "Lidar",
+    "Look",
     "Motion",
     "MotionError",
     "MotionRecorder",
@@ -49,6 +57,7 @@ __all__ = [
     "Obstacle",
     "OpenCr",
     "PinholeCamera",
+    "Profile",
     "Record",
     "Recorder",
     "Rover",

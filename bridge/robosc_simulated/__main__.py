@@ -25,6 +25,7 @@ from robosc_simulated.floor import Track, oval, parse_track
 from robosc_simulated.lidar import LIDARS
 from robosc_simulated.motion import MotionRecorder
 from robosc_simulated.output import Output
+from robosc_simulated.profile import PROFILES, TYPICAL
 from robosc_simulated.recorder import Recorder
 from robosc_simulated.robots import BODIES
 from robosc_simulated.scene import Scene, load_scene, maze_scene, scene_names
@@ -97,11 +98,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _robot(options: argparse.Namespace, recorder: Recorder | None) -> SimulatedTurtleBot3:
+    scene = _scene(options)
     return SimulatedTurtleBot3(
         options.robot,
         options.base,
         options.lidar,
-        scene=_scene(options),
+        scene=scene,
         factor=options.speed,
         pose=options.pose,
         base_link=options.base_link,
@@ -111,6 +113,7 @@ def _robot(options: argparse.Namespace, recorder: Recorder | None) -> SimulatedT
         camera_link=options.camera_link,
         recorder=recorder,
         patience_s=options.wait,
+        profile=options.profile or scene.profile or TYPICAL.name,
     )
 
 
@@ -209,7 +212,12 @@ def _parser() -> argparse.ArgumentParser:
         "--noise",
         type=option(_deviation),
         metavar="M",
-        help="standard deviation of the LiDAR in m; default: the scene's, else 0",
+        help="standard deviation of the LiDAR in m; default: as the scene and the profile say",
+    )
+    parser.add_argument(
+        "--profile",
+        choices=sorted(PROFILES),
+        help="how far lines, motors, battery and sensors are from ideal; default: the scene's, else typical",
     )
     parser.add_argument(
         "--seed", type=option(seed), default=0, metavar="N", help="of the maze and of all that comes by chance"

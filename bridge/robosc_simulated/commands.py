@@ -33,6 +33,7 @@ rover refuse REASON|accept                  whether it arms
 rover take_over MODE                        its mode's number, by its remote control
 rover disarm|restart|silent|heard           the rover's autopilot
 press|let NAME                              button_1, button_2, bumper_1, bumper_2 of OpenCR
+steer LINEAR ANGULAR                        OpenCR's remote control (m/s, rad/s)
 scanner cover|uncover|stall|go              the LiDAR
 scanner turn SHARE                          its speed, as a share of the nominal one
 camera disconnect|reconnect                 the plug of the camera
@@ -42,6 +43,8 @@ camera cover|uncover|freeze|go              the camera
 
 # As much as a port takes at once.
 _MOST_GARBAGE = 4096
+# Of a remote control, in m/s or rad/s.
+_FASTEST = 100.0
 
 
 class UnknownCommandError(ValueError):
@@ -145,6 +148,8 @@ def _obey(robot: SimulatedTurtleBot3, words: list[str]) -> str:
             _to_rover(robot.rover, what)
         case ["press" | "let" as what, name] if robot.opencr is not None:
             robot.opencr.press(**{name: what == "press"})
+        case ["steer", linear, angular] if robot.opencr is not None:
+            robot.opencr.steer(_speed(linear), _speed(angular))
         case ["scanner", "cover" | "uncover" as what]:
             robot.scanner.is_covered = what == "cover"
         case ["scanner", "stall" | "go" as what]:
@@ -258,6 +263,15 @@ _READERS: dict[str, Callable[[str], object]] = {
     "split_s": _seconds_or_none,
     "echo": _boolean,
     "is_deaf": _boolean,
+    "duplicate_share": _share,
+    "cut_share": _share,
+    "flip_share": _share,
+    "device_drop_share": _share,
+    "device_duplicate_share": _share,
+    "device_cut_share": _share,
+    "device_flip_share": _share,
+    "batch_s": _seconds,
+    "has_wire_time": _boolean,
 }
 
 
@@ -278,3 +292,7 @@ def _to_line(line: SimulatedLine, words: list[str]) -> None:
             setattr(line.faults, name, _READERS[name](value))
         case _:
             raise UnknownCommandError(f"a line does not know {' '.join(words)!r}; `help` lists what it knows")
+
+
+def _speed(text: str) -> float:
+    return number(text, -_FASTEST, _FASTEST)

@@ -19,11 +19,16 @@ import numpy as np
 
 from robosc_simulated.lidar_frames import lds01_frame, lds02_frame, lds03_frame, lds03_identity
 from robosc_simulated.line import Sending
+from robosc_simulated.scene import Look
 from robosc_simulated.walls import Floats
-from robosc_simulated.world import World
+from robosc_simulated.world import Looks, World
 
 # A thread that was late sends what was missed, but not for longer than this.
 _BACKLOG_S = 0.5
+# Of the speed of a motor that begins to rotate: below that, it sends nothing that could be told from silence.
+_SLOWEST_SHARE = 0.2
+_LOOKS = tuple(Look)
+_DARK, _GLASS = _LOOKS.index(Look.DARK), _LOOKS.index(Look.GLASS)
 
 
 @dataclass(frozen=True)
@@ -45,7 +50,7 @@ class Lidar(ABC):
     Args:
         world: World that it sees.
         seed: Seed of the angle at which it begins, and of the noise.
-        noise_m: Standard deviation of what it measures.
+        noise_m: Standard deviation of what it measures, beside what the world's profile says.
         starts_mid_frame: True if the first frame after a start is cut, as when a host begins to listen at any time.
 
     Attributes:
@@ -74,6 +79,11 @@ class Lidar(ABC):
         self._noise_m = noise_m
         self._starts_mid_frame = starts_mid_frame
         self._is_cut = False
+        self._profile = world.profile
+        # When its motor began to rotate, and when it stalls next, until when.
+        self._spun_s = -math.inf
+        self._stalls_s = math.inf
+        self._stalled_until_s = -math.inf
         self._is_spinning = False
         self._frame_world_s = 0.0
         self.plug_in()
@@ -86,7 +96,14 @@ class Lidar(ABC):
     @property
     def revolutions_per_s(self) -> float:
         """Revolutions per second of world time, as it rotates now."""
-        return self.nominal_hz * self._speed_share
+        return self.nominal_hz * self._speed_share * self._spin_share()
+
+    def _spin_share(self) -> float:
+        """Share of its speed that a motor has that was started a while ago."""
+        spin_up_s = self._profile.spin_up_s
+        if not spin_up_s:
+            return 1.0
+        return max(_SLOWEST_SHARE, min(1.0, (self._time.world_s() - self._spun_s) / spin_up_s))
 
     def set_speed(self, share: float) -> None:
         """Rotate at this share of the nominal speed.
@@ -115,7 +132,7 @@ class Lidar(ABC):
         self._frame_world_s = max(self._frame_world_s, now_s - _BACKLOG_S)
         frames: list[_Frame] = []
         while self._is_spinning and self._frame_world_s <= now_s + 1e-9:
-            if self.is_stalled:
+            if self.is_stalled or self._has_stalled(now_s):
                 self._frame_world_s = now_s + self._frame_s()
                 break
             frames.append(self._frame())
@@ -144,10 +161,24 @@ class Lidar(ABC):
             self._is_spinning = True
             self._is_cut = self._starts_mid_frame
             self._begin_revolution(self._chance.random())
+            self._spun_s = self._time.world_s()
+            self._stalls_s = self._spun_s + self._until_stall_s()
             self._frame_world_s = self._time.world_s() + self._frame_s()
 
     def _halt(self) -> None:
         self._is_spinning = False
+
+    def _until_stall_s(self) -> float:
+        mean_s = self._profile.stall_every_s
+        return self._chance.expovariate(1.0 / mean_s) if mean_s else math.inf
+
+    def _has_stalled(self, now_s: float) -> bool:
+        """Return True if its motor stands still; when it goes on, it must come to its speed again."""
+        if now_s >= self._stalls_s:
+            self._stalled_until_s = now_s + self._profile.stall_s
+            self._stalls_s = self._stalled_until_s + self._until_stall_s()
+            self._spun_s = self._stalled_until_s
+        return now_s < self._stalled_until_s
 
     @abstractmethod
     def _begin_revolution(self, share: float) -> None:
@@ -165,12 +196,22 @@ class Lidar(ABC):
         """Return the distances measured at clockwise angles from the front, in mm; 0: nothing."""
         angles = -np.radians(np.asarray(device_degrees))
         directions = np.stack((np.cos(angles), np.sin(angles)), axis=1)
-        return self._measured(self._world.cast(None, directions))
+        return self._measured(*self._world.seen(None, directions))
 
-    def _measured(self, lengths_m: Floats) -> list[int]:
+    def _measured(self, true_m: Floats, looks: Looks | None) -> list[int]:
+        profile, chance = self._profile, self._chance
+        lengths_m = true_m
         if self._noise_m:
-            lengths_m = lengths_m + [self._chance.gauss(0.0, self._noise_m) for _ in range(len(lengths_m))]
+            lengths_m = lengths_m + [chance.gauss(0.0, self._noise_m) for _ in range(len(lengths_m))]
+        if profile.lidar_share:
+            lengths_m = lengths_m * [1.0 + chance.gauss(0.0, profile.lidar_share) for _ in range(len(lengths_m))]
         is_seen = (lengths_m >= self.nearest_m) & (lengths_m <= self.farthest_m) & (not self.is_covered)
+        if profile.dropout_share:
+            is_seen &= np.array([chance.random() for _ in range(len(lengths_m))]) >= profile.dropout_share
+        if looks is not None:
+            is_seen &= (looks != _DARK) | (true_m <= profile.dark_reach * self.farthest_m)
+            returns = np.array([chance.random() for _ in range(len(lengths_m))]) < profile.sees_glass
+            is_seen &= (looks != _GLASS) | returns
         found: list[int] = np.rint(np.where(is_seen, lengths_m, 0.0) * 1000).astype(int).tolist()
         return found
 
@@ -256,7 +297,7 @@ class Lds02(Lidar):
             x, y = vector
             return np.stack((x * cosines - y * sines, x * sines + y * cosines), axis=1)
 
-        return self._measured(self._world.cast(turned(self._CENTRE_M), turned(self._DIRECTION)))
+        return self._measured(*self._world.seen(turned(self._CENTRE_M), turned(self._DIRECTION)))
 
 
 class Lds03(Lidar):

@@ -21,11 +21,15 @@ from robosc_simulated.virtual_host import VirtualHost
 # As much as the line discipline holds: what is beyond it waits deeper in the kernel, where no host can flush it, and
 # would be old news for the next one that opens the port.
 _BUFFER = 4095
+# Of a byte on the wire, with a start and a stop bit.
+_BITS = 10
 # A world that passes faster is lived in fewer and larger pieces: a wake-up for each frame would be thousands a second.
 _COARSE_S = 0.002
 _PIECE = 1024
 # Less than a revolution of any LiDAR: who leaves more unread is behind.
 _MOST_UNREAD = 1024
+# Bytes after which an adapter passes them on though its time is not over: a USB packet of 64 with two of its own.
+_USB_PACKET = 62
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,16 @@ class Faults:
         split_s: Seconds between single bytes; 0: each is written alone, at once; None: packets are whole.
         echo: True if the adapter sends back what the host sends.
         is_deaf: True if nothing from the host reaches the device.
+        duplicate_share: Share of packets to the host that come twice.
+        cut_share: Share of packets to the host that end too early.
+        flip_share: Share of packets to the host in which one bit is wrong.
+        device_drop_share: Share of what the host writes that is lost.
+        device_duplicate_share: Share of it that comes twice.
+        device_cut_share: Share of it that ends too early.
+        device_flip_share: Share of it in which one bit is wrong.
+        batch_s: Time for which an adapter gathers less than 62 bytes to the host, in seconds.
+        has_wire_time: True if bytes to the host take their time at the device's speed, and less in a faster world; a
+            bus sees to it itself.
     """
 
     delay_s: float = 0.0
@@ -90,6 +104,15 @@ class Faults:
     split_s: float | None = None
     echo: bool = False
     is_deaf: bool = False
+    duplicate_share: float = 0.0
+    cut_share: float = 0.0
+    flip_share: float = 0.0
+    device_drop_share: float = 0.0
+    device_duplicate_share: float = 0.0
+    device_cut_share: float = 0.0
+    device_flip_share: float = 0.0
+    batch_s: float = 0.0
+    has_wire_time: bool = False
 
     def clear(self) -> None:
         """A sound wire again."""
@@ -134,6 +157,10 @@ class SimulatedLine:
         self._end = clock.new_end(link) if isinstance(clock, VirtualHost) else TerminalEnd(link)
         self.path = self._end.path
         self._wire: deque[tuple[float, bytes]] = deque()
+        # When the last byte has passed; when the adapter passes on what it has gathered, and how much that is.
+        self._free_s = -math.inf
+        self._batch_end_s = -math.inf
+        self._gathered = 0
         # Bytes that were unread when it had sent last, and whether any were ever read.
         self._waiting = 0
         self._is_used = False
@@ -209,8 +236,16 @@ class SimulatedLine:
         self._time.host_sent()
         if self.faults.echo:
             self._send([Sending(data)])
-        if not self.faults.is_deaf:
-            self._send(self.device.receive(self._heard_through(data), self._end.host_baud()))
+        faults = self.faults
+        if not faults.is_deaf:
+            shares = (
+                faults.device_drop_share,
+                faults.device_duplicate_share,
+                faults.device_cut_share,
+                faults.device_flip_share,
+            )
+            for heard in self._damaged(data, shares):
+                self._send(self.device.receive(self._heard_through(heard), self._end.host_baud()))
 
     def _catch_up(self) -> None:
         """Hear what has come, and live until now: time has passed."""
@@ -248,17 +283,63 @@ class SimulatedLine:
 
     def _send(self, sendings: Iterable[Sending]) -> None:
         for sending in sendings:
-            data = self._spoilt(sending.data)
-            if data is None:
+            spoilt = self._spoilt(sending.data)
+            if spoilt is None:
                 continue
             faults = self.faults
-            due_s = self._end.now_s() + sending.after_s + faults.delay_s
-            if faults.split_s is None:
-                self._wire.append((due_s, data))
-            else:
-                for index in range(len(data)):
-                    self._wire.append((due_s + index * faults.split_s, data[index : index + 1]))
+            shares = (0.0, faults.duplicate_share, faults.cut_share, faults.flip_share)
+            for data in self._damaged(spoilt, shares):
+                self._transmit(data, self._end.now_s() + sending.after_s + faults.delay_s)
         self._flush()
+
+    def _transmit(self, data: bytes, due_s: float) -> None:
+        faults, baud = self.faults, self.device.baud
+        if faults.has_wire_time and baud is not None:
+            due_s = self._free_s = max(due_s, self._free_s) + len(data) * _BITS / (baud * self._time.factor)
+        if faults.split_s is not None:
+            for index in range(len(data)):
+                self._wire.append((due_s + index * faults.split_s, data[index : index + 1]))
+        elif faults.batch_s:
+            self._gather(data, due_s, faults.batch_s)
+        else:
+            self._wire.append((due_s, data))
+
+    def _gather(self, data: bytes, due_s: float, batch_s: float) -> None:
+        """Let an adapter pass bytes on when it has a packet full of them, or when its time is over."""
+        end_s = math.ceil(due_s / batch_s) * batch_s
+        if end_s != self._batch_end_s:
+            self._batch_end_s, self._gathered = end_s, 0
+        self._gathered += len(data)
+        if self._gathered < _USB_PACKET:
+            self._wire.append((end_s, data))
+            return
+        # What was gathered goes with what has made the packet full.
+        self._wire = deque((min(at_s, due_s) if at_s == end_s else at_s, held) for at_s, held in self._wire)
+        self._gathered %= _USB_PACKET
+        full = len(data) - self._gathered
+        self._wire.append((due_s, data[:full]))
+        if self._gathered:
+            self._wire.append((end_s, data[full:]))
+
+    def _damaged(self, data: bytes, shares: tuple[float, float, float, float]) -> list[bytes]:
+        """Return what comes of a packet: itself, a part, with a wrong bit, twice, or nothing.
+
+        Args:
+            data: Packet.
+            shares: Shares that are lost, doubled, cut and have a wrong bit.
+        """
+        drop, duplicate, cut, flip = shares
+        chance = self._chance
+        if drop and chance.random() < drop:
+            return []
+        if cut and chance.random() < cut:
+            data = data[: chance.randrange(len(data))]
+        if flip and data and chance.random() < flip:
+            index = chance.randrange(len(data))
+            data = data[:index] + bytes((data[index] ^ 1 << chance.randrange(8),)) + data[index + 1 :]
+        if not data:
+            return []
+        return [data, data] if duplicate and chance.random() < duplicate else [data]
 
     def _spoilt(self, data: bytes) -> bytes | None:
         faults, chance = self.faults, self._chance

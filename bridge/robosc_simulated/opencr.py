@@ -1,8 +1,12 @@
 """OpenCR with the ROS 2 firmware of the TurtleBot3, as the Dynamixel device 200 that it is to its host.
 
 After ROBOTIS-GIT/OpenCR 1.5.3 (`turtlebot3_ros2`) and Dynamixel2Arduino 0.8.0 (`slave`). It commands real servos
-(`servo.py`) as the firmware does, so that what a servo refuses is not driven. Buttons and bumpers are only told to the
-host: that a long press on a button starts a test drive is left out, and so is the remote control.
+(`servo.py`) as the firmware does, so that what a servo refuses is not driven. To what its host commands it adds what
+its two buttons want, each of which starts a drive of its own when it is held, and what an RC-100 remote control wants.
+
+Its firmware is one loop. In each pass it compares the heartbeat, commands the servos every 20 ms, reads where they are
+for the drives of the buttons, refreshes its registers every 20 ms, and handles one packet of its host. A servo that
+does not answer (a loose cable, a dead motor) holds up each of these reads for 100 ms.
 """
 
 import math
@@ -11,9 +15,10 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from robosc_simulated.battery import Battery
 from robosc_simulated.line import Sending
 from robosc_simulated.packets import Error, Instruction, Request, RequestParser, status
-from robosc_simulated.servo import Servo
+from robosc_simulated.servo import TICKS, Servo
 from robosc_simulated.world import World
 
 DEVICE_ID = 200
@@ -30,6 +35,19 @@ _EARTH_FIELD_T = 20e-6
 # Power to the motors: a mean of one second below 11 V for more than five cuts it; below 5 V the battery is off.
 _CUT_V, _CUT_AFTER_S, _MEAN_OVER_S, _OFF_V = 11.0, 5.0, 1.0, 5.0
 _EMPTY_V, _FULL_V = 10.5, 12.3
+# Dynamixel2Arduino waits so long for a servo. The drives of the buttons read positions; the refresh reads positions,
+# velocities, currents and torque.
+_MUTE_S = 0.100
+_BUTTON_READS, _REFRESH_READS = 1, 4
+MUTE_PASS_S = (_BUTTON_READS + _REFRESH_READS) * _MUTE_S
+"""Time of a pass of the firmware's loop while a servo does not answer, in seconds."""
+
+# A button that is pressed, and pressed again or still so long afterwards, starts a drive (e-Manual: 30 cm forward, half
+# a turn on the spot), which ends by the ticks of the right wheel.
+_HELD_S = 3.0
+_TEST_M, _TEST_RAD = 0.3, 3.14
+_TEST_M_S, _TEST_RAD_S = 0.05, -0.7
+_CIRCUMFERENCE_M = 0.207
 
 _CHIP, _INFORMATION, _DEBUG, _CONNECTED, _HEARTBEAT = 0, 2, 14, 15, 19
 _CALIBRATE, _TORQUE = 59, 149
@@ -70,6 +88,37 @@ class Panel:
     cliff: int = 0
 
 
+@dataclass
+class _ButtonDrive:
+    """A button that drives, as `test_motors_with_buttons` and `getButtonPress` of the firmware.
+
+    Attributes:
+        velocity: Linear and angular velocity that it wants, in m/s and rad/s.
+        ticks: Ticks of the right wheel after which it ends.
+        pressed_s: Time when it was found pressed; None: it waits for that.
+        is_used_up: True until it is let go after it has started a drive.
+        from_ticks: Ticks of the right wheel when it started; None: it does not drive.
+    """
+
+    velocity: tuple[float, float]
+    ticks: float
+    pressed_s: float | None = None
+    is_used_up: bool = False
+    from_ticks: int | None = None
+
+    def is_started(self, is_pressed: bool, now_s: float) -> bool:
+        """Return True if it has been held for long enough now; what was between is not looked at."""
+        if self.is_used_up:
+            self.is_used_up = is_pressed
+        elif self.pressed_s is None:
+            self.pressed_s = now_s if is_pressed else None
+        elif now_s - self.pressed_s >= _HELD_S:
+            self.pressed_s = None
+            self.is_used_up = is_pressed
+            return is_pressed
+        return False
+
+
 class OpenCr:
     """The board, its two servos and its sensors.
 
@@ -79,6 +128,9 @@ class OpenCr:
         right: The right one.
         has_motors: True if the servos answered when it started.
         calibration_s: Time for which a recalibration of the gyroscope keeps it busy; 5 s at most.
+        pass_s: Time of a pass of its loop in which it has nothing to refresh, in seconds; it handles a packet in each.
+        refresh_s: Time of a pass in which it has, in seconds.
+        battery: Battery that it measures, until `set_battery` says otherwise; None: 12 V.
 
     Attributes:
         panel: Buttons, bumpers, battery.
@@ -88,7 +140,16 @@ class OpenCr:
     baud: int | None = None
 
     def __init__(
-        self, world: World, left: Servo, right: Servo, *, has_motors: bool = True, calibration_s: float = 5.0
+        self,
+        world: World,
+        left: Servo,
+        right: Servo,
+        *,
+        has_motors: bool = True,
+        calibration_s: float = 5.0,
+        pass_s: float = 0.0,
+        refresh_s: float = 0.0,
+        battery: Battery | None = None,
     ) -> None:
         self.panel = Panel()
         self.answers_as: int | None = None
@@ -104,14 +165,29 @@ class OpenCr:
         self._cycle_s = self._began_s
         self._period_s = min(CYCLE_S, max(CYCLE_S / self._time.factor, _SHORTEST_CYCLE_S))
         self._busy_until_s: float | None = None
+        self._pass_s, self._refresh_s = pass_s, refresh_s
+        # Until when a pass lasts, and whether a servo that does not answer holds it up.
+        self._pass_end_s = self._began_s
+        self._is_held_up = False
         self._goal = (0.0, 0.0)
+        self._remote_goal = (0.0, 0.0)
+        turning_radius_m = world.body.wheel_separation_m / 2
+        tick_m = _CIRCUMFERENCE_M / TICKS
+        self._drives = (
+            _ButtonDrive((_TEST_M_S, 0.0), _TEST_M / tick_m),
+            _ButtonDrive((0.0, _TEST_RAD_S), _TEST_RAD * turning_radius_m / tick_m),
+        )
         self._has_motor_power = True
         self._percent = 0.0
+        self._battery = battery
+        if battery is not None:
+            self.panel.battery_v = battery.voltage_v()
         self._is_connected = False
         self._skips_comparison = False
         self._seen_heartbeat = 0
         self._alive_s = self._began_s
         self._voltages: deque[float] = deque([self.panel.battery_v], maxlen=round(_MEAN_OVER_S / self._period_s))
+        self._sampled_s = self._began_s
         self._low_since_s: float | None = None
         self._start_heading_rad = world.heading_rad
         self._last_speed_m_s = 0.0
@@ -140,10 +216,18 @@ class OpenCr:
                     raise ValueError(f"there is no button or bumper {name!r}")
                 setattr(self.panel, name, value)
 
+    def steer(self, linear_m_s: float, angular_rad_s: float) -> None:
+        """Let an RC-100 remote control want this velocity, until it wants another one."""
+        fastest_m_s, fastest_rad_s = self._fastest()
+        with self._time.lock:
+            self.update()
+            self._remote_goal = (_within(linear_m_s, fastest_m_s), _within(angular_rad_s, fastest_rad_s))
+
     def set_battery(self, voltage_v: float) -> None:
         """Let the battery have this voltage from now on."""
         with self._time.lock:
             self.update()
+            self._battery = None
             self.panel.battery_v = voltage_v
             self._supply()
 
@@ -154,35 +238,57 @@ class OpenCr:
         self._parser.clear()
 
     def due_s(self) -> float:
-        """The next cycle, or the end of what keeps it busy."""
-        return self._cycle_s if self._busy_until_s is None else self._busy_until_s
+        """The next pass that does something, or the end of what keeps it busy."""
+        if self._busy_until_s is not None:
+            return self._busy_until_s
+        if self._is_held_up:
+            return self._pass_end_s
+        return min(self._cycle_s, self._pass_end_s) if self._waiting else self._cycle_s
 
     def update(self) -> Iterable[Sending]:
-        """Do all cycles until now."""
+        """Do all passes until now."""
         now_s = self._time.now_s()
         found: list[Sending] = []
         if self._busy_until_s is not None and now_s >= self._busy_until_s:
             found += self._end_calibration(self._busy_until_s)
-        if self._busy_until_s is None and now_s >= self._cycle_s:
-            missed = int((now_s - self._cycle_s) / self._period_s)
-            # One cycle at one time: the wheels have lived on meanwhile, and a late thread must not repeat itself.
-            self._cycle_s += (missed + 1) * self._period_s
-            self._cycle(now_s)
+        while self._busy_until_s is None and now_s >= self.due_s():
+            if self._is_held_up:
+                self._is_held_up = False
+                self._refresh()
+                # The next pass begins at once, with the heartbeat and the motors.
+                self._cycle_s = self._pass_end_s
+                found += self._answer_next()
+            elif self._waiting and self._pass_end_s < self._cycle_s:
+                self._pass_end_s += self._pass_s
+                found += self._answer_next()
+            else:
+                missed = int((now_s - self._cycle_s) / self._period_s)
+                # One cycle at one time: the wheels have lived on meanwhile, and a late thread must not repeat itself.
+                began_s = self._cycle_s + missed * self._period_s
+                self._cycle_s = began_s + self._period_s
+                self._cycle(began_s, now_s)
         return found
 
     def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
-        """Answer what is addressed to it; while it is busy, later."""
+        """Answer what is addressed to it, in the passes that follow."""
         found = list(self.update())
-        self._waiting.extend(self._parser.feed(data, self._time.now_s()))
-        return found + self._answer_waiting()
+        now_s = self._time.now_s()
+        is_first = not self._waiting
+        self._waiting.extend(self._parser.feed(data, now_s))
+        if self._is_held_up or self._busy_until_s is not None:
+            return found
+        if self._is_missing_servo():
+            # The pass under way is held up already.
+            self._cycle_s = now_s
+        elif is_first and now_s > self._pass_end_s and self._pass_s:
+            passes = math.ceil((now_s - self._pass_end_s) / self._pass_s)
+            self._pass_end_s += passes * self._pass_s
+        self._pass_end_s = max(self._pass_end_s, now_s)
+        return found + list(self.update())
 
-    def _answer_waiting(self) -> list[Sending]:
-        found = []
-        while self._waiting and self._busy_until_s is None:
-            answer = self._answer(self._waiting.popleft())
-            if answer is not None:
-                found.append(self._sending(*answer))
-        return found
+    def _answer_next(self) -> list[Sending]:
+        answer = self._answer(self._waiting.popleft()) if self._waiting else None
+        return [] if answer is None else [self._sending(*answer)]
 
     def _sending(self, error: int, data: bytes) -> Sending:
         return Sending(status(DEVICE_ID if self.answers_as is None else self.answers_as, error, data))
@@ -238,8 +344,7 @@ class OpenCr:
         return error
 
     def _written(self, address: int) -> None:
-        body = self._world.body
-        fastest_m_s = 2 * math.pi * body.wheel_radius_m * body.fastest_rpm / 60
+        fastest_m_s, fastest_rad_s = self._fastest()
         match address:
             case 19:
                 self._compare_heartbeat(self._time.now_s())
@@ -250,46 +355,81 @@ class OpenCr:
                 for servo in self._powered_servos():
                     servo.write(64, bytes((int(bool(self._get(_TORQUE))),)))
             case 150:
-                linear_m_s = self._get(_LINEAR_X) * 0.01
-                self._goal = (max(-fastest_m_s, min(fastest_m_s, linear_m_s)), self._goal[1])
+                self._goal = (_within(self._get(_LINEAR_X) * 0.01, fastest_m_s), self._goal[1])
             case 170:
-                fastest_rad_s = fastest_m_s / (body.wheel_separation_m / 2)
-                angular_rad_s = self._get(_ANGULAR_Z) * 0.01
-                self._goal = (self._goal[0], max(-fastest_rad_s, min(fastest_rad_s, angular_rad_s)))
+                self._goal = (self._goal[0], _within(self._get(_ANGULAR_Z) * 0.01, fastest_rad_s))
             case 174 | 178:
                 for servo, start in zip(self._servos, _PROFILES, strict=True):
                     if start == address and servo.answers and self._has_motors:
                         servo.instruction_received()
                         servo.write(108, bytes(self._memory[start : start + 4]))
 
+    def _fastest(self) -> tuple[float, float]:
+        """Limits of the firmware, in m/s and rad/s."""
+        body = self._world.body
+        fastest_m_s = 2 * math.pi * body.wheel_radius_m * body.fastest_rpm / 60
+        return fastest_m_s, fastest_m_s / (body.wheel_separation_m / 2)
+
     def _end_calibration(self, ended_s: float) -> list[Sending]:
         self._busy_until_s = None
         self._put(_CALIBRATE, 0)
         # Its cycles stood still meanwhile, and what it told before is told until the next one.
         self._cycle_s = ended_s + self._period_s
-        return [self._sending(Error.NONE, b""), *self._answer_waiting()]
+        self._pass_end_s = ended_s
+        return [self._sending(Error.NONE, b"")]
 
     # Its cycle.
 
     def _powered_servos(self) -> tuple[Servo, ...]:
         return tuple(servo for servo in self._servos if self._has_motors and servo.answers)
 
-    def _cycle(self, now_s: float) -> None:
+    def _is_missing_servo(self) -> bool:
+        """Return True if a servo that it asks does not answer."""
+        return self._has_motors and not all(servo.answers for servo in self._servos)
+
+    def _cycle(self, began_s: float, now_s: float) -> None:
         self._compare_heartbeat(now_s)
         if not self._is_connected:
             self._goal = (0.0, 0.0)
         self._watch_battery(now_s)
-        linear_m_s, angular_rad_s = self._goal
+        goals = (
+            self._goal,
+            self._remote_goal,
+            *(drive.velocity for drive in self._drives if drive.from_ticks is not None),
+        )
+        linear_m_s, angular_rad_s = (sum(parts) for parts in zip(*goals, strict=True))
         half_m = self._world.body.wheel_separation_m / 2
         wheels_m_s = (linear_m_s - angular_rad_s * half_m, linear_m_s + angular_rad_s * half_m)
         for servo, wheel_m_s in zip(self._servos, wheels_m_s, strict=True):
             if self._has_motors and servo.answers:
                 servo.instruction_received()
                 servo.catch_up()
-                raw = int(max(-_RAW_LIMIT, min(_RAW_LIMIT, wheel_m_s * _RAW_PER_M_S)))
+                raw = int(_within(wheel_m_s * _RAW_PER_M_S, _RAW_LIMIT))
                 # As in a SYNC WRITE: nobody hears of what the servo refuses.
                 servo.write(104, raw.to_bytes(4, "little", signed=True))
+        self._obey_buttons(now_s)
+        if self._is_missing_servo():
+            self._is_held_up = True
+            self._pass_end_s = began_s + MUTE_PASS_S
+            return
+        self._pass_end_s = max(self._pass_end_s, began_s + self._refresh_s)
         self._refresh()
+
+    def _obey_buttons(self, now_s: float) -> None:
+        _, right = self._servos
+        if not (self._has_motors and right.answers):
+            return
+        right.read(132, 4)
+        ticks = right.table["present position"]
+        straight, around = self._drives
+        for drive, is_pressed in zip(self._drives, (self.panel.button_1, self.panel.button_2), strict=True):
+            if drive.is_started(is_pressed, now_s):
+                drive.from_ticks = ticks
+            elif drive.from_ticks is not None and abs(ticks - drive.from_ticks) > drive.ticks:
+                drive.from_ticks = None
+        if straight.from_ticks is not None:
+            # One at a time.
+            around.from_ticks = None
 
     def _compare_heartbeat(self, now_s: float) -> None:
         if self._skips_comparison:
@@ -307,8 +447,13 @@ class OpenCr:
         self._skips_comparison = was_connected != self._is_connected
 
     def _watch_battery(self, now_s: float) -> None:
+        if self._battery is not None:
+            self.panel.battery_v = self._battery.voltage_v()
         voltage_v = self.panel.battery_v
-        self._voltages.append(voltage_v)
+        # After a long pass, the mean is of what there was meanwhile.
+        samples = max(round((now_s - self._sampled_s) / self._period_s), 1)
+        self._voltages.extend([voltage_v] * min(samples, self._voltages.maxlen or 1))
+        self._sampled_s = now_s
         mean_v = sum(self._voltages) / len(self._voltages)
         if mean_v >= _CUT_V:
             self._low_since_s = None
@@ -374,3 +519,7 @@ class OpenCr:
         )  # fmt: skip
         for address, value in zip(range(60, 112, 4), readings, strict=True):
             self._put(address, value)
+
+
+def _within(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))

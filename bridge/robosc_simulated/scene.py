@@ -5,8 +5,9 @@ package are in `scenes/`.
 """
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -32,6 +33,7 @@ from robosc_simulated.walls import CELL_M, Segment, Walls, open_maze
 # Of a cell: the robot's middle is out of the gap before it is there, and is there also where it rounds the
 # corner of the gap at once, 0.3 of a cell from it.
 _GOAL_SHARE = 0.45
+_SEGMENT = "x1, y1, x2, y2"
 _FOLDER = Path(__file__).parent / "scenes"
 
 
@@ -58,6 +60,14 @@ class Goal:
         return math.hypot(x_m - self.x_m, y_m - self.y_m) <= self.radius_m
 
 
+class Look(StrEnum):
+    """Look of a wall or an obstacle to a LiDAR."""
+
+    PLAIN = "plain"
+    DARK = "dark"
+    GLASS = "glass"
+
+
 @dataclass(frozen=True)
 class Obstacle:
     """A round thing that can be moved, put away and put back while the simulation runs.
@@ -68,6 +78,7 @@ class Obstacle:
         y_m: y of its middle.
         radius_m: Its radius.
         is_there: True if the robot meets and sees it.
+        look: Look to a LiDAR.
     """
 
     name: str
@@ -75,6 +86,7 @@ class Obstacle:
     y_m: float
     radius_m: float
     is_there: bool = True
+    look: Look = Look.PLAIN
 
 
 @dataclass(frozen=True)
@@ -115,6 +127,8 @@ class Scene:
         noise: Noise that makes motion and sensors less than ideal.
         wall_height_m: Height of walls and obstacles, as a camera sees them; a LiDAR sees them at any height.
         wall_shade: Shade of the same, from 0 (black) to 255 (white).
+        special_walls: Those of the walls that a LiDAR sees badly, by their look.
+        profile: Name of the profile of a run in it; None: it does not say.
     """
 
     name: str
@@ -127,6 +141,8 @@ class Scene:
     noise: Noise = IDEAL
     wall_height_m: float = WALL_HEIGHT_M
     wall_shade: int = WALL_SHADE
+    special_walls: Mapping[Look, Walls] = field(default_factory=dict)
+    profile: str | None = None
 
 
 def maze_scene(columns: int, rows: int, *, cell_m: float = CELL_M, seed: int = 0) -> Scene:
@@ -202,6 +218,12 @@ class _Maker:
     def scene(self, name: str, said: SceneFile) -> Scene:
         """The scene."""
         segments = list(self._segments(said.walls))
+        special = {
+            look: [self._four(segment, _SEGMENT, ("walls", look, place)) for place, segment in enumerate(found)]
+            for look, found in ((Look.DARK, said.walls.dark), (Look.GLASS, said.walls.glass))
+        }
+        for found in special.values():
+            segments += found
         goal = None if said.goal is None else Goal(said.goal.x_m, said.goal.y_m, said.goal.radius_m)
         if said.maze is not None:
             walls, exit_m = self._maze(said.maze)
@@ -216,11 +238,16 @@ class _Maker:
             (start.x_m, start.y_m, math.radians(start.heading_deg)),
             goal,
             None if said.line is None else self._line(said.line),
-            tuple(Obstacle(key, it.x_m, it.y_m, it.radius_m, it.is_there) for key, it in said.obstacles.items()),
+            tuple(
+                Obstacle(key, it.x_m, it.y_m, it.radius_m, it.is_there, Look(it.look))
+                for key, it in said.obstacles.items()
+            ),
             Texture(floor.texture, floor.shade, floor.other_shade, floor.size_m, floor.joint_m, self._seed),
             Noise(noise.slip_share, noise.slip_deviation, noise.encoder_deviation, noise.lidar_m, noise.camera_shades),
             said.walls.height_m,
             said.walls.shade,
+            {look: Walls(found) for look, found in special.items() if found},
+            said.profile,
         )
 
     def _maze(self, said: MazePart) -> tuple[Walls, Point]:
@@ -228,7 +255,7 @@ class _Maker:
 
     def _segments(self, said: WallsPart) -> Iterator[Segment]:
         for place, segment in enumerate(said.segments):
-            yield self._four(segment, "x1, y1, x2, y2", ("walls", "segments", place))
+            yield self._four(segment, _SEGMENT, ("walls", "segments", place))
         for place, polyline in enumerate(said.polylines):
             points = self._points(polyline, ("walls", "polylines", place))
             for start, end in pairwise(points):

@@ -46,6 +46,14 @@ class WallsPart(_Section, frozen=True):
             description="Four walls, `[x, y, width, height]` each, where x, y is the corner of the least coordinates."
         ),
     ] = ()
+    dark: Annotated[
+        tuple[tuple[_Metres, ...], ...],
+        Meta(description="Straight walls that a LiDAR sees from near only, `[x1, y1, x2, y2]` each."),
+    ] = ()
+    glass: Annotated[
+        tuple[tuple[_Metres, ...], ...],
+        Meta(description="Straight walls through which most beams of a LiDAR go, `[x1, y1, x2, y2]` each."),
+    ] = ()
     height_m: Annotated[
         float, Meta(ge=0.01, le=10, description="Of walls and obstacles, as the camera sees them; the LiDAR sees all.")
     ] = WALL_HEIGHT_M
@@ -122,6 +130,7 @@ class ObstaclePart(_Section, frozen=True):
     y_m: Annotated[float, Meta(ge=-1000, le=1000, description="Of its middle.")]
     radius_m: Annotated[float, Meta(ge=0.005, le=100, description="Of the thing.")]
     is_there: Annotated[bool, Meta(description="True: it is there from the start.")] = True
+    look: Annotated[Literal["plain", "dark", "glass"], Meta(description="Look to a LiDAR, as that of walls.")] = "plain"
 
 
 class NoisePart(_Section, frozen=True):
@@ -155,3 +164,7 @@ class SceneFile(_Section, frozen=True):
     floor: Annotated[FloorPart, Meta(description="Looks of the floor.")] = FloorPart()
     obstacles: Annotated[dict[Name, ObstaclePart], Meta(description="Round things that can be moved, by name.")] = {}
     noise: Annotated[NoisePart, Meta(description="Disturbances of motion and sensors.")] = NoisePart()
+    profile: Annotated[
+        Literal["ideal", "typical", "bad-day"] | None,
+        Meta(description="Distance of devices and lines from ideal; null: that of the run (`--profile`)."),
+    ] = None

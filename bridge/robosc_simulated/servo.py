@@ -14,6 +14,7 @@ The motor follows goals in the velocity mode (1) and the PWM mode (16); in any o
 import math
 from enum import IntFlag
 
+from robosc_simulated.battery import Battery
 from robosc_simulated.control_table import MODELS, ControlTable, Item
 from robosc_simulated.packets import ALERT, Error
 from robosc_simulated.world import Wheel, World
@@ -28,6 +29,9 @@ OVERLOAD_S = 1.0
 _PROCESSOR_V = 5.5
 # Silence after a reboot: not stated, "allow 0.5 s".
 REBOOT_S = 0.35
+_VOLTAGE_STEP_V = 0.02
+# A small motor in a closed case: minutes; the e-Manual says only that it must cool for 20 minutes after overheating.
+_AMBIENT_C, _WARMING_S, _WARMING_STEP_S = 33.0, 300.0, 0.1
 
 _REVERSE, _TIME_BASED, _TORQUE_BY_GOAL = 0x01, 0x04, 0x08
 _RESET_BY_MODE = frozenset(
@@ -58,6 +62,7 @@ class Servo:
         device_id: Its ID.
         is_mirrored: True if it is mounted so that its own positive direction is backward.
         settings: Other items of the EEPROM that differ from the factory's, by name.
+        battery: Battery that it lives from, until `brown_out` says otherwise; None: 12 V.
 
     Attributes:
         table: Its registers.
@@ -75,10 +80,13 @@ class Servo:
         *,
         is_mirrored: bool = False,
         settings: dict[str, int] | None = None,
+        battery: Battery | None = None,
     ) -> None:
         self.table = ControlTable(MODELS[model])
         self.voltage_v = 12.0
         self.temperature_c = 33.0
+        self._battery = battery
+        self._warmed_s = world.lived_s
         self._world = world
         self.time = world.time
         self._wheel = wheel
@@ -123,6 +131,7 @@ class Servo:
         """Set the voltage at its input: beyond its limits it flags an error, below 5.5 V it is off."""
         with self.time.lock:
             self.catch_up()
+            self._battery = None
             self.voltage_v = voltage_v
             if voltage_v < _PROCESSOR_V:
                 self._has_power = False
@@ -171,6 +180,7 @@ class Servo:
         """Live until now."""
         self._world.catch_up()
         now_s = self.time.now_s()
+        self._age()
         is_driven = self._has_power and bool(self.table["torque enable"])
         periods = self.table["bus watchdog"]
         if is_driven and 0 < periods < 0xFF and now_s - self._heard_s > periods * _WATCHDOG_S:
@@ -183,6 +193,25 @@ class Servo:
             self._blocked_s = now_s
         elif now_s - self._blocked_s >= OVERLOAD_S:
             self._fail(HardwareError.OVERLOAD)
+
+    def _age(self) -> None:
+        """Let supply and temperature be what came of the time that has passed."""
+        if self._battery is not None:
+            voltage_v = self._battery.voltage_v()
+            if abs(voltage_v - self.voltage_v) > _VOLTAGE_STEP_V:
+                self.voltage_v = voltage_v
+                self._protect()
+                self._drive()
+        warming_c = self._world.profile.warming_c
+        passed_s = self._world.lived_s - self._warmed_s
+        if warming_c and passed_s >= _WARMING_STEP_S:
+            self._warmed_s = self._world.lived_s
+            wheel = self._wheel
+            is_held = wheel.is_blocked and wheel.goal_rad_s
+            load = (1.0 if is_held else abs(wheel.speed_rad_s) / wheel.fastest_rad_s) if wheel.is_driven else 0.0
+            end_c = _AMBIENT_C + warming_c * load
+            self.temperature_c += (end_c - self.temperature_c) * (1.0 - math.exp(-passed_s / _WARMING_S))
+            self._protect()
 
     def due_s(self) -> float:
         """Return the time when something will happen by itself."""

@@ -8,11 +8,13 @@ from types import TracebackType
 from typing import Self
 
 from robosc.execution.runtime.clock import Clock
+from robosc_simulated.battery import Battery
 from robosc_simulated.camera import SimulatedCamera
 from robosc_simulated.floor import Track
 from robosc_simulated.lidar import LIDARS, Lidar
 from robosc_simulated.line import Faults, SimulatedLine
 from robosc_simulated.opencr import OpenCr
+from robosc_simulated.profile import IDEAL, find_profile
 from robosc_simulated.recorder import Recorder
 from robosc_simulated.robots import BODIES
 from robosc_simulated.rover import Rover
@@ -28,11 +30,17 @@ BASES = ("opencr", "dynamixel", "mavlink-rover")
 _SET_UP = {"baud rate": 3, "operating mode": 1}
 
 
-def wheel_servos(world: World) -> tuple[Servo, Servo]:
-    """The left and the right servo of a robot, set up as a TurtleBot3's are."""
+def wheel_servos(world: World, battery: Battery | None = None) -> tuple[Servo, Servo]:
+    """The left and the right servo of a robot, set up as a TurtleBot3's are.
+
+    Args:
+        world: World that they move in.
+        battery: Battery that they live from; None: 12 V.
+    """
     model = world.body.servo_model
-    left = Servo(model, world, world.left, 1, settings=_SET_UP)
-    right = Servo(model, world, world.right, 2, is_mirrored=True, settings={**_SET_UP, "drive mode": 1})
+    left = Servo(model, world, world.left, 1, settings=_SET_UP, battery=battery)
+    settings = {**_SET_UP, "drive mode": 1}
+    right = Servo(model, world, world.right, 2, is_mirrored=True, settings=settings, battery=battery)
     return left, right
 
 
@@ -53,7 +61,8 @@ class SimulatedTurtleBot3:
         seed: Seed of all that comes by chance.
         has_motors: True if OpenCR has found its motors when it started.
         calibration_s: Duration of the calibration of OpenCR's gyroscope.
-        noise_m: Standard deviation of what the LiDAR measures; None: as its scene says, or 0.
+        noise_m: Standard deviation of what the LiDAR measures; None: as its scene and the profile say.
+        profile: Name of one of `profile.PROFILES`; None: as its scene says, or `ideal`.
         line: Line on the floor, in place of a scene; with one, there is a camera.
         camera_link: Place of the camera's socket; with a place, there is a camera, also without a line.
         recorder: Recorder that takes all bytes, as of the lines `base` and `scanner`; None: nobody does.
@@ -61,6 +70,8 @@ class SimulatedTurtleBot3:
 
     Attributes:
         time: Time that all of it lives by.
+        profile: Distance of all of it from ideal.
+        battery: Battery that it lives from; None: its voltage is what a test says.
         world: Walls, pose, wheels.
         left: The left servo, also behind OpenCR; of no use where the base is a MAVLink rover.
         right: The right one.
@@ -73,7 +84,7 @@ class SimulatedTurtleBot3:
         camera: Camera that looks at the floor; None: there is none.
 
     Raises:
-        ValueError: There is no such robot, base or LiDAR, or there are walls or a line beside a scene.
+        ValueError: There is no such robot, base, LiDAR or profile, or there are walls or a line beside a scene.
         FileExistsError: There is something at a link already.
     """
 
@@ -98,6 +109,7 @@ class SimulatedTurtleBot3:
         camera_link: Path | None = None,
         recorder: Recorder | None = None,
         patience_s: float | None = None,
+        profile: str | None = None,
     ) -> None:
         for kind, name, known in (("robot", robot, BODIES), ("base", base, BASES), ("LiDAR", lidar, LIDARS)):
             if name not in known:
@@ -107,27 +119,40 @@ class SimulatedTurtleBot3:
         elif walls is not None or line is not None:
             raise ValueError("a scene has its own walls and its own line")
         self.time = Timebase(clock, factor, patience_s)
-        self.world = World(BODIES[robot], scene, self.time, pose, seed)
-        self.left, self.right = wheel_servos(self.world)
+        self.profile = find_profile(profile or scene.profile or IDEAL.name)
+        self.world = World(BODIES[robot], scene, self.time, pose, seed, self.profile)
+        self.battery: Battery | None = None
+        if self.profile.charge is not None and base != "mavlink-rover":
+            self.battery = Battery(self.world, self.profile.charge, self.profile.resistance_ohm)
+        self.left, self.right = wheel_servos(self.world, self.battery)
         self.opencr: OpenCr | None = None
         self.bus: ServoBus | None = None
         self.rover: Rover | None = None
         device: OpenCr | ServoBus | Rover
         if base == "opencr":
             device = self.opencr = OpenCr(
-                self.world, self.left, self.right, has_motors=has_motors, calibration_s=calibration_s
+                self.world,
+                self.left,
+                self.right,
+                has_motors=has_motors,
+                calibration_s=calibration_s,
+                pass_s=self.profile.pass_s / self.time.factor,
+                refresh_s=self.profile.refresh_s / self.time.factor,
+                battery=self.battery,
             )
         elif base == "dynamixel":
             device = self.bus = ServoBus((self.left, self.right))
         else:
             device = self.rover = Rover(self.world)
-        noise = scene.noise.lidar_m if noise_m is None else noise_m
+        noise = self.world.scene.noise.lidar_m if noise_m is None else noise_m
         self.scanner: Lidar = LIDARS[lidar](self.world, seed=seed, noise_m=noise)
         base_tap, scanner_tap = (None if recorder is None else recorder.tap(line) for line in ("base", "scanner"))
         self.base_line = SimulatedLine(device, self.time, base_link, seed, base_tap)
+        self._roughen(self.base_line.faults, self.profile.ftdi_s if base == "dynamixel" else self.profile.usb_s)
         self.camera: SimulatedCamera | None = None
         try:
             self.scanner_line = SimulatedLine(self.scanner, self.time, scanner_link, seed + 1, scanner_tap)
+            self._roughen(self.scanner_line.faults, self.profile.usb_s)
             try:
                 if scene.line is not None or camera_link is not None:
                     self.camera = SimulatedCamera(self.world, camera_link, seed=seed)
@@ -137,6 +162,23 @@ class SimulatedTurtleBot3:
         except BaseException:
             self.base_line.close()
             raise
+
+    def _roughen(self, faults: Faults, batch_s: float) -> None:
+        """Let a line have the errors of the profile.
+
+        Args:
+            faults: Faults of the line.
+            batch_s: Time for which its adapter gathers bytes, in seconds.
+        """
+        there, here = self.profile.to_device, self.profile.to_host
+        # What is a part of a revolution or of an exchange stays one where the world passes faster.
+        faults.batch_s, faults.has_wire_time = batch_s / self.time.factor, self.profile.has_wire_time
+        faults.drop_share, faults.duplicate_share, faults.cut_share, faults.flip_share = (
+            here.drop, here.duplicate, here.cut, here.flip,
+        )  # fmt: skip
+        faults.device_drop_share, faults.device_duplicate_share, faults.device_cut_share, faults.device_flip_share = (
+            there.drop, there.duplicate, there.cut, there.flip,
+        )  # fmt: skip
 
     @property
     def base_path(self) -> str:

@@ -14,8 +14,10 @@ import numpy as np
 from robosc_simulated.control_table import MODELS
 from robosc_simulated.discs import Discs
 from robosc_simulated.drift import Drift
+from robosc_simulated.profile import IDEAL, Profile
 from robosc_simulated.robots import Body
-from robosc_simulated.scene import IDEAL, Obstacle, Scene
+from robosc_simulated.scene import IDEAL as NO_NOISE
+from robosc_simulated.scene import Look, Obstacle, Scene
 from robosc_simulated.sweep import Sweep
 from robosc_simulated.timebase import Timebase
 from robosc_simulated.walls import Floats, Walls
@@ -24,8 +26,12 @@ STEP_S = 0.005
 # What a motor can do at all, and how soon a wheel that nothing drives stands.
 _STRONGEST_RAD_S2 = 150.0
 _FRICTION_RAD_S2 = 60.0
+# What is left of a change that is done at once, so that a wheel comes to a standstill.
+_NEAR_RAD_S = 0.003
 # A body that has left a wall by so much has left it; less is the same collision.
 _APART_M = 0.005
+# Two rays that are computed in different ways meet the same thing.
+_SAME_M = 1e-6
 
 
 @dataclass
@@ -40,6 +46,8 @@ class Wheel:
         is_blocked: True if something holds it.
         speed_rad_s: Present speed.
         angle_rad: Angle turned so far, as its encoder counts.
+        lag_s: Time constant with which it follows its goal: inertia of the robot, and softness of its controller.
+        dead_band_rad_s: Goals below this do not overcome its friction.
     """
 
     fastest_rad_s: float
@@ -49,6 +57,8 @@ class Wheel:
     is_blocked: bool = False
     speed_rad_s: float = 0.0
     angle_rad: float = 0.0
+    lag_s: float = 0.0
+    dead_band_rad_s: float = 0.0
 
     def step(self, step_s: float) -> float:
         """Live one step.
@@ -61,7 +71,11 @@ class Wheel:
             return 0.0
         goal_rad_s = max(-self.fastest_rad_s, min(self.fastest_rad_s, self.goal_rad_s)) if self.is_driven else 0.0
         strongest = min(self.acceleration_rad_s2, _STRONGEST_RAD_S2) if self.is_driven else _FRICTION_RAD_S2
+        if abs(goal_rad_s) < self.dead_band_rad_s:
+            goal_rad_s = 0.0
         change = goal_rad_s - self.speed_rad_s
+        if self.lag_s and abs(change) > _NEAR_RAD_S:
+            change *= 1.0 - math.exp(-step_s / self.lag_s)
         before = self.speed_rad_s
         self.speed_rad_s += math.copysign(min(abs(change), strongest * step_s), change)
         turned = (before + self.speed_rad_s) / 2 * step_s
@@ -90,6 +104,9 @@ class WorldEvent:
     is_there: bool = True
 
 
+Looks = np.ndarray[tuple[int], np.dtype[np.int64]]
+"""For each ray, the place in `tuple(Look)` of the look of what it meets."""
+
 OnStep = Callable[[float], None]
 """Is told the world time of every step that was lived."""
 
@@ -106,9 +123,11 @@ class World:
         time: Time that its devices share.
         pose: Start pose: x, y in metres, heading in rad; None: where its scene says.
         seed: Seed of slip and of what encoders count.
+        profile: Distance of its motors and its floor from ideal.
 
     Attributes:
-        scene: Scene as it was at the start.
+        profile: The same.
+        scene: Scene as it was at the start, with the noise of the profile.
         walls: Walls of the scene.
         x_m: x of the middle between the wheels.
         y_m: y of the same.
@@ -131,15 +150,20 @@ class World:
         time: Timebase,
         pose: tuple[float, float, float] | None = None,
         seed: int = 0,
+        profile: Profile = IDEAL,
     ) -> None:
         self.body = body
-        self.scene = walls if isinstance(walls, Scene) else Scene("walls", walls)
+        self.profile = profile
+        scene = walls if isinstance(walls, Scene) else Scene("walls", walls)
+        self.scene = replace(scene, noise=profile.noise_in(scene))
         self.walls = self.scene.walls
         self._sweep = Sweep(self.walls)
         self.time = time
         self.x_m, self.y_m, self.heading_rad = self.scene.start if pose is None else pose
         fastest_rad_s = MODELS[body.servo_model].no_load_rpm * math.tau / 60
-        self.left, self.right = Wheel(fastest_rad_s), Wheel(fastest_rad_s)
+        self.left, self.right = (
+            Wheel(fastest_rad_s, lag_s=profile.lag_s, dead_band_rad_s=profile.dead_band_rad_s) for _ in range(2)
+        )
         self.floor_speed_m_s = 0.0
         self.floor_yaw_rate_rad_s = 0.0
         self.collisions = 0
@@ -148,7 +172,8 @@ class World:
         self.reached_s: float | None = None
         self._obstacles = {obstacle.name: obstacle for obstacle in self.scene.obstacles}
         self._see_obstacles()
-        self._drift = Drift(self.scene.noise, seed) if self.scene.noise != IDEAL else None
+        noise = self.scene.noise
+        self._drift = Drift(noise, seed) if noise != NO_NOISE else None
         self._watchers: list[tuple[OnStep, OnWorldEvent]] = []
         self._see_goal()
 
@@ -222,6 +247,15 @@ class World:
     def _see_obstacles(self) -> None:
         self._there = tuple(obstacle for obstacle in self._obstacles.values() if obstacle.is_there)
         self._discs = Discs((obstacle.x_m, obstacle.y_m, obstacle.radius_m) for obstacle in self._there)
+        self._special: list[tuple[int, Walls | Discs]] = []
+        for place, look in enumerate(Look):
+            if look is Look.PLAIN:
+                continue
+            if (walls := self.scene.special_walls.get(look)) is not None:
+                self._special.append((place, walls))
+            round_things = [(it.x_m, it.y_m, it.radius_m) for it in self._there if it.look is look]
+            if round_things:
+                self._special.append((place, Discs(round_things)))
         self._clear_m = 0.0
 
     def watch(self, on_step: OnStep, on_event: OnWorldEvent) -> None:
@@ -313,11 +347,23 @@ class World:
         Returns:
             Shape (n,): in lengths of each direction; infinity where nothing is met.
         """
+        return self.seen(origins, directions)[0]
+
+    def seen(self, origins: Floats | None, directions: Floats) -> tuple[Floats, Looks | None]:
+        """Return the lengths of rays of the laser as `cast` does, and the looks of what they meet.
+
+        Args:
+            origins: As of `cast`.
+            directions: Likewise.
+
+        Returns:
+            Lengths, and for each ray the place in `tuple(Look)`; None: everything is plain.
+        """
         with self.time.lock:
             self.catch_up()
             cosine, sine = math.cos(self.heading_rad), math.sin(self.heading_rad)
             x_m, y_m = self._scanner_place()
-            discs = self._discs
+            discs, special = self._discs, self._special
         rotation = np.array(((cosine, sine), (-sine, cosine)))
         along = directions @ rotation
         if origins is None:
@@ -326,7 +372,15 @@ class World:
         else:
             starts = origins @ rotation + np.array((x_m, y_m))
             found = self.walls.cast(starts, along)
-        return np.minimum(found, discs.cast(starts, along)) if discs.discs else found
+        if discs.discs:
+            found = np.minimum(found, discs.cast(starts, along))
+        if not special:
+            return found, None
+        looks = np.zeros(len(found), dtype=np.int64)
+        for look, things in special:
+            looks[things.cast(np.broadcast_to(starts, along.shape), along) <= found + _SAME_M] = look
+        looks[np.isinf(found)] = 0
+        return found, looks
 
     def ranges(self, angles_rad: Sequence[float]) -> tuple[float, ...]:
         """Return the ranges that an ideal laser would measure now.

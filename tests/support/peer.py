@@ -18,7 +18,9 @@ Answers = Iterable[bytes | float]
 
 
 def _obey(peer: "VirtualPeer | Peer", heard: bytes, sleep: Callable[[float], object]) -> bytes:
-    """Have a peer answer all whole requests; return the bytes behind them."""
+    """Have a peer answer all whole requests; return the bytes behind them, without what is before them."""
+    # Zeros that fill what a device may wait for.
+    heard = heard.lstrip(b"\0")
     while len(heard) >= 7 and len(heard) >= (length := 7 + int.from_bytes(heard[5:7], "little")):
         request, heard = heard[:length], heard[length:]
         peer.requests.append(request)

@@ -69,6 +69,12 @@ def empty(bridge: Driven) -> None:
         bridge.robot.opencr.set_battery(stop_v - 0.05)
 
 
+def steer(bridge: Driven) -> None:
+    """Let OpenCR's own remote control steer, too."""
+    assert bridge.robot.opencr is not None
+    bridge.robot.opencr.steer(0.04, 0.0)
+
+
 # What a person must see to.
 GRAVE = (
     Fault("a motor is overloaded", lambda bridge: bridge.robot.left.overload(), "A motor tells of a fault."),
@@ -81,11 +87,13 @@ GRAVE = (
         is_line=True,
     ),
     Fault(
-        "a motor has lost its power",
+        "a motor behind OpenCR is mute",
         lambda bridge: bridge.robot.right.brown_out(0.0),
-        "A motor tells of a fault.",
+        "OpenCR answers too slowly, as when a wheel servo does not answer it: it may be disconnected",
         ("opencr",),
+        is_line=True,
     ),
+    Fault("OpenCR's remote control steers", steer, "The wheels rotate though nobody commanded it", ("opencr",)),
     Fault("a wheel is held", lambda bridge: bridge.robot.left.block_wheel(), "A motor tells of a fault."),
     Fault("the battery is empty", empty, "The battery is empty.", (*BASES, "mavlink-rover")),
     Fault("the base is unplugged", lambda bridge: bridge.robot.base_line.disconnect(), "the drive base is lost: /",

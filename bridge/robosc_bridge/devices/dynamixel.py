@@ -310,7 +310,12 @@ class DynamixelBase:
             acceleration_m_s2=self._acceleration_raw * ACCELERATION_RAW_RAD_S2 * self._robot.wheel_radius_m or None,
             battery_v=min(one.voltage_v for one in measured),
             temperature_c=max(one.temperature_c for one in measured),
+            goals_m_s=self._goals_m_s(goals) if self._is_torque_wanted else None,
         )
+
+    def _goals_m_s(self, goals: tuple[int, int]) -> tuple[float, float]:
+        left, right = goals
+        return left * self._robot.raw_m_s, right * self._robot.raw_m_s
 
 
 def _profile(robot: Robot, acceleration_rad_s2: float | None) -> tuple[int, float]:

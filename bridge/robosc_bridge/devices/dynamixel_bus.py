@@ -5,6 +5,10 @@ comes too late looks as the answer to the next request. A device answers in the 
 device that has not answered is first asked for something else, of a length that no other request has; once that answer
 is there, nothing older can follow. Only then is it asked again.
 
+A request whose length was damaged on its way makes a device wait for bytes that never come, and take the requests that
+follow for them. So a device that does not answer twice in a row is sent as many zeros as may be missing: the
+checksum of what they complete is wrong, and between packets they are skipped.
+
 Packets are those of dynamixel-sdk. Its `readTxRx`, `writeTxRx` and `GroupSyncRead` are not used: they take any answer
 of a device for the one they wait for, and the last forgets the error bytes and whatever came behind a missing device.
 """
@@ -32,6 +36,11 @@ def exchange_limit_s(answer_limit_s: float) -> float:
     """
     return 3 * answer_limit_s + 0.02
 
+
+_FILLER = bytes(2048)  # The longest packet that a device takes.
+_FILLER_S = 0.02  # On a slower line than 1 Mbps fewer are sent: what is missing may take several times.
+_FILL_AFTER = 2  # Requests in a row without an answer.
+_BITS_PER_BYTE = 10
 
 _EMPTY_STATUS = 11  # Bytes of an answer without data.
 
@@ -71,6 +80,7 @@ class BusCounters:
         unanswered: Those of the requests without a sound answer in time.
         damaged: Answers with a wrong checksum or cut short.
         foreign: Sound packets that were no answer to the request.
+        late: Those of them from the device that was asked: answers to what it was asked before.
         repeated: Requests that were made again.
     """
 
@@ -78,6 +88,7 @@ class BusCounters:
     unanswered: int = 0
     damaged: int = 0
     foreign: int = 0
+    late: int = 0
     repeated: int = 0
 
 
@@ -110,6 +121,8 @@ class DynamixelBus:
         self._name_of = name_of
         self._repeats = 0
         self._unsettled: set[int] = set()
+        # Requests in a row that were not answered.
+        self._silent = 0
 
     @property
     def received_s(self) -> float:
@@ -143,22 +156,31 @@ class DynamixelBus:
             DeviceSilentError: There is no answer in time.
         """
         address, length = next(_revolutions)
+        limit_s = None
+        if self._silent >= _FILL_AFTER and not self._port.is_late:
+            filler = _FILLER[: int(self._port.line.baud * _FILLER_S / _BITS_PER_BYTE)]
+            self._port.line.write(filler)
+            limit_s = self._port.answer_limit_s + _FILLER_S
 
         def fits(status: StatusPacket) -> bool:
             # A refusal has no length to know it by: it may be that of an older request.
             return not status.number and len(status.data) == length
 
-        status = self._answered(device, lambda: self._read(device, address, length), fits, length)
+        status = self._answered(device, lambda: self._read(device, address, length), fits, length, limit_s)
         return status.data
 
-    def ping(self, device: int) -> tuple[int, int]:
+    def ping(self, device: int, limit_s: float | None = None) -> tuple[int, int]:
         """Model number and version of the firmware.
+
+        Args:
+            device: Id of the device.
+            limit_s: Longest wait for the answer, where it is not the usual one.
 
         Raises:
             LineError: The line is gone.
             DeviceSilentError: There is no answer in time.
         """
-        status = self._asked(device, lambda: self._plain(device, INST_PING), PING_DATA)
+        status = self._asked(device, lambda: self._plain(device, INST_PING), PING_DATA, limit_s)
         return int.from_bytes(status.data[:2], "little"), status.data[2]
 
     def read(self, device: int, address: int, length: int) -> StatusPacket:
@@ -195,6 +217,27 @@ class DynamixelBus:
         return self._accepted(
             self._asked(device, transmit, 0, limit_s), f"does not let {len(data)} bytes at {address} be written"
         )
+
+    def is_late(self, device: int, limit_s: float) -> bool:
+        """Return True if a device that has not answered in time does so after all.
+
+        Args:
+            device: Id of the device.
+            limit_s: Longest wait for it, in seconds.
+
+        Raises:
+            LineError: The line is gone.
+        """
+        end_s = self._host.monotonic() + limit_s
+        self._port.end_s = end_s
+        while self._host.monotonic() < end_s:
+            self._port.wait_for(0, end_s - self._host.monotonic())
+            status = self._received()
+            if status is not None and status.device == device:
+                self.counters.foreign += 1
+                self.counters.late += 1
+                return True
+        return False
 
     def tell(self, device: int, address: int, data: bytes) -> None:
         """Write to an address of a device that may hear though it is not heard: no answer is waited for.
@@ -258,7 +301,9 @@ class DynamixelBus:
             status = self._received()
             if status is None:
                 self.counters.unanswered += 1
+                self._silent += 1
                 break
+            self._silent = 0
             if status.device in asked and status.device not in found and _fits(status, length):
                 self._unsettled.discard(status.device)
                 if status.number == DAMAGED_REQUEST:
@@ -309,15 +354,19 @@ class DynamixelBus:
         while (status := self._received()) is not None:
             if status.device == device and fits(status):
                 self._unsettled.discard(device)
+                self._silent = 0
                 return status
             self._is_foreign(status, (device,))
         self.counters.unanswered += 1
+        self._silent += 1
         raise self.silence_of(self._name_of(device), "does")
 
     def _is_foreign(self, status: StatusPacket, devices: Collection[int]) -> None:
-        """Count an answer that comes from another device than these."""
+        """Count an answer that is to another request, or comes from another device than these."""
         self.counters.foreign += 1
-        if status.device not in devices:
+        if status.device in devices:
+            self.counters.late += 1
+        else:
             self.stranger = status.device
 
     def _begin_request(self) -> None:

@@ -56,6 +56,7 @@ class MotorFault(StrEnum):
     TORQUE_LOST = "torque off by itself"
     WATCHDOG = "bus watchdog"
     BLOCKED = "does not rotate as told"
+    UNCOMMANDED = "rotates without a command"
 
 
 class BatteryLevel(StrEnum):
@@ -75,6 +76,8 @@ class DriveReading:
         pose: Odometry.
         velocity: Velocity as the wheels measure it.
         wheels_m_s: Speed of the left and the right wheel.
+        goals_m_s: Speeds that the left and the right wheel were told in this exchange, as the device rounds them;
+            None: they were told none, or the driver does not say.
         is_torque_on: True if the motors hold and obey.
         faults: Faults of any motor.
         acceleration_m_s2: Acceleration with which the motors bring a wheel to a new goal; None: as fast as they can.
@@ -99,6 +102,7 @@ class DriveReading:
     temperature_c: float | None = None
     buttons: Mapping[str, bool] = field(default_factory=dict)
     imu: Mapping[str, float] = field(default_factory=dict)
+    goals_m_s: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

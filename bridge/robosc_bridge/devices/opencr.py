@@ -5,11 +5,20 @@ second after the last change. It does not tell what is wrong with a motor, only 
 
 Sources: ROBOTIS-GIT/OpenCR 1.5.3 (`turtlebot3_ros2`) and turtlebot3_node 2.3.6; what the latter does wrong is not done
 here (it reads the device status before it has one, and takes old readings for new ones).
+
+A wheel servo that does not answer the board holds up each pass of its firmware for half a second, and it handles one
+packet in a pass: the board answers, but later than any answer is waited for. Nothing more is asked of it then than is
+needed to tell that from a board that is silent: whatever is asked must be worked off before it hears anything else.
+
+The board adds to every command what its two buttons want, of which one drives 0.3 m and the other one half a turn when
+they are held for 3 s, and what an RC-100 remote control wants; a command of zero does not end that, torque off does.
 """
 
 import contextlib
+import logging
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NoReturn
 
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, DynamixelBus, exchange_limit_s
@@ -17,7 +26,7 @@ from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFaul
 from robosc_bridge.devices.kinematics import body_velocity, opencr_words, wheel_speeds
 from robosc_bridge.devices.odometry import Odometry
 from robosc_bridge.devices.robots import Robot
-from robosc_bridge.devices.wheel_following import FollowingMonitor
+from robosc_bridge.devices.wheel_following import ExcessMonitor, FollowingMonitor
 from robosc_bridge.errors import BridgeError, DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
 from robosc_bridge.host import Host, Port
 from robosc_bridge.protocol import opencr
@@ -27,10 +36,15 @@ from robosc_bridge.transport.system_host import SYSTEM_HOST
 BAUD = 1_000_000  # A USB device: any is right.
 
 _CALIBRATION_LIMIT_S = 6.0
+# A board that a servo holds up takes half a second for a packet, and begins at any time in it.
+_SLOW_LIMIT_S = 0.65
+# Exchanges in a row without an answer after which it is seen whether the board is slow.
+_SILENT_LIMIT = 3
+# Of buttons that drive when they are held for 3 s: for half of that, there is time to let go.
+_HELD_S = 1.5
+_DRIVES = {"button_1": "0.3 m forward", "button_2": "half a turn to the right"}
 _REST_RAW = 2
 _REST_LIMIT_S = 1.0
-# What rotates against a goal of zero, by a button of the board or its remote control, rests without torque alone.
-_RELEASE_LIMIT_S = 0.3
 _TORQUE_LIMIT_S = 1.0
 _REFRESHED_MS = 45  # Two refreshes, every 20 ms, of what the board knows of its motors.
 _POLL_S = 0.01
@@ -38,6 +52,9 @@ _UPTIME_MODULUS = 2**32
 # Differences between the board's time and the computer's, from one reading to the next, that a restart is told from.
 _LEAD_S = 0.7
 _LAG_S = 1.0
+
+
+_log = logging.getLogger(__name__)
 
 
 class OpenCrBase:
@@ -73,11 +90,21 @@ class OpenCrBase:
         self._bus: DynamixelBus | None = None
         self._odometry = Odometry(robot.tick_m, robot.wheel_separation_m)
         self._following = FollowingMonitor()
+        self._excess = ExcessMonitor()
+        self._is_driven_otherwise = False
+        # Since when each button is pressed, until a person was warned.
+        self._pressed_s: dict[str, float] = {}
         self._heartbeat = 0
         # The uptime in the last block, and when that was asked for and received.
         self._uptime: tuple[int, float, float] | None = None
         self._is_torque_wanted = False
         self._is_torque_lost = False
+        # Exchanges in a row without an answer, and what was so when the first of them began.
+        self._silent = 0
+        self._late = 0
+        self._asked_s = 0.0
+        # Whether the board was too slow last: what it was asked then may still be answered in the next session.
+        self._is_slow = False
 
     def open(self) -> None:
         """Find the board and check that it is the one that is meant; wheels at rest, torque off.
@@ -86,7 +113,8 @@ class OpenCrBase:
             LineError: The line cannot be used.
             DeviceSilentError: Nothing answers.
             WrongDeviceError: It is another device, firmware or robot.
-            DeviceFaultError: The board has found no motors, keeps a profile acceleration, or a motor does not let go.
+            DeviceFaultError: The board has found no motors, keeps a profile acceleration, or is too slow, as when a
+                motor does not answer it; or a motor does not let go.
         """
         self.close()
         line = self._host.open_port(self._path, BAUD)
@@ -97,17 +125,66 @@ class OpenCrBase:
             self._is_torque_wanted = self._is_torque_lost = False
             self._odometry = self._odometry.rebased()
             self._following.forget()
-            self._check_identity(self._bus)
-            self._check_motors(self._bus)
-            self._clear_profile(self._bus)
-            self._await_refresh()
-            self._comes_to_rest()
-            self._switch_torque(False)
-            if self._calibrates_gyro:
-                self._calibrate(self._bus)
+            self._excess.forget()
+            self._is_driven_otherwise = False
+            self._silent = 0
+            self._check_speed(self._bus)
+            try:
+                self._set_up(self._bus)
+            except DeviceSilentError:
+                self._check_late(self._bus, 0)
+                raise
         except BaseException:
             self._release()
             raise
+
+    def _set_up(self, bus: DynamixelBus) -> None:
+        self._check_identity(bus)
+        self._check_motors(bus)
+        self._clear_profile(bus)
+        self._await_refresh()
+        self._comes_to_rest()
+        self._switch_torque(False)
+        if self._calibrates_gyro:
+            self._calibrate(bus)
+
+    def _check_speed(self, bus: DynamixelBus) -> None:
+        """See that the board answers at once, at the cost of one request where it does not.
+
+        Raises:
+            DeviceFaultError: It is slow.
+        """
+        if self._is_slow and bus.is_late(opencr.DEVICE, _SLOW_LIMIT_S):
+            # It has not worked off yet what it was asked before.
+            raise self._slowness()
+        self._is_slow = False
+        bus.begin(self._exchange_limit_s, repeats=0)
+        try:
+            bus.ping(opencr.DEVICE)
+        except DeviceSilentError:
+            # One that is silent is asked again, as one whose answer was lost.
+            self._check_late(bus, 0, _SLOW_LIMIT_S)
+
+    def _check_late(self, bus: DynamixelBus, late: int, limit_s: float = 0.0) -> None:
+        """Raise what is wrong if the board answers, too late.
+
+        Args:
+            bus: Bus of the board.
+            late: Number of late answers that had come when this began.
+            limit_s: Further wait for one, in seconds.
+
+        Raises:
+            DeviceFaultError: The board is slow.
+        """
+        if bus.counters.late > late or (limit_s > 0.0 and bus.is_late(opencr.DEVICE, limit_s)):
+            raise self._slowness()
+
+    def _slowness(self) -> DeviceFaultError:
+        self._is_slow = True
+        return DeviceFaultError(
+            f"{self._path}: OpenCR answers too slowly, as when a wheel servo does not answer it: it may be "
+            "disconnected, or have no power; check the cables of both"
+        )
 
     def set_torque(self, is_on: bool) -> None:
         """Torque on from a standstill, or off after a stop.
@@ -119,7 +196,10 @@ class OpenCrBase:
             DeviceError: The wheels do not come to rest.
         """
         self._is_torque_wanted = False
-        if not self._comes_to_rest(_REST_LIMIT_S if is_on else _RELEASE_LIMIT_S) and is_on:
+        # What does not obey does not come to rest either.
+        is_awaited = is_on or not self._is_driven_otherwise
+        self._is_driven_otherwise = False
+        if is_awaited and not self._comes_to_rest() and is_on:
             raise DeviceError(f"{self._path}: the wheels still rotate")
         try:
             self._switch_torque(is_on)
@@ -130,6 +210,7 @@ class OpenCrBase:
         self._is_torque_wanted = is_on
         self._is_torque_lost = False
         self._following.forget()
+        self._excess.forget()
 
     def exchange(self, velocity: Velocity) -> DriveReading:
         """Command a velocity, change the heartbeat, read everything; at most `exchange_limit_s` of the bus.
@@ -137,15 +218,24 @@ class OpenCrBase:
         Raises:
             LineError: The line is gone.
             DeviceSilentError: The board did not answer, also when asked again; it has been told to stop.
+            DeviceFaultError: It is slow, as when a motor does not answer it; it has been told to stop.
             DeviceError: The board has started anew, or the computer stood still; the board has been told to stop.
         """
+        bus = self._used_bus
+        if self._silent == 0:
+            self._late, self._asked_s = bus.counters.late, self._host.monotonic()
         try:
-            return self._exchange(velocity)
+            reading = self._exchange(velocity)
         except DeviceSilentError:
             if self._is_torque_wanted:
                 # It may hear though it is not heard: its own time limit is half a second.
-                self._used_bus.tell(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
+                bus.tell(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
+            self._silent += 1
+            if self._silent >= _SILENT_LIMIT:
+                self._check_late(bus, self._late, self._asked_s + _SLOW_LIMIT_S - self._host.monotonic())
             raise
+        self._silent = 0
+        return reading
 
     def _exchange(self, velocity: Velocity) -> DriveReading:
         is_obeying = self._is_torque_wanted and not self._is_torque_lost
@@ -158,11 +248,47 @@ class OpenCrBase:
             self._command((0, 0))
         faults = {MotorFault.TORQUE_LOST} if self._is_torque_lost else set()
         if is_obeying and not self._is_torque_lost:
-            if self._following.is_blocked(self._wheels_raw(words), block.velocities_raw, self._used_bus.received_s):
-                faults.add(MotorFault.BLOCKED)
-        else:
-            self._following.forget()
+            goals_raw = self._wheels_raw(words)
+            faults |= self._unfollowed(goals_raw, block)
+            self._watch_buttons(block)
+            left_m_s, right_m_s = (raw * self._robot.raw_m_s for raw in goals_raw)
+            return replace(self._reading(block, frozenset(faults)), goals_m_s=(left_m_s, right_m_s))
+        self._following.forget()
+        self._excess.forget()
+        self._pressed_s.clear()
         return self._reading(block, frozenset(faults))
+
+    def _unfollowed(self, goals_raw: tuple[int, int], block: Block) -> set[MotorFault]:
+        """Return what is wrong with how the wheels follow their goals."""
+        time_s = self._used_bus.received_s
+        is_blocked = self._following.is_blocked(goals_raw, block.velocities_raw, time_s)
+        if self._excess.is_driven(goals_raw, block.velocities_raw, time_s):
+            if not self._is_driven_otherwise:
+                self._is_driven_otherwise = True
+                _log.warning(
+                    "%s: the wheels rotate though the bridge has not commanded it: a button of OpenCR was held for "
+                    "3 s, or its remote control (RC-100) steers",
+                    self._path,
+                )
+            return {MotorFault.UNCOMMANDED}
+        return {MotorFault.BLOCKED} if is_blocked and not self._is_driven_otherwise else set()
+
+    def _watch_buttons(self, block: Block) -> None:
+        time_s = self._used_bus.received_s
+        for button, drive in _DRIVES.items():
+            if not block.buttons[button]:
+                self._pressed_s.pop(button, None)
+                continue
+            since_s = self._pressed_s.setdefault(button, time_s)
+            if time_s - since_s >= _HELD_S:
+                # Once for each time that it is pressed.
+                self._pressed_s[button] = math.inf
+                _log.warning(
+                    "%s: let %s go: held for 3 s, it lets OpenCR drive %s, whatever the bridge commands",
+                    self._path,
+                    button.replace("_", " "),
+                    drive,
+                )
 
     def reset(self) -> None:
         """See whether both motors hold again; the board cannot restart them.
@@ -177,7 +303,13 @@ class OpenCrBase:
 
     def close(self) -> None:
         """Stop, torque off, and give the line back."""
-        if self._bus is not None:
+        if self._bus is not None and self._is_slow:
+            self._is_torque_wanted = False
+            with contextlib.suppress(BridgeError):
+                # Nothing is waited for: the wheels have stopped when the board comes to the second one.
+                self._bus.tell(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
+                self._bus.tell(opencr.DEVICE, opencr.TORQUE, b"\0")
+        elif self._bus is not None:
             self._is_torque_wanted = False
             with contextlib.suppress(BridgeError):
                 self._comes_to_rest()
@@ -249,9 +381,9 @@ class OpenCrBase:
         # After a calibration, which another program may have begun, the board first tells an uptime from before it.
         self._host.sleep(_REFRESHED_MS / 1000)
 
-    def _comes_to_rest(self, limit_s: float = _REST_LIMIT_S) -> bool:
+    def _comes_to_rest(self) -> bool:
         """Command zero and wait for the wheels; whether they came to rest in time."""
-        return self._cycles_until(lambda block: max(map(abs, block.velocities_raw)) <= _REST_RAW, limit_s)
+        return self._cycles_until(lambda block: max(map(abs, block.velocities_raw)) <= _REST_RAW, _REST_LIMIT_S)
 
     def _switch_torque(self, is_on: bool) -> None:
         self._write_torque(is_on)

@@ -24,6 +24,7 @@ from robosc_simulated.error_monitor import ErrorMonitor
 from robosc_simulated.lidar import LIDARS
 from robosc_simulated.motion import MotionRecorder
 from robosc_simulated.output import Output
+from robosc_simulated.profile import IDEAL, PROFILES, find_profile
 from robosc_simulated.robots import BODIES
 from robosc_simulated.ros.commands import execute
 from robosc_simulated.ros.readings import Reading
@@ -171,7 +172,9 @@ def make_robot(options: argparse.Namespace) -> tuple[RosRobot, Pacer]:
         ValueError: There is no such scene, or something in it is wrong, or the speed is no positive number.
     """
     scene = load_scene(options.scene, options.seed)
-    world = World(BODIES[options.robot], scene, Timebase(PacedClock(), options.speed), seed=options.seed)
+    profile = find_profile(options.profile or scene.profile or IDEAL.name)
+    time = Timebase(PacedClock(), options.speed)
+    world = World(BODIES[options.robot], scene, time, seed=options.seed, profile=profile)
     robot = RosRobot(
         world,
         lidar=options.lidar,
@@ -209,6 +212,11 @@ def parser(prog: str, description: str) -> argparse.ArgumentParser:
     )
     found.add_argument(
         "--speed", type=float, default=1.0, metavar="N", help=f"the world passes N times as fast, up to {FASTEST:g}"
+    )
+    found.add_argument(
+        "--profile",
+        choices=sorted(PROFILES),
+        help="how far wheels and noise are from ideal; default: the scene's, else ideal",
     )
     found.add_argument(
         "--seed", type=option(seed), default=0, metavar="N", help="of whatever the scene leaves to chance, and of noise"

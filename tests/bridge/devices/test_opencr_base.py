@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S
 from robosc_bridge.devices.interface import MotorFault, Velocity
 from robosc_bridge.devices.opencr import OpenCrBase
 from robosc_bridge.devices.robots import BURGER, WAFFLE
@@ -163,7 +164,7 @@ def test_the_gyroscope_is_calibrated_at_rest_if_asked_to() -> None:
 
 
 def test_a_late_answer_to_another_programs_calibration_is_none_of_ours() -> None:
-    with rig("opencr", answer_limit_s=0.1, calibration_s=0.8) as bench:
+    with rig("opencr", answer_limit_s=0.1, calibration_s=2.0) as bench:
         # Somebody calibrates and leaves; the board is silent until it is done, and answers all of it then.
         port = bench.host.open_port(bench.robot.base_path, 1_000_000)
         port.write(bytes.fromhex(CALIBRATE))
@@ -175,7 +176,7 @@ def test_a_late_answer_to_another_programs_calibration_is_none_of_ours() -> None
         while True:
             try:
                 bench.base.open()
-            except DeviceSilentError:
+            except DeviceError:
                 assert bench.host.monotonic() < end_s
                 continue
             break
@@ -270,27 +271,137 @@ def test_motors_that_restart_in_a_pause_have_not_jumped(bench: Rig) -> None:
     assert (reading.pose.x_m, reading.pose.heading_rad) == (0.0, 0.0)
 
 
-def test_motors_that_were_without_power_can_be_used_again_and_have_not_jumped(bench: Rig) -> None:
-    bench.start()
-    bench.robot.left.set_position(40_000)
-    bench.robot.right.set_position(-90_000)
-    bench.base.open()
-    bench.base.set_torque(True)
-    bench.drive(Velocity(0.1), 0.3)
-    before = bench.robot.world.pose[0]
-    _board(bench).set_battery(4.0)
-    reading = bench.drive_until(lambda reading: bool(reading.faults), Velocity(0.1))
-    assert MotorFault.TORQUE_LOST in reading.faults
-    _board(bench).set_battery(12.0)
-    bench.drive(Velocity(0.1), 0.6)
-    assert bench.goals_rad_s() == (0.0, 0.0)
-    bench.base.reset()
-    reading = bench.drive()
-    assert (reading.faults, reading.is_torque_on) == (frozenset(), False)
-    assert reading.pose.x_m == pytest.approx(before, abs=0.02)
-    bench.base.set_torque(True)
-    bench.drive(Velocity(0.1), 0.2)
-    assert bench.goals_rad_s() != (0.0, 0.0)
+def _mute(bench: Rig, side: str) -> None:
+    """Let a servo lose its cable, which takes effect in the board's next cycle."""
+    getattr(bench.robot, side).brown_out(0.0)
+
+
+def _opened_again(bench: Rig) -> list[str]:
+    """Open it until it can be; what was wrong until then."""
+    problems = []
+    end_s = bench.host.monotonic() + 10.0
+    while True:
+        try:
+            bench.base.open()
+        except DeviceError as error:
+            problems.append(str(error))
+            assert bench.host.monotonic() < end_s, problems
+            bench.host.sleep(0.25)
+            continue
+        return problems
+
+
+def test_motors_that_were_without_power_can_be_used_again_and_have_not_jumped() -> None:
+    with rig("opencr", answer_limit_s=ANSWER_LIMIT_S) as bench:
+        bench.start()
+        bench.robot.left.set_position(40_000)
+        bench.robot.right.set_position(-90_000)
+        bench.base.open()
+        bench.base.set_torque(True)
+        bench.drive(Velocity(0.1), 0.3)
+        before = bench.robot.world.pose[0]
+        _board(bench).set_battery(4.0)
+        problem = _slowness(bench)
+        assert "may be disconnected, or have no power; check the cables" in problem
+        bench.base.close()
+        _board(bench).set_battery(12.0)
+        _opened_again(bench)
+        reading = bench.drive()
+        assert (reading.faults, reading.is_torque_on) == (frozenset(), False)
+        assert bench.goals_rad_s() == (0.0, 0.0)
+        assert reading.pose.x_m == pytest.approx(before, abs=0.03)
+        bench.base.set_torque(True)
+        bench.drive(Velocity(0.1), 0.2)
+        assert bench.goals_rad_s() != (0.0, 0.0)
+
+
+def _slowness(bench: Rig) -> str:
+    """Exchange until the board is told to be slow, as the bridge does; what is told then."""
+    for _ in range(100):
+        silent = 0
+        while True:
+            try:
+                bench.base.exchange(Velocity(0.1, 0.5))
+            except DeviceSilentError:
+                silent += 1
+                assert silent < 3, "it counts as silent"
+                continue
+            except DeviceFaultError as error:
+                return str(error)
+            break
+        bench.host.sleep(0.02)
+    raise AssertionError("it is not slow")
+
+
+# At whatever time of a cycle the cable comes off, also between two packets of one.
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("after_s", [0.0, 0.004, 0.009, 0.013, 0.017])
+def test_a_servo_that_does_not_answer_is_told_and_the_other_wheel_stops(side: str, after_s: float) -> None:
+    with rig("opencr", answer_limit_s=ANSWER_LIMIT_S) as bench:
+        board = OpenCr(bench.robot.world, bench.robot.left, bench.robot.right, pass_s=0.0015, refresh_s=0.008)
+        bench.tap.device = board
+        bench.start()
+        bench.drive(Velocity(0.1, 0.5), 0.3)
+        begin_s = bench.host.monotonic() + after_s
+        stopped_s: list[float] = []
+
+        def watch() -> None:
+            bench.host.sleep(after_s)
+            _mute(bench, side)
+            while bench.goals_rad_s() != (0.0, 0.0):
+                bench.host.sleep(0.002)
+            stopped_s.append(bench.host.monotonic() - begin_s)
+
+        bench.host.thread(watch, "watch").start()
+        problem = _slowness(bench)
+        assert "OpenCR answers too slowly, as when a wheel servo does not answer it: it may be disconnected" in problem
+        assert bench.host.monotonic() - begin_s < 0.8
+        bench.base.close()
+        bench.host.sleep(1.5)
+        # A pass, and another one where the heartbeat was on its way.
+        assert stopped_s
+        assert stopped_s[0] < 1.03
+        # It stays so, and nothing is asked in vain: each time that it is opened, one request at most is.
+        bench.host.sleep(10.0)
+        asked = len(bench.tap.packets)
+        for count in range(4):
+            with pytest.raises(DeviceFaultError, match="OpenCR answers too slowly"):
+                bench.base.open()
+            assert len(bench.tap.packets) - asked <= count + 1
+            bench.host.sleep(0.25)
+        assert bench.goals_rad_s() == (0.0, 0.0)
+        # Plugged in again, it can be used again.
+        getattr(bench.robot, side).brown_out(12.0)
+        bench.host.sleep(1.0)
+        _opened_again(bench)
+        bench.base.set_torque(True)
+        assert bench.drive(Velocity(0.1), 0.3).velocity.linear_m_s == pytest.approx(0.1, abs=0.002)
+
+
+def test_a_board_that_is_slow_from_the_start_is_told_so() -> None:
+    with rig("opencr", answer_limit_s=ANSWER_LIMIT_S) as bench:
+        _mute(bench, "left")
+        bench.host.sleep(0.1)
+        with pytest.raises(DeviceFaultError, match="OpenCR answers too slowly"):
+            bench.base.open()
+
+
+def test_a_board_that_is_silent_is_not_slow() -> None:
+    with rig("opencr", answer_limit_s=ANSWER_LIMIT_S) as bench:
+        bench.start()
+        bench.robot.base_faults.drop_share = 1.0
+        for _ in range(3):
+            with pytest.raises(DeviceSilentError, match="OpenCR does not answer"):
+                bench.base.exchange(Velocity())
+        bench.base.close()
+        with pytest.raises(DeviceSilentError, match="OpenCR does not answer"):
+            bench.base.open()
+
+
+def test_one_answer_that_is_lost_when_it_is_opened_does_no_harm() -> None:
+    with rig("opencr", answer_limit_s=ANSWER_LIMIT_S) as bench:
+        bench.robot.base_faults.drop_next = 1
+        bench.start()
 
 
 def test_a_board_that_has_started_anew_must_be_opened_again(bench: Rig) -> None:
@@ -378,3 +489,75 @@ def test_torque_that_is_gone_is_a_fault_that_stays_until_torque_is_switched_on_a
     assert not bench.robot.right.table["torque enable"]
     with pytest.raises(DeviceFaultError, match="does not hold"):
         bench.base.reset()
+
+
+def test_a_reading_tells_what_the_wheels_were_told(bench: Rig) -> None:
+    bench.start()
+    reading = bench.base.exchange(Velocity(0.1, 0.5))
+    # As the firmware casts them: 75 and 176.
+    assert reading.goals_m_s == pytest.approx((75 * BURGER.raw_m_s, 176 * BURGER.raw_m_s))
+    bench.base.set_torque(False)
+    assert bench.base.exchange(Velocity(0.1)).goals_m_s is None
+
+
+@pytest.mark.parametrize("velocity", [Velocity(), Velocity(0.1, 0.0), Velocity(0.0, 0.6)])
+def test_a_drive_of_a_button_is_a_fault_and_ends_with_the_torque(
+    bench: Rig, velocity: Velocity, caplog: pytest.LogCaptureFixture
+) -> None:
+    bench.start()
+    bench.drive(velocity, 0.5)
+    _board(bench).press(button_1=True)
+    begin_s = bench.host.monotonic()
+    reading = bench.drive(velocity, 1.4)
+    assert caplog.messages == []
+    assert reading.buttons["button_1"]
+    bench.drive(velocity, 1.4)
+    assert [text.split(": ", 1)[1] for text in caplog.messages] == [
+        "let button 1 go: held for 3 s, it lets OpenCR drive 0.3 m forward, whatever the bridge commands"
+    ]
+    reading = bench.drive_until(lambda reading: bool(reading.faults), velocity)
+    assert reading.faults == {MotorFault.UNCOMMANDED}
+    # Three seconds, a cycle or two, and half a second.
+    assert bench.host.monotonic() - begin_s == pytest.approx(3.55, abs=0.05)
+    assert "though the bridge has not commanded it: a button of OpenCR was held" in caplog.messages[-1]
+    bench.drive(velocity, 1.0)
+    assert len(caplog.messages) == 2
+    begin_s = bench.host.monotonic()
+    bench.base.set_torque(False)
+    assert bench.host.monotonic() - begin_s < 0.2
+    assert not bench.robot.world.left.is_driven
+    assert bench.drive().faults == frozenset()
+
+
+def test_a_remote_control_that_steers_is_a_fault(bench: Rig) -> None:
+    bench.start()
+    bench.drive(Velocity(0.05), 0.3)
+    _board(bench).steer(0.0, 0.4)
+    begin_s = bench.host.monotonic()
+    reading = bench.drive_until(lambda reading: bool(reading.faults), Velocity(0.05))
+    assert reading.faults == {MotorFault.UNCOMMANDED}
+    assert bench.host.monotonic() - begin_s == pytest.approx(0.55, abs=0.05)
+    # It ends, and a new start is possible.
+    _board(bench).steer(0.0, 0.0)
+    bench.base.set_torque(False)
+    bench.base.set_torque(True)
+    assert bench.drive(Velocity(0.05), 1.0).faults == frozenset()
+
+
+def test_a_button_that_is_pressed_shortly_and_often_is_not_warned_of(
+    bench: Rig, caplog: pytest.LogCaptureFixture
+) -> None:
+    bench.start()
+    for _ in range(6):
+        _board(bench).press(button_2=True)
+        bench.drive(seconds=0.3)
+        _board(bench).press(button_2=False)
+        bench.drive(seconds=0.3)
+    assert caplog.messages == []
+
+
+def test_commands_that_change_at_once_are_followed(bench: Rig) -> None:
+    """No stop and no turn is taken for a motion that nobody has commanded."""
+    bench.start()
+    for velocity in (Velocity(0.2), Velocity(-0.2), Velocity(0.0, 2.0), Velocity(), Velocity(0.2, -1.0)):
+        assert bench.drive(velocity, 0.8).faults == frozenset()

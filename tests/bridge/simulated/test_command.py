@@ -108,6 +108,15 @@ def test_every_fault_of_a_wire_can_be_told(robot: SimulatedTurtleBot3) -> None:
         "split_s": ("0.001", 0.001),
         "echo": ("true", True),
         "is_deaf": ("true", True),
+        "duplicate_share": ("0.1", 0.1),
+        "cut_share": ("0.2", 0.2),
+        "flip_share": ("0.3", 0.3),
+        "device_drop_share": ("0.4", 0.4),
+        "device_duplicate_share": ("0.5", 0.5),
+        "device_cut_share": ("0.6", 0.6),
+        "device_flip_share": ("0.7", 0.7),
+        "batch_s": ("0.016", 0.016),
+        "has_wire_time": ("true", True),
     }
     assert set(values) == set(vars(Faults()))
     for name, (text, _) in values.items():
@@ -175,7 +184,8 @@ def test_what_is_not_known_is_told(robot: SimulatedTurtleBot3, line: str) -> Non
 
 @pytest.mark.parametrize(
     "line",
-    ["pose nan 0 0", "pose 1e308 0 0", "pose 0 0 1e308", "battery nan", "battery 1e300", "battery -1",
+    ["steer nan 0", "steer 0 1e9",
+     "pose nan 0 0", "pose 1e308 0 0", "pose 0 0 1e308", "battery nan", "battery 1e300", "battery -1",
      "left voltage nan", "right voltage inf", "base delay_s nan", "scanner delay_s 1e30", "scanner split_s 1e30",
      "scanner split_s -1", "base drop_share nan", "base drop_share 1.1", "base corrupt_next -1",
      "base cut_next 1000000000000", "base answers_as 99999", "scanner turn 1e-9", "scanner turn nan",
@@ -188,6 +198,17 @@ def test_numbers_that_no_device_can_bear_are_refused(robot: SimulatedTurtleBot3,
     robot.advance(0.2)
     assert robot.base_faults == robot.scanner_faults == Faults()
     assert robot.world.pose == (0.0, 0.0, 0.0)
+
+
+def test_a_remote_control_steers(robot: SimulatedTurtleBot3) -> None:
+    execute(robot, "steer 0.05 0")
+    robot.advance(0.2)
+    execute(robot, "steer 0 0")
+    robot.advance(0.1)
+    way_m = robot.world.pose[0]
+    assert 0.0 < way_m < 0.02
+    robot.advance(0.2)
+    assert robot.world.pose[0] == way_m
 
 
 def test_a_port_whose_place_was_taken_is_told(tmp_path: Path) -> None:

@@ -50,7 +50,7 @@ def test_a_thread_that_fails_ends_the_program(
     monkeypatch.setattr(sys, "stdin", io.StringIO())
     before = threading.excepthook
 
-    def fail(self: OpenCr, now_s: float) -> None:
+    def fail(self: OpenCr, began_s: float, now_s: float) -> None:
         raise ZeroDivisionError("a battery of no cells")
 
     monkeypatch.setattr(OpenCr, "_cycle", fail)

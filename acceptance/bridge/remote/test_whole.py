@@ -68,7 +68,8 @@ def configured(folder: Path, robot: SimulatedTurtleBot3, model: str, *grpc: str,
     file.write_text(
         f"robot: burger\ndrive: {{driver: opencr, port: {robot.base_path}}}\n"
         # A machine on which tests run is not one for robots.
-        f"safety: {{overrun_s: 1.0, motor_timeout_s: 1.0, operator_link_timeout_s: {operator}}}\n"
+        "safety:\n  {overrun_s: 1.0, motor_timeout_s: 1.0, command_timeout_s: 1.0, "
+        f"operator_link_timeout_s: {operator}}}\n"
         "remote: {grpc_address: '127.0.0.1:0'}\n"
         "channels:\n  /cmd_vel: {channel: drive}\n" + "".join(f"  {name}: {{channel: grpc}}\n" for name in grpc)
     )
